@@ -32,8 +32,8 @@ def bench_beams(folder: Path, quick: bool) -> None:
         errors = [_percent(found[frames][0], finest[frames]) for frames in finest]
         times = [f"{1e6 * found[frames][1]:.1f}" for frames in finest]
         rows.append((f"beam{nodes}", str(elements), str(3 * (elements * (nodes - 1) + 1)), *errors, *times))
-    header = ("element", "elements a link", "unknowns a link", "error, rigid-body frames", "error, following",
-              "step, nominal [µs]", "step, following [µs]")  # fmt: skip
+    header = ("element", "elements a link", "unknowns a link", "error, rigid-body frames", "error, co-rotational",
+              "step, rigid-body [µs]", "step, co-rotational [µs]")  # fmt: skip
     write_page(folder, "performance/beams", [table(header, rows), _by_step(steps)])
 
 
@@ -42,7 +42,7 @@ def _by_step(steps: Sequence[int]) -> list[str]:
     rows = []
     for count in steps:
         rows.append((f"{count:,}", _percent(_run(*FINEST, "co-rotational", count)[0], reference)))
-    return table(("steps a turn", "error, following"), rows)
+    return table(("steps a turn", "error, co-rotational"), rows)
 
 
 def _run(nodes: int, elements: int, frames: str, steps: int) -> tuple[Histories, float]:

@@ -1,4 +1,4 @@
-"""Co-rotational frames, on the source's four-bar from rest: error against time, linear, stiffened and following."""
+"""Co-rotational frames, on the source's four-bar from rest: error against time, linear, stiffened and co-rotational."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.followed import BLOCKS, POINTS, Curve, Ran, cost, four_bar, run
+from benchmarks.corotational_run import BLOCKS, POINTS, Curve, Ran, cost, four_bar, run
 from benchmarks.pages import script, table, write_page
 from kedfem.dynamics.system.corotational import CorotationalSteps
 
@@ -53,7 +53,7 @@ def bench_corotational(folder: Path, quick: bool) -> None:
         for equation in EQUATIONS
     ]
     header = ("mesh of a link", "equation", *(f"worst error, {kind}" for kind in kinds),
-              *(f"rms, {kind}" for kind in kinds), "sweeps", "factorisations", "3,000 steps [ms]",
+              *(f"rms, {kind}" for kind in kinds), "iterations", "factorisations", "3,000 steps [ms]",
               "of linear")  # fmt: skip
     exact = references["damped"]
     tables = [table(header, rows), _space(study, kinds, quick), _time(study, references, quick)]
@@ -94,7 +94,7 @@ def _equation_row(
     return (
         f"{count} {element}", equation, *(_percent(worst(found[kind].curve, y)) for kind, y in references.items()),
         *(_percent(rms(found[kind].curve, y)) for kind, y in references.items()),
-        f"{of.sweeps:.2f}" if of.sweeps else "-", str(of.factorised), f"{1e3 * of.seconds:.0f}",
+        f"{of.iterations:.2f}" if of.iterations else "-", str(of.factorised), f"{1e3 * of.seconds:.0f}",
         f"{of.seconds / linear:.1f}",
     )  # fmt: skip
 
@@ -123,13 +123,13 @@ def _time(study: _Study, references: Mapping[str, Curve], quick: bool) -> list[s
         linear = study.ran(_beam("beam5", 3), steps, "damped", "linear")
         of = found["damped"]
         errors = (_percent(worst(found[kind].curve, y)) for kind, y in references.items())
-        rows.append((f"{steps:,}", *errors, f"{of.sweeps:.2f}", f"{1e3 * of.seconds:.0f}", f"{1e3 * linear.seconds:.0f}",
-                     f"{of.seconds / linear.seconds:.1f}"))  # fmt: skip
+        rows.append((f"{steps:,}", *errors, f"{of.iterations:.2f}", f"{1e3 * of.seconds:.0f}",
+                     f"{1e3 * linear.seconds:.0f}", f"{of.seconds / linear.seconds:.1f}"))  # fmt: skip
     header = (
         "steps",
         *(f"error, {kind}" for kind in references),
-        "sweeps",
-        "following [ms]",
+        "iterations",
+        "co-rotational [ms]",
         "linear [ms]",
         "ratio",
     )
@@ -147,11 +147,11 @@ def _solids(study: _Study, exact: Curve) -> list[str]:
         rows.append((
             " × ".join(map(str, elements)), str(segments), f"{found.unknowns:,}",
             _percent(worst(linear.curve, finest["linear"])), _percent(worst(found.curve, finest["co-rotational"])),
-            _percent(worst(found.curve, exact)), f"{found.sweeps:.2f}", f"{1e3 * found.seconds:,.0f}",
+            _percent(worst(found.curve, exact)), f"{found.iterations:.2f}", f"{1e3 * found.seconds:,.0f}",
             f"{found.seconds / linear.seconds:.1f}",
         ))  # fmt: skip
-    header = ("hex20 of a link", "segments", "unknowns", "from beams, both linear", "from beams, both following",
-              "worst error", "sweeps", "3,000 steps [ms]", "of linear")  # fmt: skip
+    header = ("hex20 of a link", "segments", "unknowns", "from beams, both linear", "from beams, both co-rotational",
+              "worst error", "iterations", "3,000 steps [ms]", "of linear")  # fmt: skip
     return table(header, rows)
 
 
@@ -173,15 +173,15 @@ def _reduced(study: _Study, exact: Curve) -> list[str]:
         study.done[f"reduced, {segments} segments, {tolerance}"] = ran
         rows.append((
             str(segments), _percent(tolerance), str(ran.unknowns), _percent(worst(ran.curve, finest)),
-            _percent(worst(ran.curve, exact)), f"{ran.sweeps:.2f}", f"{1e3 * ran.seconds:.0f}",
+            _percent(worst(ran.curve, exact)), f"{ran.iterations:.2f}", f"{1e3 * ran.seconds:.0f}",
         ))  # fmt: skip
-    header = ("segments", "modes for", "unknowns", "from following beams", "worst error", "sweeps",
+    header = ("segments", "modes for", "unknowns", "from co-rotational beams", "worst error", "iterations",
               "3,000 steps [ms]")  # fmt: skip
     return table(header, rows)
 
 
 def _costs() -> list[str]:
-    """A step of solids, following against linear on the same mesh."""
+    """A step of solids, co-rotational against linear on the same mesh."""
     rows: list[Sequence[str]] = []
     for elements, segments in COSTS:
         link = {"model": "solid", "element": "hex20", "mesh": {"elements": list(elements)}}
@@ -189,13 +189,15 @@ def _costs() -> list[str]:
         for count in segments:
             step, solver = cost(four_bar({**link, "segments": count}, STEPS, frames="co-rotational"))
             unknowns = sum(each.unknowns for each in solver.links)
-            sweeps = solver.sweeps / (BLOCKS * POINTS) if isinstance(solver, CorotationalSteps) else 0.0
+            iterations = (
+                solver.iterations / (BLOCKS * POINTS) if isinstance(solver, CorotationalSteps) else 0.0
+            )
             rows.append((
                 " × ".join(map(str, elements)), str(count), f"{unknowns:,}", f"{1e3 * linear:.2f}", f"{1e3 * step:.2f}",
-                f"{step / linear:.1f}", f"{sweeps:.2f}", str(solver.factorisations),
+                f"{step / linear:.1f}", f"{iterations:.2f}", str(solver.factorisations),
             ))  # fmt: skip
-    header = ("hex20 of a link", "segments", "unknowns", "linear step [ms]", "following step [ms]", "ratio", "sweeps",
-              "factorisations")  # fmt: skip
+    header = ("hex20 of a link", "segments", "unknowns", "linear step [ms]", "co-rotational step [ms]", "ratio",
+              "iterations", "factorisations")  # fmt: skip
     return table(header, rows)
 
 
@@ -230,16 +232,16 @@ def _series(study: _Study, exact: Curve) -> dict[str, list[tuple[float, float]]]
     for element, count in BEAMS[1:6]:
         for equation in EQUATIONS:
             key = repr((_beam(element, count), STEPS, "damped", equation))
-            name = f"{equation}, beams" if equation != "co-rotational" else f"following, {element}"
+            name = f"{equation}, beams" if equation != "co-rotational" else f"co-rotational, {element}"
             if key in study.done:
                 add(f"{name}, step 0.1 ms", study.done[key])
     for steps in COUNTS:
         key = repr((_beam("beam5", 3), steps, "damped", "co-rotational"))
         if key in study.done:
-            add("following, 3 beam5, steps of 0.17 to 0.025 ms", study.done[key])
+            add("co-rotational, 3 beam5, steps of 0.17 to 0.025 ms", study.done[key])
     for key, ran in study.done.items():
         if key.startswith("reduced"):
-            add("following, reduced solids", ran)
+            add("co-rotational, reduced solids", ran)
     return found
 
 

@@ -126,7 +126,7 @@ def _short(number: float) -> str:
 
 
 def _cheapest(ms: dict[str, float]) -> str:
-    """The elements within a tenth of the least time, which is what the clock can tell."""
+    """The elements within a tenth of the least time, which is what the clock resolves."""
     return ", ".join(e for e in ms if ms[e] <= 1.1 * min(ms.values())) or "—"
 
 

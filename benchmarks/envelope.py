@@ -22,7 +22,7 @@ QUICK = ("four_bar_beams", "bennett")
 
 
 def bench_envelope(folder: Path, quick: bool) -> None:
-    """Seconds of all steps of an example, of its envelope, and how many points and times that looked at; a table."""
+    """Seconds of all steps of an example, of its envelope, and how many points and times that examined; a table."""
     header = (
         "example",
         "points",
@@ -30,7 +30,7 @@ def bench_envelope(folder: Path, quick: bool) -> None:
         "the steps [s]",
         "the envelope [s]",
         "ratio",
-        "looked at",
+        "examined",
         "with all modes",
     )
     rows = [_measured(name) for name in (QUICK if quick else EXAMPLES)]
@@ -39,7 +39,7 @@ def bench_envelope(folder: Path, quick: bool) -> None:
 
 def _measured(name: str) -> tuple[str, ...]:
     ready, _ = prepared(read_scene(ROOT / "examples" / name / "scene.toml"))
-    links = [*ready.model.links, *(carried.link for carried in ready.model.carried)]
+    links = [*ready.model.links, *(prescribed.link for prescribed in ready.model.prescribed)]
     recoveries = [stress_recovery(link) for link in links]
     for _ in range(2):  # the first time compiles
         blocks, steps = _stepped(ready)

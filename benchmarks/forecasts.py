@@ -16,7 +16,7 @@ QUIET = {"animation": None, "plots": False, "picture": False, "report": False, "
 
 
 def bench_forecasts(folder: Path, quick: bool) -> None:
-    """Forecast and run of mechanisms in full and reduced, and of examples; table to the folder."""
+    """Forecast and run of mechanisms unreduced and reduced, and of examples; table to the folder."""
     names = [*_cases(), *EXAMPLES]
     rows = []
     for name in names[:2] if quick else names:
@@ -36,7 +36,7 @@ def bench_forecasts(folder: Path, quick: bool) -> None:
 
 
 def _cases() -> dict[str, dict[str, object]]:
-    """The suite's mechanisms in full and reduced."""
+    """The suite's mechanisms unreduced and reduced."""
     out: dict[str, dict[str, object]] = {}
     for name, raw in mechanisms().items():
         out |= {f"{name}, full": raw, f"{name}, reduced": with_reduced_links(raw)}

@@ -58,7 +58,7 @@ def judged(name: str, folder: Path) -> Judged:
         found.append((indicator(link, u).eta, compliance))
     (eta, soft), (left, stiff) = found
     true = float(np.sqrt(max(1 - soft / stiff, 0.0) + left**2))
-    return Judged(name, coarse.way.split(";")[0], coarse.unknowns, eta, true)
+    return Judged(name, coarse.method.split(";")[0], coarse.unknowns, eta, true)
 
 
 def pulled_apart(link: Link) -> tuple[Float[np.ndarray, "n 3"], float]:

@@ -29,8 +29,8 @@ def bench_kinematics(folder: Path, quick: bool) -> None:
     for name, scene in scenes.items():
         got = _measured(scene(), POINTS // 10 if quick else POINTS)
         rows.append((
-            name, str(got.unknowns), str(got.rows), f"{got.batch:.1f}", f"{got.literal:.0f}",
-            f"{got.literal / got.batch:.0f}", f"{1e3 * got.path:.0f}", f"{got.difference:.0e}",
+            name, str(got.unknowns), str(got.rows), f"{got.batch:.1f}", f"{got.monolithic:.0f}",
+            f"{got.monolithic / got.batch:.0f}", f"{1e3 * got.path:.0f}", f"{got.difference:.0e}",
         ))  # fmt: skip
     header = ("linkage", "unknowns", "rows", "together [µs/point]", "one by one [µs/point]", "ratio", "path [ms]",
               "accelerations differ by")  # fmt: skip
@@ -44,7 +44,7 @@ class _Measured:
     unknowns: int
     rows: int
     batch: float
-    literal: float
+    monolithic: float
     path: float
     difference: float
 
@@ -58,12 +58,12 @@ def _measured(scene: Scene, points: int) -> _Measured:
     drive = (tau, np.ones(points), np.zeros(points))
     batch = min(_time(lambda: rigid_motion(link, along, tau, drive)) for _ in range(REPEATS)) / points
     few = np.linspace(0.0, 2 * np.pi * LITERAL_POINTS / 720, LITERAL_POINTS)
-    literal = _time(lambda: _one_by_one(link, along, few)) / LITERAL_POINTS
+    monolithic = _time(lambda: _one_by_one(link, along, few)) / LITERAL_POINTS
     motion = rigid_motion(link, along, few, (few, np.ones(len(few)), np.zeros(len(few))))
     slow = _one_by_one(link, along, few)
     difference = float(np.abs(slow - motion.alpha).max() / np.abs(motion.alpha).max())
     unknowns = 6 * (len(link.bodies) - 1)
-    return _Measured(unknowns, link.rows.count, 1e6 * batch, 1e6 * literal, followed, difference)
+    return _Measured(unknowns, link.rows.count, 1e6 * batch, 1e6 * monolithic, followed, difference)
 
 
 def _time(work: Callable[[], object]) -> float:

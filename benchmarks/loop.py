@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.followed import advanced, first_state
+from benchmarks.corotational_run import advanced, first_state
 from benchmarks.pages import seconds
 from benchmarks.scenes import mechanisms
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import reduced
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.nominal import forcings, motions
+from kedfem.dynamics.rigid_body import forcings, motions
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.results.recording import recording, rows
 from kedfem.scene import Scene, scene_from, time_grid

@@ -20,14 +20,14 @@ from jaxtyping import Float
 from benchmarks.pages import script, table, write_loglog, write_page
 from benchmarks.scenes import DAMPED, EYE, four_bar_of
 from kedfem.accuracy.reduction import prepared
-from kedfem.dynamics.nominal import forcings
-from kedfem.dynamics.stepping.literal import LiteralSteps
+from kedfem.dynamics.rigid_body import forcings
+from kedfem.dynamics.stepping.monolithic import MonolithicSteps
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import path_parameter, scene_from
 
 TURN, TURNS = 0.1, 2  # s
-SEEN = 100  # instants of a run at which its error is looked at
+SEEN = 100  # instants of a run at which its error is examined
 MOST = 51_200  # solves of a march
 ASKED = (1e-2, 1e-3, 1e-4, 1e-6)
 State = tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]
@@ -104,7 +104,7 @@ class Equation:
     def __init__(self, raw: Mapping[str, Any]) -> None:
         self.ready = prepared(scene_from(raw))[0]
         model = self.ready.model
-        steps = LiteralSteps(model.links, model.joints, generalised_alpha(1.0, 1.0), model.damping)
+        steps = MonolithicSteps(model.links, model.joints, generalised_alpha(1.0, 1.0), model.damping)
         self.T = steps.T.toarray()
         self.at = np.concatenate([[0], np.cumsum([link.unknowns for link in model.links])])
         parts = [self.T[a:b] for a, b in zip(self.at, self.at[1:], strict=False)]

@@ -21,7 +21,7 @@ from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link, mass_times
 from kedfem.links.recovery import von_mises
 from kedfem.links.solid import solid_link
-from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, joint_seat
+from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, joint_surface
 from kedfem.mesh import SolidMesh, link_mesh
 from kedfem.mesh.elements.hexahedra import linear, quadratic, serendipity
 from kedfem.mesh.elements.tetrahedra import tetrahedral
@@ -118,7 +118,7 @@ def _moved(mesh: SolidMesh, part: float, counts: Size) -> SolidMesh:
 def loaded(part: BenchPart, link: Link) -> tuple[float, Float[np.ndarray, "n 3"]]:
     """Mean deflection of the loaded coupling surface under a unit force, along it, as seen from the other; and the link's
     state."""
-    fixed, moved = (joint_seat(link, "coupling surface", np.asarray(end), None) for end in ends(part))
+    fixed, moved = (joint_surface(link, "coupling surface", np.asarray(end), None) for end in ends(part))
     force = np.outer(moved.fit[0], np.asarray(part.force) / np.linalg.norm(part.force))
     modes = _rigid_modes(link, fixed.origin)
     u = _free_solution(link, modes, force + _reaction(fixed, modes, force))
@@ -137,18 +137,18 @@ def _rigid_modes(link: Link, origin: Float[np.ndarray, "3"]) -> Float[np.ndarray
     return np.stack([*(np.tile(axis, (link.n, 1)) for axis in np.eye(3)), *turns], axis=2)
 
 
-def _fits(seat: CouplingSurface, modes: Float[np.ndarray, "n 3 6"]) -> Float[np.ndarray, "12 6"]:
+def _fits(surface: CouplingSurface, modes: Float[np.ndarray, "n 3 6"]) -> Float[np.ndarray, "12 6"]:
     """Value and gradient at a coupling surface of the rigid modes."""
-    return np.asarray(np.einsum("cn,nik->cik", seat.fit, modes).reshape(-1, RIGID))
+    return np.asarray(np.einsum("cn,nik->cik", surface.fit, modes).reshape(-1, RIGID))
 
 
 def _reaction(
-    seat: CouplingSurface, modes: Float[np.ndarray, "n 3 6"], force: Float[np.ndarray, "n 3"]
+    surface: CouplingSurface, modes: Float[np.ndarray, "n 3 6"], force: Float[np.ndarray, "n 3"]
 ) -> Float[np.ndarray, "n 3"]:
     """The forces in a coupling surface's mean value and gradient that balance a load."""
     resultant = np.einsum("ni,nik->k", force, modes)
-    amounts = np.linalg.lstsq(_fits(seat, modes).T, -resultant, rcond=None)[0]
-    return np.asarray(seat.fit.T @ amounts.reshape(-1, 3))
+    amounts = np.linalg.lstsq(_fits(surface, modes).T, -resultant, rcond=None)[0]
+    return np.asarray(surface.fit.T @ amounts.reshape(-1, 3))
 
 
 def _free_solution(

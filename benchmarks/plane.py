@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.pages import script, table, write_page
 from benchmarks.scenes import plate_four_bar
 from kedfem.dynamics.elastic_model import elastic_model
-from kedfem.dynamics.nominal import drive_range
+from kedfem.dynamics.rigid_body import drive_range
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.motion.linkage import linkage

@@ -15,8 +15,8 @@ from kedfem.dynamics.matrices.substructure import effective_matrix
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_gradients, stress_of_gradient, von_mises
-from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, joint_seat
-from kedfem.links.surfaces.rigid_coupling import STIFF, radius, surface_gram, with_stiff_seat
+from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, joint_surface
+from kedfem.links.surfaces.rigid_coupling import STIFF, radius, surface_gram, with_rigid_coupling
 
 PLATE = next(part for part in PARTS if part.name == "plate with bores")
 LOADS = {"pull": (1.0, 0.0, 0.0), "bend": (0.0, 1.0, 0.0)}
@@ -24,7 +24,7 @@ SIZES: tuple[Size, ...] = ((2, 1), (4, 1), (8, 2))
 TRIED = (1e1, 1e2, 1e3, 1e4, 1e5, 1e6)
 NEAR = 2.0  # radii of a bore: where its peak stress is looked for
 FORCE = 1e3  # [N]
-STEP = 1e-4  # [s], of the effective matrix whose conditioning is told
+STEP = 1e-4  # [s], of the effective matrix whose conditioning is reported
 ROUNDS = 40  # of power iteration
 
 
@@ -62,13 +62,13 @@ def bench_ports(folder: Path, quick: bool) -> None:
 
 
 def _stiffened(link: Link, times: float) -> Link:
-    for seat in _bores(link):
-        link = with_stiff_seat(link, seat, times)
+    for surface in _bores(link):
+        link = with_rigid_coupling(link, surface, times)
     return link
 
 
 def _bores(link: Link) -> list[CouplingSurface]:
-    return [joint_seat(link, "coupling surface", np.asarray(end), None) for end in ends(PLATE)]
+    return [joint_surface(link, "coupling surface", np.asarray(end), None) for end in ends(PLATE)]
 
 
 def _found(link: Link) -> _Found:
@@ -84,16 +84,16 @@ def _found(link: Link) -> _Found:
 
 def _peak_stress(link: Link, u: Float[np.ndarray, "n 3"]) -> float:
     """The highest equivalent stress of a node near the loaded bore."""
-    seat = _bores(link)[1]
+    surface = _bores(link)[1]
     H = np.stack([G @ u for G in nodal_gradients(link)], axis=2)
-    near = np.linalg.norm((link.X - seat.origin)[:, :2], axis=1) <= NEAR * radius(seat)
+    near = np.linalg.norm((link.X - surface.origin)[:, :2], axis=1) <= NEAR * radius(surface)
     return float(von_mises(stress_of_gradient(H[near], link)).max())
 
 
-def _out_of_round(link: Link, seat: CouplingSurface, u: Float[np.ndarray, "n 3"]) -> float:
+def _out_of_round(link: Link, surface: CouplingSurface, u: Float[np.ndarray, "n 3"]) -> float:
     """Root mean square, over a bore, of what no rigid motion of it is."""
-    nodes, G = surface_gram(link, seat.facets)  # type: ignore[arg-type]
-    r = link.X[nodes] - seat.origin
+    nodes, G = surface_gram(link, surface.facets)  # type: ignore[arg-type]
+    r = link.X[nodes] - surface.origin
     turns = [np.cross(axis, r) for axis in np.eye(3)]
     B = np.stack([*(np.tile(axis, (len(r), 1)) for axis in np.eye(3)), *turns], axis=2).reshape(-1, 6)
     root = np.kron(np.linalg.cholesky(G.toarray()).T, np.eye(3))

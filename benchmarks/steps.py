@@ -36,22 +36,22 @@ class _Measured:
 def bench_steps(folder: Path, quick: bool) -> None:
     """Mean time of a step of both solvers at several sizes; table and plot go to the folder."""
     sizes = SIZES[:2] if quick else SIZES
-    rows, unknowns, condensed_times, literal_times = [], [], [], []
+    rows, unknowns, condensed_times, monolithic_times = [], [], [], []
     for size in sizes:
         fast = _stepped(size, "condensed", CONDENSED_STEPS)
         slow = _stepped(size, "monolithic", LITERAL_STEPS)
         unknowns.append(fast.unknowns)
         condensed_times.append(fast.step)
-        literal_times.append(slow.step)
+        monolithic_times.append(slow.step)
         rows.append((
             f"{fast.unknowns:,}", f"{1e3 * slow.step:.1f}", f"{1e3 * fast.step:.2f}", f"{slow.step / fast.step:.0f}",
             f"{100 * fast.share:.0f} %", str(fast.factorisations), f"{_difference(fast.states, slow.states):.1e}",
         ))  # fmt: skip
-    header = ("unknowns", "literal [ms/step]", "condensed [ms/step]", "ratio", "of it triangular solves",
+    header = ("unknowns", "monolithic [ms/step]", "condensed [ms/step]", "ratio", "of it triangular solves",
               "factorisations in the run", "difference of u after 5 steps")  # fmt: skip
     write_page(folder, "performance/steps", [table(header, rows)])
     curves = {
-        "literal (assemble, sparse LU)": (unknowns, literal_times),
+        "monolithic (assemble, sparse LU)": (unknowns, monolithic_times),
         "condensed": (unknowns, condensed_times),
     }
     write_loglog(folder, "steps", curves, ("unknowns", "seconds per step"))

@@ -1,4 +1,4 @@
-"""Five mechanisms from a scene to the last step, links in full and reduced: where the time goes."""
+"""Five mechanisms from a scene to the last step, links unreduced and reduced: where the time goes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

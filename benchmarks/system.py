@@ -10,7 +10,7 @@ from tests.rooms.test_acted import four_bar as hinged
 from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.matrices.substructure import factored
-from kedfem.dynamics.nominal import forcings, motions
+from kedfem.dynamics.rigid_body import forcings, motions
 from kedfem.dynamics.segment import CONVERGED
 from kedfem.dynamics.stepping.first_state import started
 from kedfem.dynamics.stepping.scheme import generalised_alpha
@@ -20,7 +20,7 @@ from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.march import march, ready
 from kedfem.dynamics.system.sparse import SparsePart
 from kedfem.dynamics.system.starts.start import rest
-from kedfem.dynamics.system.steps import SystemSteps, nominal_system
+from kedfem.dynamics.system.steps import SystemSteps, rigid_frame_system
 from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import path_parameter, scene_from, time_grid
 
@@ -103,7 +103,7 @@ def beside_solves(raw: dict[str, Any], count: int) -> tuple[float, float]:
     made, _ = prepared(scene_from(raw))
     scene, model = made.scene, made.model
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
-    solver = SystemSteps(scene, nominal_system(scene, model), model, scheme)
+    solver = SystemSteps(scene, rigid_frame_system(scene, model), model, scheme)
     state = started(scene, made.linkage, made.path, model, solver)
     _, motion = next(motions(scene, made.linkage, made.path))
     motion, of = motion.part(0, count), solver.ready
@@ -131,7 +131,7 @@ def beside_solves(raw: dict[str, Any], count: int) -> tuple[float, float]:
 def main() -> None:
     """Print the tables of docs/system.md."""
     cases = {
-        "four-bar of beams, nominal": (four_bar(), STEPS),
+        "four-bar of beams, rigid-body": (four_bar(), STEPS),
         "the same with one spring, which runs on the system": (with_spring(), STEPS),
         "four-bar of beams, co-rotational": (
             four_bar(2, analysis={**four_bar()["analysis"], "frames": "co-rotational"}),

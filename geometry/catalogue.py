@@ -711,7 +711,7 @@ def row(name: str, folder: Path) -> tuple[str, SolidMesh | None]:
     off = float(solid_basis(mesh).dx.sum()) / exact - 1
     kind = "tetrahedra" if mesh.tetrahedra else "hexahedra"
     figures = f"{3 * len(mesh.points):,} | {seconds:.1f} | {mesh_quality(mesh).least:.3f} | {lower.min():.3f} | {100 * off:+.3f}"
-    return f"| {name} | {kind}: {mesh.way} | {figures} |", mesh
+    return f"| {name} | {kind}: {mesh.method} | {figures} |", mesh
 
 
 HEAD = """# Parts as designers draw them, meshed at default sizes
@@ -744,7 +744,9 @@ def main() -> None:
         f"most {sizes[-1]:,}."
     )
     titled = [
-        (f"{name}\n{found[0]}", mesh) for name, mesh in meshes if mesh and (found := TURNED.search(mesh.way))
+        (f"{name}\n{found[0]}", mesh)
+        for name, mesh in meshes
+        if mesh and (found := TURNED.search(mesh.method))
     ]
     write_mesh_picture(
         titled, DOCS / "pictures" / "swept.png", "Swept about an axis, or along lines and arcs"

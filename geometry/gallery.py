@@ -30,9 +30,9 @@ def main() -> None:
             link_from({"shape": {"kind": "cad", "file": f"{name}.step"}, "material": "steel"}), HERE
         )
         least = mesh_quality(mesh).least
-        seats = sum(face_kind(mesh, face) in {"bore", "ball seat", "ball"} for face in mesh.faces)
+        surfaces = sum(face_kind(mesh, face) in {"bore", "ball seat", "ball"} for face in mesh.faces)
         lines.append(
-            f"| {name} | {mesh.way} | {len(mesh.cells):,} | {3 * len(mesh.points):,} | {least:.2f} | {seats} |"
+            f"| {name} | {mesh.method} | {len(mesh.cells):,} | {3 * len(mesh.points):,} | {least:.2f} | {surfaces} |"
         )
         drawn.append((f"{name}\n{len(mesh.cells):,} elements, worst {least:.2f}", mesh))
         sys.stdout.write(lines[-1] + "\n")

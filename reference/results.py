@@ -57,7 +57,7 @@ def _among(found: tuple[str, ...], known: tuple[str, ...]) -> bool:
 CHANNELS: dict[str, tuple[Told, ...]] = {
     "Probes": (
         Told("probes/NAME/displacement|velocity|acceleration", XYZ, "m|m/s|m/s^2", "either",
-             f"Elastic motion of the point against the rigid motion of its link; without a drive against the free motions held as drawn; {FLAT}."),
+             f"Elastic motion of the point against the rigid motion of its link; without a drive against the free motions held in the reference position; {FLAT}."),
         Told("probes/NAME/position|travel", XYZ, "m", "world",
              f"Where the point is; how far it is from where it is drawn. Rigid and elastic motion together; {FLAT}."),
         Told("probes/NAME/total_velocity|total_acceleration", XYZ, "m/s|m/s^2", "world",
@@ -65,14 +65,14 @@ CHANNELS: dict[str, tuple[Told, ...]] = {
         Told("probes/NAME/deflection", XYZ, "m", "either",
              f"From the chord of the link's joints, which goes with them, or the link's mean rigid motion, as the description says; {FLAT}."),
         Told("probes/NAME/stress", STRESS, "Pa", "link",
-             "Axes of the link as drawn; tension is positive. xy, yz, zx are shear stresses, not twice; von_mises is never negative."),
+             "Axes of the link in the reference position; tension is positive. xy, yz, zx are shear stresses, not twice; von_mises is never negative."),
     ),
     "Joints": (
         Told("joints/NAME/force|rigid_force", XYZ, "N", "world",
              "What the joint exerts on the link that the description names first, not on the other. rigid_: were all links rigid, in "
              "scenes whose drives move all of them; it may lack components that statics leave open."),
         Told("joints/NAME/moment|rigid_moment", XYZ, "N m", "world",
-             "On the same link, about the joint's nominal point as it moves with the rigid motion, of a slot about the pin."),
+             "On the same link, about the joint's point as it moves with the rigid-body motion, of a slot about the pin."),
         Told("joints/NAME/angle|angle_about_NAME", ("angle",), "rad", "",
              "Of the link named first against the other, from the reference position, by the right hand about the joint's axis, of "
              "a universal joint about the axis in the link named; counted on over turns."),
@@ -126,22 +126,22 @@ INTRODUCTION = """\
 
 `results.h5` holds time series: `time` [s], `drive_angle` [rad] or `drive_travel` [m] from the reference position, of several
 drives the first one's, and the channels below, each with `units`, `long_name` and `frame` (`world`, or `link`: axes of the
-link as drawn, which go with it). NAME is a name of the scene; all units are SI. xarray, Panoply and other readers of
+link in the reference position, which go with it). NAME is a name of the scene; all units are SI. xarray, Panoply and other readers of
 netCDF 4 open the file: dimension `time`, and of vectors and tensors one with the names of their components (below, in
 brackets). Energies apart, nothing is summed up over time.
 
 | group | attributes |
 |---|---|
 | `/` | `status` (`complete`, `doubtful`, `interrupted`, `running`), `reason`, `kedfem_version`, `Conventions` |
-| `/notes` | what the run said of itself: unknowns, step, estimated errors (`error of mesh, stress` ...), residuals of energy and momentum |
-| `/notes/LINK` | what a link was modelled as: `model`, `elements`, `unknowns`; with what is attached `mass [kg]`, `centre of mass [m]` as drawn, `inertia [kg m^2]` about it: xx, yy, zz, xy, yz, zx |
-| `/warnings`, `/timing` | what the user was told; seconds of each stage; both of a run that came to its end |
-| `/peaks/LINK` | highest von Mises stress over all steps, its place as drawn, time, step and drive; `away` from places where it means little |
+| `/notes` | what the run reported of itself: unknowns, step, estimated errors (`error of mesh, stress` ...), residuals of energy and momentum |
+| `/notes/LINK` | what a link was modelled as: `model`, `elements`, `unknowns`; with what is attached `mass [kg]`, `centre of mass [m]` in the reference position, `inertia [kg m^2]` about it: xx, yy, zz, xy, yz, zx |
+| `/warnings`, `/timing` | what was reported to the user; seconds of each stage; both of a run that came to its end |
+| `/peaks/LINK` | highest von Mises stress over all steps, its place in the reference position, time, step and drive; `away` from places where it means little |
 | `/fatigue/LINK/RANK` | of a scene with `[fatigue]`: damage in a period, utilisation, worst cycle, criterion, place of the highest damage of each link, the worst first; period and `doubt` are those of `/fatigue` |
 | `/scene` | the scene that was analysed, as `json` and `toml` |
 
 `peaks.csv` has the ten highest von Mises stresses of each link over all steps, each at least 2 % of the link's size from
-those before, with place as drawn, time, drive and what is near; `envelope.csv` (`output.csv = true`) and `envelope.vtu`
+those before, with place in the reference position, time, drive and what is near; `envelope.csv` (`output.csv = true`) and `envelope.vtu`
 have the highest von Mises and extreme principal stresses of every point, each with its time and drive.
 
 `results.csv` (`output.csv = true`) has all channels with nine digits, `results.parquet` (`output.parquet = true`, needs

@@ -78,7 +78,7 @@ as *where: what was wanted, what was got*.
   itself. A plane link is welded to plane links, to planar beams, or to a rigid link that the drive carries; others it
   takes by hinges.
 * **Without a drive** the mechanism moves by itself: under `motors`, `springs`, gravity and other loads, from
-  `analysis.initial_speeds`. All frames follow the links then, `analysis.end_time` and `step` are required, and links need
+  `analysis.initial_speeds`. Frames are co-rotational then, `analysis.end_time` and `step` are required, and links need
   not be held by joints. Torques, angles and speeds of a joint are those of its first link that is not the ground against
   the other, positive about its axis.
 * **From Python** `kedfem.scene.scene_from(dict, folder)` takes the same keys, and records such as

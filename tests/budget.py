@@ -107,15 +107,15 @@ FINE = beams("beam5", 4)
 
 
 def cases() -> Iterator[Case]:
-    """Thirty: beams, quadrilaterals, hexahedra; nominal and following; 60 to 600 rpm; smooth and sudden. Then in full."""
+    """Thirty: beams, plane, solid; rigid-body and co-rotational; 60 to 600 rpm; smooth, sudden. Then unreduced."""
     for speed in (60, 150, 300, 600):
         fine = four_bar(speed, 4320, FINE, frames="co-rotational")
         for element, count in (("beam3", 1), ("beam5", 1), ("beam5", 3)):
-            name = f"{speed} rpm, {count} {element} a link, nominal"
+            name = f"{speed} rpm, {count} {element} a link, rigid-body"
             yield Case(name, four_bar(speed, 720, beams(element, count)), fine)
         for element, count in (("beam3", 2), ("beam5", 2)) if speed > 60 else ():
             raw = four_bar(speed, 720, beams(element, count), frames="co-rotational")
-            yield Case(f"{speed} rpm, {count} {element} a link, following", raw, fine)
+            yield Case(f"{speed} rpm, {count} {element} a link, co-rotational", raw, fine)
     for speed in (60, 150):
         fine = four_bar(speed, 4320, FINE, frames="co-rotational")
         yield Case(f"{speed} rpm, 2 beam5, 120 steps a turn", four_bar(speed, 120, beams("beam5", 2)), fine)
@@ -150,11 +150,11 @@ def in_full() -> Iterator[Case]:
         )
         for along in (4, 8):
             raw = four_bar(speed, 720, solids(along, 1), 0.5)
-            yield Case(f"{speed} rpm, solid {along} × 1 a link, in full", raw, fine, full=True)
+            yield Case(f"{speed} rpm, solid {along} × 1 a link, unreduced", raw, fine, full=True)
     for sudden in (False, True):
         fine = arm(4000, solids(20, 2), sudden, "co-rotational")
         raw = arm(1000, solids(8, 1), sudden, "rigid-body")
-        yield Case(f"arm {'struck' if sudden else 'swung'}, solid 8 × 1, in full", raw, fine, full=True)
+        yield Case(f"arm {'struck' if sudden else 'swung'}, solid 8 × 1, unreduced", raw, fine, full=True)
 
 
 def solids(along: int, across: int) -> Raw:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from kedfem.dynamics.stepping.literal import LiteralSteps
+from kedfem.dynamics.stepping.monolithic import MonolithicSteps
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.start import initial_rates
 from kedfem.dynamics.stepping.transient import transient
@@ -44,7 +44,7 @@ LAWS = (
     "rack", "point mass", "damping", "damping of mass", "no numerical damping",
 )  # fmt: skip
 WITHIN = {"rigid-body": 1e-8, "stiffening": 1e-8, "co-rotational": 1e-7}
-#: nominal, with beams in space: rounding beside the stiff rigid parts at their ends limits the fast step; a diameter
+#: rigid-body, with beams in space: rounding beside the stiff rigid parts at their ends limits the fast step; a diameter
 #: changed by 1e-14 of itself changes what it finds by 8.5e-8 of the peak, and what the oracle finds by 4e-11
 ROUNDED = 5e-7
 STEPS = 3
@@ -227,7 +227,7 @@ def executed(cell: Cell) -> tuple[str, float]:
         of = begun(scene_of(cell))
         run = run_of(of)
         if cell.frames == "stiffening":
-            return "ran", apart(run, run_of(of, literal=True))
+            return "ran", apart(run, run_of(of, monolithic=True))
         of = as_a_run(of) if cell.frames == "co-rotational" else of
         wanted = by_oracle(of, STEPS, keeps=True)[0]
         found = [rows(of.ready, marched(of, STEPS)[1].u)]
@@ -251,12 +251,12 @@ def as_a_run(of: Begun) -> Begun:
     return replace(of, state=rest(of.ready, of.motion, rates, accelerated=accelerated_in_a_step))
 
 
-def run_of(of: Begun, literal: bool = False) -> np.ndarray:
-    """Displacements (T, N) of all links by the solver that a run takes, or by the literal one."""
+def run_of(of: Begun, monolithic: bool = False) -> np.ndarray:
+    """Displacements (T, N) of all links by the solver that a run takes, or by the monolithic one."""
     made, model = of.prepared, of.prepared.model
-    if literal:
+    if monolithic:
         links = model.links, model.joints
-        solver: Any = LiteralSteps(*links, of.ready.scheme, model.damping, stiffening(model))
+        solver: Any = MonolithicSteps(*links, of.ready.scheme, model.damping, stiffening(model))
     else:
         solver = steps_of(made.scene, model)
     blocks = list(transient(made.scene, made.linkage, made.path, model, solver))

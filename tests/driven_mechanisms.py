@@ -143,7 +143,7 @@ LAWS: dict[str, Callable[[Raw], dict[str, float]]] = {
     "energy": energy,
     "frames": with_small_deflections,
 }
-"""Each tells how far a mechanism is from it, of what is allowed: less than one is fine."""
+"""Each shows how far a mechanism is from it, of what is allowed: less than one is fine."""
 STANDING = {"rigid", "frames"}
 """Laws of quasi-static positions."""
 

@@ -30,7 +30,7 @@ class Bodies:
         return self.p[:, self.numbers[name]], self.R[:, self.numbers[name]]
 
     def place(self, name: str, X: np.ndarray) -> np.ndarray:
-        """Where points (…, 3) of a link as drawn are (T, …, 3)."""
+        """Where points (…, 3) of a link in the reference position are (T, …, 3)."""
         p, R = self.of(name)
         return p.reshape(-1, *[1] * (X.ndim - 1), 3) + np.einsum("tij,...j->t...i", R, X)
 
@@ -89,7 +89,7 @@ def ports(ready: Prepared, name: str, on: str) -> tuple[int, np.ndarray]:
 
 
 def port_motion(ready: Prepared, blocks: list[Block], name: str, on: str) -> tuple[np.ndarray, np.ndarray]:
-    """Ports as drawn (p, 3), and their displacements (T, p, 3)."""
+    """Ports in the reference position (p, 3), and their displacements (T, p, 3)."""
     k, here = ports(ready, name, on)
     joint, link = ready.model.joints[k], ready.model.links[k]
     u = joint.weights[here] @ state(blocks, k, "u")[:, joint.nodes]
@@ -119,11 +119,11 @@ def twist(ready: Prepared, blocks: list[Block], name: str, on: str) -> np.ndarra
         travel = np.linalg.norm(P - at.place(on, X[0]), axis=1)
         value = np.stack([CubicSpline(s, row)(t) for row, t in zip(u, travel, strict=True)])
         return np.hstack([value, np.zeros_like(value)])
-    x, u0, turn = seat_motion(ready, blocks, name, on)
+    x, u0, turn = surface_motion(ready, blocks, name, on)
     return np.hstack([u0 + np.cross(turn, P - x), LENGTH * turn])
 
 
-def seat_motion(
+def surface_motion(
     ready: Prepared, blocks: list[Block], name: str, on: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Middle of a joint's or gears' coupling surface, its displacement and turn, world components (T, 3), from its
@@ -171,7 +171,7 @@ def balanced(ready: Prepared, a: np.ndarray) -> np.ndarray:
 
 
 def unbalanced(ready: Prepared, blocks: list[Block]) -> tuple[float, float]:
-    """Greatest force and moment left over at any link and time: joints, gears, P − M R0'' and M δ''; of the greatest."""
+    """Greatest residual force and moment at any link and time: joints, gears, P − M R0'' and M δ''; of the greatest."""
     at, found, sizes = bodies(ready, blocks), [], [0.0, 0.0]
     forces = channels(ready, blocks)
     for k, link in enumerate(ready.model.links):

@@ -7,14 +7,14 @@ import numpy as np
 
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.stepping.literal import LiteralSteps
+from kedfem.dynamics.stepping.monolithic import MonolithicSteps
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.results.recording import recording
 from kedfem.scene import scene_from, time_grid
 
-Solver = type[LiteralSteps]
+Solver = type[MonolithicSteps]
 
 
 def bar(model: str, a: Sequence[float], b: Sequence[float], along: int = 8, **more: Any) -> dict[str, Any]:

@@ -85,11 +85,11 @@ def judged(scene: Scene) -> Planned:
 
 
 def cases() -> Iterator[tuple[str, Scene]]:
-    """Slow and fast; nominal and co-rotational; beams and solids; smooth and from rest."""
+    """Slow and fast; rigid-body and co-rotational; beams and solids; smooth and from rest."""
     for speed in (60, 600):
-        yield f"{speed} rpm, beams, nominal", four_bar(speed, BEAMS)
+        yield f"{speed} rpm, beams, rigid-body", four_bar(speed, BEAMS)
         yield f"{speed} rpm, beams, co-rotational", four_bar(speed, BEAMS, frames="co-rotational")
-        yield f"{speed} rpm, solids, nominal", four_bar(speed, SOLIDS)
+        yield f"{speed} rpm, solids, rigid-body", four_bar(speed, SOLIDS)
     yield (
         "600 rpm, beams, co-rotational, from rest",
         four_bar(600, BEAMS, frames="co-rotational", initial="rest"),

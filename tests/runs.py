@@ -29,9 +29,9 @@ class Ran:
         return np.concatenate([block.motion.t for block in self.blocks])
 
     @property
-    def sweeps(self) -> float:
-        """Mean number of sweeps a step."""
-        return float(self.solver.sweeps) / (len(self.t) - 1)
+    def iterations(self) -> float:
+        """Mean number of iterations a step."""
+        return float(self.solver.iterations) / (len(self.t) - 1)
 
     def state(self, k: int, name: str) -> np.ndarray:
         """u, v, a, g, strain, port_forces … of a segment over time."""
@@ -39,7 +39,7 @@ class Ran:
 
     def position(self, link: str, at: Any, name: str = "u") -> np.ndarray:
         """Where a point of a link is, (T, 3); or its elastic displacement, with `displaced`."""
-        return self.nominal(link, at) + self.displaced(link, at, name)
+        return self.rigid_motion(link, at) + self.displaced(link, at, name)
 
     def displaced(self, link: str, at: Any, name: str = "u") -> np.ndarray:
         """Displacement from the rigid-body motion (T, 3), or its rates."""
@@ -49,7 +49,7 @@ class Ran:
         part = self.ready.model.links[k]
         return in_space(part, np.einsum("n,tnd->td", weights, self.state(k, name)))
 
-    def nominal(self, link: str, at: Any) -> np.ndarray:
+    def rigid_motion(self, link: str, at: Any) -> np.ndarray:
         body = self.ready.linkage.bodies.index(link)
         return np.concatenate([b.motion.p[:, body] + b.motion.R[:, body] @ point(at) for b in self.blocks])
 

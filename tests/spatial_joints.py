@@ -39,7 +39,7 @@ def ball(first: str, second: str, at: Any) -> Raw:
 
 
 def cross(first: str, second: str, at: Any, held: Any) -> Raw:
-    """A cross whose axes are across a direction, so that it holds the turn about that one as drawn."""
+    """A cross whose axes are across a direction, so that it holds the turn about that one in the reference position."""
     n = np.array(held, float) / np.linalg.norm(held)
     a = np.cross(n, [0.2, 0.5, 0.9])
     a /= np.linalg.norm(a)
@@ -233,7 +233,7 @@ SOLIDS: dict[str, Callable[[], Raw]] = {
 
 
 def as_mesh_files(raw: Raw, drawn: Sequence[Link], folder: Path, R: np.ndarray, shift: np.ndarray) -> Raw:
-    """A turned and shifted scene with its solids, as drawn, in mesh files: all other shapes of solids lie along z."""
+    """A turned and shifted scene with its solids, undeformed, in mesh files: all other shapes of solids lie along z."""
     links = {}
     for link in drawn:
         file = folder / f"{link.name}.vtu"

@@ -14,8 +14,8 @@ from kedfem.dynamics.stepping.start import initial_rates
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.layout import groups, near_diagonal
 from kedfem.dynamics.system.march import Ready, displacements, march, ready
-from kedfem.dynamics.system.oracle.literal import Literal, Now
-from kedfem.dynamics.system.oracle.literal_steps import nodal_forces
+from kedfem.dynamics.system.oracle.monolithic import Monolithic, Now
+from kedfem.dynamics.system.oracle.monolithic_steps import nodal_forces
 from kedfem.dynamics.system.starts.internal import own
 from kedfem.dynamics.system.starts.start import rest
 from kedfem.dynamics.system.state import History, State
@@ -83,9 +83,9 @@ def in_order(of: Ready, z: np.ndarray) -> np.ndarray:
 def by_oracle(of: Begun, count: int, keeps: bool = False) -> tuple[np.ndarray, np.ndarray]:
     """Displacements (T, N) and multipliers (T, r) of the first steps, by the oracle from the same start.
 
-    keeps : see `Literal`; where forces bend sharply it may find another solution
+    keeps : see `Monolithic`; where forces bend sharply it may find another solution
     """
-    solver, start = Literal(of.ready.system, of.ready.scheme, keeps), of.state
+    solver, start = Monolithic(of.ready.system, of.ready.scheme, keeps), of.state
     links = of.ready.system.model.links
     u, v, a = (rows(of.ready, x[None])[0] for x in (start.u, start.v, start.a))
     at = of.motion(np.zeros(1))

@@ -24,7 +24,7 @@ from kedfem.dynamics.loads import coarse_steps
 from kedfem.dynamics.stepping.cost import factor_words
 from kedfem.dynamics.stepping.first_state import period_map
 from kedfem.dynamics.stepping.levels import level_steps
-from kedfem.dynamics.stepping.literal import LiteralSteps
+from kedfem.dynamics.stepping.monolithic import MonolithicSteps
 from kedfem.dynamics.stepping.solvers import Steps, eased_warning
 from kedfem.dynamics.system.period.map import Carried
 from kedfem.dynamics.vibration import Vibration, vibration
@@ -53,7 +53,7 @@ from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.data_sets import drive_heading
 from kedfem.results.fatigue.damage import fatigue_of, kept_since, stress_period
 from kedfem.results.fatigue.strength import require_fatigue
-from kedfem.results.forces.force_elements import measured_actions
+from kedfem.results.forces.force_elements import measured_elements
 from kedfem.results.forces.indeterminate import undetermined, undetermined_warning
 from kedfem.results.recording import recording
 from kedfem.results.stresses.envelope import Envelope
@@ -114,7 +114,7 @@ def analyse(
     Parameters
     ----------
     scene : validated scene
-    watch : told of progress
+    watch : reported of progress
     resumes : whether to go on from the last state that an earlier run of the same scene stored
     every : seconds between stored states
     stresses_since : time [s] before which stresses do not count as highest
@@ -160,11 +160,11 @@ def _analysed(
     plain = sizes(scene, ready.model)
     notices = [*size_warnings(scene, plain), *assembly_warning(assembly), *stubby_warning(ready.model)]
     solvers = clock.timed("factor", lambda: _solvers(ready, beside), factor_words(ready.model))
-    account = Account(ready.model, measured_actions(scene, ready.model))
+    account = Account(ready.model, measured_elements(scene, ready.model))
     recorded = clock.timed(
         "probes", lambda: recording(scene, ready.model, account, ready.path, ready.linkage)
     )
-    every = [*ready.model.links, *(carried.link for carried in ready.model.carried)]
+    every = [*ready.model.links, *(each.link for each in ready.model.prescribed)]
     recoveries = clock.timed("recovery", lambda: [stress_recovery(link) for link in every])
     notices += _about_steps(ready, clock)
     channels = [each.channel for each in recorded]
@@ -227,7 +227,7 @@ def _solvers(ready: Prepared, beside: Neighbours) -> list[Steps]:
     """Those of all levels in time; a steady motion is looked for where that of a neighbour was."""
     solvers = level_steps(ready.scene, ready.model)
     for each in solvers:
-        if not isinstance(each, LiteralSteps):
+        if not isinstance(each, MonolithicSteps):
             each.search = replace(each.search, near=beside.near)
     return solvers
 
@@ -235,11 +235,11 @@ def _solvers(ready: Prepared, beside: Neighbours) -> list[Steps]:
 def _growing(ready: Prepared, solvers: Sequence[Steps]) -> tuple[Steady | None, Vibration | None]:
     """What is known of a steady motion, and of one that is unstable the vibration that grows."""
     steady, solver = steady_of(ready.scene, solvers), solvers[-1]
-    if steady is None or not steady.unstable or isinstance(solver, LiteralSteps) or solver.steady is None:
+    if steady is None or not steady.unstable or isinstance(solver, MonolithicSteps) or solver.steady is None:
         return steady, None
     over = period_map(ready.scene, ready.linkage, ready.path, ready.model, solver, solver.steady.state)
     found = vibration(over, solver, solver.steady)
-    steady = steady.told(found.frequency, found.words, solver.ready.c.h)
+    steady = steady.reported(found.frequency, found.words, solver.ready.c.h)
     return steady, found if steady.unstable else None
 
 

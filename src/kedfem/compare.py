@@ -90,13 +90,13 @@ def compare(
         for link in links
     }
     ends = float(along[0]), float(along[-1])
-    told = (*_missing(names, runs), *_partial(names, runs))
+    reported = (*_missing(names, runs), *_partial(names, runs))
     unit = "s" if over == "time" else runs[0].drive.unit
-    return Comparison(target, names, over, unit, ends, differing_keys(runs), tuple(found), peaks, told)
+    return Comparison(target, names, over, unit, ends, differing_keys(runs), tuple(found), peaks, reported)
 
 
 def _names(paths: Sequence[FilePath]) -> tuple[str, ...]:
-    """The shortest end of each path that tells it from the others, without results.h5."""
+    """The shortest end of each path that distinguishes it from the others, without results.h5."""
     places = [path.resolve().parent if path.name == "results.h5" else path.resolve() for path in paths]
     for length in range(1, max(len(place.parts) for place in places) + 1):
         names = tuple("/".join(place.parts[-length:]) for place in places)

@@ -4,7 +4,7 @@ numba compiles a function again when its own file has changed, but not when one 
 constant there. So what it compiled is kept in a folder named after all `*kernel.py` files together, what they import of
 kedfem, the records that they are given, and this file with its options: in the user's cache folder, so that a read-only
 installation compiles once too, or beside the package where that cannot be used. Numba takes a while to load: imported by
-kernels, and where users are told that it compiles.
+kernels, and where it is reported that it compiles.
 """
 
 import atexit
@@ -47,27 +47,27 @@ def _imported(kernel: Path, root: Path) -> set[Path]:
 
 
 @contextmanager
-def compiling(told: Callable[[bool], None]) -> Iterator[None]:
-    """Tell when numba begins to compile, by True, and when it ends, by False; loading compiled code is not told."""
-    with event.install_listener("numba:compile", _Compiling(told)):
+def compiling(report: Callable[[bool], None]) -> Iterator[None]:
+    """Report when numba begins to compile, by True, and when it ends, by False; loading compiled code is not reported."""
+    with event.install_listener("numba:compile", _Compiling(report)):
         yield
 
 
 class _Compiling(event.Listener):
     """Told of each function; those that a function calls are compiled within it."""
 
-    def __init__(self, told: Callable[[bool], None]) -> None:
-        self.told, self.depth = told, 0
+    def __init__(self, report: Callable[[bool], None]) -> None:
+        self.report, self.depth = report, 0
 
     def on_start(self, _: object) -> None:
         self.depth += 1
         if self.depth == 1:
-            self.told(True)
+            self.report(True)
 
     def on_end(self, _: object) -> None:
         self.depth -= 1
         if self.depth == 0:
-            self.told(False)
+            self.report(False)
 
 
 if not os.environ.get("NUMBA_CACHE_DIR"):

@@ -11,7 +11,7 @@ from kedfem.accuracy.prepared import moving
 from kedfem.accuracy.variants import moved
 from kedfem.dynamics.inertias import Inertias, inertias_of_links
 from kedfem.dynamics.joints.places import slider_axis
-from kedfem.dynamics.nominal import all_motions
+from kedfem.dynamics.rigid_body import all_motions
 from kedfem.errors import MeshError
 from kedfem.links.build import bare_link, part_meshes
 from kedfem.links.record import Link
@@ -167,7 +167,7 @@ def _missing(scene: Scene, linked: Linkage, masses: Inertias) -> Iterator[str]:
         got = ", ".join(f"{name} (a slider without mass)" if name in sliders else name for name in bare)
         yield f"rigid forces: links without shape and material are taken to have no mass: {got}"
     if linked.mobility:
-        yield f"free motions ({linked.mobility}) are held as drawn; forces of joints are left out"
+        yield f"free motions ({linked.mobility}) are held in the reference position; forces of joints are left out"
 
 
 def _transmission(results: Results, recorded: Kinematics) -> Iterator[str]:

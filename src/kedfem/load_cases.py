@@ -33,8 +33,8 @@ from kedfem.scene import Scene, corotational, scene_from
 from kedfem.stepping import Watch
 
 OTHER = 0.01  # of the largest strain energy: what a run taken again may differ by, on another processor too
-DIFFERENT = 0.01  # of the highest stress: more between run and statics is told as a warning
-OUT_OF_BALANCE = 0.01  # reactions of supports, of the largest force: more is told as a warning
+DIFFERENT = 0.01  # of the highest stress: more between run and statics is reported as a warning
+OUT_OF_BALANCE = 0.01  # reactions of supports, of the largest force: more is reported as a warning
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,7 +208,7 @@ def _elements(link: Link) -> Iterator[str]:
     if link.cell_type == "hexahedron":
         yield (
             f"links.{link.name}: 8-node hexahedra have kedfem's stresses in their middles; at nodes CalculiX puts what "
-            "its points near the corners tell, which is far off where a link bends: compare middles, or take hex20"
+            "its points near the corners show, which is far off where a link bends: compare middles, or take hex20"
         )
 
 

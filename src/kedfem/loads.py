@@ -71,14 +71,14 @@ def loads(file: FilePath, last: float | None = None, folder: FilePath | None = N
         write_polar(target / f"joint {joint.joint}.png", joint, rows)
     for drive in drives:
         write_drive_load(target / f"drive {drive.joint}.csv", drive, results, rows)
-    told = summaries(joints, drives, results, rows)
-    write_summary(target / JOINTS, "joint", told[0])
-    write_summary(target / DRIVES, "drive", told[1])
-    return Loads(target, *told, (*why, *_missing(scene, joints), *_partial(results)))
+    tables = summaries(joints, drives, results, rows)
+    write_summary(target / JOINTS, "joint", tables[0])
+    write_summary(target / DRIVES, "drive", tables[1])
+    return Loads(target, *tables, (*why, *_missing(scene, joints), *_partial(results)))
 
 
 def loads_of(scene: Scene, results: Results) -> tuple[list[JointLoad], list[DriveLoad], tuple[str, ...]]:
-    """Of all joints and drives whose forces the results tell, over time; and what is not known of them, and why."""
+    """Of all joints and drives whose forces the results show, over time; and what is not known of them, and why."""
     linked, motion, why = _moved(scene, results)
     joints = joint_loads(scene, results, linked, motion)
     return joints, drive_loads(scene, results, linked, motion), why
@@ -122,7 +122,7 @@ def _moved(scene: Scene, results: Results) -> tuple[Linkage | None, RigidMotion 
 
 
 def _missing(scene: Scene, found: list[JointLoad]) -> tuple[str, ...]:
-    """Joints whose force is not told."""
+    """Joints whose force is not reported."""
     left = sorted(set(scene.joints) - {each.joint for each in found})
     return (f"forces of joints {', '.join(left)} are not in the results, or not whole",) if left else ()
 

@@ -19,7 +19,7 @@ TREE = "tree"
 NUMBERED = "array{}"
 
 
-def packed(said: Mapping[str, Any]) -> bytes:
+def packed(content: Mapping[str, Any]) -> bytes:
     """Names and what belongs to them as the content of a file.
 
     Raises
@@ -28,7 +28,7 @@ def packed(said: Mapping[str, Any]) -> bytes:
         Something is neither a number, a text, an array, a record, nor made up of such.
     """
     arrays: list[np.ndarray] = []
-    tree = json.dumps({name: _plain(value, arrays) for name, value in said.items()}).encode()
+    tree = json.dumps({name: _plain(value, arrays) for name, value in content.items()}).encode()
     out = BytesIO()
     named = {NUMBERED.format(k): x for k, x in enumerate(arrays)}
     np.savez(out, allow_pickle=False, **{TREE: np.frombuffer(tree, np.uint8)}, **named)
@@ -47,7 +47,7 @@ class Packed:
     def __init__(self, content: bytes) -> None:
         try:
             self._file = np.load(BytesIO(content), allow_pickle=False)
-            self.said: dict[str, Any] = json.loads(bytes(self._file[TREE]))
+            self.content: dict[str, Any] = json.loads(bytes(self._file[TREE]))
         except (OSError, EOFError, BadZipFile, KeyError, TypeError) as error:
             raise ValueError(f"content that is not what was written ({error})") from error
 
@@ -60,7 +60,7 @@ class Packed:
             There is no such name, or it holds what kedfem does not know.
         """
         try:
-            return self._made(self.said[name], onto)
+            return self._made(self.content[name], onto)
         except (KeyError, TypeError, AttributeError, ImportError, BadZipFile, IndexError) as error:
             raise ValueError(f"{name} that is not what was written ({error})") from error
 

@@ -36,7 +36,7 @@ def end_as_interrupted() -> None:
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) in {signal.SIG_DFL, signal.default_int_handler}:
             signal.signal(number, _interrupt)
-    told = sys.unraisablehook
+    before = sys.unraisablehook
 
     def dropped(what: "sys.UnraisableHookArgs") -> None:
         if _asked and issubclass(what.exc_type, KeyboardInterrupt):
@@ -44,7 +44,7 @@ def end_as_interrupted() -> None:
             again.daemon = True
             again.start()
         else:
-            told(what)
+            before(what)
 
     sys.unraisablehook = dropped
 
@@ -76,7 +76,7 @@ def caught_in(call: CodeType, caught: Callable[[BaseException], None]) -> Iterat
     """
 
     def watched(before: Callable[[int, FrameType | None], Any]) -> Callable[[int, FrameType | None], None]:
-        def told(number: int, frame: FrameType | None) -> None:
+        def on_signal(number: int, frame: FrameType | None) -> None:
             try:
                 before(number, frame)
             except BaseException as error:
@@ -86,7 +86,7 @@ def caught_in(call: CodeType, caught: Callable[[BaseException], None]) -> Iterat
                     raise
                 caught(error)
 
-        return told
+        return on_signal
 
     main = threading.current_thread() is threading.main_thread()  # no other one is told of signals
     numbers = [getattr(signal, name) for name in ("SIGINT", *INTERRUPTIONS) if main and hasattr(signal, name)]
@@ -179,7 +179,7 @@ def threads() -> int:
 
 
 def most_memory() -> float:
-    """The most that this process has held so far [bytes]; nan where the system does not tell."""
+    """The most that this process has held so far [bytes]; nan where the system does not report it."""
     try:
         import resource
     except ImportError:
@@ -188,7 +188,7 @@ def most_memory() -> float:
 
 
 def memory_held() -> float:
-    """What this process holds now [bytes]; where the system does not tell, the most that it has held so far."""
+    """What this process holds now [bytes]; where the system does not report it, the most that it has held so far."""
     try:
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
     except (OSError, ValueError, IndexError):

@@ -70,14 +70,14 @@ class Keeper:
         keeper = cls(folder, origin(scene), every, token_hex(8), _since=perf_counter())
         if resumes:
             keeper.stored = _read(folder / STATE)
-            keeper.run = str(keeper.stored.said["run"])
+            keeper.run = str(keeper.stored.content["run"])
             _refuse_other(keeper.stored.put_back("origin"), keeper.origin, "changed back")
         return keeper
 
     @property
     def rows(self) -> int:
         """Rows that belong to the state to go on from."""
-        return int(self.stored.said["rows"]) if self.stored else 0
+        return int(self.stored.content["rows"]) if self.stored else 0
 
     def prepared(self, ready: Prepared) -> None:
         """What was planned and meshed belongs to the state to go on from.
@@ -95,8 +95,8 @@ class Keeper:
             same = _alike(before.pop("model"), model)
             _refuse_other(before, self.origin, remedy)
             if not same:
-                said = "model: must be that of the run to be resumed, got other meshes or modes of links"
-                raise SceneError(f"{said}; they have to be {remedy}, or run without --resume")
+                message = "model: must be that of the run to be resumed, got other meshes or modes of links"
+                raise SceneError(f"{message}; they have to be {remedy}, or run without --resume")
         self.origin["model"] = model
 
     def put_back(self, memories: Mapping[str, Any]) -> None:
@@ -115,18 +115,18 @@ class Keeper:
                 raise OutputError(f"{self.folder / STATE}: must be a stored state, got {error}") from error
 
     def due(self, waits: bool) -> bool:
-        """Whether it is time to store a state; later, while steps wait whose stresses were not looked at."""
+        """Whether it is time to store a state; later, while steps wait whose stresses were not examined."""
         since = perf_counter() - self._since
         return since >= max(self.every, SHARE * self._takes) * (OVERDUE if waits else 1.0)
 
     def keep(self, rows: int, memories: Mapping[str, Any]) -> None:
         """Store a state that belongs to so many rows; where it cannot be, the run goes on without."""
         began = perf_counter()
-        said = {"format": FORMAT, "run": self.run, "rows": rows, "all": self.origin}
-        said |= {
+        header = {"format": FORMAT, "run": self.run, "rows": rows, "all": self.origin}
+        header |= {
             "origin": {k: v for k, v in self.origin.items() if k != "model" and not k.startswith("planned ")}
         }
-        content = packed(said | dict(memories))
+        content = packed(header | dict(memories))
         try:
             with replacing(self.folder / STATE) as part:
                 part.write_bytes(sealed(content))
@@ -185,16 +185,18 @@ def _refuse_other(before: Mapping[str, Any], now: Mapping[str, Any], remedy: str
 
 
 def _short(x: Any) -> str:
-    said = str(x)
-    return said if len(said) <= 60 else f"{said[:57]}..."
+    text = str(x)
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _read(path: Path) -> Packed:
     try:
         whole = path.read_bytes()
     except FileNotFoundError:
-        said = f"{path}: must be the stored state of a run, got nothing there: the run before is complete, ended before"
-        raise OutputError(f"{said} it stored any, or cannot store them; run without --resume") from None
+        message = (
+            f"{path}: must be the stored state of a run, got nothing there: the run is complete, ended before"
+        )
+        raise OutputError(f"{message} it stored any, or cannot store them; run without --resume") from None
     except OSError as error:
         raise OutputError(f"{path}: must be a readable file, got {error.strerror}") from error
     try:
@@ -202,7 +204,7 @@ def _read(path: Path) -> Packed:
         if content is None:
             raise ValueError("other bytes than were written")
         found = Packed(content)
-        if found.said.get("format") != FORMAT:
+        if found.content.get("format") != FORMAT:
             raise ValueError("another layout")
         return found
     except ValueError as error:
@@ -210,7 +212,7 @@ def _read(path: Path) -> Packed:
 
 
 def _fingerprint(ready: Prepared) -> list[list[float]]:
-    """Of the model's numbers, three for each array: how many, the sum of their sizes, and a sum that tells their places.
+    """Of the model's numbers, three for each array: how many, the sum of their sizes, and a sum that shows their places.
 
     Another processor's kernels change the last digits of stiffnesses, and of these.
     """

@@ -17,10 +17,10 @@ from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.singular import SingularPasses
 from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
 from kedfem.dynamics.history import Block, Snapshot
-from kedfem.dynamics.model import segments, ways
+from kedfem.dynamics.model import mesh_methods, segments
 from kedfem.dynamics.stepping.levels import leveled
-from kedfem.dynamics.stepping.literal import LiteralSteps
 from kedfem.dynamics.stepping.marks import Marks
+from kedfem.dynamics.stepping.monolithic import MonolithicSteps
 from kedfem.dynamics.stepping.solvers import Steps
 from kedfem.errors import OutputError
 from kedfem.links.recovery import StressRecovery
@@ -66,7 +66,7 @@ def frame_steps(scene: Scene) -> Int[np.ndarray, " f"]:
 
 @dataclass(frozen=True, slots=True)
 class Watched:
-    """What is made of each step: channels, those that none tells with the reason, efforts to compare, stresses.
+    """What is made of each step: channels, those that none shows with the reason, efforts to compare, stresses.
 
     stresses_since : time [s] before which they do not count as highest
     kept_since : time [s] from which on their history is kept
@@ -107,7 +107,7 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
         keeper.put_back(memories)
         refuse_without(shown.frames, shown.one)
     for each in solvers:
-        if not isinstance(each, LiteralSteps):
+        if not isinstance(each, MonolithicSteps):
             each.watch = lambda marched: watch(f"steady motion: march {marched} over a period", 0, 0)
     notes, drive = _notes(ready, watched), drive_channel(scene)
     written = ResultsWriter(
@@ -149,7 +149,7 @@ def _notes(ready: Prepared, watched: Watched) -> dict[str, str | float | Mapping
     }
     corotational = {name: parts for name, parts in segments(model).items() if parts[0].fit is not None}
     notes |= {f"segments of {name}": len(parts) for name, parts in corotational.items()}
-    notes |= {f"mesh of {name}": way for name, way in ways(model).items()}
+    notes |= {f"mesh of {name}": method for name, method in mesh_methods(model).items()}
     notes |= {f"not reported: {name}": reason for name, reason in watched.untold.items()}
     return notes | modelled(ready.scene, ready.linkage, model)
 
@@ -273,7 +273,7 @@ class _Table:
 
 @dataclass
 class Clock:
-    """Seconds of each stage, told to the watcher as it begins."""
+    """Seconds of each stage, reported to the watcher as it begins."""
 
     watch: Watch
     seconds: dict[str, float] = field(default_factory=dict)
@@ -281,7 +281,7 @@ class Clock:
     _since: float = 0.0
 
     def stage(self, name: str, words: str = "") -> None:
-        """End the running stage and begin the next, told in its own words if there are any."""
+        """End the running stage and begin the next, reported in its own words if there are any."""
         now = perf_counter()
         if self._name:
             self.seconds[self._name] = now - self._since

@@ -79,7 +79,7 @@ def chain_forces(this: Chain, x: np.ndarray, root: float, flywheel: float) -> tu
 def chain_history(
     rpm: float, bars: tuple[int, int, int], h: float, steps: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """t [s] and the rocker's outer stress [Pa] from the nominal state on; an even number of bars in the rocker."""
+    """t [s] and the rocker's outer stress [Pa] of links that begin rigid; an even number of bars in the rocker."""
     speed = rpm * 2 * np.pi / 60
     at = pose(0.0, speed)
     this, motions = chain(at, bars), rigid(at)

@@ -1,4 +1,4 @@
-"""The four-bar of Nath and Ghosh (1980), the general equation's worked example, started from its nominal state."""
+"""The four-bar of Nath and Ghosh (1980), the general equation's worked example, started as rigid links move."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

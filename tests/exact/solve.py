@@ -33,9 +33,9 @@ class Problem:
 
     held : law, or constant value, per held unknown
     load : dead nodal forces over time
-    alpha : damping force α M (v − v of the nominal rigid motion, at the place where the node is) [1/s]
+    alpha : damping force α M (v − v of the rigid-body motion, at the place where the node is) [1/s]
     beta : stress resultants D (e + β ė) [s]
-    nominal : for alpha
+    rigid_motion : for alpha
     """
 
     beams: Beams
@@ -43,7 +43,7 @@ class Problem:
     load: Load | None = None
     alpha: float = 0.0
     beta: float = 0.0
-    nominal: Callable[[float], RigidMotions] | None = None
+    rigid_motion: Callable[[float], RigidMotions] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +107,7 @@ def held_values(problem: Problem, t: float) -> tuple[list[int], np.ndarray]:
 
 
 def turning(beams: Beams, q: np.ndarray, motions: RigidMotions) -> tuple[np.ndarray, np.ndarray]:
-    """Rate (E, k) of each element's unknowns, and (N,) of the bodies', in the nominal rigid motion."""
+    """Rate (E, k) of each element's unknowns, and (N,) of the bodies', in the rigid-body motion."""
     qe, omega = q[beams.edof].reshape(len(beams.edof), -1, 3), motions.omega[beams.rod][:, None]
     rate = np.empty_like(qe)
     rate[..., :2] = motions.v[beams.rod][:, None, :]
@@ -122,12 +122,12 @@ def turning(beams: Beams, q: np.ndarray, motions: RigidMotions) -> tuple[np.ndar
 
 
 def mass_damping(problem: Problem, state: State, rate: float) -> tuple[np.ndarray, np.ndarray]:
-    """α M (v − nominal), with the rotations of bodies only, and its derivative by q when dv = rate · dq, (E, k, k)."""
+    """α M (v − rigid-body), with the rotations of bodies only, and its derivative by q when dv = rate · dq, (E, k, k)."""
     beams, alpha = problem.beams, problem.alpha
-    assert problem.nominal is not None
-    motions = problem.nominal(state.t)
-    nominal, lumped = turning(beams, state.q, motions)
-    relative = state.v[beams.edof] - nominal
+    assert problem.rigid_motion is not None
+    motions = problem.rigid_motion(state.t)
+    rigid_motion, lumped = turning(beams, state.q, motions)
+    relative = state.v[beams.edof] - rigid_motion
     forces = alpha * (beams.Me @ relative[..., None])[..., 0]
     out = np.bincount(beams.edof.ravel(), forces.ravel(), beams.size)
     out += alpha * beams.lumps * (state.v - lumped)
@@ -230,13 +230,13 @@ def motion(
         t = first.t + step * h
         at, values = held_values(problem, t)
         q = now.q + h * now.v + h * h / 2 * now.a
-        for sweep in range(NEWTON):
+        for iteration in range(NEWTON):
             a = (q - now.q - h * now.v) / (beta * h * h) - (1 / (2 * beta) - 1) * now.a
             v = now.v + h * ((1 - gamma) * now.a + gamma * a)
             q[at], v[at], a[at] = values
             f, Ke = forces(problem, State(t, q, v, a), gamma / (beta * h))
             residual = beams.M @ ((1 - am) * a + am * now.a) + (1 - af) * f + af * f0
-            if sweep and size < 1e-7 * scale:  # the correction was so small that what is left is rounding
+            if iteration and size < 1e-7 * scale:  # the correction was so small that what is left is rounding
                 break
             effective = inertia + (1 - af) * Ke
             bodies = lumped + (1 - af) * damped(problem, gamma / (beta * h))

@@ -1,4 +1,4 @@
-"""Hard cases of whole mechanisms: closed forms, kedfem's literal solver, or a like mechanism tell what is right."""
+"""Hard cases of whole mechanisms: closed forms, kedfem's monolithic solver, or a like mechanism show what is right."""
 
 from typing import Any
 
@@ -131,7 +131,7 @@ def redundant() -> list[Outcome]:
 @case("Mass ratio of a million between neighbours")
 def mass_ratio() -> list[Outcome]:
     """[KED]'s four-bar with a coupler a million times as light, or as heavy, as its neighbours; 60 rpm, one turn. The
-    literal solver, which factors the whole assembled system at each step, tells what is right.
+    monolithic solver, which factors the whole assembled system at each step, shows what is right.
     """
     outcomes: list[Outcome] = []
     for factor in (1e-6, 1e6):
@@ -139,11 +139,11 @@ def mass_ratio() -> list[Outcome]:
         raw["drive"]["motion"]["speed"] = "60 rpm"
         raw["materials"]["other"] = {**raw["materials"]["alloy"], "density": 2796 * factor}
         raw["links"]["coupler"]["material"] = "other"
-        fast, literal = (
+        fast, monolithic = (
             run({**raw, "analysis": {**raw["analysis"], "solver": x}}) for x in ("condensed", "monolithic")
         )
         what = f"coupler's density × {factor:g}: torque, fast against monolithic steps"
-        outcomes.append(Right(what, apart(fast, literal, "drive/torque"), 1e-6))
+        outcomes.append(Right(what, apart(fast, monolithic, "drive/torque"), 1e-6))
     return outcomes
 
 
@@ -158,12 +158,12 @@ def stiffness_ratio() -> list[Outcome]:
     raw["materials"]["stiff"] = {"density": 2796, "youngs_modulus": 7.031e16, "shear_modulus": 2.712e16}
     raw["links"]["coupler"]["material"] = "stiff"
     fast = run(raw)
-    literal = run({**raw, "analysis": {**raw["analysis"], "solver": "monolithic"}})
+    monolithic = run({**raw, "analysis": {**raw["analysis"], "solver": "monolithic"}})
     shape = raw["links"]["coupler"]["shape"]
     raw["links"]["coupler"] = {"model": "rigid", "material": "stiff", "shape": shape}
     rigid = run(raw)
     return [
-        Right("torque, fast against monolithic steps", apart(fast, literal, "drive/torque"), 1e-5),
+        Right("torque, fast against monolithic steps", apart(fast, monolithic, "drive/torque"), 1e-5),
         Right("torque against that with a rigid coupler", apart(fast, rigid, "drive/torque"), 1e-4),
     ]
 

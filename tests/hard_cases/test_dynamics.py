@@ -75,7 +75,7 @@ def test_a_link_500_times_as_long_as_high(model: str, elements: list[int]) -> No
     assert_allclose(tip(small), tip(full), rtol=1e-3)  # as asked for
     few = prepared(
         scene_from(reduced(raw, modes=12))
-    )  # too few for a solid: shear locks, and the estimate tells
+    )  # too few for a solid: shear locks, and the estimate shows
     error = worst(relative_errors(histories(few[0]), full))
     assert few[1] is not None
     assert error < 1e-3 or 0.5 < worst(few[1].estimate) / error < 2
@@ -173,7 +173,7 @@ def growth(rho_inf: float, steps: int, per_turn: int, said: str = "") -> tuple[f
     assert all(said in text for text in warned)
     ready = meshed(scene)
     solver, out = steps_of(scene, ready.model), []
-    with suppress(SolveError):  # beyond any size: what came before tells the growth
+    with suppress(SolveError):  # beyond any size: what came before shows the growth
         for block in transient(scene, ready.linkage, ready.path, ready.model, solver):
             out.extend(np.max([np.abs(link.u[..., 2]).max(axis=1) for link in block.links], axis=0))
     return max(out[1 : min(1280, len(out) // 4)]), max(out[-1024:])
@@ -196,7 +196,7 @@ def test_twenty_thousand_damped_steps_stay_bounded(rho_inf: float, per_turn: int
 def test_vibration_grows_in_damped_links_that_turn_too_far_in_a_step(
     rho_inf: float, per_turn: int, said: str
 ) -> None:
-    """By 1 − ρ∞ and more: a limit of the scheme that a warning tells, not of the mechanism."""
+    """By 1 − ρ∞ and more: a limit of the scheme that a warning shows, not of the mechanism."""
     first, last = growth(rho_inf, 4000, per_turn, said)
     assert last > 100 * first
 

@@ -34,7 +34,7 @@ def test_a_slender_beam_keeps_its_frequencies() -> None:
     np.testing.assert_allclose(got, [exact["along z"][0], exact["along y"][0]], rtol=1e-5)
 
 
-def test_condensed_is_literal_on_a_slender_arm_in_space() -> None:
+def test_condensed_is_monolithic_on_a_slender_arm_in_space() -> None:
     """1 : 500, swung about an axis askew to its section; long and short steps."""
     shape = {
         "kind": "polyline",

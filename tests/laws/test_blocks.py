@@ -124,7 +124,7 @@ def test_dead_points_are_found_and_told_the_same(name: str, whole_up_to: Any) ->
 
 @pytest.mark.parametrize("name", SCENES)
 def test_joints_of_rigid_links_bear_the_same(name: str, whole_up_to: Any) -> None:
-    """Forces, moments and efforts with the least multipliers; and which of them statics tell."""
+    """Forces, moments and efforts with the least multipliers; and which of them statics determine."""
     scene = SCENES[name]()
 
     def borne() -> dict[str, np.ndarray]:
@@ -151,7 +151,7 @@ REFUSED: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
             }
         },
     ),
-    "a dead point as drawn": (
+    "a dead point in the reference position": (
         {
             "A": ("revolute", "ground", "crank", (0.3, -0.4, 0.0), Z),
             "B": ("revolute", "crank", "coupler", (0.3, 0.0, 0.0), Z),

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from kedfem.dynamics.frames import Followed, deformation, frame_force, frames_of, rotation
+from kedfem.dynamics.frames import Deformed, deformation, frame_force, frames_of, rotation
 from kedfem.links.beams.beam import beam_link
 from kedfem.links.beams.beam_axis import straight_axis
 from kedfem.links.beams.beam_segments import beam_segments, space_segments
@@ -90,7 +90,7 @@ def force(
     total, energy, zero = np.zeros_like(y), 0.0, np.zeros_like(y)
     for frame in frames_of(link):
         Q, a = rotation(link, frame.fit, y, angle)
-        f, e = frame_force(link, frame, Followed(Q, a, deformation(link, y, Q, a), zero, zero), y, 0.0)
+        f, e = frame_force(link, frame, Deformed(Q, a, deformation(link, y, Q, a), zero, zero), y, 0.0)
         total, energy = total + f, energy + e
     return total, energy
 
@@ -200,7 +200,7 @@ def _held(link: Link) -> np.ndarray:
 
 
 @pytest.mark.parametrize("kind", ["beam", "spatial_beam"])
-def test_segments_of_a_beam_in_nominal_frames_are_the_whole_beam(kind: str) -> None:
+def test_segments_of_a_beam_in_rigid_body_frames_are_the_whole_beam(kind: str) -> None:
     link, cut = segments(kind, 5)
     for load in (np.array([1.0, 0, 0]), np.array([0.0, 1, 0])):
         assert_allclose(tip_deflection(cut, load), tip_deflection(link, load), rtol=1e-8, atol=1e-12)
@@ -260,9 +260,9 @@ def test_small_loads_leave_the_linear_answer_and_the_difference_grows_with_their
     changes = {"analysis": {"end_time": 0.012, "step": 4e-4}} if kind == "solid" else {}
     apart, linear = [], 0.0
     for load in (1, 2, 4):
-        nominal, free = (tip(ran(merged(elbow(kind, load, follow), changes))) for follow in (False, True))
-        apart.append(np.abs(free - nominal).max())
-        linear = np.abs(nominal).max()
+        rigid_body, free = (tip(ran(merged(elbow(kind, load, follow), changes))) for follow in (False, True))
+        apart.append(np.abs(free - rigid_body).max())
+        linear = np.abs(rigid_body).max()
     assert apart[-1] < 0.03 * linear
     order = np.diff(np.log2(apart))
     assert np.all(order > 1.95)
@@ -301,9 +301,9 @@ def test_stiff_links_leave_the_linear_answer_and_the_difference_falls_with_the_s
 ):
     apart = []
     for factor in (0.25, 1, 4):
-        nominal, free = (ran(slow_four_bar(factor, follow)) for follow in (False, True))
+        rigid_body, free = (ran(slow_four_bar(factor, follow)) for follow in (False, True))
         at = free.ready.scene.joints["C"].at
-        d = free.displaced("rocker", at) - nominal.displaced("rocker", at)
+        d = free.displaced("rocker", at) - rigid_body.displaced("rocker", at)
         apart.append(float(np.sqrt(np.mean(d**2))))
     order = np.diff(np.log(apart)) / np.log(4)
     assert np.all(order < -1.9)
@@ -384,7 +384,7 @@ def flight(kind: str, h: float) -> dict[str, Any]:
 
 
 def test_joints_stay_closed_and_work_is_as_counted() -> None:
-    """One factorisation per segment, at most four sweeps a step, in the source's four-bar at 600 rpm."""
+    """One factorisation per segment, at most four iterations a step, in the source's four-bar at 600 rpm."""
     raw = four_bar(
         {"revolutions": 0.5, "steps_per_revolution": 1000, "frames": "co-rotational", "initial": "rest"},
         {"mesh": {"elements": 4}},
@@ -392,7 +392,7 @@ def test_joints_stay_closed_and_work_is_as_counted() -> None:
     ).model_dump(mode="json", exclude_unset=True)  # fmt: skip
     made = ran(raw)
     assert made.solver.factorisations == len(made.ready.model.links) == 12
-    assert 1 < made.sweeps <= 4
+    assert 1 < made.iterations <= 4
     for at, (one, other) in {"B": ("crank", "coupler"), "C": ("coupler", "rocker")}.items():
         point = made.ready.scene.joints[at].at
         gap = made.position(one, point) - made.position(other, point)

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy.plan import plan_for
 from kedfem.analysis import Run, analyse
-from kedfem.links.surfaces.coupling_surfaces import is_flat, joint_seat
+from kedfem.links.surfaces.coupling_surfaces import is_flat, joint_surface
 from kedfem.scene import scene_from
 from tests.laws.test_limits import AXES
 from tests.laws.test_positions import across
@@ -78,9 +78,9 @@ def test_a_weld_at_a_shafts_end_sits_there_however_fine_its_fillet_is(angle: flo
     """A ring of a fillet is at one distance from a point on the axis, too, but no ball about it."""
     link = meshed(shaft, None, fillet_angle=float(np.radians(angle)))
     for end in (0.0, 0.1):
-        seat = joint_seat(link, "joints.W", np.array([end, 0, 0]), None)
-        assert_allclose(seat.origin, [end, 0, 0], atol=1e-12)
-        assert is_flat(seat)
+        surface = joint_surface(link, "joints.W", np.array([end, 0, 0]), None)
+        assert_allclose(surface.origin, [end, 0, 0], atol=1e-12)
+        assert is_flat(surface)
 
 
 @pytest.mark.parametrize(("accuracy", "angle"), [("quick", None), (0.2, 45.0), (0.05, 22.5), (0.02, 15.0)])

@@ -59,7 +59,7 @@ def test_the_envelope_is_the_maximum_over_all_steps(kind: str, frames: str) -> N
     """Against stresses of every step by the recovery that frames are drawn with, and eigenvalues by LAPACK."""
     ready, _ = prepared(scene_from(scene(kind, frames)))
     recoveries = [
-        stress_recovery(link) for link in [*ready.model.links, *(x.link for x in ready.model.carried)]
+        stress_recovery(link) for link in [*ready.model.links, *(x.link for x in ready.model.prescribed)]
     ]
     envelope = Envelope(ready.model, recoveries)
     blocks = list(

@@ -1,4 +1,4 @@
-"""Natural frequencies of frozen linkages: closed forms, and eigenvalues of the literal system."""
+"""Natural frequencies of frozen linkages: closed forms, and eigenvalues of the monolithic system."""
 
 from typing import Any
 
@@ -13,10 +13,10 @@ from kedfem.accuracy.prepared import moving
 from kedfem.dynamics.matrices.dense import SMALL
 from kedfem.dynamics.modes.frozen import Frozen, Modes
 from kedfem.dynamics.modes.lanczos import lanczos
-from kedfem.dynamics.stepping.literal import rotated_stiffness
+from kedfem.dynamics.stepping.monolithic import rotated_stiffness
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.system.build import system_of
-from kedfem.dynamics.system.oracle.literal import Literal
+from kedfem.dynamics.system.oracle.monolithic import Monolithic
 from kedfem.dynamics.system.record import Driven, Held, Spring, System
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.scene import path_parameter, scene_from
@@ -61,12 +61,12 @@ def frozen(
     return system, motion, Frozen(system, count, mobility).at(motion), mobility
 
 
-def literal_eigenvalues(system: System, motion: RigidMotion, s: float) -> np.ndarray:
+def monolithic_eigenvalues(system: System, motion: RigidMotion, s: float) -> np.ndarray:
     """ω² [1/s²] of K and M on the null space of all constraints, assembled by the oracle.
 
     s : of the size of the first, so that rounding of zero ones, 1e-16/s of θ = 1/(ω² + s), is small beside others
     """
-    oracle = Literal(system, generalised_alpha(1e-3, 1.0))
+    oracle = Monolithic(system, generalised_alpha(1e-3, 1.0))
     every = zip(system.model.links, system.model.bodies, strict=True)
     K = [
         rotated_stiffness(sp.csr_array(link.K0), motion.R[0, n][: link.d, : link.d]).toarray()
@@ -89,14 +89,14 @@ def literal_eigenvalues(system: System, motion: RigidMotion, s: float) -> np.nda
 
 
 def difference(system: System, motion: RigidMotion, found: Modes) -> float:
-    wanted = literal_eigenvalues(system, motion, found.omega[found.still] ** 2)[
+    wanted = monolithic_eigenvalues(system, motion, found.omega[found.still] ** 2)[
         found.still : len(found.omega)
     ]
     return float(np.abs(found.omega[found.still :] ** 2 / wanted - 1).max())
 
 
 @pytest.mark.parametrize("cell", CELLS, ids=str)
-def test_frequencies_are_eigenvalues_of_the_literal_system(cell: Cell) -> None:
+def test_frequencies_are_eigenvalues_of_the_monolithic_system(cell: Cell) -> None:
     system, motion, found, mobility = frozen(scene_of(cell))
     springs = any(isinstance(x.law, Spring) for x in system.constraints)
     assert found.still <= mobility if springs else found.still == mobility
@@ -104,7 +104,7 @@ def test_frequencies_are_eigenvalues_of_the_literal_system(cell: Cell) -> None:
     assert difference(system, motion, found) < (1e-8 if cell.plane else 2e-6)
 
 
-@pytest.mark.parametrize("turn", TURNS, ids=["as drawn", "y", "z", "oblique"])
+@pytest.mark.parametrize("turn", TURNS, ids=["reference", "y", "z", "oblique"])
 def test_frequencies_do_not_depend_on_the_axes_of_the_world(turn: np.ndarray) -> None:
     raw = scene_of(Cell("revolute", "rigid-body", True, "beams in space"))
     del raw["loads"]
@@ -123,7 +123,7 @@ def test_an_arm_is_a_cantilever_with_its_drive_held_and_pinned_at_one_end_with_i
 
 
 @pytest.mark.parametrize("driven", [True, False])
-def test_a_large_solid_with_its_sparse_factor_is_the_literal_one(driven: bool) -> None:
+def test_a_large_solid_with_its_sparse_factor_is_the_monolithic_one(driven: bool) -> None:
     system, motion, found, _ = frozen(arm("solid"), driven=driven)
     assert system.model.links[0].unknowns > SMALL
     assert found.still == (not driven)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from skfem.models.elasticity import linear_elasticity
 
-from kedfem.dynamics.stepping.literal import rotated_stiffness
+from kedfem.dynamics.stepping.monolithic import rotated_stiffness
 from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
 from kedfem.links.recovery import (
@@ -21,7 +21,7 @@ from kedfem.links.recovery import (
     turned_stress,
 )
 from kedfem.links.solid import elastic_stiffness, gradient_products, pattern, solid_basis
-from kedfem.links.surfaces.surface import surface
+from kedfem.links.surfaces.surface import surface_quadrature
 from kedfem.mesh import SolidMesh
 from kedfem.mesh.elements.shape_functions import NODES, shape_gradients
 from kedfem.motion.newton import cross_matrix
@@ -256,7 +256,7 @@ def test_a_linear_displacement_is_held_by_the_surface_alone(nodes: int, seed: in
     H = random.uniform(-1, 1, (3, 3))
     g = random.uniform(-1, 1, 3) + link.X @ H.T
     forces, scale = (link.K0 @ g.ravel()).reshape(-1, 3), np.abs(link.K0).max() * np.abs(g).max()
-    on = surface(link, link.basis.mesh.boundary_facets())
+    on = surface_quadrature(link, link.basis.mesh.boundary_facets())
     inside = np.setdiff1d(np.arange(link.n), on.dofs[np.abs(on.N).max(axis=1) > ROUNDING])
     assert len(inside) == {8: 1, 10: 27, 20: 7, 27: 27}[nodes]
     assert np.abs(forces[inside]).max() < ROUNDING * scale

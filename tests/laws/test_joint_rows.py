@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from kedfem.accuracy.prepared import Prepared
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.constraint_joints import needs_rows
-from kedfem.dynamics.stepping.literal import LiteralSteps
+from kedfem.dynamics.stepping.monolithic import MonolithicSteps
 from kedfem.motion.joint_equations import joint_axis
 from kedfem.scene import GROUND
 from tests.joint_checks import (
@@ -22,9 +22,9 @@ from tests.joint_checks import (
     free_twists,
     held_twists,
     port_wrench,
-    seat_motion,
     shared_gap,
     sides,
+    surface_motion,
     twist,
     unbalanced,
 )
@@ -69,11 +69,11 @@ def assert_the_same(kind: str, one: Any, other: Any, R: np.ndarray, digits: floa
         )  # of a plane link two
         assert_allclose(state(again, k, "g") @ back, g, atol=digits * size)
     here, there = channels(*one), channels(*other)
-    # what statics tells of rigid links depends on which axes of the world their redundant directions lie along
+    # what statics determines of rigid links depends on which axes of the world their redundant directions lie along
     elastic = [name for name in here if "/rigid_" not in name]
     loads = [name for name in elastic if name.split("/")[0] in {"joints", "drive", "gears"}]
     hinged = sum(joint.kind != "weld" for joint in ready.scene.joints.values())
-    assert len(loads) >= 2 * hinged - 1  # a slider's guide: statics may not tell its force
+    assert len(loads) >= 2 * hinged - 1  # a slider's guide: statics may not show its force
     force = max(np.abs(here[name]).max() for name in loads if name.endswith("force"))
     for unit, arm in (
         (("force",), 1.0),
@@ -150,7 +150,7 @@ def test_forces_and_moments_balance_inertia_and_loads_of_every_link(kind: str) -
 
 @pytest.mark.parametrize("kind", list(EVERY))
 def test_what_joints_let_free_is_free(kind: str) -> None:
-    """Port forces, summed up, do no work along what a joint's kind leaves free; which does move, as turns and slides."""
+    """Port forces, summed up, do no work along what a joint's kind releases; which does move, as turns and slides."""
     ready, blocks = run_of(kind)
     at, geared = bodies(ready, blocks), {name for gear in ready.scene.gears.values() for name in gear.joints}
     for name, joint in ready.scene.joints.items():
@@ -194,7 +194,7 @@ def test_gears_tie_the_turns_of_their_wheels_and_a_rack() -> None:
     def motion(name: str, gear: str) -> np.ndarray:
         joint = ready.scene.joints[name]
         i, j = sides(joint)
-        _, u, turn = seat_motion(ready, blocks, f"gears.{gear}", i)
+        _, u, turn = surface_motion(ready, blocks, f"gears.{gear}", i)
         z = at.of(j)[1] @ joint_axis(joint)
         return np.asarray(np.einsum("tk,tk->t", z, u if joint.kind == "prismatic" else turn))
 
@@ -229,10 +229,10 @@ def shortened(raw: dict[str, Any], end: float) -> dict[str, Any]:
 @pytest.mark.parametrize(
     "kind", [pytest.param(x, marks=pytest.mark.long if "bores" in x else ()) for x in EVERY]
 )
-def test_the_literal_steps_agree(kind: str) -> None:
+def test_the_monolithic_steps_agree(kind: str) -> None:
     """Assembled at every step, with bordered rows and no condensation: displacements, rates, joint forces and torques."""
     raw = shortened(EVERY[kind](), 0.01 if kind in BEAMS else 0.002)
-    (ready, wanted), (_, got) = ran(raw, LiteralSteps), ran(raw)
+    (ready, wanted), (_, got) = ran(raw, MonolithicSteps), ran(raw)
     links = range(len(ready.model.links))
     digits = 1e-7 if kind in BEAMS else 1e-8  # solids hardly move in four steps
     for name in ("u", "v"):

@@ -141,11 +141,11 @@ def test_weights_remove_powers_of_the_step() -> None:
 
 
 @pytest.mark.parametrize("kind", ["rigid-body", "rows"])
-def test_literal_steps_combine_to_the_same(kind: str) -> None:
+def test_monolithic_steps_combine_to_the_same(kind: str) -> None:
     """The oracle through the layer, in all that a block holds; rounding grows over 40 steps."""
-    fast, literal = blocks(kind, 20, 2), blocks(kind, 20, 2, solver="monolithic")
+    fast, monolithic = blocks(kind, 20, 2), blocks(kind, 20, 2, solver="monolithic")
     for name in LINEAR:
-        for x, y in zip(over_time(fast, name), over_time(literal, name), strict=True):
+        for x, y in zip(over_time(fast, name), over_time(monolithic, name), strict=True):
             assert_allclose(x, y, rtol=0, atol=2e-8 * np.abs(y).max(initial=1e-300))
 
 

@@ -9,8 +9,8 @@ from kedfem.links.bodies import euler_tensor, inertia_of, with_body, with_point_
 from kedfem.links.record import Link, mass_times
 from kedfem.links.surfaces.coupling_surfaces import (
     CouplingSurface,
-    face_seat,
-    joint_seat,
+    face_surface,
+    joint_surface,
     port_weights,
     surface_weights,
 )
@@ -101,7 +101,7 @@ def test_inertia_load_of_a_beam_is_literally_minus_M_R0(
 
 def bore(link: Link, motion: Motion) -> CouplingSurface:
     """The coupling surface on the bore of a ring that has moved rigidly."""
-    return joint_seat(link, "joints.A", motion.p, motion.R @ Z)
+    return joint_surface(link, "joints.A", motion.p, motion.R @ Z)
 
 
 @LAW
@@ -140,7 +140,7 @@ def test_surface_weights_of_a_face_sum_to_its_area(nodes: int, motion: Motion) -
     """The top of a ring between parabolas, each through three points of 45°: triangles and 2/3 chord · height."""
     link = solid(rotated(ring(nodes), motion))
     top = motion.moved(np.array([[0.175, 0.0, 0.1]]))[0]
-    area = surface_weights(link, face_seat(link, "loads.push", top)).sum()
+    area = surface_weights(link, face_surface(link, "loads.push", top)).sum()
     half = np.pi / 8
     of_unit_radius = 8 * (np.sin(2 * half) / 2 + 4 / 3 * np.sin(half) * (1 - np.cos(half)))
     assert area == pytest.approx(of_unit_radius * (0.25**2 - 0.1**2), rel=1e-12)
@@ -184,7 +184,7 @@ def test_kinetic_energy_of_a_beam_with_a_body_on_its_node(beam: Beam, motion: Mo
     link, motion, random = beam.link(), planar(motion), np.random.default_rng(seed)
     node = link.X[0]
     mass, inertia = random.uniform(0.1, 10), np.diag(random.uniform(0.1, 5, 3))
-    loaded = with_body(link, joint_seat(link, "joints.A", node, Z), mass, node, euler_tensor(inertia))
+    loaded = with_body(link, joint_surface(link, "joints.A", node, Z), mass, node, euler_tensor(inertia))
     velocity = motion.velocity(link.X * [1, 1, 0])
     velocity[:, 2] = motion.omega[2]
     v = motion.velocity(node * [1, 1, 0])

@@ -1,4 +1,4 @@
-"""Laws of random mechanisms: literal equals fast, a run is a march, a scene turned is the same, momentum stays."""
+"""Laws of random mechanisms: monolithic equals fast, a run is a march, a scene turned is the same, momentum stays."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def test_twenty_random_mechanisms_keep_all_laws() -> None:
 
 @pytest.mark.parametrize("turn", [[0.0, 0.0, 0.0], [0.7, -1.1, 0.4], [2.0, 0.5, -0.3]])
 def test_free_bodies_on_a_screw_that_spin_together_stay_where_they_are(turn: list[float]) -> None:
-    """What a screw leaves open tells nothing of how both move together: rounding of it must not fling them away."""
+    """What a screw leaves open shows nothing of how both move together: rounding of it must not fling them away."""
     R = Rotation.from_rotvec(turn).as_matrix()
     a, b, c = (R @ x for x in ([0.0, 0.0, 0.0], [0.1, 0.02, 0.05], [0.15, 0.1, -0.05]))
     spin = {"at": [0.0, 0.0, 0.0], "angular_velocity": (R @ [0.3, -2.0, 1.0]).tolist()}

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from skfem.models.elasticity import linear_elasticity
 
 from kedfem.dynamics.loads import applied
-from kedfem.dynamics.stepping.literal import rotated_stiffness
+from kedfem.dynamics.stepping.monolithic import rotated_stiffness
 from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body
 from kedfem.links.plane import plane_basis, plane_link, plane_stress
 from kedfem.links.point_rows import point_rows
@@ -16,9 +16,9 @@ from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_stress, stress_recovery
 from kedfem.links.solid import elastic_stiffness, gradient_products, pattern, solid_link
 from kedfem.links.surfaces.coupling_surfaces import (
-    face_seat,
+    face_surface,
     is_flat,
-    joint_seat,
+    joint_surface,
     port_weights,
     surface_weights,
 )
@@ -209,28 +209,28 @@ def disc(z: float = 0.9) -> Link:
 def test_a_bore_reads_value_and_gradient_of_affine_fields_exactly(seed: int) -> None:
     link, random = disc(), np.random.default_rng(seed)
     a, H = random.uniform(-1, 1, 2), random.uniform(-1, 1, (2, 2))
-    seat = joint_seat(link, "joints.A", np.zeros(3), Z)
+    surface = joint_surface(link, "joints.A", np.zeros(3), Z)
     u = a + link.X[:, :2] @ H.T
     point = random.uniform(-1, 1, 3)  # its z plays no part
     np.testing.assert_allclose(
-        port_weights(seat, point[None, :]) @ u, (a + H @ point[:2])[None, :], atol=1e-13
+        port_weights(surface, point[None, :]) @ u, (a + H @ point[:2])[None, :], atol=1e-13
     )
-    np.testing.assert_allclose(seat.fit[1:] @ u, [*H.T, [0, 0]], atol=1e-12)
-    np.testing.assert_allclose(port_weights(seat, point[None, :]).sum(), 1, atol=1e-13)
+    np.testing.assert_allclose(surface.fit[1:] @ u, [*H.T, [0, 0]], atol=1e-12)
+    np.testing.assert_allclose(port_weights(surface, point[None, :]).sum(), 1, atol=1e-13)
     # the circle of radius 0.1 is chords of parabolas: its spread is r/√2 to their fourth order
-    np.testing.assert_allclose(seat.spread, [0.1 / np.sqrt(2), 0.1 / np.sqrt(2), 0], rtol=1e-4)
+    np.testing.assert_allclose(surface.spread, [0.1 / np.sqrt(2), 0.1 / np.sqrt(2), 0], rtol=1e-4)
 
 
 def test_edges_have_the_area_of_length_times_thickness() -> None:
     link = disc()
-    bore = joint_seat(link, "joints.A", np.zeros(3), Z)
-    rim = face_seat(link, "loads.p.at", np.array([0.25, 0, 0]))
+    bore = joint_surface(link, "joints.A", np.zeros(3), Z)
+    rim = face_surface(link, "loads.p.at", np.array([0.25, 0, 0]))
     # 2 π r t; quadratic edges of 30° are 8e-5 short
     assert surface_weights(link, bore).sum() == pytest.approx(2 * np.pi * 0.1 * 0.02, rel=1e-4)
     assert surface_weights(link, rim).sum() == pytest.approx(2 * np.pi * 0.25 * 0.02, rel=1e-4)
     quads, cells = rectangle_quads(0.3, 0.1, 3, 2)
     bar = plane(QuadMesh(np.pad(quads, ((0, 0), (0, 1))), cells, 0.02))
-    end = face_seat(bar, "loads.p.at", np.array([0.3, 0.01, 0]))
+    end = face_surface(bar, "loads.p.at", np.array([0.3, 0.01, 0]))
     assert len(end.facets) == 2
     weights = surface_weights(bar, end)
     assert weights.sum() == pytest.approx(0.1 * 0.02, rel=1e-13)
@@ -261,10 +261,10 @@ def test_kinetic_energy_with_a_body_is_that_of_link_and_rigid_body(
 ) -> None:
     """In the plane: T = T_link + ½ m v² + ½ I_zz ω², the centre anywhere, its z of no account."""
     link, random = disc(), np.random.default_rng(seed)
-    seat = joint_seat(link, "joints.A", np.zeros(3), Z)
+    surface = joint_surface(link, "joints.A", np.zeros(3), Z)
     mass, spread = random.uniform(0.1, 100), random.uniform(-1, 1, (4, 3))
     inertia = mass * sum(r @ r * np.eye(3) - np.outer(r, r) for r in spread)
-    loaded = with_body(link, seat, mass, centre, euler_tensor(inertia))
+    loaded = with_body(link, surface, mass, centre, euler_tensor(inertia))
     velocity = motion.velocity(link.X * [1, 1, 0])[:, :2]
     v = motion.velocity(centre * [1, 1, 0])
     wanted = kinetic_energy(link, velocity) + (mass * v @ v + inertia[2, 2] * motion.omega[2] ** 2) / 2
@@ -278,9 +278,9 @@ def test_a_flywheel_adds_its_inertia_about_z(where: str) -> None:
     quads, cells = rectangle_quads(0.3, 0.1, 3, 2)
     bar = plane(QuadMesh(np.pad(quads, ((0, 0), (0, 1))), cells, 0.02))
     link = disc() if where == "bore" else bar
-    seat = joint_seat(link, "joints.A", np.zeros(3), Z)
-    assert is_flat(seat) == (where == "edge")
-    loaded = with_body(link, seat, 0.0, np.zeros(3), flywheel_tensor(seat, Z, 0.7))
+    surface = joint_surface(link, "joints.A", np.zeros(3), Z)
+    assert is_flat(surface) == (where == "edge")
+    loaded = with_body(link, surface, 0.0, np.zeros(3), flywheel_tensor(surface, Z, 0.7))
     turning = np.stack([-link.X[:, 1], link.X[:, 0]], axis=1) * 3.0
     added = kinetic_energy(loaded, turning) - kinetic_energy(link, turning)
     assert added == pytest.approx(0.7 * 3.0**2 / 2, rel=1e-9)

@@ -18,8 +18,8 @@ from kedfem.links.plane import plane_link
 from kedfem.links.record import Link, mass_times
 from kedfem.links.reduced import reduced, rigid, rigid_functions, rigid_modes
 from kedfem.links.solid import solid_link
-from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, face_seat, joint_seat
-from kedfem.links.surfaces.rigid_coupling import STIFF, surface_gram, with_stiff_seat
+from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, face_surface, joint_surface
+from kedfem.links.surfaces.rigid_coupling import STIFF, surface_gram, with_rigid_coupling
 from kedfem.mesh import QuadMesh, SolidMesh, link_mesh
 from kedfem.motion.linkage import linkage
 from kedfem.scene import scene_from
@@ -36,17 +36,17 @@ def solid(mesh: SolidMesh) -> Link:
 
 
 def bore(link: Link, motion: Motion = REST) -> CouplingSurface:
-    return joint_seat(link, "joints.A", motion.p, motion.R @ Z)
+    return joint_surface(link, "joints.A", motion.p, motion.R @ Z)
 
 
 def dense(K: Any) -> np.ndarray:
     return np.asarray(K.toarray() if sp.issparse(K) else K)
 
 
-def out_of_round(link: Link, seat: CouplingSurface, u: np.ndarray) -> float:
+def out_of_round(link: Link, surface: CouplingSurface, u: np.ndarray) -> float:
     """Root mean square over a coupling surface of what no rigid motion of it is, by least squares in Gauss points'
     weights."""
-    nodes, G = surface_gram(link, seat.facets)
+    nodes, G = surface_gram(link, surface.facets)
     B = rigid_modes(link).reshape(link.n, link.d, -1)[nodes].reshape(link.d * len(nodes), -1)
     L = np.linalg.cholesky(np.kron(G.toarray(), np.eye(link.d))).T
     left = np.linalg.lstsq(L @ B, L @ u[nodes].ravel(), rcond=None)
@@ -58,10 +58,10 @@ def out_of_round(link: Link, seat: CouplingSurface, u: np.ndarray) -> float:
 
 @LAW
 @given(rings(), motions)
-def test_a_stiff_seat_leaves_rigid_motions_free_and_k0_symmetric(mesh: SolidMesh, motion: Motion) -> None:
+def test_a_rigid_coupling_leaves_rigid_motions_free_and_k0_symmetric(mesh: SolidMesh, motion: Motion) -> None:
     """K0 · (rigid modes) = 0, [KED, eqs. (13)(14)]."""
     link = solid(rotated(mesh, motion))
-    stiff = with_stiff_seat(link, bore(link, motion))
+    stiff = with_rigid_coupling(link, bore(link, motion))
     K = dense(stiff.K0)
     assert_allclose(K, K.T, rtol=0, atol=1e-15 * np.abs(K).max())
     forces = stiff.K0 @ rigid_modes(stiff)
@@ -71,12 +71,12 @@ def test_a_stiff_seat_leaves_rigid_motions_free_and_k0_symmetric(mesh: SolidMesh
 
 @LAW
 @given(rings(), motions)
-def test_a_stiff_seat_is_the_same_in_every_direction(mesh: SolidMesh, motion: Motion) -> None:
+def test_a_rigid_coupling_is_the_same_in_every_direction(mesh: SolidMesh, motion: Motion) -> None:
     """K0 of the turned link is T K0 Tᵀ, [KED, eq. (14)]."""
     here, there = solid(mesh), solid(rotated(mesh, motion))
-    K = dense(with_stiff_seat(here, bore(here)).K0).reshape(here.n, 3, here.n, 3)
+    K = dense(with_rigid_coupling(here, bore(here)).K0).reshape(here.n, 3, here.n, 3)
     turned = np.einsum("ki,aibj,lj->akbl", motion.R, K, motion.R).reshape(3 * here.n, -1)
-    got = dense(with_stiff_seat(there, bore(there, motion)).K0)
+    got = dense(with_rigid_coupling(there, bore(there, motion)).K0)
     assert_allclose(got, turned, rtol=0, atol=1e-10 * np.abs(K).max())
 
 
@@ -85,10 +85,10 @@ def test_a_stiff_seat_is_the_same_in_every_direction(mesh: SolidMesh, motion: Mo
 def test_a_stiff_bore_keeps_its_shape_and_makes_the_link_stiffer(mesh: SolidMesh, seed: int) -> None:
     """Compliance fᵀ K0⁺ f falls with every load; of the bore's deformation under it 1/STIFF or so is left."""
     link = solid(mesh)
-    seat = bore(link)
-    stiff = with_stiff_seat(link, seat)
+    surface = bore(link)
+    stiff = with_rigid_coupling(link, surface)
     force = np.random.default_rng(seed).uniform(-1, 1, 3 * link.n)
-    on_bore = surface_gram(link, seat.facets)[0]
+    on_bore = surface_gram(link, surface.facets)[0]
     force.reshape(-1, 3)[on_bore] = 0.0
     B = rigid_modes(link)
     held = np.linalg.qr(B)[0]
@@ -102,7 +102,7 @@ def test_a_stiff_bore_keeps_its_shape_and_makes_the_link_stiffer(mesh: SolidMesh
         answers.append(np.linalg.solve(K + size * held @ held.T, force))
     assert force @ answers[1] < force @ answers[0]
     assert np.linalg.eigvalsh(dense(stiff.K0) - dense(link.K0)).min() > -1e-12 * np.abs(stiff.K0).max()
-    averaged, kept = (out_of_round(link, seat, u.reshape(-1, 3)) for u in answers)
+    averaged, kept = (out_of_round(link, surface, u.reshape(-1, 3)) for u in answers)
     assert kept < 3 / STIFF * averaged
 
 
@@ -111,8 +111,8 @@ def test_a_stiff_reduced_link_is_the_stiff_link_reduced(nodes: int) -> None:
     link = solid(ring(nodes))
     random = np.random.default_rng(0).standard_normal((link.n, 9))
     Q = np.column_stack([rigid_functions(link), random])
-    one = with_stiff_seat(reduced(link, Q), bore(reduced(link, Q)))
-    other = reduced(with_stiff_seat(link, bore(link)), Q)
+    one = with_rigid_coupling(reduced(link, Q), bore(reduced(link, Q)))
+    other = reduced(with_rigid_coupling(link, bore(link)), Q)
     for K in (one, other):  # functions may differ by a turn among them, the eigenvalues may not
         assert K.full is not None
     assert_allclose(
@@ -120,7 +120,7 @@ def test_a_stiff_reduced_link_is_the_stiff_link_reduced(nodes: int) -> None:
     )
 
 
-def test_a_stiff_seat_of_a_plane_link_leaves_three_motions_free() -> None:
+def test_a_rigid_coupling_of_a_plane_link_leaves_three_motions_free() -> None:
     angle = np.arange(16) * np.pi / 8
     points = np.concatenate(
         [r * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]) for r in (0.1, 0.2, 0.3)]
@@ -130,7 +130,7 @@ def test_a_stiff_seat_of_a_plane_link_leaves_three_motions_free() -> None:
         for k in range(8)
     ]  # fmt: skip
     link = plane_link("any", QuadMesh(points, np.array(quads), 0.02), MATERIAL, np.eye(3))
-    stiff = with_stiff_seat(link, bore(link))
+    stiff = with_rigid_coupling(link, bore(link))
     K = dense(stiff.K0)
     assert (np.linalg.eigvalsh(K) < 1e-9 * np.abs(link.K0).max()).sum() == 3
     u = np.zeros((link.n, 2))
@@ -143,8 +143,8 @@ def test_a_stiff_seat_of_a_plane_link_leaves_three_motions_free() -> None:
 
 def test_a_stiff_flat_face_stays_flat() -> None:
     link = solid(ring())
-    top = face_seat(link, "joints.A", np.array([0.175, 0.0, 0.1]))
-    stiff = with_stiff_seat(link, top)
+    top = face_surface(link, "joints.A", np.array([0.175, 0.0, 0.1]))
+    stiff = with_rigid_coupling(link, top)
     u = np.zeros((link.n, 3))
     u[:, 2] = link.X[:, 0] * link.X[:, 1]  # a saddle
     assert u.ravel() @ stiff.K0 @ u.ravel() > 10 * (u.ravel() @ link.K0 @ u.ravel())
@@ -153,7 +153,7 @@ def test_a_stiff_flat_face_stays_flat() -> None:
 
 def test_rigid_links_stay_as_they_are() -> None:
     link = rigid(solid(ring()))
-    assert with_stiff_seat(link, bore(link)).K0.shape == link.K0.shape
+    assert with_rigid_coupling(link, bore(link)).K0.shape == link.K0.shape
 
 
 # -- of a mechanism -----------------------------------------------------------------------------------------
@@ -208,7 +208,7 @@ def test_a_scene_in_another_direction_bends_alike(
 @pytest.mark.parametrize("port", ["distributing", "rigid"])
 @pytest.mark.parametrize("kind", ["plate", "plane"])
 def test_joints_are_closed_and_hand_on_force_and_moment_in_full(kind: str, port: str) -> None:
-    """Newton's and Euler's laws of each link about its nominal shape: Σ λ, Σ X × λ balance P − M R0'' − M δ''."""
+    """Newton's and Euler's laws of each link about its undeformed shape: Σ λ, Σ X × λ balance P − M R0'' − M δ''."""
     raw = ported(four_bar(kind, revolutions=1 / 12, steps_per_revolution=240), port)
     raw["damping"], raw["gravity"] = {"beta": 1e-5}, [0, -9.81, 0]  # inner damping carries no resultant
     model, _, snapshots = run(raw)
@@ -236,7 +236,7 @@ def moment(x: np.ndarray, force: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("kind", ["plate", "plane"])
-def test_condensed_is_literal_with_stiff_ports(kind: str) -> None:
+def test_condensed_is_monolithic_with_stiff_ports(kind: str) -> None:
     fast = run(ported(four_bar(kind, revolutions=1 / 24, steps_per_revolution=240), "rigid"))
     slow = run(
         ported(four_bar(kind, revolutions=1 / 24, steps_per_revolution=240, solver="monolithic"), "rigid")
@@ -296,7 +296,7 @@ def test_segments_and_reduced_links_take_stiff_ports(reduce: bool) -> None:
 
 
 def test_frames_that_follow_converge_with_stiff_ports_too() -> None:
-    """Stiff coupling surfaces stretch the rounding of positions; sweeps may be some more, and the joints stay closed."""
+    """Stiff coupling surfaces stretch the rounding of positions; it may take more iterations, joints stay closed."""
     runs = []
     for port in ("distributing", "rigid"):
         raw = four_bar(
@@ -306,7 +306,7 @@ def test_frames_that_follow_converge_with_stiff_ports_too() -> None:
             link["segments"] = 2
         runs.append(run(ported(raw, port)))
     (_, averaged, soft), (model, stiff, hard) = runs
-    assert averaged.sweeps < stiff.sweeps < 2 * averaged.sweeps
+    assert averaged.iterations < stiff.iterations < 2 * averaged.iterations
     peaks = [max(np.abs(s.u).max() for s in snapshots[-1].states) for snapshots in (soft, hard)]
     assert 0 < 1 - peaks[1] / peaks[0] < 0.01
     held = np.concatenate([port_values(j, s.u) for j, s in zip(model.joints, hard[-1].states, strict=True)])
@@ -343,7 +343,7 @@ def test_both_ports_are_the_same_from_afar() -> None:
         raw["bodies"] = {}
         (link,) = model_of(raw).links
         (stiff,) = model_of(ported(raw, "rigid")).links
-        near, far = (joint_seat(link, "joints", np.array([x, 0.0, 0.0]), Z) for x in (0.0, length))
+        near, far = (joint_surface(link, "joints", np.array([x, 0.0, 0.0]), Z) for x in (0.0, length))
         tips = [tip_deflection(each, near, far) for each in (link, stiff)]
         assert tips[1] < tips[0]
         apart.append(1 - tips[1] / tips[0])

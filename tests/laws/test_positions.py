@@ -274,7 +274,7 @@ def test_a_whole_run_has_positions_without_steps(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("axis", AXES)
 def test_what_nothing_loads_is_told(axis: str, tmp_path: Path) -> None:
-    """What rounding leaves there is told neither as a stress nor as an error."""
+    """What rounding leaves there is reported neither as a stress nor as an error."""
     joint = {"kind": "weld", "links": ["rod", "ground"], "at": [0, 0, 0]}
     raw = {
         "links": {"rod": rod(AXES[axis])}, "joints": {"W": joint}, "analysis": {"kind": "static"},

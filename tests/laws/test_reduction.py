@@ -17,8 +17,8 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.bases import bases
 from kedfem.dynamics.modes.reduction import Basis, static_parts
 from kedfem.dynamics.modes.residual import residual_deflections
-from kedfem.dynamics.nominal import instants
 from kedfem.dynamics.reduced_model import reduced_model
+from kedfem.dynamics.rigid_body import instants
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import snapshots
 from kedfem.links.reduced import rigid, rigid_modes

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from kedfem.dynamics.stepping.literal import rotated_stiffness
+from kedfem.dynamics.stepping.monolithic import rotated_stiffness
 from kedfem.links.beams.beam_axis import Axis, smooth_axis, straight_axis
 from kedfem.links.beams.section import rectangle
 from kedfem.links.beams.spatial_beam import (
@@ -20,7 +20,7 @@ from kedfem.links.beams.spatial_beam import (
 )
 from kedfem.links.bodies import euler_tensor, with_body
 from kedfem.links.record import Link
-from kedfem.links.surfaces.coupling_surfaces import joint_seat, port_weights
+from kedfem.links.surfaces.coupling_surfaces import joint_surface, port_weights
 from tests.laws.strategies import LAW, MATERIAL, Motion, motions, rotations, seeds, vectors
 from tests.laws.test_hexahedra import ROUNDING, dense_mass, node_rotation
 from tests.laws.test_loads_and_joints import kinetic_energy
@@ -185,8 +185,8 @@ def test_kinetic_energy_of_a_rigid_beam_with_a_body_on_its_end(
     )
     mass, spread = random.uniform(0.1, 100), random.uniform(-1, 1, (4, 3))
     inertia = mass * sum(r @ r * np.eye(3) - np.outer(r, r) for r in spread)
-    seat = joint_seat(link, "bodies.a", np.array([L, 0, 0]), None)
-    loaded = with_body(link, seat, mass, centre, euler_tensor(inertia))
+    surface = joint_surface(link, "bodies.a", np.array([L, 0, 0]), None)
+    loaded = with_body(link, surface, mass, centre, euler_tensor(inertia))
     own, omega = MATERIAL.density * h * b * L, motion.R.T @ motion.omega
     box = own / 12 * np.diag([h**2 + b**2, L**2 + b**2, L**2 + h**2])
     hub = HUB_INERTIA * MATERIAL.density * np.sqrt(h * b) * h * b**3 / 12
@@ -212,10 +212,10 @@ def test_port_weights_of_a_hub_reproduce_affine_fields_and_commute_with_rotation
     value, gradient = random.uniform(-1, 1, 3), random.uniform(-1, 1, (3, 3))
     for k in range(2):
         end = link.nodes[-k]
-        W = port_weights(joint_seat(link, "joints.A", end, None), points)
+        W = port_weights(joint_surface(link, "joints.A", end, None), points)
         np.testing.assert_allclose(W @ link.one, 1, atol=1e-12)
         np.testing.assert_allclose(
             W @ (np.outer(link.one, value) + link.X @ gradient), value + points @ gradient, atol=1e-11
         )
-        there = port_weights(joint_seat(turned, "joints.A", turned.nodes[-k], None), points @ motion.R.T)
+        there = port_weights(joint_surface(turned, "joints.A", turned.nodes[-k], None), points @ motion.R.T)
         np.testing.assert_allclose(there, W, atol=1e-11)

@@ -331,7 +331,7 @@ def test_growth_that_levels_in_time_do_not_agree_on_is_not_told() -> None:
     assert of.growth is None
     assert not of.unstable
     (said,) = steady_warning(of)
-    assert "whether it is stable cannot be told with steps as long as these" in said
+    assert "whether it is stable cannot be determined with steps as long as these" in said
 
 
 @pytest.mark.long

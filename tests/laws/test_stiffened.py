@@ -1,4 +1,4 @@
-"""Natural frequencies of links that turn: published bars, eigenvalues of the literal system, buckling, critical speeds.
+"""Frequencies of links that turn: published bars, eigenvalues of the monolithic system, buckling, critical speeds.
 
 A cantilever that turns about its root has f(μ) of Hamza-Cherif and Houmat (ICAS 2004, table 2; Bernoulli's beam), μ =
 Ω √(ρA L⁴/EI). Gyroscopic forces, which are left out, take 1e-4 μ² from the chordwise one; shear takes 0.15 % from both.
@@ -120,7 +120,7 @@ def linkage(kind: str, rpm: float = 1500.0) -> Raw:
 
 
 @pytest.mark.parametrize("kind", LINKS)
-def test_a_linkage_has_the_eigenvalues_of_the_literal_system(kind: str) -> None:
+def test_a_linkage_has_the_eigenvalues_of_the_monolithic_system(kind: str) -> None:
     system, motion, solver = stiffened(linkage(kind), count=3)
     found = solver.at(motion)
     assert difference(solver.system_at(motion)[0], motion, found) < (1e-8 if "pla" in kind else 2e-6)
@@ -162,7 +162,7 @@ def test_a_harmonic_meets_what_stiffens_with_the_speed(tmp_path: Path) -> None:
 
 def test_speeds_at_which_links_buckle_are_left_out_and_told(tmp_path: Path) -> None:
     found = frequencies(scene_from(linkage("planar beam", 3000.0), tmp_path), Wanted(2, 8), tmp_path / "out")
-    assert [text for text in found.warnings if "buckle by the stresses of the motion between" in text]
+    assert [text for text in found.warnings if "buckle by the stresses of motion between" in text]
     assert np.isfinite(found.values).all()
 
 
@@ -174,7 +174,7 @@ def with_rigid(name: str) -> Raw:
 
 
 @pytest.mark.parametrize("name", ["crank", "coupler", "rocker"])
-def test_rigid_links_have_the_eigenvalues_of_the_literal_system_too(name: str) -> None:
+def test_rigid_links_have_the_eigenvalues_of_the_monolithic_system_too(name: str) -> None:
     _, motion, solver = stiffened(with_rigid(name), count=3)
     assert difference(solver.system_at(motion)[0], motion, solver.at(motion)) < 1e-8
 

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from kedfem.dynamics.stepping.literal import LiteralSteps
+from kedfem.dynamics.stepping.monolithic import MonolithicSteps
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.march import displacements, march, ready
 from kedfem.dynamics.system.record import COROTATIONAL, TANGENTIAL, Driven, Held, Spring, Stop
@@ -58,7 +58,7 @@ def elements() -> Raw:
 def monolithic_displacements(of: Begun) -> np.ndarray:
     """Of the step that assembles and factors everything at each time, all bodies' rows over the steps."""
     made, scheme = of.prepared, of.ready.scheme
-    solver = LiteralSteps(made.model.links, made.model.joints, scheme, made.model.damping)
+    solver = MonolithicSteps(made.model.links, made.model.joints, scheme, made.model.damping)
     blocks = list(transient(made.scene, made.linkage, made.path, made.model, solver))
     every = [np.concatenate([block.links[k].u for block in blocks])[1:] for k in range(len(made.model.links))]
     return np.concatenate([u.reshape(len(u), -1) for u in every], axis=1)
@@ -139,7 +139,7 @@ def test_every_kind_of_joint_in_all_frames_moves_as_by_the_oracle(
     kind: str, frames: str, driven: bool, within: float
 ) -> None:
     if kind == "slot" and frames == "co-rotational":
-        pytest.skip("the pin of a slot slides as the rigid-body motion tells")
+        pytest.skip("the pin of a slot slides as the rigid-body motion shows")
     of = begun(BEAMS[kind](), frames, driven)
     assert (COROTATIONAL in of.ready.bodies.frame) == (frames == "co-rotational")
     assert against_oracle(of, 2) < within
@@ -193,8 +193,8 @@ def test_gears_couple_driven_links_with_frames_of_their_own() -> None:
     of = geared_arms("co-rotational", driven=True)
     _, history = marched(of, 100)
     two = displacements(of.ready, 1, history.u)[:, :, 2] + 0.0
-    nominal = of.steps(100).drives[:, 0]
-    turned = nominal + displacements(of.ready, 0, history.u)[:, 0, 2]
+    prescribed = of.steps(100).drives[:, 0]
+    turned = prescribed + displacements(of.ready, 0, history.u)[:, 0, 2]
     body = of.ready.system.model.bodies[1]
     R = of.steps(100).R[:, body]
     other = np.unwrap(np.arctan2(R[:, 1, 0], R[:, 0, 0])) + two[:, 0]

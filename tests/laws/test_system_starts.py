@@ -23,7 +23,7 @@ STEEL = 7850.0 * 0.03 * 0.02  # kg/m of `bar`
 
 
 def at(raw: Raw, frames: str | None = None, **more: Any) -> Begun:
-    """A scene as a system; the state at rest that comes with it is not looked at."""
+    """A scene as a system; the state at rest that comes with it is not examined."""
     return begun(raw, frames, **more)
 
 

@@ -19,7 +19,7 @@ from tests.spatial_joints import rigid_in_space
 from tests.systems import against_oracle, begun, marched
 
 ASKEW = Rotation.from_rotvec([0.9, -0.7, 1.3]).as_matrix()
-DRAWN = {"as drawn": np.eye(3), "askew": ASKEW}
+DRAWN = {"reference": np.eye(3), "askew": ASKEW}
 Raw = dict[str, Any]
 
 
@@ -133,7 +133,7 @@ def follower_tip(load: float) -> np.ndarray:
     return np.array([c * x + s * y, s * x - c * y])
 
 
-@pytest.mark.parametrize(("drawn", "elements"), [("as drawn", 4), ("askew", 8)])
+@pytest.mark.parametrize(("drawn", "elements"), [("reference", 4), ("askew", 8)])
 def test_a_rod_in_space_bends_as_elastica_under_a_force_that_stays_across_its_tip(
     drawn: str, elements: int
 ) -> None:
@@ -214,7 +214,7 @@ def on_a_rigid_end(plane: bool, R: np.ndarray) -> Raw:
 @pytest.mark.parametrize("drawn", DRAWN)
 @pytest.mark.parametrize("plane", [True, False])
 def test_a_load_turns_with_a_rigid_link(plane: bool, drawn: str, tmp_path: Path) -> None:
-    """As by the oracle; where the link has turned by Q its forces are those as drawn by Q.
+    """As by the oracle; where the link has turned by Q its forces are those in the reference position by Q.
 
     A run, whose rigid links are very stiff ones, moves alike; frequencies are those without the load.
     """

@@ -114,7 +114,7 @@ def test_an_edge_is_not_looked_for_where_points_between_tell_nothing() -> None:
 
 
 def grown(*growths: float | None) -> list[Row]:
-    """Points of a sweep that tell of growth, or of nothing."""
+    """Points of a sweep that report growth, or nothing."""
     told = [{} if x is None else {GROWTH: ("1", (x, np.nan, np.nan, np.nan))} for x in growths]
     return [Row("complete", "", 0.0, extremes=extremes) for extremes in told]
 
@@ -142,7 +142,7 @@ def test_bands_are_between_edges_or_throughout(
 
 
 def test_growth_of_what_steps_do_not_resolve_is_not_told(tmp_path: Path) -> None:
-    """At four degrees a step and β = 2e-5 the crank's 38 kHz grow by 1.9 in a turn, by the method; half a step tells."""
+    """At four degrees a step and β = 2e-5 the crank's 38 kHz grow by 1.9 in a turn, by the method; half a step shows."""
     raw = at_speed(plane_slider_crank(True), 2600)
     raw["damping"] = {"beta": 2e-5}
 
@@ -155,7 +155,9 @@ def test_growth_of_what_steps_do_not_resolve_is_not_told(tmp_path: Path) -> None
     assert long.steady is not None
     assert long.steady.growth is None
     assert long.steady.levels[0] > 1.5
-    assert any("cannot be told with steps as long as these: a vibration at about" in x for x in long.warnings)
+    assert any(
+        "cannot be determined with steps as long as these: a vibration at about" in x for x in long.warnings
+    )
     assert not (tmp_path / "growing.pvd").exists()
     short = found(180)
     assert short.steady is not None

@@ -1,4 +1,4 @@
-"""`kedfem run` that tells what it is at, to be ended there: `python -m tests.reliability.phases run scene.toml`.
+"""`kedfem run` that shows what it is at, to be ended there: `python -m tests.reliability.phases run scene.toml`.
 
 Each beginning and end of a phase is a line of the file that KEDFEM_PHASES names: the phase, + or -, and the time.
 """

@@ -84,28 +84,28 @@ def line(load: float) -> dict[str, Any]:
 def test_the_difference_to_frames_that_follow_falls_with_the_square_of_the_load() -> None:
     found = []
     for load in (400.0, 200.0):
-        followed, nominal = (
+        corotational, rigid_body = (
             places(four_bar(frames, springs=line(load))) for frames in ("co-rotational", "rigid-body")
         )
-        assert apart(followed, nominal) < 2e-3 * largest(nominal)
-        found.append(apart(followed, nominal))
+        assert apart(corotational, rigid_body) < 2e-3 * largest(rigid_body)
+        found.append(apart(corotational, rigid_body))
     assert found[0] / found[1] == pytest.approx(4.0, rel=0.05)
 
 
 @pytest.mark.parametrize("initial", ["rest", "quasi-static"])
 @pytest.mark.parametrize("rho_inf", [1.0, 0.8])
-def test_the_literal_solver_finds_the_same(initial: str, rho_inf: float) -> None:
+def test_the_monolithic_solver_finds_the_same(initial: str, rho_inf: float) -> None:
     """It assembles and factors all of it at every step."""
     analysis = {"initial": initial, "rho_inf": rho_inf}
     condensed = four_bar("rigid-body", springs=line(200.0), analysis=analysis, steps=40)
-    literal = four_bar(
+    monolithic = four_bar(
         "rigid-body", springs=line(200.0), analysis={**analysis, "solver": "monolithic"}, steps=40
     )
-    ready, _ = prepared(scene_from(literal))
+    ready, _ = prepared(scene_from(monolithic))
     solver = steps_of(ready.scene, ready.model)
     assert isinstance(solver, SystemSteps)
     assert solver.oracle is not None
-    one, other = places(condensed), places(literal)
+    one, other = places(condensed), places(monolithic)
     assert apart(one, other) < 1e-9 * largest(one)
 
 
@@ -125,7 +125,7 @@ def tied(k: float, **analysis: Any) -> dict[str, Any]:
 
 @pytest.mark.long
 def test_a_spring_may_be_far_stiffer_than_the_links() -> None:
-    """One of 1e12 N/m keeps the ends of the coupler, E A / L = 1.4e8 N/m, apart as drawn."""
+    """One of 1e12 N/m keeps the ends of the coupler, E A / L = 1.4e8 N/m, apart in the reference position."""
     soft, stiff = (np.ptp(channel(*run(tied(k)), "springs/tie/length")) for k in (1.0, 1e12))
     assert 0 < stiff < 1e-3 * soft
     one, other = places(tied(1e12)), places(tied(1e12, solver="monolithic"))
@@ -136,20 +136,20 @@ def test_the_same_law_drives_a_motor() -> None:
     """Over the speed of its joint, elastic part and all; constant ones are loads on both links."""
     curve = {"over": "speed", "at": [-10, 10], "value": [5, -5]}
     for torque in (curve, 2.0, {"over": "angle", "at": [-1, 1], "value": [3, -3]}):
-        followed, nominal = (
+        corotational, rigid_body = (
             places(four_bar(frames, motors={"m": {"joint": "C", "torque": torque}}))
             for frames in ("co-rotational", "rigid-body")
         )
-        assert apart(followed, nominal) < 1e-3 * largest(nominal)
+        assert apart(corotational, rigid_body) < 1e-3 * largest(rigid_body)
 
 
 @pytest.mark.parametrize("model", ["plane", pytest.param("solid", marks=pytest.mark.long)])
 def test_meshed_links_bear_springs_too(model: str) -> None:
-    followed, nominal = (
+    corotational, rigid_body = (
         places(four_bar(frames, model, springs=line(50.0), steps=72))
         for frames in ("co-rotational", "rigid-body")
     )
-    assert apart(followed, nominal) < 1e-3 * largest(nominal)
+    assert apart(corotational, rigid_body) < 1e-3 * largest(rigid_body)
 
 
 def test_without_a_force_a_spring_changes_nothing() -> None:

@@ -19,8 +19,8 @@ from kedfem.links.beams.beam_axis import directions
 from kedfem.mesh import link_mesh
 from kedfem.mesh.methods import file_axes
 from kedfem.motion.assembly import assembled
+from kedfem.motion.closed import Shift, closed_scene
 from kedfem.motion.linkage import linkage
-from kedfem.motion.redrawn import Shift, redrawn
 from kedfem.scene import Cad, Polyline, RigidBody, Scene, inertia_tensor, scene_from
 from tests.runs import quick
 
@@ -91,7 +91,7 @@ def points_of(scene: Scene, link: str) -> Array:
 
 
 def motions_of(before: Scene, after: Scene) -> dict[str, tuple[Array, Array]]:
-    """How each link was moved, x → R x + p, told from the points on it and nothing else (Kabsch's algorithm)."""
+    """How each link was moved, x → R x + p, found from the points on it and nothing else (Kabsch's algorithm)."""
     out = {}
     for name in before.links:
         X, Y = points_of(before, name), points_of(after, name)
@@ -320,7 +320,7 @@ def test_everything_on_a_link_goes_with_it(shift: Shift) -> None:
         springs={"spring": {"kind": "spring", "between": ends, "stiffness": 1.0}},
     )
     raw["output"]["probes"] = {"tip": {"link": "arm", "at": [0.4, 0], "quantity": "displacement"}}
-    scene = redrawn(scene_from(raw), {"arm": shift})
+    scene = closed_scene(scene_from(raw), {"arm": shift})
     R, tip = Rotation.from_rotvec(shift.theta).as_matrix(), moved(shift, [0.4, 0, 0])
     for load in scene.loads.values():
         assert_allclose(load.at, tip, rtol=0, atol=1e-15)  # type: ignore[union-attr]
@@ -348,7 +348,7 @@ def test_plates_go_with_their_outline_and_holes() -> None:
     raw = arm()
     raw["links"]["arm"] = {"material": "steel", "shape": plate, "mesh": {"size": 0.02}}
     before = scene_from(raw)
-    after = redrawn(before, {"arm": SHIFT})
+    after = closed_scene(before, {"arm": SHIFT})
     one, other = (link_mesh("arm", scene.links["arm"], Path()) for scene in (before, after))
     lowest, highest = moved(SHIFT, one.points).min(axis=0), moved(SHIFT, one.points).max(axis=0)
     assert_allclose(
@@ -375,7 +375,7 @@ def test_parts_from_cad_are_placed_where_their_link_goes(
     raw = arm()
     raw["links"]["arm"] = {"material": "steel", "shape": {"kind": "cad", "file": "arm.step", **keys}}
     before = scene_from(raw, tmp_path)
-    one, other = (scene.links["arm"].shape for scene in (before, redrawn(before, {"arm": shift})))
+    one, other = (scene.links["arm"].shape for scene in (before, closed_scene(before, {"arm": shift})))
     assert isinstance(one, Cad)
     assert isinstance(other, Cad)
     R = Rotation.from_rotvec(shift.theta).as_matrix()
@@ -394,7 +394,8 @@ def test_meshes_from_files_are_placed_where_their_link_goes(tmp_path: Path) -> N
     }
     before = scene_from(raw, tmp_path)
     one, other = (
-        link_mesh("arm", scene.links["arm"], tmp_path) for scene in (before, redrawn(before, {"arm": TILT}))
+        link_mesh("arm", scene.links["arm"], tmp_path)
+        for scene in (before, closed_scene(before, {"arm": TILT}))
     )
     assert_allclose(one.points, 0.1 * cube, rtol=0, atol=0)
     assert_allclose(other.points, moved(TILT, one.points), rtol=0, atol=1e-14)
@@ -485,7 +486,7 @@ def test_shapes_that_cannot_be_tilted_are_refused_where_they_would_have_to_be() 
     eyes = {"kind": "plate_link", "between": [[0, 0], [0.3, 0]], "width": 0.02, "thickness": 0.01}
     raw["links"]["arm"] = {"material": "steel", "shape": {**eyes, "bore_diameter": 0.01}}
     with pytest.raises(MotionError, match=r"links\.arm\.shape: must be .* got a plate_link tilted by .* deg"):
-        redrawn(scene_from(raw), {"arm": TILT})
+        closed_scene(scene_from(raw), {"arm": TILT})
 
 
 # -- told ---------------------------------------------------------------------------------------------------
@@ -495,7 +496,7 @@ def test_a_run_warns_that_links_were_moved(tmp_path: Path) -> None:
     done = analyse(scene_from(quick(apart_four_bar()), tmp_path))
     (warning,) = [each for each in done.warnings if each.startswith("joints.C:")]
     assert warning == (
-        "joints.C: its links are drawn 0.0001 m apart; closed by moving links up to 0.000115 m (kedfem check tells which)"
+        "joints.C: its links are drawn 0.0001 m apart; closed by moving links up to 0.000115 m (kedfem check shows which)"
     )
 
 

@@ -135,7 +135,7 @@ class TestMended:
         path = bad_cad.gap(tmp_path, 0.02)
         link = link_from({"shape": {"kind": "cad", "file": path.name}, "material": "steel"})
         mesh = made_mesh(KEYS, "rod", link, Cad(file=path.name), path)
-        assert mesh.way.endswith("; faces up to 0.064 mm apart sewn")
+        assert mesh.method.endswith("; faces up to 0.064 mm apart sewn")
 
     def test_a_step_of_half_a_micrometre_does_not_stop_a_part(self, tmp_path):
         path = bad_cad.sliver(tmp_path)

@@ -71,7 +71,7 @@ def test_stiffening_beside_frames_that_follow() -> None:
     )
 
 
-def test_the_literal_solver_with_frames_that_follow() -> None:
+def test_the_monolithic_solver_with_frames_that_follow() -> None:
     said = fault(arm(solver="monolithic"))
     assert said == (
         "analysis.solver: must be 'condensed' for co-rotational frames (the monolithic solver of scenes "

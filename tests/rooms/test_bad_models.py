@@ -103,7 +103,7 @@ def test_surface_force_on_no_face() -> None:
     )
 
 
-def test_body_on_no_seat() -> None:
+def test_body_on_no_coupling_surface() -> None:
     raw = arm()
     raw["bodies"] = {"lump": {"kind": "point_mass", "link": "arm", "at": [0.25, 0.5], "mass": 1}}
     assert fault(raw) == "bodies.lump.at: must lie in link 'arm', got (0.25, 0.5, 0), 0.49 m outside it"

@@ -9,11 +9,11 @@ from kedfem.accuracy.error_budget import budget_warning
 from tests.budget import Judged, cases, judged
 
 FEW = (
-    "60 rpm, 1 beam3 a link, nominal",
-    "300 rpm, 2 beam5 a link, following",
+    "60 rpm, 1 beam3 a link, rigid-body",
+    "300 rpm, 2 beam5 a link, co-rotational",
     "150 rpm, 2 beam5, 120 steps a turn",
     "60 rpm, plane 4 × 1 a link",
-    "60 rpm, solid 4 × 1 a link, in full",
+    "60 rpm, solid 4 × 1 a link, unreduced",
 )
 
 

@@ -77,8 +77,8 @@ class TestForms:
     @pytest.mark.parametrize("ending", FORMATS)
     def test_sphere_cone_and_torus(self, tmp_path, ending):
         def draw(occ: Any) -> None:
-            ball, seat = occ.addSphere(0, 0, 0, 9), occ.addSphere(0, 0, 9, 3)
-            occ.cut([(3, ball)], [(3, seat)])
+            ball, surface = occ.addSphere(0, 0, 0, 9), occ.addSphere(0, 0, 9, 3)
+            occ.cut([(3, ball)], [(3, surface)])
 
         written(tmp_path, "ball", draw, (ending,))
         found = {(f.kind, round(f.radius / MM, 6), f.inward) for f in read(tmp_path / f"ball.{ending}").faces}
@@ -220,4 +220,4 @@ def test_parts_are_meshed_side_by_side_as_one_by_one(monkeypatch: pytest.MonkeyP
         alone = solid_mesh(scene, name)
         assert np.array_equal(mesh.points, alone.points)
         assert np.array_equal(mesh.cells, alone.cells)
-        assert mesh.way == alone.way
+        assert mesh.method == alone.method

@@ -142,7 +142,7 @@ SCENES: list[Raw] = [
 
 
 def test_every_line_of_the_table_refuses_a_scene_in_its_own_words() -> None:
-    """But those of models, which their parts tell when they are meshed."""
+    """But those of models, which their parts show when they are meshed."""
     said = [fault for raw in SCENES for fault in faults(raw)]
     silent = [each for each in REFUSALS if each.of != "model" and not any(as_said(each, x) for x in said)]
     assert not silent, [each.must for each in silent]
@@ -178,7 +178,7 @@ def test_a_message_says_what_was_wanted_why_what_was_got_and_what_to_take() -> N
     (said,) = faults(slid("slot", analysis={**inverted()["analysis"], "frames": "co-rotational"}))
     assert said == (
         'joints.S.kind: must be another than slot with frames = "co-rotational" (the pin of a slot slides as the '
-        'rigid-body motion tells), got a slot: take frames = "rigid-body", or a slide with a hinge'
+        'rigid-body motion shows), got a slot: take frames = "rigid-body", or a slide with a hinge'
     )
 
 

@@ -11,7 +11,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.dynamics.elastic_model import elastic_model
-from kedfem.dynamics.joints.places import part_seat, seat_of
+from kedfem.dynamics.joints.places import part_surface, surface_of
 from kedfem.errors import MeshError
 from kedfem.links.build import bare_links
 from kedfem.links.record import Link
@@ -21,8 +21,8 @@ from kedfem.links.solid import solid_link
 from kedfem.links.surfaces.candidates import surfaces
 from kedfem.links.surfaces.choosing import as_choice, chosen_surface, distance, fits
 from kedfem.mesh import SolidMesh
+from kedfem.motion.closed import STILL, Shift, closed_scene
 from kedfem.motion.linkage import linkage
-from kedfem.motion.redrawn import STILL, Shift, redrawn
 from kedfem.scene import ChosenFace, Material, Scene, scene_from
 
 from ..turned import ball_on_neck, ball_seat, turned
@@ -90,7 +90,7 @@ def test_a_joint_is_held_by_the_face_that_is_meant(
 
 
 @pytest.mark.usefixtures("sleeve")
-def test_choices_and_names_of_several_faces_make_one_seat(tmp_path: Path) -> None:
+def test_choices_and_names_of_several_faces_make_one_coupling_surface(tmp_path: Path) -> None:
     X = held(scene_with(tmp_path, [{"cylinder": "8 mm"}, {"cylinder": "10 mm"}]))
     assert_allclose(sorted(set(np.round(np.hypot(X[:, 0], X[:, 1]), 7))), [0.004, 0.005])
 
@@ -103,12 +103,12 @@ def test_segments_and_reduced_links_know_the_choice_that_was_made_on_the_whole(t
     cut = segmented(whole, STEEL, 2, np.array([[0, 0, 0.0], [0, 0, 0.02]]), [])
     assert len(cut.parts) == 2
     links = {f"part {i}": each for i, each in enumerate(cut.parts)}
-    key, seat = part_seat(scene, "A", links, "part")
-    assert_allclose(seat.origin, [0, 0, 0.015], atol=1e-7)
-    X = links[key].X[links[key].basis.mesh.facets[:, seat.facets]]
+    key, surface = part_surface(scene, "A", links, "part")
+    assert_allclose(surface.origin, [0, 0, 0.015], atol=1e-7)
+    X = links[key].X[links[key].basis.mesh.facets[:, surface.facets]]
     assert_allclose(np.hypot(X[..., 0], X[..., 1]), 0.004, rtol=1e-6)
     small = reduced(whole, np.column_stack([rigid_functions(whole), np.sin(90 * whole.X[:, 0])]))
-    assert_allclose(seat_of(scene, "A", small).origin, seat.origin, atol=1e-7)
+    assert_allclose(surface_of(scene, "A", small).origin, surface.origin, atol=1e-7)
     (face,) = whole.faces
     assert face.face.chosen
     assert face.face.name == '{ cylinder = "8 mm" }'
@@ -222,7 +222,7 @@ def test_what_cannot_be_a_choice_is_refused(tmp_path: Path, faces: Any, message:
 def test_a_choice_goes_with_its_link_when_joints_are_closed(tmp_path: Path) -> None:
     scene = scene_with(tmp_path, {"cylinder": "8 mm", "axis": "x", "near": [0.1, 0, 0]})
     turn = Shift(np.zeros(3), np.array([0.0, 0.0, 0.001]), np.array([0.0, 0.0, math.pi / 2]))
-    (face,) = redrawn(scene, {"part": turn, "ground": STILL}).joints["A"].chosen_faces("part")
+    (face,) = closed_scene(scene, {"part": turn, "ground": STILL}).joints["A"].chosen_faces("part")
     assert_allclose(face.axis, [0, 1, 0], atol=1e-12)
     assert_allclose(face.near, [0, 0.1, 0.001], atol=1e-12)
     assert face.cylinder == 0.008

@@ -1,4 +1,4 @@
-"""Signs as docs/conventions.md tells them, each in a small scene."""
+"""Signs as docs/conventions.md shows them, each in a small scene."""
 
 from pathlib import Path
 from typing import Any, get_args

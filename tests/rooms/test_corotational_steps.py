@@ -102,7 +102,7 @@ def shorter(raw: Raw) -> Raw:
     )
 
 
-def off_its_seat(raw: Raw) -> Raw:
+def off_its_surface(raw: Raw) -> Raw:
     """The slide's first link is the arm, whose face has its middle 30 mm from the joint's point."""
     slide = {**raw["joints"]["S"], "links": ["arm", "block"]}
     return {**raw, "joints": {**raw["joints"], "S": slide}}
@@ -111,7 +111,9 @@ def off_its_seat(raw: Raw) -> Raw:
 DRIVEN = {
     **{kind: make for kind, make in BEAMS.items() if kind not in {"slot", "bushings"}},
     "sliding block": inverted,
-    "sliding block of plane links": lambda: off_its_seat(with_analysis(inverted("plane"), revolutions=0.02)),
+    "sliding block of plane links": lambda: off_its_surface(
+        with_analysis(inverted("plane"), revolutions=0.02)
+    ),
     "shaft of universal joints": cardan,
     "gears": geared,
     "two drives": two_drives,
@@ -122,7 +124,9 @@ SOON = {"screw", "sliding block of plane links", "gears"}
 @pytest.mark.parametrize(
     "kind", [pytest.param(x, marks=[] if x in SOON else pytest.mark.long) for x in DRIVEN]
 )
-def test_joints_by_constraint_equations_bear_in_stiff_links_what_they_do_in_nominal_frames(kind: str) -> None:
+def test_joints_by_constraint_equations_bear_in_stiff_links_what_they_do_in_rigid_body_frames(
+    kind: str,
+) -> None:
     """Joint forces, drives, gears, energies: the rest falls with compliance. Efforts do the work."""
     raw = with_analysis(stiffer(shorter(DRIVEN[kind]()), 100.0), rho_inf=0.8)
     _, wanted, _ = channels(raw)

@@ -23,7 +23,7 @@ def sprung(**analysis: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("frames", ["rigid-body", "co-rotational"])
-def test_springs_on_nominal_frames_and_frames_that_follow_are_tried(frames: str) -> None:
+def test_springs_on_rigid_body_frames_and_frames_that_follow_are_tried(frames: str) -> None:
     """By steps of their own solver, whatever sizes would say."""
     raw = sprung(frames=frames, steps_per_revolution=120)
     for link in raw["links"].values():

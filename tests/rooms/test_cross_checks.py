@@ -14,7 +14,7 @@ from kedfem.results.audit import Account
 from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.forces.constraint_forces import ConstraintForces
 from kedfem.results.forces.constraint_work import interface
-from kedfem.results.forces.force_elements import Measured, measured_actions
+from kedfem.results.forces.force_elements import Measured, measured_elements
 from kedfem.results.recording import recording, rows
 from kedfem.scene import scene_from
 from tests.moving import ran
@@ -29,7 +29,7 @@ def checked(raw: dict[str, Any], **changed: float) -> tuple[str, ...]:
 
 def compared(ready: Prepared, blocks: list[Block], **changed: float) -> tuple[CrossChecks, Account]:
     """A run's efforts with some channels multiplied, and its energy."""
-    account = Account(ready.model, measured_actions(ready.scene, ready.model))
+    account = Account(ready.model, measured_elements(ready.scene, ready.model))
     every = recording(ready.scene, ready.model, account, ready.path)
     checks = CrossChecks(ready.scene, ready.linkage, [each.channel for each in every], account)
     for block in blocks:
@@ -57,7 +57,7 @@ def test_a_spring_or_motor_that_is_missing_at_the_hub_is_noticed(acting: str, mo
 
 
 @pytest.mark.parametrize("kind", [*BEAMS, *SLIDERS])
-def test_drives_do_the_work_of_all_port_forces_on_the_nominal_motion(kind: str) -> None:
+def test_drives_do_the_work_of_all_port_forces_on_the_rigid_body_motion(kind: str) -> None:
     """To rounding, with every kind of joint between links that move, springs in them or not; of inertia's slider 2e-9."""
     checks, _ = compared(*ran((BEAMS | SLIDERS)[kind]()))
     assert checks.worked

@@ -1,4 +1,4 @@
-"""The condensed step against the literal one, joints at all times, forces in balance, work counted."""
+"""The condensed step against the monolithic one, joints at all times, forces in balance, work counted."""
 
 import tomllib
 from collections.abc import Mapping
@@ -16,8 +16,8 @@ from kedfem.dynamics.joints.ports import port_values, port_vectors
 from kedfem.dynamics.matrices import substructure
 from kedfem.dynamics.matrices.substructure import mass_substructure
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.nominal import drive_range
-from kedfem.dynamics.stepping.literal import LiteralSteps
+from kedfem.dynamics.rigid_body import drive_range
+from kedfem.dynamics.stepping.monolithic import MonolithicSteps
 from kedfem.dynamics.stepping.solvers import Steps, steps_of
 from kedfem.dynamics.stepping.transient import snapshots
 from kedfem.dynamics.system.steps import SystemSteps
@@ -69,13 +69,17 @@ def run(raw: Mapping[str, Any]) -> tuple[Model, Steps, list[Snapshot]]:
     [("beam", 720, 1e-8), ("bar", 120, 1e-8), ("plate", 24, 1e-7), ("plane", 120, 1e-7)],
 )
 @pytest.mark.parametrize("rho_inf", [1.0, pytest.param(0.8, marks=pytest.mark.long)])
-def test_condensed_is_literal_over_a_whole_turn(kind: str, steps: int, bound: float, rho_inf: float) -> None:
+def test_condensed_is_monolithic_over_a_whole_turn(
+    kind: str, steps: int, bound: float, rho_inf: float
+) -> None:
     model, solver, fast = run(four_bar(kind, rho_inf=rho_inf, steps_per_revolution=steps))
-    _, literal, slow = run(four_bar(kind, rho_inf=rho_inf, steps_per_revolution=steps, solver="monolithic"))
+    _, monolithic, slow = run(
+        four_bar(kind, rho_inf=rho_inf, steps_per_revolution=steps, solver="monolithic")
+    )
     assert isinstance(solver, SystemSteps)
-    assert isinstance(literal, LiteralSteps)
+    assert isinstance(monolithic, MonolithicSteps)
     assert solver.factorisations == len(model.links) == 3  # one per link, for the whole turn
-    assert literal.factorisations == steps
+    assert monolithic.factorisations == steps
     peak = max(np.abs(s.u).max() for snapshot in slow for s in snapshot.states)
     for a, b in zip(fast, slow, strict=True):
         for s, r in zip(a.states, b.states, strict=True):
@@ -105,7 +109,7 @@ def test_mass_is_solved_exactly_under_a_heavy_flywheel(element: str) -> None:
 
 
 @pytest.mark.parametrize("kind", ["beam", "bar"])
-def test_condensed_is_literal_however_long_the_step(kind: str) -> None:
+def test_condensed_is_monolithic_however_long_the_step(kind: str) -> None:
     raw = four_bar(kind, steps_per_revolution=36)
     raw["drive"]["motion"]["speed"] = (
         "6 rpm"  # a step of 0.28 s: the free links hang on their inertia by a thread
@@ -285,7 +289,7 @@ def worst_difference(a: list[Snapshot], b: list[Snapshot]) -> float:
 @pytest.mark.parametrize(
     ("example", "steps", "bound"), [("four_bar_beams", 720, 1e-8), ("four_bar_solids", 90, 1e-7)]
 )
-def test_condensed_is_literal_over_a_turn_of_the_examples(
+def test_condensed_is_monolithic_over_a_turn_of_the_examples(
     example: str, steps: int, bound: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The solids at 150 rpm are too badly conditioned for 1e-8 between the two: the monolithic step alone, its matrix

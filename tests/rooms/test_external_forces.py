@@ -58,7 +58,7 @@ def arm(kind: str, loads: dict[str, Any], speed: float = 1e-6, **analysis: Any) 
 
 
 def wrench(link: Link, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Resultant force and moment about the origin of forces on a link's functions, as drawn."""
+    """Resultant force and moment about the origin of forces on a link's functions, in the reference position."""
     if link.kind == "beam":
         moment = (link.X[:, 0] @ forces[:, 1] - link.X[:, 1] @ forces[:, 0]) + forces[:, 2].sum()
         return np.array([*(link.one @ forces)[:2], 0.0]), np.array([0.0, 0.0, moment])
@@ -153,7 +153,7 @@ def test_a_drive_takes_the_torque_on_the_link_that_it_carries() -> None:
     raw["joints"]["B"] = {"kind": "weld", "links": ["arm", "tip"], "at": [L, 0], "axis": "z"}
     scene = scene_from(raw)
     model = elastic_model(scene, linkage(scene))
-    (carried,) = model.carried
+    (carried,) = model.prescribed
     (load,) = carried.loads
     force, moment = wrench(carried.link, load.forces)
     assert_allclose(force, 0, atol=1e-10)

@@ -183,7 +183,7 @@ def test_cuts_between_segments_are_no_surface(kind: str) -> None:
 
 
 def test_a_run_that_goes_on_finds_the_same_damage(settled: Run, tmp_path: Path) -> None:
-    from kedfem.dynamics import nominal
+    from kedfem.dynamics import rigid_body
     from kedfem.dynamics.stepping import solvers
 
     scene = scene_from(swung(initial="quasi-static"), tmp_path)
@@ -193,7 +193,7 @@ def test_a_run_that_goes_on_finds_the_same_damage(settled: Run, tmp_path: Path) 
             raise KeyboardInterrupt
 
     with pytest.MonkeyPatch.context() as patch:
-        for module in (nominal, solvers):
+        for module in (rigid_body, solvers):
             patch.setattr(module, "POINTS", 16)
         patch.setattr("kedfem.resume.SHARE", 0.0)
         with pytest.raises(KeyboardInterrupt):

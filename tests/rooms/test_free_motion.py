@@ -1,4 +1,4 @@
-"""Linkages that nothing drives, or that a drive leaves free: mobility, rigid-body motion, velocities at the start."""
+"""Linkages that nothing drives, or that a drive releases: mobility, rigid-body motion, velocities at the start."""
 
 from typing import Any
 
@@ -66,7 +66,7 @@ def test_links_that_no_joint_holds_fly_with_six_motions_each() -> None:
     assert linkage(loose).mobility == 12
 
 
-def test_an_undriven_linkage_rests_nominally() -> None:
+def test_an_undriven_linkage_rests_in_its_rigid_body_motion() -> None:
     scene = linkage_scene(PENDULUM, drive=None)
     t = np.linspace(0, 1, 5)
     motion = motion_at(scene, t)
@@ -78,7 +78,7 @@ def test_an_undriven_linkage_rests_nominally() -> None:
     assert (motion.part(1, 3).t == t[1:3]).all()
 
 
-def test_a_pendulum_on_a_driven_crank_is_nominally_held_as_drawn() -> None:
+def test_a_pendulum_on_a_driven_crank_is_held_in_the_rigid_body_motion_as_drawn() -> None:
     motion = motion_at(linkage_scene(PENDULUM, **FOLLOWING), np.linspace(0, 7, 40))
     np.testing.assert_allclose(motion.R[:, 2], motion.R[:, 1], atol=1e-12)  # turns with the crank
     np.testing.assert_allclose(turned(motion, 1, np.array(Z)), motion.phi, atol=1e-9)
@@ -87,7 +87,7 @@ def test_a_pendulum_on_a_driven_crank_is_nominally_held_as_drawn() -> None:
         np.testing.assert_allclose(one, other, atol=1e-9)
 
 
-def test_a_five_bar_with_one_drive_is_nominally_a_four_bar() -> None:
+def test_a_five_bar_with_one_drive_moves_as_a_four_bar() -> None:
     P = [(0, 0, 0), (0, 0.2, 0), (0.4, 0.6, 0), (0.9, 0.6, 0), (1.0, 0, 0)]
     names = ["ground", "crank", "one", "two", "rocker", "ground"]
     joints = {x: ("revolute", names[k], names[k + 1], P[k], Z) for k, x in enumerate("ABCDE")}
@@ -102,7 +102,7 @@ def test_a_five_bar_with_one_drive_is_nominally_a_four_bar() -> None:
     assert sum(held) == 1 or np.abs(motion.R[:, 4] - np.eye(3)).max() < 1e-9
 
 
-def test_nominal_frames_leave_nothing_free() -> None:
+def test_rigid_body_frames_leave_nothing_free() -> None:
     scene = linkage_scene(PENDULUM)
     with pytest.raises(MotionError, match=r"link 'lower' can turn about z.*\"co-rotational\""):
         linkage(scene)

@@ -70,7 +70,7 @@ def tip(*force: float) -> dict[str, Any]:
 
 @pytest.mark.parametrize(
     ("rpm", "true"), [(60, 0.006), (150, 0.038), (300, 0.143), (400, 0.248), (600, 0.396)]
-)  # against geometrically exact beams, converged: tests/verification/nominal_frames.py
+)  # against geometrically exact beams, converged: tests/verification/rigid_body_frames.py
 def test_the_four_bar_of_the_source_is_judged_as_a_geometrically_exact_solution_does(
     rpm: float, true: float
 ) -> None:
@@ -183,7 +183,7 @@ def test_what_stiffening_leaves_is_said_without_advising_it_again() -> None:
     assert "stiffening" not in geometric_warning(stiffened)[0]
 
 
-def test_what_helps_where_a_joint_knows_nominal_frames_only() -> None:
+def test_what_helps_where_a_joint_knows_rigid_body_frames_only() -> None:
     ready, blocks = ran(inverted("beam", "slot", rho_inf=0.8, revolutions=0.01))
     found = GeometricError(ready.model)
     for block in blocks:

@@ -67,7 +67,7 @@ def test_where_finer_ones_are_too_many_the_mesh_is_the_usual_one(
     monkeypatch.setattr(filling, "_MOST", 1000)
     usual, mesh = (meshed(bored_shaft, tmp_path, Sizing(hollow=x)) for x in (np.pi / 4, ASKED))
     assert len(mesh.points) == len(usual.points)
-    assert "fillets and free bores no finer" in mesh.way
+    assert "fillets and free bores no finer" in mesh.method
 
 
 def test_too_many_elements_along_a_bore_are_made_fewer_and_it_says_so(
@@ -78,7 +78,7 @@ def test_too_many_elements_along_a_bore_are_made_fewer_and_it_says_so(
     monkeypatch.setattr(filling, "_MOST", most)
     mesh = meshed(bored_shaft, tmp_path, Sizing(hollow=np.radians(10)))
     assert 3 * len(usual.points) < 3 * len(mesh.points) <= most
-    assert "fillets and free bores by " in mesh.way
+    assert "fillets and free bores by " in mesh.method
 
 
 def rounded(occ: ModuleType) -> None:

@@ -37,7 +37,11 @@ def numbers(rows: list[dict[str, str]], *names: str) -> np.ndarray:
     return np.array([[float(row[name] or "nan") for name in names] for row in rows])
 
 
-PLACE = ("x as drawn [m]", "y as drawn [m]", "z as drawn [m]")
+PLACE = (
+    "reference x [m]",
+    "reference y [m]",
+    "reference z [m]",
+)
 
 
 def test_the_first_of_each_link_is_its_peak(run: Run) -> None:
@@ -51,7 +55,7 @@ def test_the_first_of_each_link_is_its_peak(run: Run) -> None:
 
 
 def test_the_others_are_the_highest_at_places_apart(run: Run) -> None:
-    """Of all points of the envelope none is higher than the last that is told, but beside one that is told."""
+    """Of all points of the envelope none is higher than the last that is reported, but beside one that is reported."""
     every, top = lines(run.folder / "envelope.csv"), lines(run.folder / "peaks.csv")
     for link in run.peaks:
         mine, told = ([row for row in rows if row["link"] == link] for rows in (every, top))

@@ -18,7 +18,7 @@ from kedfem.dynamics.inertias import (
     load_power,
 )
 from kedfem.dynamics.loads import applied
-from kedfem.dynamics.nominal import motions
+from kedfem.dynamics.rigid_body import motions
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.links.build import bare_links
@@ -26,7 +26,7 @@ from kedfem.links.record import in_space
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.reactions import BlockReactions, Reactions, reactions
 from kedfem.motion.rigid import RigidMotion, rigid_motion
-from kedfem.results.forces.rigid import RigidForces, rigid_forces, told
+from kedfem.results.forces.rigid import RigidForces, determined, rigid_forces
 from kedfem.results.recording import recording
 from kedfem.scene import Scene, drive_angle, path_parameter, scene_from, time_grid
 
@@ -261,7 +261,7 @@ def test_the_drives_torque_is_that_of_virtual_work_on_all_nodes(raw: dict[str, A
     found = rigid_forces(ready.scene, ready.linkage, masses, ready.path).rows(motion)
     work = np.zeros(len(motion.t))
     every = [*zip(model.links, model.bodies, model.loads, strict=True),
-             *((x.link, x.body, x.loads) for x in model.carried)]  # fmt: skip
+             *((x.link, x.body, x.loads) for x in model.prescribed)]  # fmt: skip
     for link, body, loads in every:  # −Σ F · ∂R0/∂φ, with the sliders' mass on the nodes that carry it
         F = applied(link, loads, motion, body)
         f = in_space(link, F)
@@ -271,7 +271,7 @@ def test_the_drives_torque_is_that_of_virtual_work_on_all_nodes(raw: dict[str, A
         if link.kind == "beam":
             work -= motion.omega_phi[:, body, 2] * (F[:, :, 2] @ link.one)
     torque = found["drive/rigid_torque"][:, 0]
-    assert (len(model.carried) == 1) == carried
+    assert (len(model.prescribed) == 1) == carried
     assert_allclose(torque, work, rtol=0, atol=1e-11 * np.abs(work).max())
 
 
@@ -387,11 +387,11 @@ def test_what_is_told_does_not_depend_on_how_redundant_rows_share(raw: dict[str,
 def test_told_columns() -> None:
     n = np.array([0.0, 0.6, 0.8])
     full = np.eye(3)
-    assert told(np.zeros((3, 3)), full)[0] == ("x", "y", "z")
-    assert told(np.diag([0.0, 0.0, 1.0]), full)[0] == ("x", "y")
-    assert told(np.eye(3), full)[0] == ()
-    assert told(np.zeros((3, 3)), np.zeros((3, 3)))[0] == ()  # a ball bears no moment
-    columns_, P, text = told(np.outer(n, n), full)
+    assert determined(np.zeros((3, 3)), full)[0] == ("x", "y", "z")
+    assert determined(np.diag([0.0, 0.0, 1.0]), full)[0] == ("x", "y")
+    assert determined(np.eye(3), full)[0] == ()
+    assert determined(np.zeros((3, 3)), np.zeros((3, 3)))[0] == ()  # a ball bears no moment
+    columns_, P, text = determined(np.outer(n, n), full)
     assert columns_ == ("x", "y", "z")
     assert_allclose(P, np.eye(3) - np.outer(n, n), atol=1e-12)
     assert "(0, 0.6, 0.8)" in text or "(0, -0.6, -0.8)" in text

@@ -1,4 +1,4 @@
-"""Joints between elastic links: what they hold, what they leave free, whatever the direction of the scene."""
+"""Joints between elastic links: what they hold, what they release, whatever the direction of the scene."""
 
 import gc
 import tracemalloc
@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.dynamics.elastic_model import elastic_model
-from kedfem.dynamics.nominal import drive_range
+from kedfem.dynamics.rigid_body import drive_range
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.motion.linkage import linkage
@@ -139,7 +139,7 @@ def test_a_ball_leaves_turning_free_and_holds_the_point() -> None:
 
 
 def test_memory_does_not_grow_with_the_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("kedfem.dynamics.nominal.POINTS", 256)
+    monkeypatch.setattr("kedfem.dynamics.rigid_body.POINTS", 256)
     raw = four_bar("beam", steps_per_revolution=2000)
     scene = scene_from(raw)
     joined = linkage(scene)

@@ -376,7 +376,9 @@ def test_without_a_drive_the_linkage_rests_and_the_command_says_so(
     path.write_text(text, encoding="utf-8")
     said = run_kedfem("kinematics", path)
     assert said.code == USER_ERROR
-    wanted = "drive: is required for kinematics, got none: without one the linkage rests as drawn"
+    wanted = (
+        "drive: is required for kinematics, got none: without one the linkage rests in the reference position"
+    )
     assert wanted in " ".join(said.err.split())
     assert not (tmp_path / "free-kinematics").exists()
 

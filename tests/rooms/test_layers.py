@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from kedfem.mesh import SolidMesh, mesh_quality
-from kedfem.mesh.cad.solids import CadFace, OtherWayError, Sizing, Solid
+from kedfem.mesh.cad.solids import CadFace, OtherMethodError, Sizing, Solid
 from kedfem.mesh.cad.words import direction_in_words
 from kedfem.mesh.elements.shape_functions import HEX27, shape_functions, shape_gradients
 from kedfem.mesh.layered.cusps import Cusp, cusps
@@ -261,18 +261,18 @@ class TestParts:
 
     @pytest.mark.parametrize("part", MAPPED, ids=lambda part: part.__name__)
     def test_that_can_be_mapped_are(self, part):
-        assert meshed(part).way.startswith("mapped blocks, swept along z through")
+        assert meshed(part).method.startswith("mapped blocks, swept along z through")
 
     @pytest.mark.parametrize("part", PAVED, ids=lambda part: part.__name__)
     def test_that_cannot_say_what_made_them(self, part):
-        assert "quadrilaterals swept along z through" in (way := meshed(part).way)
+        assert "quadrilaterals swept along z through" in (way := meshed(part).method)
         assert "gmsh algorithm" in way
 
     def test_turned_and_far_away_are_meshed_where_they_are(self):
         with part_in_gmsh(connecting_rod, (1, 2, 3, 0.8)) as (gmsh, solid):
             mesh = layered_mesh(gmsh, solid, Sizing())
             assert_same_body(mesh, gmsh, tolerance=5e-5)
-        assert "along (0.448, -0.0617, 0.892)" in mesh.way  # the third column of the rotation
+        assert "along (0.448, -0.0617, 0.892)" in mesh.method  # the third column of the rotation
         assert mesh_quality(mesh).least > 0.3
 
     @pytest.mark.parametrize("scale", [0.02, 50])
@@ -313,7 +313,7 @@ class TestCusps:
         assert_conforming(mesh)
         gained = figures(mesh)[0] / wanted - 1
         assert 1e-5 < gained < 3e-4  # 2e-4 at most by intent, 1e-5 for curved sides
-        assert f"cusps between touching edges filled, {100 * 2e-4:.2g} % of the volume" in mesh.way
+        assert f"cusps between touching edges filled, {100 * 2e-4:.2g} % of the volume" in mesh.method
 
     def test_that_are_left_are_refused_with_their_place(self):
         """The web's side touches the circle of radius 20 where its normal has the sine (20 - 12) / 90."""
@@ -326,7 +326,7 @@ class TestCusps:
             found = [refusal_of(plan, cusp) for cusp in cusps(plan)]
             assert len(found) == 4
             with pytest.raises(
-                OtherWayError, match="must meet at angles of at least 6°, got two that touch at"
+                OtherMethodError, match="must meet at angles of at least 6°, got two that touch at"
             ):
                 plan_mesh("part", plan, 0.1, Sizing())
         assert any(place in words for words in found)
@@ -349,18 +349,18 @@ class TestBlocks:
             assert_same_body(mesh, gmsh, tolerance=1e-5)
         assert len(mesh.cells) == count
         assert mesh_quality(mesh).least > 0.9
-        assert mesh.way.startswith("one mapped block of ")
+        assert mesh.method.startswith("one mapped block of ")
         assert_conforming(mesh)
 
     def test_have_elements_of_the_size_that_is_asked_for(self):
         with part_in_gmsh(bar) as (gmsh, solid):
-            assert "20 × 4 × 2" in block_mesh(gmsh, solid, Sizing(size=5 * MM)).way
+            assert "20 × 4 × 2" in block_mesh(gmsh, solid, Sizing(size=5 * MM)).method
 
     @pytest.mark.parametrize("part", [connecting_rod, disc, washer])
     def test_other_forms_are_refused(self, part):
         with (
             part_in_gmsh(part) as (gmsh, solid),
-            pytest.raises(OtherWayError, match="must have six faces with four edges each, got"),
+            pytest.raises(OtherMethodError, match="must have six faces with four edges each, got"),
         ):
             block_mesh(gmsh, solid, Sizing())
 
@@ -406,7 +406,7 @@ class TestSizing:
 
     def test_layers_are_at_least_so_many_in_each_slab(self):
         mesh = meshed(connecting_rod, Sizing(layers=2))
-        assert "through 5 slabs, 10 layers" in mesh.way
+        assert "through 5 slabs, 10 layers" in mesh.method
         heights = np.unique(mesh.points[:, 2].round(9))
         assert len(heights) == 2 * 10 + 1
 
@@ -426,9 +426,9 @@ class TestRefusals:
         def crossed(occ: ModuleType) -> Shapes:
             return drilled(occ, post(occ, 20, 10, -1, 9, 4))
 
-        assert "swept along y" in meshed(drilled).way
+        assert "swept along y" in meshed(drilled).method
         with pytest.raises(
-            OtherWayError,
+            OtherMethodError,
             match=r"the [a-z ]+ of radius [24] mm along . near \(.*\) mm \(face \d+\) is neither along nor",
         ):
             meshed(crossed)
@@ -440,14 +440,14 @@ class TestRefusals:
             return occ.fillet([shape[0][1]], [1, 6], [2 * MM])
 
         with pytest.raises(
-            OtherWayError,
+            OtherMethodError,
             match=r"part: no layers along one direction, as the rounded edge of radius 2 mm along z near",
         ):
             meshed(rounded)
 
     def test_a_ball_has_no_layers(self):
         with pytest.raises(
-            OtherWayError, match="part: no layers along one direction, as it has no plane face"
+            OtherMethodError, match="part: no layers along one direction, as it has no plane face"
         ):
             meshed(lambda occ: [(3, occ.addSphere(0, 0, 0, 0.01))])
 
@@ -492,18 +492,18 @@ class TestRandomLayers:
         with part_in_gmsh(part, (1, 1, 0, tilt)) as (gmsh, solid):
             try:
                 mesh = layered_mesh(gmsh, solid, Sizing())
-            except OtherWayError:
+            except OtherMethodError:
                 event("refused")
                 if abs(web - 1) > 0.1:
                     raise
                 return
-            assert_same_body(mesh, gmsh, tolerance=1e-3 if "cusps" in mesh.way else 1e-4)
+            assert_same_body(mesh, gmsh, tolerance=1e-3 if "cusps" in mesh.method else 1e-4)
         assert mesh_quality(mesh).least > (0.3 if abs(web - 1) > 0.25 else 0.1)
         assert_conforming(mesh)
 
 
 class TestCount:
-    """A step of 0.1 mm asks for elements as thin: millions of them are told before any is made."""
+    """A step of 0.1 mm asks for elements as thin: millions of them are reported before any is made."""
 
     @staticmethod
     def stepped(occ: ModuleType) -> Shapes:
@@ -516,7 +516,7 @@ class TestCount:
             "kedfem.mesh.layered.layers.plan_mesh", lambda *given: made.append(given) or plan_mesh(*given)
         )
         with pytest.raises(
-            OtherWayError, match=r"swept along z through 2 slabs, 16 layers: about 3.3 million unknowns"
+            OtherMethodError, match=r"swept along z through 2 slabs, 16 layers: about 3.3 million unknowns"
         ):
             meshed(self.stepped)
         assert len(made) == 1  # a finer one would have more
@@ -529,7 +529,7 @@ class TestCount:
             return occ.cut([box(occ, 0, 0, 0, 60, 40, 10)], [post(occ, 30, 20, -1, 11, 6)])[0]
 
         mesh = meshed(plate, Sizing(size=2 * MM))  # a size that is asked for is taken
-        with pytest.raises(OtherWayError) as caught:
+        with pytest.raises(OtherMethodError) as caught:
             meshed(plate)
         monkeypatch.undo()
         told = float(re.search(r"about ([\d.e-]+) million", str(caught.value))[1])

@@ -1,4 +1,4 @@
-"""Loads for suppliers: closed forms of equivalent loads, of rotating and sinusoidal ones, and what a run tells."""
+"""Loads for suppliers: closed forms of equivalent loads, of rotating and sinusoidal ones, and what a run reports."""
 
 import csv
 import json

@@ -286,7 +286,7 @@ class TestExtrusion:
         }  # a quarter of a circle that ends along the first edge
         shape = extrusion_shape([[0, 0], [0.2, 0], [0.2, 0.1], [0.1, 0.1], touching], [])
         mesh = meshed(**shape, mesh={"size": size})
-        assert mesh.way == "cusps between touching edges cut off, 0.02 % of the area"
+        assert mesh.method == "cusps between touching edges cut off, 0.02 % of the area"
         assert mesh_quality(mesh).least >= 0.4
         assert_allclose(volume(mesh), 0.02 * (0.02 - math.pi * 0.0025) * (1 - 2e-4), rtol=2e-5)
 
@@ -312,14 +312,14 @@ class TestUnknowns:
         link = LinkScene(shape=shape, mesh={"unknowns": wanted, **({} if plane else {"layers": 2})}, **sizes)
         mesh = (plane_mesh if plane else link_mesh)("arm", link, GEOMETRY)
         assert 0.75 < (2 if plane else 3) * len(mesh.points) / wanted < 1.33
-        assert mesh.way == ""
+        assert mesh.method == ""
 
     @pytest.mark.parametrize("kind", ["plate_link", "extrusion"])
     def test_fewer_than_the_shape_has_are_told(self, kind):
         shape = plate_shape(0.3, 0.03, 0.05, 0.02) if kind == "plate_link" else extrusion_shape(*OUTLINES[0])
         mesh = meshed(**shape, mesh={"unknowns": 300})
         assert len(mesh.points) > 130
-        assert mesh.way == "the nearest found to the 300 unknowns asked for"
+        assert mesh.method == "the nearest found to the 300 unknowns asked for"
 
 
 class TestParts:

@@ -39,8 +39,8 @@ def volume_and_centre(mesh: SolidMesh) -> tuple[float, np.ndarray]:
     return float(m1.sum()), np.asarray(m1 @ record.X / m1.sum())
 
 
-#: Radii [mm] of the bores, ball coupling surfaces and balls that geometry/README.md lists.
-SEATS = {
+#: Radii [mm] of the bores, ball seats and balls that geometry/README.md lists.
+ROUND = {
     "ball_ended_rod": [2.5, 12, 12],
     "bell_crank": [6, 7, 10],
     "bent_rocker": [6, 7, 12.5],
@@ -55,47 +55,47 @@ SEATS = {
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("part", SEATS)
+@pytest.mark.parametrize("part", ROUND)
 def test_parts_mesh_unattended_with_their_bores_found(part: str) -> None:
     mesh = made(f"{part}.step")
     assert mesh.tetrahedra or mesh_quality(mesh).least >= 0.3
     assert valid_everywhere(mesh.points, mesh.cells).all()
     assert 3 * len(mesh.points) < (45_000 if mesh.tetrahedra else 70_000)
-    seats = [face for face in mesh.faces if face_kind(mesh, face) in {"bore", "ball seat", "ball"}]
-    assert_allclose(sorted(1e3 * face.radius for face in seats), SEATS[part], rtol=1e-6)
+    surfaces = [face for face in mesh.faces if face_kind(mesh, face) in {"bore", "ball seat", "ball"}]
+    assert_allclose(sorted(1e3 * face.radius for face in surfaces), ROUND[part], rtol=1e-6)
 
 
 class TestLadder:
     def test_the_best_way_that_the_part_allows_is_taken_and_told(self) -> None:
-        assert "swept along z" in made().way
+        assert "swept along z" in made().method
         assert mesh_quality(made()).least > 0.3
 
     def test_a_part_that_is_no_layers_is_filled_another_way_and_the_reason_told(self) -> None:
         mesh = made("ball_ended_rod.step")
-        assert "tetrahedra" in mesh.way
+        assert "tetrahedra" in mesh.method
         assert (
             "no layers along one direction, as the ball of radius 12 mm near (150, 0, 0) mm (face 14) is"
-            in mesh.way
+            in mesh.method
         )
         assert mesh.cell_type == "tetra10"
         assert valid_everywhere(mesh.points, mesh.cells).all()
 
     def test_a_part_that_no_way_fills_is_refused_with_the_reasons(self) -> None:
         def refused(*_: Any) -> SolidMesh:
-            raise methods.OtherWayError("is not what this way wants")
+            raise methods.OtherMethodError("is not what this way wants")
 
         message = r"^crank.step: must be a solid .* got none: is not what this way wants; is not what this way .*; take"
         with pytest.raises(MeshError, match=message):
-            methods.best_mesh("crank.step", math, CUBE, methods.Sizing(), ways=(refused, refused))
+            methods.best_mesh("crank.step", math, CUBE, methods.Sizing(), methods=(refused, refused))
 
     def test_the_better_of_two_poor_meshes_is_taken(self) -> None:
         poor, poorer = sheared(0.97, "first"), sheared(0.99, "second")
         assert mesh_quality(poorer).least < mesh_quality(poor).least < methods.ENOUGH
         for order in ([poor, poorer], [poorer, poor]):
             both = tuple(lambda *_, mesh=mesh: mesh for mesh in order)
-            taken = methods.best_mesh("crank.step", math, CUBE, methods.Sizing(), ways=both)
-            assert taken.way.startswith("first")
-            assert ("worst scaled Jacobian" in taken.way) == (order[0] is poorer)
+            taken = methods.best_mesh("crank.step", math, CUBE, methods.Sizing(), methods=both)
+            assert taken.method.startswith("first")
+            assert ("worst scaled Jacobian" in taken.method) == (order[0] is poorer)
 
 
 def sheared(by: float, way: str) -> SolidMesh:
@@ -103,7 +103,7 @@ def sheared(by: float, way: str) -> SolidMesh:
     corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
     points = np.array([(x, y, z) for z in (-1, 1) for x, y in corners], dtype=float)
     points[:, :2] = points[:, :2] @ np.array([[1, 0], [by, np.sqrt(1 - by**2)]])
-    return SolidMesh(points, np.arange(8)[None], way=way)
+    return SolidMesh(points, np.arange(8)[None], method=way)
 
 
 class TestApart:
@@ -208,7 +208,9 @@ class TestSizes:
             assert 0.75 < 3 * len(made(mesh={"unknowns": wanted}).points) / wanted < 1.33
 
     def test_fewer_unknowns_than_the_shape_allows_are_told(self) -> None:
-        assert made(mesh={"unknowns": 500}).way.endswith("; the nearest found to the 500 unknowns asked for")
+        assert made(mesh={"unknowns": 500}).method.endswith(
+            "; the nearest found to the 500 unknowns asked for"
+        )
 
     def test_layers_are_the_least_through_each_slab(self) -> None:
         assert len(made(mesh={"layers": 3}).cells) > 1.5 * len(made().cells)
@@ -227,7 +229,7 @@ class TestKept:
         monkeypatch.setattr(methods, "apart", None)
         again = made()
         assert np.array_equal(again.points, first.points)
-        assert again.way == first.way
+        assert again.method == first.method
         with pytest.raises(TypeError):
             made(mesh={"size": 0.01})
 

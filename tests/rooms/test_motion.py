@@ -160,7 +160,7 @@ def test_a_structure_is_refused_with_what_would_let_it_move(change: JointTable, 
 
 
 def test_axes_that_are_slightly_askew_are_refused_where_they_no_longer_fit() -> None:
-    """1e-5 rad: a first-order test of mobility cannot see it as drawn; further on the joints come apart."""
+    """1e-5 rad: a first-order test of mobility cannot see it there; further on the joints come apart."""
     askew = {**BAR, "C": ("revolute", "coupler", "rocker", BAR["C"][3], (1e-5, 0.0, 1.0))}
     message = refusal(askew)
     assert re.match(r"joints\.[A-D]: the linkage must follow its drive joints\.A", message)

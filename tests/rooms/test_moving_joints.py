@@ -95,7 +95,7 @@ def test_stiffer_links_bear_what_rigid_ones_do() -> None:
 
 
 @pytest.mark.parametrize("kind", list(KINDS))
-def test_the_systems_steps_are_the_literal_ones(kind: str) -> None:
+def test_the_systems_steps_are_the_monolithic_ones(kind: str) -> None:
     """Two ways to one number."""
     found = []
     for solver in ("monolithic", "condensed"):
@@ -121,7 +121,7 @@ def test_joints_stay_closed_and_what_is_free_is_free(kind: str) -> None:
             open_ = max(open_, float(np.abs(rows.C[k] @ z)[~rows.soft].max()))
             size = max(size, float(np.abs(z).max()))
     assert open_ < 1e-10 * max(size, 1e-3)
-    assert size > 1e-8 or kind == "driven slide"  # which holds all of its seat
+    assert size > 1e-8 or kind == "driven slide"  # which holds all of its coupling surface
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "two drives"])
@@ -206,7 +206,7 @@ def test_a_pin_that_leaves_its_link_is_refused() -> None:
     raw["links"]["arm"] = bar("beam", (-0.3, 0), (0.03, 0.11))
     raw["joints"]["S"] |= {"at": [0, 0.1], "axis": [3, 1, 0]}
     wanted = r"joints\.S: the pin must stay on link 'arm', which reaches from -0.316\d* to 0.0316\d* m along the line, "
-    with pytest.raises(MeshError, match=wanted + r"got a way from -0.116\d* to 0.0837\d* m"):
+    with pytest.raises(MeshError, match=wanted + r"got a travel from -0.116\d* to 0.0837\d* m"):
         ran(raw)
 
 

@@ -187,7 +187,7 @@ def cushion(occ: Any) -> None:
     occ.fuse(solid, [(3, pin(occ, (45, 20), 3, 10, 30)), (3, occ.addSphere(45, 20, 32, 5))])
 
 
-def test_blends_and_halves_of_bores_are_no_seats(tmp_path: Path) -> None:
+def test_blends_and_halves_of_bores_are_no_coupling_surfaces(tmp_path: Path) -> None:
     written(tmp_path, "cushion", cushion, ("step",))
     (solid,) = assembly_solids(tmp_path / "cushion.step", None)
     seen = sorted((each.kind, each.inward, round(each.radius / MM, 6)) for each in solid.rounds)

@@ -17,7 +17,7 @@ from kedfem.scene import Cad
 
 from ..turned import ball_on_neck, turned
 from .cad_files import lever, written
-from .test_seats import with_face
+from .test_coupling_surfaces import with_face
 
 
 def with_rounds(mesh: SolidMesh, *rounds: tuple[str, float, float, float]) -> SolidMesh:
@@ -31,7 +31,7 @@ def with_rounds(mesh: SolidMesh, *rounds: tuple[str, float, float, float]) -> So
     return mesh
 
 
-def test_what_a_joint_finds_is_told_of_each_seat() -> None:
+def test_what_a_joint_finds_is_told_of_each_coupling_surface() -> None:
     """A stepped sleeve: its journals are beside its bores, where a joint goes into the bore."""
     sleeve = turned([(0.0, 0.01, 0.005, 0.01), (0.01, 0.02, 0.004, 0.015)])
     rounds = [("wide bore", 0.005, 0, 0.01), ("bore", 0.004, 0.01, 0.02), ("rim", 0.015, 0.01, 0.02)]

@@ -70,3 +70,36 @@ def test_the_notation_lists_all_renamed_keys_and_values() -> None:
             names = [re.match(r" `(\w+) =", cell) for cell in row[1:3]]
             found |= {old[1]: new[1] for old, new in [names] if old and new and old[1] != new[1]}
     assert found == KEYS | VALUES
+
+
+RETIRED = {
+    "nominal": r"\bnominal",
+    "seat": r"(?<!ball )\bseats?\b(?!\.)|_seat\b|\bseat_",
+    "literal": r"\bliteral\b|\bLiteralS|literal_(?!e)",
+    "as drawn": r"\bas drawn\b(?! by hand)",
+    "drawn position": r"\bdrawn position",
+    "in full": r"\blinks in full\b",
+    "told": r"\btold\b(?! (?:of|to|apart)\b)",
+    "noticed": r"\bNOTICED\b",
+    "looked at": r"\blooked at\b",
+    "carried": r"\.carried\b",
+    "left over": r"\bleft over\b",
+    "leaves free": r"\bleaves? free\b",
+    "action": r"\bactions?\b",
+    "sweeps": r"\bSWEEPS\b",
+}
+"""Words of docs/notation.md that the package does not use any more; its names and prose have the right column."""
+
+
+@pytest.mark.parametrize("word", RETIRED)
+def test_the_package_speaks_the_words_of_the_field(word: str) -> None:
+    package = TABLE.parents[1] / "src" / "kedfem"
+    used = [
+        f"{file.relative_to(package)}:{number}: {line.strip()}"
+        for file in package.rglob("*.py")
+        if file.name != "wording.py"
+        for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1)
+        if re.search(RETIRED[word], line)
+    ]
+    assert used == []
+    assert word.split(maxsplit=1)[0] in TABLE.read_text(encoding="utf-8")

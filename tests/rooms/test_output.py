@@ -42,7 +42,7 @@ HEX27 = np.array([
 
 
 def filled(name: str, cell_type: str, cells: np.ndarray, points: np.ndarray) -> LinkField:
-    """A link with numbers that tell node and component."""
+    """A link with numbers that show node and component."""
     node = np.arange(len(points), dtype=float)
     stress = 1e6 * (node[:, None] + np.arange(6) / 10)
     principal = 1e6 * np.c_[node - 1, node + 2]

@@ -53,7 +53,7 @@ def test_what_the_scene_states_stays() -> None:
     link = plan.scene.links["arm"]
     assert (link.model, link.reduced, link.mesh.elements) == ("solid", False, (8, 2, 1))
     assert time_grid(plan.scene).steps == 200
-    assert "the scene states all meshes; the run tells their error" in plan.notes
+    assert "the scene states all meshes; the run reports their error" in plan.notes
 
 
 def test_links_whose_steps_in_full_would_be_dear_are_reduced_unless_they_or_the_step_are_stated(
@@ -175,7 +175,7 @@ def test_frames_follow_beams_in_space_that_bend_far() -> None:
     raw["analysis"] |= {"accuracy": 0.02}
     plan = planned(scene_from(raw))
     assert plan.scene.analysis.frames == "co-rotational"
-    assert any("frames follow" in note for note in plan.notes)
+    assert any("frames are co-rotational" in note for note in plan.notes)
 
 
 def test_trials_that_differ_in_the_step_share_their_model() -> None:
@@ -251,7 +251,7 @@ def beams(speed: str, **analysis: Any) -> dict[str, Any]:
     return raw
 
 
-def test_at_60_rpm_frames_are_nominal_and_the_step_is_what_is_needed() -> None:
+def test_at_60_rpm_frames_are_rigid_body_and_the_step_is_what_is_needed() -> None:
     """3,700 steps leave 0.13 % over two turns, 1,830 leave 0.29 % of the 0.3 % that the step may cost."""
     plan = planned(scene_from(beams("60 rpm")))
     assert plan.reached

@@ -15,7 +15,7 @@ from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.model import Model
 from kedfem.errors import KedfemError, MeshError
 from kedfem.links.build import bare_links
-from kedfem.links.surfaces.coupling_surfaces import joint_seat
+from kedfem.links.surfaces.coupling_surfaces import joint_surface
 from kedfem.mesh import QuadMesh, SolidMesh, link_mesh, mesh_quality, plane_mesh
 from kedfem.motion.linkage import linkage
 from kedfem.output.array_names import DISPLACEMENT, STRESS, VON_MISES
@@ -130,8 +130,8 @@ def test_a_driven_bore_is_as_stiff_whatever_its_mesh(kind: str, sizes: tuple[int
         raw["output"] = {"probes": {"B": {"link": "crank", "at": [0.3048 * 0.4, 0.3048 * 0.4 * 3**0.5],
                                           "quantity": "displacement"}}}  # fmt: skip
         link = bare_links(scene_from(raw))["crank"]
-        seat = joint_seat(link, "A", np.zeros(3), np.array([0.0, 0, 1]))
-        across.append(seat.directions[0 if kind == "plane" else 1] @ link.axes[:, 0])
+        surface = joint_surface(link, "A", np.zeros(3), np.array([0.0, 0, 1]))
+        across.append(surface.directions[0 if kind == "plane" else 1] @ link.axes[:, 0])
         found.append(histories(raw)["probes/B/displacement"][0])
     assert abs(abs(across[0]) - abs(across[1])) > 0.9
     # the mesh's own error; held along one direction only, the eye's compliance changed it by 40 %
@@ -154,7 +154,7 @@ def mixed(*fidelities: str, **analysis: Any) -> dict[str, Any]:
     "kinds", [("plane", "beam", "solid"), ("solid", "plane", "beam"), ("beam", "solid", "plane")]
 )
 def test_plane_links_beams_and_solids_share_a_scene(kinds: tuple[str, ...]) -> None:
-    """Hinges close between rows of two and of three components; condensed is literal; pins stay upright."""
+    """Hinges close between rows of two and of three components; condensed is monolithic; pins stay upright."""
     model, _, fast = run(mixed(*kinds))
     _, _, slow = run(mixed(*kinds, solver="monolithic"))
     peak = max(np.abs(s.u).max() for snapshot in slow for s in snapshot.states)

@@ -70,7 +70,7 @@ def test_factors_that_do_not_fit_twice_leave_one_level(monkeypatch: pytest.Monke
 
 
 def test_what_nothing_drives_has_its_beams_chosen() -> None:
-    """A beam that a joint lets fall: its stated step stays, frames follow, and one beam3 is not taken unseen."""
+    """A beam that a joint lets fall: its step stays, frames are co-rotational, and one beam3 is not taken unseen."""
     raw: dict[str, Any] = {
         "gravity": [0, -9.81, 0],
         "links": {"arm": {

@@ -94,7 +94,7 @@ def test_rigid_and_elastic_motion_add_up_on_links_of_every_kind(kind: str, frame
     for link, X in at.items():
         f, x, travel, v, a = (values(read, f"{link} {quantity}", quantity) for quantity in QUANTITIES)
         n = x.shape[1]
-        rigid = done.nominal(link, X)[:, :n]
+        rigid = done.rigid_motion(link, X)[:, :n]
         np.testing.assert_allclose(x, rigid + f, atol=1e-12)  # R' = R + f, [KED, eqs. (2)(3)]
         np.testing.assert_allclose(travel, x - np.array([*X, 0.0])[:n], atol=1e-12)
         h = done.t[1] - done.t[0]

@@ -1,4 +1,4 @@
-"""The page about a run: it shows what the run wrote, fetches nothing, and tells what is missing."""
+"""The page about a run: it shows what the run wrote and what is missing, and fetches nothing."""
 
 import contextlib
 import json
@@ -114,7 +114,7 @@ def shown(folder: Path) -> Animated:
 
 
 def test_solids_are_drawn_where_frames_have_them(solid: Path) -> None:
-    """Every point and its stress, in each frame; the links' axes move as the drive does; then as drawn."""
+    """Every point and its stress, in each frame; the links' axes move as the drive does; then undeformed."""
     found, written = shown(solid), frames_of(solid)
     (surface,) = found.surfaces
     drawn, *placed = surface.world()
@@ -255,7 +255,7 @@ def told(folder: Path) -> str:
 
 
 def test_what_is_missing_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without animation as drawn; without anything to draw; damaged frames; rows of a run that was stopped; no rows."""
+    """Without animation undeformed; without anything to draw; damaged frames; rows of a run that was stopped; no rows."""
     folder = run(swung(animation=False), tmp_path)
     assert "does not move: the run left no animation" in told(folder)
     for name in ("envelope.vtu", "worst.vtu"):

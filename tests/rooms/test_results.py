@@ -1,4 +1,4 @@
-"""Results: what is written is read, the status tells the truth, and nothing old is lost."""
+"""Results: what is written is read, the status is true, and nothing old is lost."""
 
 import csv
 import errno
@@ -55,7 +55,7 @@ NOTES = {"solver": "condensed", "factorisations": 3, "alpha": 0.25}
 
 
 def rows(first: int, count: int) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
-    """Rows whose numbers tell their place."""
+    """Rows whose numbers show their place."""
     step = np.arange(first, first + count, dtype=float)
     values = {c.name: step[:, None] / 3 + np.arange(len(c.columns)) for c in CHANNELS}
     return step * 1e-3, step * 0.1, values

@@ -11,7 +11,7 @@ import pytest
 
 from kedfem.accuracy.histories import Histories, relative_errors
 from kedfem.analysis import Run, analyse
-from kedfem.dynamics import nominal
+from kedfem.dynamics import rigid_body
 from kedfem.dynamics.stepping import solvers
 from kedfem.errors import OutputError, SceneError
 from kedfem.memory import Packed, packed
@@ -73,7 +73,7 @@ def turning(folder: Path, **analysis: Any) -> Scene:
 @pytest.fixture(autouse=True)
 def _states_at_every_block(monkeypatch: pytest.MonkeyPatch) -> None:
     """Blocks of few steps, and a state after each, however long that takes."""
-    monkeypatch.setattr(nominal, "POINTS", 16)
+    monkeypatch.setattr(rigid_body, "POINTS", 16)
     monkeypatch.setattr(solvers, "POINTS", 16)
     monkeypatch.setattr("kedfem.resume.SHARE", 0.0)
 
@@ -116,7 +116,7 @@ def test_a_resumed_run_leaves_what_an_undisturbed_one_does_bit_by_bit(tmp_path: 
     ended = scene_of(kind, tmp_path / "ended", analysis)
     ended_early(ended, 0.4)
     state = (ended.results_folder / STATE).read_bytes()
-    rows = Packed(state[32:]).said["rows"]
+    rows = Packed(state[32:]).content["rows"]
     assert STEPS / 4 < rows <= len(read_results(ended.results_folder / "results.h5").time) < STEPS
     resumed = analyse(ended, resumes=True)
     assert_same(whole, content(resumed))
@@ -128,10 +128,10 @@ ELSEWHERE = """
 import sys
 from pathlib import Path
 from kedfem.analysis import analyse
-from kedfem.dynamics import nominal
+from kedfem.dynamics import rigid_body
 from kedfem.dynamics.stepping import solvers
 from tests.rooms.test_resume import turning
-nominal.POINTS = solvers.POINTS = 16
+rigid_body.POINTS = solvers.POINTS = 16
 run = analyse(turning(Path(sys.argv[1]), frames=sys.argv[2], extrapolation_levels=2), resumes=True)
 print(max(run.step.errors.values()))
 """
@@ -174,7 +174,7 @@ def test_a_resumed_steady_motion_knows_what_the_search_for_it_found(tmp_path: Pa
 @pytest.mark.parametrize("points", [16, 1024])
 def test_poses_that_return_are_found_again(tmp_path: Path, at: float, points: int, monkeypatch: Any) -> None:
     """Wherever blocks of the rigid-body motion end: beyond the first turn its poses are those of the first."""
-    monkeypatch.setattr(nominal, "POINTS", points)
+    monkeypatch.setattr(rigid_body, "POINTS", points)
     whole = content(analyse(turning(tmp_path / "whole")))
     ended_early(turning(tmp_path / "ended"), at)
     assert_same(whole, content(analyse(turning(tmp_path / "ended"), resumes=True)))
@@ -189,7 +189,7 @@ def test_the_envelope_goes_on_with_the_modes_that_it_had(
     ended = turning(tmp_path / "ended")
     ended_early(ended, 0.7)
     stored = Packed((ended.results_folder / STATE).read_bytes()[32:])
-    held = envelope_in(stored.said)
+    held = envelope_in(stored.content)
     assert all(modes["remembered"]["gain"] > 0 for modes in held["_modes"]["list"])
     assert_same(whole, content(analyse(ended, resumes=True)))
 
@@ -245,7 +245,7 @@ def test_without_a_state_nothing_is_resumed(tmp_path: Path) -> None:
     ):
         analyse(turning(tmp_path), resumes=True)
     run = analyse(turning(tmp_path))
-    with pytest.raises(OutputError, match="the run before is complete"):
+    with pytest.raises(OutputError, match="the run is complete"):
         analyse(turning(tmp_path), resumes=True)
     assert read_results(run.folder / "results.h5").status == "complete"
 
@@ -298,7 +298,7 @@ def test_a_state_makes_records_and_nothing_else() -> None:
         "kedfem.resume:Keeper",
     ):
         made = Packed(packed({"x": 1}))
-        made.said["x"] = {"record": [name, {"folder": "."}]}
+        made.content["x"] = {"record": [name, {"folder": "."}]}
         if name == "kedfem.resume:Keeper":
             continue
         with pytest.raises(ValueError, match="not what was written"):

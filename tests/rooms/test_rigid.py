@@ -70,7 +70,7 @@ def test_a_linkage_of_rigid_links_needs_the_torque_of_virtual_work(kind: str) ->
 def test_a_rigid_crank_has_no_unknowns() -> None:
     ready = meshed(scene_from(scene("bar", rigid=("crank",))))
     assert [link.name for link in ready.model.links] == ["coupler", "rocker"]
-    assert [x.link.name for x in ready.model.carried] == ["crank"]
+    assert [x.link.name for x in ready.model.prescribed] == ["crank"]
 
 
 def test_a_rigid_link_stays_rigid_beside_reduced_ones() -> None:

@@ -203,7 +203,7 @@ def test_a_stiff_link_of_each_kind_in_each_direction(model: str, direction: str)
 
 
 @pytest.mark.long
-def test_a_stiff_link_and_the_literal_solver() -> None:
+def test_a_stiff_link_and_the_monolithic_solver() -> None:
     reference = ran(four_bar("coupler", BASE))
     runs = [ran(four_bar("coupler", 10.0**k, solver="monolithic")) for k in (8, 9, 10, 11)]
     honest(runs, reference)

@@ -18,8 +18,8 @@ from kedfem.analysis import analyse
 from kedfem.dynamics.model import Model, segments
 from kedfem.dynamics.modes.bases import bases
 from kedfem.dynamics.modes.reduction import energy_sorted, excited, port_functions, static_parts
-from kedfem.dynamics.nominal import instants
 from kedfem.dynamics.reduced_model import restored_model, stored_model
+from kedfem.dynamics.rigid_body import instants
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import snapshots, transient
 from kedfem.errors import MeshError, SceneError
@@ -113,7 +113,7 @@ def test_functions_go_by_what_their_loss_costs() -> None:
         few = left_out(link, found[k].first(12), seen)
         assert few < 0.02
         assert few < 0.2 * left_out(link, old.first(12), seen)
-        # the weights tell what is left out, but for answers to port forces and to turns that count besides
+        # the weights show what is left out, but for answers to port forces and to turns that count besides
         assert few <= 1.5 * np.sqrt((found[k].weights[12 - found[k].needed.shape[1] :] ** 2).sum())
 
 
@@ -253,7 +253,7 @@ def test_reduced_segments_are_the_same_from_a_file() -> None:
         assert_array_equal(b.K0, a.K0)
 
 
-def test_only_links_with_nominal_frames_have_a_geometric_error() -> None:
+def test_only_links_with_rigid_body_frames_have_a_geometric_error() -> None:
     raw = bars(3, segments=3)
     raw["links"]["rocker"] |= {"frames": "rigid-body"}
     raw["links"]["rocker"].pop("segments")

@@ -88,7 +88,7 @@ def test_growth_in_any_function_ends_a_run(value: float) -> None:
 
 
 def test_a_rigid_link_whose_mass_lies_in_a_plane_is_refused() -> None:
-    """A lamina on a carrier of next to no mass: nothing tells how the link's functions move across it."""
+    """A lamina on a carrier of next to no mass: nothing determines how the link's functions move across it."""
     light = {"density": 1e-3, "youngs_modulus": 2.1e11, "poisson_ratio": 0.3}
     raw: dict[str, Any] = {
         "materials": {"light": light},

@@ -1,4 +1,4 @@
-"""Plain sizes: silent where units are right, and each usual mistake is told with the unit that was meant."""
+"""Plain sizes: silent where units are right, and each usual mistake is reported with the unit that was meant."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,7 +22,7 @@ def seen(scene: Scene) -> tuple[str, tuple[str, ...]]:
     drawn = {name: link for name, link in scene.links.items() if not isinstance(link.shape, Cad)}
     links = rigid_links(scene.model_copy(update={"links": drawn}))
     sliders = [SimpleNamespace(name=name, mass=x.mass) for name, x in scene.links.items() if x.shape is None]
-    model: Any = SimpleNamespace(links=list(links.values()), carried=(), sliders=sliders)
+    model: Any = SimpleNamespace(links=list(links.values()), prescribed=(), sliders=sliders)
     found = sizes(scene, model)
     return size_line(found), size_warnings(scene, found)
 

@@ -86,7 +86,7 @@ def test_a_turned_spatial_linkage_of_beams_moves_the_same() -> None:
 
 
 @pytest.mark.parametrize("rho_inf", [1.0, 0.8])
-def test_condensed_is_literal_on_a_spatial_linkage_of_beams(rho_inf: float) -> None:
+def test_condensed_is_monolithic_on_a_spatial_linkage_of_beams(rho_inf: float) -> None:
     model, _, fast = run(rssr_of_beams(rho_inf=rho_inf))
     assert {link.kind for link in model.links} == {"spatial_beam"}
     _, _, slow = run(rssr_of_beams(rho_inf=rho_inf, solver="monolithic"))

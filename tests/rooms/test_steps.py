@@ -12,9 +12,9 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy.histories import Histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed
-from kedfem.dynamics.nominal import motions
+from kedfem.dynamics.rigid_body import motions
 from kedfem.dynamics.stepping.first_state import started
-from kedfem.dynamics.stepping.literal import LiteralSteps
+from kedfem.dynamics.stepping.monolithic import MonolithicSteps
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.solvers import Steps, steps_of
 from kedfem.dynamics.stepping.transient import snapshots, transient
@@ -25,9 +25,9 @@ from kedfem.dynamics.system import (
     ends_kernel,
     interface_kernel,
     linear_kernel,
-    nominal_kernel,
+    rigid_frame_kernel,
 )
-from kedfem.dynamics.system.steps import SystemSteps, nominal_system
+from kedfem.dynamics.system.steps import SystemSteps, rigid_frame_system
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import rigid_motion
 from kedfem.results import Channel
@@ -36,7 +36,7 @@ from kedfem.scene import drive_angle, scene_from, time_grid
 from .test_dynamics import four_bar, slider_crank
 
 KERNELS = (
-    algebra_kernel, bodies_kernel, constraints_kernel, ends_kernel, interface_kernel, linear_kernel, nominal_kernel,
+    algebra_kernel, bodies_kernel, constraints_kernel, ends_kernel, interface_kernel, linear_kernel, rigid_frame_kernel,
 )  # fmt: skip
 
 
@@ -68,14 +68,16 @@ def displacements(ready: Prepared, solver: Steps) -> tuple[np.ndarray, np.ndarra
 
 @pytest.mark.parametrize("rho_inf", [1.0, 0.9, 0.5])
 @pytest.mark.parametrize("made", [mixed, sliding])
-def test_the_systems_steps_are_the_literal_ones(made: Any, rho_inf: float) -> None:
+def test_the_systems_steps_are_the_monolithic_ones(made: Any, rho_inf: float) -> None:
     ready = meshed(scene_from(made()))
     model = ready.model
     scheme = generalised_alpha(time_grid(ready.scene).step, rho_inf)
-    literal = displacements(ready, LiteralSteps(model.links, model.joints, scheme, model.damping))
-    system = displacements(ready, SystemSteps(ready.scene, nominal_system(ready.scene, model), model, scheme))
+    monolithic = displacements(ready, MonolithicSteps(model.links, model.joints, scheme, model.damping))
+    system = displacements(
+        ready, SystemSteps(ready.scene, rigid_frame_system(ready.scene, model), model, scheme)
+    )
     assert model.damping.present
-    for got, wanted in zip(system, literal, strict=True):
+    for got, wanted in zip(system, monolithic, strict=True):
         # rounding, amplified by the stiffness of the links along their line
         assert_allclose(got, wanted, rtol=0, atol=2e-8 * np.abs(wanted).max())
 
@@ -120,7 +122,7 @@ def test_rigid_motion_of_later_turns_is_that_of_the_first() -> None:
 
 
 def test_what_was_finite_before_a_blow_up_is_handed_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("kedfem.dynamics.nominal.POINTS", 256)
+    monkeypatch.setattr("kedfem.dynamics.rigid_body.POINTS", 256)
     ready = meshed(scene_from(four_bar("beam", revolutions=1, steps_per_revolution=300)))
     solver = steps_of(ready.scene, ready.model)
     advance, left, seen = solver.advance, [270], []  # not finite from a step in the second block on

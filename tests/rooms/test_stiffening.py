@@ -1,4 +1,4 @@
-"""Geometric stiffening: the nominal stresses, three solvers, order in time, sweeps, and where they do not settle."""
+"""Geometric stiffening: stresses of the rigid-body motion, solvers, order in time, iterations, where none converge."""
 
 from itertools import pairwise
 from typing import Any
@@ -13,9 +13,9 @@ from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics import stiffening
 from kedfem.dynamics.joints.ports import add_port_forces
 from kedfem.dynamics.matrices.substructure import coupled
-from kedfem.dynamics.nominal import forcings, motions
+from kedfem.dynamics.rigid_body import forcings, motions
 from kedfem.dynamics.stepping.first_state import started
-from kedfem.dynamics.stepping.literal import LiteralSteps
+from kedfem.dynamics.stepping.monolithic import MonolithicSteps
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
@@ -58,7 +58,7 @@ def loaded() -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("made", [loaded, sliding, lambda: four_bar("plate")])
-def test_stress_modes_hold_every_stress_of_the_nominal_motion(
+def test_stress_modes_hold_every_stress_of_the_rigid_body_motion(
     made: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Port forces are those of `coupled`; Σ s_i g_i is the static deflection but for rigid motion."""
@@ -92,16 +92,18 @@ def test_stress_modes_hold_every_stress_of_the_nominal_motion(
 
 @pytest.mark.parametrize("rho_inf", [1.0, 0.8])
 @pytest.mark.parametrize(("made", "effect"), [(loaded, 0.02), (sliding, 3e-4)])
-def test_stiffened_steps_of_the_system_are_the_literal_ones(made: Any, effect: float, rho_inf: float) -> None:
+def test_stiffened_steps_of_the_system_are_the_monolithic_ones(
+    made: Any, effect: float, rho_inf: float
+) -> None:
     ready = meshed(scene_from(stiff(made(), initial="quasi-static", rho_inf=rho_inf)))
     model, scheme = ready.model, generalised_alpha(time_grid(ready.scene).step, rho_inf)
     stresses = stiffening.stiffening(model)
-    literal, plain = (
-        displacements(ready, LiteralSteps(model.links, model.joints, scheme, model.damping, which))
+    monolithic, plain = (
+        displacements(ready, MonolithicSteps(model.links, model.joints, scheme, model.damping, which))
         for which in (stresses, None)
     )
     system = displacements(ready, steps_of(ready.scene, model))
-    for got, wanted in zip(system, literal, strict=True):
+    for got, wanted in zip(system, monolithic, strict=True):
         # rounding, amplified by the stiffness of the links along their line, and what the passes leave
         assert_allclose(got, wanted, rtol=0, atol=1e-8 * np.abs(wanted).max())
     assert np.abs(plain[0] - system[0]).max() > effect * np.abs(plain[0]).max()
@@ -112,7 +114,7 @@ def test_stiffened_steps_of_the_system_are_the_literal_ones(made: Any, effect: f
     [
         ("beam", "condensed", SystemSteps),
         ("plate", "condensed", SystemSteps),
-        ("beam", "monolithic", LiteralSteps),
+        ("beam", "monolithic", MonolithicSteps),
     ],
 )
 def test_only_a_scene_that_asks_for_stiffening_has_it(kind: str, solver: str, taken: type) -> None:

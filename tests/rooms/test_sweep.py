@@ -232,7 +232,7 @@ def test_a_pool_of_processes_finds_the_same_rows(tmp_path: Path) -> None:
 
 
 def test_a_point_whose_worker_is_lost_is_a_failed_row(tmp_path: Path) -> None:
-    """As executors of clusters tell it; the other points are kept, and it is tried again."""
+    """As executors of clusters report it; the other points are kept, and it is tried again."""
 
     class Losing(Inline):
         def submit(self, fn: Any, /, *args: Any, **_: Any) -> Future[Any]:

@@ -1,4 +1,4 @@
-"""Solids swept about an axis, or along lines and arcs: against OpenCASCADE's volumes, in any place, with their seats."""
+"""Solids swept about axes, or along lines and arcs: against OpenCASCADE's volumes, anywhere, with coupling surfaces."""
 
 from collections.abc import Callable
 from math import atan2, cos, pi, sin
@@ -16,13 +16,13 @@ from kedfem.links.surfaces.part_candidates import face_kind
 from kedfem.mesh import SolidMesh, mesh_quality, part_mesh
 from kedfem.mesh.cad.faces import with_faces
 from kedfem.mesh.cad.model import CadKeys, solid_model
-from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
+from kedfem.mesh.cad.solids import OtherMethodError, Sizing, Solid
 from kedfem.mesh.elements.bounds import valid_everywhere
 from kedfem.mesh.elements.quality import scaled_jacobian
 from kedfem.mesh.filling import filled_mesh
 from kedfem.mesh.session import gmsh_model
 from kedfem.mesh.swept.core import disc
-from kedfem.mesh.swept.path_sweep import carried_mesh
+from kedfem.mesh.swept.path_sweep import path_mesh
 from kedfem.mesh.swept.revolved import revolved_mesh
 from kedfem.scene import Material, link_from
 from kedfem.scene.records.shapes import Cad
@@ -101,7 +101,7 @@ PARTS: dict[str, tuple[Callable[[Any], None], list[float]]] = {
     "bent bar": (lambda occ: pipe(occ, CORNERS, 12.0), [5, 5, 5]),
     "bent pipe": (lambda occ: pipe(occ, CORNERS, 12.0, 3.5), [3.5, 3.5, 3.5, 5, 5, 5]),
 }
-CARRIED = ("half a pulley", "elbow", "bent bar", "bent pipe")
+ALONG_PATHS = ("half a pulley", "elbow", "bent bar", "bent pipe")
 
 
 def drawn(folder: Path, draw: Callable[[Any], None], oblique: bool = False) -> tuple[Path, float]:
@@ -117,13 +117,13 @@ def drawn(folder: Path, draw: Callable[[Any], None], oblique: bool = False) -> t
         return folder / "part.brep", 1e-9 * sum(occ.getMass(3, tag) for _, tag in occ.getEntities(3))
 
 
-Way = Callable[[ModuleType, Solid, Sizing], SolidMesh]
+Method = Callable[[ModuleType, Solid, Sizing], SolidMesh]
 
 
-def swept(file: Path, sizing: Sizing = Sizing(), way: Way = revolved_mesh) -> SolidMesh:  # noqa: B008
+def swept(file: Path, sizing: Sizing = Sizing(), method: Method = revolved_mesh) -> SolidMesh:  # noqa: B008
     """The mesh of a part's file, its faces known."""
     with solid_model(CadKeys("part", "solid"), file, "part", Cad(file=file.name)) as (gmsh, solid):
-        return with_faces(gmsh, solid, way(gmsh, solid, sizing))
+        return with_faces(gmsh, solid, method(gmsh, solid, sizing))
 
 
 def volume(mesh: SolidMesh) -> float:
@@ -139,16 +139,16 @@ CHEAP = ("shaft", "elbow")
 def test_parts_are_swept_in_any_place(name: str, tmp_path: Path) -> None:
     """det J > 0 all over, no wedges, volume within 5e-4 of CAD, each face found; turned by any angle the same mesh."""
     draw, radii = PARTS[name]
-    way = carried_mesh if name in CARRIED else revolved_mesh
+    method = path_mesh if name in ALONG_PATHS else revolved_mesh
     meshes = []
     for oblique in (False, True):
         file, exact = drawn(tmp_path, draw, oblique)
-        mesh = swept(file, way=way)
+        mesh = swept(file, method=method)
         assert valid_everywhere(mesh.points, mesh.cells).all()
         assert mesh_quality(mesh).least > 0.3
         assert volume(mesh) == pytest.approx(exact, rel=5e-4)  # parabolas at 30° lose 1.5e-4 of a circle
-        seats = [f for f in mesh.faces if face_kind(mesh, f) in {"bore", "journal", "ball", "ball seat"}]
-        assert_allclose(sorted(1e3 * face.radius for face in seats), radii, rtol=1e-6)
+        surfaces = [f for f in mesh.faces if face_kind(mesh, f) in {"bore", "journal", "ball", "ball seat"}]
+        assert_allclose(sorted(1e3 * face.radius for face in surfaces), radii, rtol=1e-6)
         meshes.append(mesh)
     assert len(meshes[0].points) == pytest.approx(len(meshes[1].points), rel=0.1)  # gmsh rounds otherwise
     assert volume(meshes[0]) == pytest.approx(volume(meshes[1]), rel=1e-4)
@@ -198,8 +198,8 @@ def test_frequencies_are_those_of_fine_tetrahedra(name: str, size: float, tmp_pa
     """First six of the free part, at default sizes, within 0.5 %."""
     file, _ = drawn(tmp_path, PARTS[name][0])
     with solid_model(CadKeys("part", "solid"), file, "part", Cad(file=file.name)) as (gmsh, solid):
-        way = carried_mesh if name in CARRIED else revolved_mesh
-        meshes = way(gmsh, solid, Sizing()), filled_mesh(gmsh, solid, Sizing(size=size))
+        method = path_mesh if name in ALONG_PATHS else revolved_mesh
+        meshes = method(gmsh, solid, Sizing()), filled_mesh(gmsh, solid, Sizing(size=size))
     links = [solid_link("part", mesh, STEEL, np.eye(3)) for mesh in meshes]
     found, fine = (frequencies(link, sp.eye_array(3 * link.n, format="csr"), 12, 5e3)[6:] for link in links)
     assert_allclose(found, fine, rtol=5e-3)
@@ -216,7 +216,7 @@ def test_about_as_many_unknowns_as_asked_for(outline: Outline, wanted: int, tmp_
     drawn(tmp_path, lambda occ: turned(occ, outline))
     given = {"shape": {"kind": "cad", "file": "part.brep"}, "material": "steel", "mesh": {"unknowns": wanted}}
     mesh = part_mesh(link_from(given), tmp_path)
-    assert "swept about" in mesh.way
+    assert "swept about" in mesh.method
     assert 1 / 1.3 < 3 * len(mesh.points) / wanted < 1.3
 
 
@@ -226,9 +226,9 @@ def test_what_is_no_solid_of_revolution_is_refused_with_the_face(tmp_path: Path)
         occ.cut([(3, shaft)], [(3, key)])
 
     message = r"no solid of revolution, as the plane face .* near .* does not turn about x"
-    with pytest.raises(OtherWayError, match=message):
+    with pytest.raises(OtherMethodError, match=message):
         swept(drawn(tmp_path, keyed)[0])
-    with pytest.raises(OtherWayError, match="no solid of revolution, as no face turns about an axis"):
+    with pytest.raises(OtherMethodError, match="no solid of revolution, as no face turns about an axis"):
         swept(drawn(tmp_path, lambda occ: occ.addBox(0, 0, 0, 1, 2, 3))[0])
 
 
@@ -242,8 +242,10 @@ def test_what_no_plane_end_sweeps_is_refused(tmp_path: Path) -> None:
         occ.fuse([(3, occ.addCylinder(0, 0, 0, 40, 0, 0, 5))], [(3, occ.addBox(10, -6, -6, 5, 12, 12))])
 
     for draw in (bored, stepped, lambda occ: turned(occ, SHAFT, 2.0)):
-        with pytest.raises(OtherWayError, match="no plane end sweeps it along lines and arcs to another end"):
-            swept(drawn(tmp_path, draw)[0], way=carried_mesh)
+        with pytest.raises(
+            OtherMethodError, match="no plane end sweeps it along lines and arcs to another end"
+        ):
+            swept(drawn(tmp_path, draw)[0], method=path_mesh)
 
 
 def test_ends_are_those_of_the_part_not_of_what_is_missing(tmp_path: Path) -> None:
@@ -251,7 +253,7 @@ def test_ends_are_those_of_the_part_not_of_what_is_missing(tmp_path: Path) -> No
     R, r = 20.0, 3.0
     for angle in (0.8, 5.5):
         file, _ = drawn(tmp_path, lambda occ, a=angle: occ.addTorus(0, 0, 0, R, r, angle=a))
-        basis = solid_basis(swept(file, Sizing(size=3e-3), carried_mesh))
+        basis = solid_basis(swept(file, Sizing(size=3e-3), path_mesh))
         x = np.asarray(basis.default_parameters()["x"])
         centre = 1e3 * (x * basis.dx).sum(axis=(1, 2)) / basis.dx.sum()
         far = R * (1 + r**2 / (4 * R**2)) * sin(angle / 2) / (angle / 2)

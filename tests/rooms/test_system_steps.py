@@ -12,7 +12,7 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.solvers import Steps, steps_of
 from kedfem.dynamics.stepping.transient import transient
-from kedfem.dynamics.system.steps import SystemSteps, nominal_system
+from kedfem.dynamics.system.steps import SystemSteps, rigid_frame_system
 from kedfem.errors import SolveError
 from kedfem.results.recording import recording
 from kedfem.results.records import Channel
@@ -71,7 +71,7 @@ def channels(raw: dict[str, Any], solver_of: Any) -> tuple[Steps, dict[Channel, 
 def oracle_of(scene: Scene, model: Model) -> SystemSteps:
     """The oracle on the same model, reduced or not: as of itself, `solver = "monolithic"` reduces nothing."""
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
-    return SystemSteps(scene, nominal_system(scene, model), model, scheme, literal=True)
+    return SystemSteps(scene, rigid_frame_system(scene, model), model, scheme, monolithic=True)
 
 
 def apart(found: dict[Channel, np.ndarray], wanted: dict[Channel, np.ndarray]) -> float:

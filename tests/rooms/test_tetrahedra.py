@@ -19,7 +19,7 @@ from kedfem.links.solid import solid_basis
 from kedfem.mesh import SolidMesh, link_mesh, mesh_quality, part_mesh
 from kedfem.mesh.cad.model import CadKeys, solid_model
 from kedfem.mesh.cad.sides import owned_sides
-from kedfem.mesh.cad.solids import OtherWayError, Sizing
+from kedfem.mesh.cad.solids import OtherMethodError, Sizing
 from kedfem.mesh.elements.bounds import valid_everywhere
 from kedfem.mesh.elements.hexahedra import extruded, quadratic, rectangle_quads
 from kedfem.mesh.elements.simplices import TET10
@@ -132,7 +132,7 @@ def test_hexahedra_at_any_price_are_gmshs_subdivision(tmp_path: Path) -> None:
     }
     mesh = part_mesh(link_from(given), tmp_path)
     assert mesh.cell_type == "hexahedron27"
-    assert "gmsh's subdivision" in mesh.way
+    assert "gmsh's subdivision" in mesh.method
     with pytest.raises(MeshError, match=r"scaled Jacobian must be at least 0\.9 everywhere"):
         part_mesh(link_from(given | {"min_quality": 0.9}), tmp_path)
 
@@ -145,7 +145,7 @@ class TestBlends:
         with solid_model(CadKeys("file", "solid"), file, name, Cad(file=file.name)) as (gmsh, solid):
             mesh = swept_without_blends(gmsh, solid, Sizing(ignore=ignore, **sizing))
             off = volume(mesh) / solid.volume - 1
-        told = float(mesh.way.partition("), ")[2].partition(" % of the volume")[0])
+        told = float(mesh.method.partition("), ")[2].partition(" % of the volume")[0])
         assert told == pytest.approx(100 * off, abs=0.01)  # parabolas for arcs
         return mesh
 
@@ -153,20 +153,20 @@ class TestBlends:
         """4 chamfers of 1 mm, of π (2 r + 2/3 mm) mm²/2 each over 27,658 mm³: 0.29 %; names of faces stay."""
         mesh = self.made("plate_with_chamfered_bores", tmp_path)
         assert mesh.cell_type == "hexahedron27"
-        assert "left out: 4 blends below 1.57 mm (face 2, face 7, face 11, face 12), +0.29 %" in mesh.way
+        assert "left out: 4 blends below 1.57 mm (face 2, face 7, face 11, face 12), +0.29 %" in mesh.method
         bores = [face for face in mesh.faces if face.kind == "cylinder"]
         assert_allclose([face.radius for face in bores], [6e-3, 6e-3], rtol=1e-6)
-        with pytest.raises(OtherWayError, match="more than small blends"):
+        with pytest.raises(OtherMethodError, match="more than small blends"):
             self.made("plate_with_chamfered_bores", tmp_path, kept=((0.02 + 0.0065, 0.015, 0.0005),))
-        with pytest.raises(OtherWayError, match="more than small blends"):
+        with pytest.raises(OtherMethodError, match="more than small blends"):
             self.made("plate_with_chamfered_bores", tmp_path, named=("face 7",))
-        with pytest.raises(OtherWayError, match="more than small blends"):
+        with pytest.raises(OtherMethodError, match="more than small blends"):
             self.made("plate_with_chamfered_bores", tmp_path, ignore=0.5e-3)
 
     def test_concave_fillets_go_on_request(self, tmp_path: Path) -> None:
-        with pytest.raises(OtherWayError, match="a concave fillet is in the way of layers"):
+        with pytest.raises(OtherMethodError, match="a concave fillet is in the way of layers"):
             self.made("crank_with_counterweight", tmp_path)
-        assert "left out: 1 blend below 2 mm" in self.made("crank_with_counterweight", tmp_path, 2e-3).way
+        assert "left out: 1 blend below 2 mm" in self.made("crank_with_counterweight", tmp_path, 2e-3).method
 
     def test_a_load_on_a_chamfer_keeps_it(self, tmp_path: Path) -> None:
         written("plate_with_chamfered_bores", tmp_path)

@@ -14,7 +14,7 @@ from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.resolution import resolution
 from kedfem.accuracy.stability import stability_warning
 from kedfem.dynamics.loads import applied
-from kedfem.dynamics.nominal import drive_range, forcings, motions
+from kedfem.dynamics.rigid_body import drive_range, forcings, motions
 from kedfem.dynamics.stepping.start import initial_rates
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import as_rows, mass_times
@@ -127,7 +127,7 @@ def test_time_and_frames_are_counted_over_the_whole_analysis() -> None:
     assert stability_warning(scene) == ()
 
 
-def test_the_nominal_motion_rests_and_loads_are_those_of_the_drawn_position() -> None:
+def test_the_rigid_body_motion_rests_and_loads_are_those_of_the_drawn_position() -> None:
     ready = prepared()
     scene, model = ready.scene, ready.model
     assert sum(len(m.t) for _, m in motions(scene, ready.linkage, ready.path)) == time_grid(scene).steps
@@ -136,7 +136,7 @@ def test_the_nominal_motion_rests_and_loads_are_those_of_the_drawn_position() ->
         gravity = link.m1 * as_rows(link, np.array([0, -9.81, 0]))
         np.testing.assert_allclose(forcing.F, [gravity, gravity], rtol=1e-12, atol=1e-15)
         np.testing.assert_array_equal(applied(link, loads, still, 1), forcing.F)
-    assert not model.carried
+    assert not model.prescribed
     assert resolution(ready) is None  # it is free to move: K has no frequencies above zero to look for
 
 

@@ -26,7 +26,7 @@ MODULES = (
     "kinematics",
     "spatial_kinematics",
     "mechanisms",
-    "nominal_frames",
+    "rigid_body_frames",
     "corotational",
     "cad",
     "concentrations",

@@ -138,7 +138,7 @@ def bent(link: Link) -> float:
 
 
 def _words(link: Link) -> str:
-    return f"{link.way.split(';')[0]}, {link.unknowns:,} unknowns"
+    return f"{link.method.split(';')[0]}, {link.unknowns:,} unknowns"
 
 
 def _rows(draw: Callable[[ModuleType], None], area: float, exact: float) -> list[Row]:

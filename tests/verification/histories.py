@@ -11,7 +11,7 @@ from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.scheme import Scheme, generalised_alpha
 from kedfem.dynamics.stepping.start import Deflected, initial_states
-from kedfem.dynamics.stepping.state import Nominal, Rayleigh
+from kedfem.dynamics.stepping.state import ForcingAt, Rayleigh
 from kedfem.dynamics.system.march import displacements, march, ready
 from kedfem.dynamics.system.record import System
 from kedfem.dynamics.system.starts.instant import Instant
@@ -68,7 +68,7 @@ def history(run: Run, steps: int) -> Iterator[Moving]:
     model = Model((link,), (0,), (joint,), ((),), (), run.damping)
     of = ready(System(("link",), (), (), joint.B.shape[1], model), run.scheme)
     begin = Deflected(*(run.start or [np.zeros((link.n, 3))] * 3))
-    states = initial_states([link], [joint], [Nominal(run.R(0.0), run.forces(0.0))], run.damping, [begin])
+    states = initial_states([link], [joint], [ForcingAt(run.R(0.0), run.forces(0.0))], run.damping, [begin])
     state = from_links(Instant(of, lambda t: motion_of(run, t), 0.0), states)
     state.F[:] = work_on(of.parts[0], run.forces(0.0)).ravel()
     yield Moving(states[0].u, states[0].v)

@@ -6,9 +6,9 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.matrices.cholesky import Cholesky
-from kedfem.dynamics.stepping.literal import shared_nodes
+from kedfem.dynamics.stepping.monolithic import shared_nodes
 from kedfem.links.record import Link
-from kedfem.links.surfaces.coupling_surfaces import face_seat, port_weights
+from kedfem.links.surfaces.coupling_surfaces import face_surface, port_weights
 
 
 def held(*sets: tuple[np.ndarray, str], d: int = 3) -> np.ndarray:
@@ -71,8 +71,8 @@ def mean_support(link: Link, *ends: tuple[np.ndarray, list[tuple[int, str]]]) ->
     """
     weights, components, p = [], [], 0
     for point, ports in ends:
-        seat = face_seat(link, "support", point)
-        weights.append(port_weights(seat, point + np.array([[0, 0, 0], [0, 1, 0], [0, 0, 1]])))
+        surface = face_surface(link, "support", point)
+        weights.append(port_weights(surface, point + np.array([[0, 0, 0], [0, 1, 0], [0, 0, 1]])))
         components += [3 * (p + port) + "xyz".index(c) for port, names in ports for c in names]
         p += 3
     W, keep = np.concatenate(weights), np.array(components)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from kedfem.dynamics.elastic_model import elastic_model
-from kedfem.dynamics.nominal import drive_range
+from kedfem.dynamics.rigid_body import drive_range
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.motion.linkage import linkage

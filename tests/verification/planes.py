@@ -8,8 +8,8 @@ import numpy as np
 
 from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
-from kedfem.links.surfaces.coupling_surfaces import face_seat
-from kedfem.links.surfaces.surface import surface
+from kedfem.links.surfaces.coupling_surfaces import face_surface
+from kedfem.links.surfaces.surface import surface_quadrature
 from kedfem.scene import Material, scene_from
 
 from .cases import Row, case
@@ -51,8 +51,8 @@ def elliptic_membrane(counts: tuple[int, int]) -> Row:
 
 def pressure(link: Link, point: np.ndarray) -> np.ndarray:
     """(n, 2) nodal forces of a unit pull along the outward normal on the curved side through a point."""
-    facets = face_seat(link, "side", point).facets
-    on = surface(link, facets)
+    facets = face_surface(link, "side", point).facets
+    on = surface_quadrature(link, facets)
     normal = on.x[..., :2] / np.array([3.25, 2.75]) ** 2  # of the ellipse
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     local = np.einsum("fqm,fq,fqi->fmi", on.N, on.dA, normal)
@@ -83,7 +83,7 @@ def cantilever(counts: tuple[int, int]) -> tuple[Link, np.ndarray]:
     """The cantilever's deflection: root as in the exact solution, its shear on the tip."""
     link = mapped_plane(counts, lambda r, s: (LENGTH * r, DEPTH * (s - 0.5)), 1.0, FLEXIBLE)
     x, y, _ = link.X.T
-    on = surface(link, face_seat(link, "tip", np.array([LENGTH, 0, 0])).facets)
+    on = surface_quadrature(link, face_surface(link, "tip", np.array([LENGTH, 0, 0])).facets)
     shear = 1.5 * LOAD / DEPTH * (1 - (2 * on.x[..., 1] / DEPTH) ** 2)
     local = np.einsum("fqm,fq,fq->fm", on.N, on.dA, shear)
     force = np.stack([np.zeros(link.n), np.bincount(on.dofs.ravel(), local.ravel(), link.n)], axis=1)

@@ -5,12 +5,12 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
 from kedfem.dynamics.elastic_model import elastic_model
-from kedfem.dynamics.nominal import drive_range
+from kedfem.dynamics.rigid_body import drive_range
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import snapshots
 from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
-from kedfem.links.surfaces.coupling_surfaces import face_seat
+from kedfem.links.surfaces.coupling_surfaces import face_surface
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path
 from kedfem.scene import Material, Scene, scene_from
@@ -116,7 +116,7 @@ def tip_history(scene: Scene) -> tuple[np.ndarray, Link]:
     along = path(rigid, *drive_range(scene))
     elastic = elastic_model(scene, rigid)
     link = elastic.links[0]
-    mean = face_seat(link, "tip", np.array([LENGTH, 0, 0])).fit[0]
+    mean = face_surface(link, "tip", np.array([LENGTH, 0, 0])).fit[0]
     shots = snapshots(scene, rigid, along, elastic, steps_of(scene, elastic))
     return np.array([mean @ shot.states[0].g for shot in shots]), link
 

@@ -107,7 +107,7 @@ def exact_rod(
 
     Parameters
     ----------
-    frame, bend : Q (3, 3) at the clamp, and its rate k0 (3,) as drawn, own components
+    frame, bend : Q (3, 3) at the clamp, and its rate k0 (3,) in the reference position, own components
     rigidity : EA, κ1 GA, κ2 GA, E I_y, E I_z, GJ of `rigidities`
     """
     EA, GA1, GA2, EI1, EI2, GJ = rigidity

@@ -108,7 +108,7 @@ def cantilevers() -> list[Row]:
     for name, section in (("rectangle", FLAT), ("tube", tube(0.03, 0.02, 0.6))):
         link = straight([[0, 0, 0], [0.5, 0, 0]], section, 16)
         wanted = wanted_modes(0.5, section)
-        if name == "tube":  # both planes alike, so that its modes are told by neither
+        if name == "tube":  # both planes alike, so that its modes are reported by neither
             found = frequencies(link, free_map(link, ROOT), 2, 80)
             out += [
                 Row(

@@ -7,7 +7,7 @@ from kedfem.links.beams.section import rectangle
 from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_stress, stress_recovery
-from kedfem.links.surfaces.coupling_surfaces import face_seat, surface_weights
+from kedfem.links.surfaces.coupling_surfaces import face_surface, surface_weights
 from kedfem.scene import Material
 
 from .cases import Row, case
@@ -37,7 +37,7 @@ def thick_plate(counts: tuple[int, int, int]) -> tuple[Link, np.ndarray]:
     outer = np.abs((x / 3.25) ** 2 + (y / 2.75) ** 2 - 1) < 1e-9
     middle = outer & (np.abs(z - 0.3) < 1e-9)
     T = free_map(link, held((np.abs(y) < 1e-9, "y"), (np.abs(x) < 1e-9, "x"), (outer, "xy"), (middle, "z")))
-    top = face_seat(link, "top", np.array([2.6, 0.1, 0.6]))
+    top = face_surface(link, "top", np.array([2.6, 0.1, 0.6]))
     return link, deflection(link, T, np.outer(surface_weights(link, top), [0, 0, -1e6]))
 
 
@@ -103,11 +103,11 @@ def tip_deflections(link: Link) -> np.ndarray:
     The root is held as beam theory has it, in the mean: free to contract and to warp.
     """
     T = mean_support(link, (np.zeros(3), [(0, "xyz"), (1, "xz"), (2, "xy")]))
-    seat = face_seat(link, "tip", np.array([6.0, 0, 0]))
-    area = surface_weights(link, seat)
+    surface = face_surface(link, "tip", np.array([6.0, 0, 0]))
+    area = surface_weights(link, surface)
     loads = [np.outer(area / area.sum(), axis) for axis in np.eye(3)]
     loads.append(
-        np.stack([0 * area, -seat.fit[3] / 2, seat.fit[2] / 2], axis=1)
+        np.stack([0 * area, -surface.fit[3] / 2, surface.fit[2] / 2], axis=1)
     )  # work = mean rotation about x
     return np.array([(f * deflection(link, T, f)).sum() for f in loads])
 
@@ -177,7 +177,7 @@ def twisted_beam(counts: tuple[int, int, int]) -> tuple[Link, np.ndarray]:
 
     link = mapped_link(counts, mapping, Material(density=1, youngs_modulus=29e6, poisson_ratio=0.22))
     T = free_map(link, held((link.X[:, 0] < 1e-9, "xyz")))
-    area = surface_weights(link, face_seat(link, "tip", np.array([12.0, 0, 0])))
+    area = surface_weights(link, face_surface(link, "tip", np.array([12.0, 0, 0])))
     loads = [np.outer(area / area.sum(), axis) for axis in np.eye(3)[1:]]
     return link, np.array([(f * deflection(link, T, f)).sum() for f in loads])
 

@@ -19,7 +19,7 @@ from kedfem.links.bodies import flywheel_tensor, with_body
 from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
 from kedfem.links.stress_stiffness import stress_stiffness, turned_directions
-from kedfem.links.surfaces.coupling_surfaces import joint_seat
+from kedfem.links.surfaces.coupling_surfaces import joint_surface
 from kedfem.scene import Material, Scene, scene_from, time_grid
 
 from .cases import Row, case
@@ -300,8 +300,8 @@ def whirl_of_link(omega: float, mass: float, polar: float, stiffened: bool = Tru
     light = Material(density=1e-3, youngs_modulus=RUBBER.youngs_modulus, poisson_ratio=0.0)
     bare = spatial_beam_link("shaft", straight_axis(line(), 4, 3, None), SHAFT, light)
     tip, axis = np.array([LENGTH, 0, 0]), np.array([1.0, 0, 0])
-    seat = joint_seat(bare, "disc", tip, axis)
-    link = with_body(bare, seat, mass, tip, flywheel_tensor(seat, axis, polar))
+    surface = joint_surface(bare, "disc", tip, axis)
+    link = with_body(bare, surface, mass, tip, flywheel_tensor(surface, axis, polar))
     T, M = free_map(link, ROOT), vector_mass(link)
     k = stressed(link, deflection(link, T, -(omega**2) * link.mX @ SPIN.T)) * float(stiffened)
     each = sp.eye_array(link.n)
@@ -311,7 +311,7 @@ def whirl_of_link(omega: float, mass: float, polar: float, stiffened: bool = Tru
     zero, one = np.zeros_like(K), np.eye(len(K))
     values, vectors = scipy.linalg.eig(np.block([[zero, one], [-K, -C]]), scipy.linalg.block_diag(one, m))
     tips = (T @ vectors[: len(K)]).reshape(link.n, 3, -1)
-    turning = np.einsum("n,ncv->cv", seat.fit[0], tips)
+    turning = np.einsum("n,ncv->cv", surface.fit[0], tips)
     # y + iz ~ exp(iwt): z = −i y; in the link frame the frequency is lower by ω
     forward = np.abs(turning[2] + 1j * turning[1]) < 1e-3 * np.abs(turning[1])
     w = values.imag[forward] + omega

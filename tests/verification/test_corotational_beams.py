@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy.histories import histories
 from kedfem.accuracy.prepared import meshed
-from kedfem.dynamics.frames import Followed, deformation, frames_of, rotation
+from kedfem.dynamics.frames import Deformed, deformation, frames_of, rotation
 from kedfem.dynamics.segment import internal_force, position
 from kedfem.links.beams.beam import beam_link
 from kedfem.links.beams.beam_segments import beam_segments
@@ -39,7 +39,7 @@ def force(parts: Sequence[Link], u: np.ndarray) -> np.ndarray:
         for frame in frames_of(part):
             Q, angle = rotation(part, frame.fit, y, float(u[here, 2].mean()))
             none = np.zeros_like(y)
-            frames.append(Followed(Q, angle, deformation(part, y, Q, angle), none, none))
+            frames.append(Deformed(Q, angle, deformation(part, y, Q, angle), none, none))
         f[here] += internal_force(part, y, np.eye(3), frames, np.zeros((3, *y.shape)), 0.0)[0]
         first += part.n - 1
     return f

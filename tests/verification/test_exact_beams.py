@@ -92,7 +92,7 @@ def four_bar_like() -> Problem:
     return replace(four_bar(300, 0.02, 2)[0], held={})
 
 
-def test_nominal_motion_of_the_four_bar_is_not_damped() -> None:
+def test_rigid_body_motion_of_the_four_bar_is_not_damped() -> None:
     problem, first = four_bar(300, 0.05, 2)
     f, _ = forces(problem, first)
     assert np.abs(f).max() < 1e-9 * np.abs(problem.beams.M @ first.v).max() * problem.alpha + 1e-6

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from kedfem.dynamics.stepping.literal import rotated_stiffness
+from kedfem.dynamics.stepping.monolithic import rotated_stiffness
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.links.beams.beam import beam_link

@@ -48,7 +48,7 @@ CLOSE = 0.15  # of the steps: as many more are not worth another trial
 
 
 def open_frames(scene: Scene) -> bool:
-    """Whether the scene leaves its frames open; without a drive they follow."""
+    """Whether the scene leaves its frames open; without a drive they are co-rotational."""
     if not scene.driven_joints:
         return False
     stated = "frames" in scene.analysis.model_fields_set or scene.analysis.stiffening
@@ -100,10 +100,12 @@ def chosen_frames(search: Trials, scene: Scene) -> tuple[Scene, float]:
             with_steps(shortened(with_beams(corotational, open_beams(scene), ELEMENTS[2])), _few(trial))
         )
     except KedfemError as fault:
-        said = str(fault).splitlines()[0]
-        search.notes.append(f"co-rotational frames would be needed, but cannot be taken: {said}")
+        message = str(fault).splitlines()[0]
+        search.notes.append(f"co-rotational frames would be needed, but cannot be taken: {message}")
         return scene, error
-    search.notes.append(f"rigid-body frames would be off by {100 * min(error, 1.0):.2g} %: frames follow")
+    search.notes.append(
+        f"rigid-body frames would be off by {100 * min(error, 1.0):.2g} %: frames are co-rotational"
+    )
     return corotational, 0.0
 
 
@@ -159,9 +161,9 @@ def chosen_beams(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, f
 def chosen_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, float]:
     """The scene with the step and the levels in time that reach an allowed error with the least work, and that error.
 
-    One trial in several levels tells what they differ by, and where the error would be allowed; the next is made there.
+    One trial in several levels shows what they differ by, and where the error would be allowed; the next is made there.
     Channels whose differences do not fall with the step hold vibration that is not resolved: they are given PATIENCE
-    shorter steps; then they are told, and the others choose. What the scene states of step and levels stays.
+    shorter steps; then they are reported, and the others choose. What the scene states of step and levels stays.
     """
     if without_vibration(scene):
         return scene, 0.0

@@ -113,9 +113,9 @@ def budget_warning(budget: Budget, asked: float | None = None) -> tuple[str, ...
     share = budget.limiting
     if not over or share is None:
         return ()
-    said = ", ".join(f"{kind} {percent(error)}" for kind, error in over.items())
+    message = ", ".join(f"{kind} {percent(error)}" for kind, error in over.items())
     remedy = share.remedy or REMEDIES[share.source]
-    return (f"estimated error: {said}; most of it from the {share.source}: {remedy}",)
+    return (f"estimated error: {message}; most of it from the {share.source}: {remedy}",)
 
 
 def meaningless(budget: Budget, balance: Balance | None, unworked: float, stiffened: bool = False) -> str:
@@ -131,11 +131,11 @@ def meaningless(budget: Budget, balance: Balance | None, unworked: float, stiffe
     momenta = {"momentum": balance.linear, "angular momentum": balance.angular} if balance else {}
     energy = {"energy": balance.energy} if balance and not stiffened else {}
     left = momenta | {"the drive's work": unworked} | energy
-    said = [f"{what} {percent(error)}" for what, error in worst.items() if error >= MEANINGLESS]
-    said += [
+    message = [f"{what} {percent(error)}" for what, error in worst.items() if error >= MEANINGLESS]
+    message += [
         f"{percent(share)} of {what} unaccounted for" for what, share in left.items() if share >= UNACCOUNTED
     ]
-    return "; ".join(said)
+    return "; ".join(message)
 
 
 REMEDIES = {

@@ -175,7 +175,7 @@ def spanned(scene: Scene, model: Model) -> Scene:
 
 
 def frames_share(geometric: GeometricError, kinds: Sequence[str]) -> Share | None:
-    """What rigid-body frames cost; None where all frames follow."""
+    """What rigid-body frames cost; None where all are co-rotational."""
     if all(link.fit is not None for link in geometric.model.links):
         return None
     warned = geometric_warning(geometric)

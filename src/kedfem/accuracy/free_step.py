@@ -1,6 +1,6 @@
 """The step of a scene without a drive: marches in successively halved steps, until what they differ by shows it.
 
-Nothing tells beforehand how fast such a scene moves, so nothing is taken from frequencies or from a coarse forecast:
+Nothing shows beforehand how fast such a scene moves, so nothing is taken from frequencies or from a coarse forecast:
 a step is chosen among those that were marched, over the whole analysis; its error is what the last halvings show.
 """
 
@@ -42,7 +42,7 @@ class _Halved:
 def free_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, float]:
     """The scene in the longest step whose error is allowed, of one level, and that error.
 
-    Where no march reaches it, as in chaotic motion, the shortest step that was tried; until when marches agree is told.
+    Where no march reaches it, as in chaotic motion, the shortest step tried; reported is until when marches agree.
 
     Raises
     ------
@@ -95,16 +95,16 @@ def _error(differences: Sequence[float]) -> float:
 def _unreached(found: _Halved, asked: float, until: float, error: float) -> str:
     errors = found.errors
     name = max(errors, key=errors.__getitem__)
-    said = (
+    message = (
         f"the step's error stays at {100 * error:.2g} % in {name} with {found.steps:,} steps, the most that are "
         "tried"
     )
     if until >= found.coarse.time[-1]:
-        return said
+        return message
     return (
-        f"{said}: {found.steps // 2:,} and {found.steps:,} steps agree within {100 * asked:.3g} % until t = {until:.3g} "
-        "s only. The motion is sensitive to the smallest differences (chaotic), or holds vibration that these steps do "
-        "not resolve: damping, a smoother start or a shorter analysis would help"
+        f"{message}: {found.steps // 2:,} and {found.steps:,} steps agree within {100 * asked:.3g} % until t = "
+        f"{until:.3g} s only. The motion is sensitive to the smallest differences (chaotic), or "
+        "holds vibration that these steps do not resolve: damping, a smoother start or a shorter analysis would help"
     )
 
 

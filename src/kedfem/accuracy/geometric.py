@@ -38,7 +38,7 @@ from kedfem.motion.rigid import RigidMotion
 SLICES = 8  # of a link along its axis, if it has so many nodes
 SAME = 1e-6  # of a slice: nodes of one cross-section, which rounding places differently along the link
 APART = 0.5  # of a slice's length, between middles: the slope between nearer ones would be that of rounding or warping
-INSTANTS = 256  # of a block that are looked at
+INSTANTS = 256  # of a block that are examined
 AXIAL = 3.0  # error of the peak stress in units of e, measured
 TURN = 0.4  # and of ψ²: elastica, load across the tip, 0.42 of its deflection, 0.24 of the stress at its root
 STIFFENED = 0.4  # of the error that geometric stiffening leaves: 0.25 to 0.4, measured
@@ -50,7 +50,7 @@ MODERATE = 0.15  # up to here stiffening helps
 class Slices:
     """A link cut across its axis; k slices, k − 1 cuts between them.
 
-    axis : (3,) along the link as drawn
+    axis : (3,) along the link in the reference position
     means : (k, n) mean displacement of each slice
     beyond : (k − 1, n) sum of the nodal forces beyond each cut
     mass : (k − 1, n) the same of M u
@@ -109,7 +109,7 @@ def _numbers(s: Float[np.ndarray, " k"]) -> Int[np.ndarray, " k"]:
 
 @dataclass
 class GeometricError:
-    """Largest sums over time of a run, looked at block by block, over links with rigid-body frames: others do not err so.
+    """Largest sums over time of a run, examined block by block, over links with rigid-body frames: others do not err so.
 
     axial : ∫ N ψ² ds of these links [J]
     strain : their energy [J]

@@ -11,7 +11,7 @@ from kedfem.accuracy.prepared import Prepared
 from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.levels import level_steps, leveled
-from kedfem.dynamics.stepping.literal import LiteralSteps
+from kedfem.dynamics.stepping.monolithic import MonolithicSteps
 from kedfem.dynamics.stepping.solvers import Steps
 from kedfem.dynamics.system.period.map import Carried, carried
 from kedfem.dynamics.system.period.search import Periodic, Search
@@ -65,7 +65,7 @@ def histories(
     times, taken, kept = [], [], []
     solvers = level_steps(ready.scene, ready.model)
     for solver in solvers:
-        if not isinstance(solver, LiteralSteps):
+        if not isinstance(solver, MonolithicSteps):
             solver.search = Search(near, ROUGHLY)
     for block in leveled(ready.scene, ready.linkage, ready.path, ready.model, solvers):
         times.append(block.motion.t)
@@ -88,7 +88,7 @@ def steady_state(solvers: Sequence[Steps]) -> Carried | None:
 
 
 def extent(model: Model) -> float:
-    """Size of a linkage as drawn [m]."""
+    """Size of a linkage in the reference position [m]."""
     nodes = np.concatenate([(link.full or link).nodes for link in model.links])
     return float(np.ptp(nodes, axis=0).max())
 

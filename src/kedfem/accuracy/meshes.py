@@ -103,7 +103,7 @@ def with_modes(search: Trials, scene: Scene, names: Sequence[str]) -> Scene:
     if unknowns < LARGE or steps * unknowns < DEAR:
         return scene
     search.notes.append(
-        f"{', '.join(names)}: reduced, as {steps:,} steps of {unknowns:,} unknowns would take long; the run tells what "
+        f"{', '.join(names)}: reduced, as {steps:,} steps of {unknowns:,} unknowns would take long; the run reports what "
         "that costs"
     )
     links = {name: scene.links[name].model_copy(update={"reduction": "modal"}) for name in names}

@@ -1,7 +1,7 @@
 """The cheapest model of a scene that is near enough: `analysis.accuracy`.
 
-Everything is found by short trial runs of the scene itself, with reduced links: whether frames must follow from how far
-links bend, beams by elements of few and many nodes against a fine one, the step from the order that three steps show,
+Everything is found by short trial runs of the scene itself, with reduced links: the frames from how far links bend,
+ beams by elements of few and many nodes against a fine one, the step from the order that three steps show,
 meshes of hexahedra and quadrilaterals from their indicator, segments of links with co-rotational frames by taking more,
 simpler links by putting them in. What the scene states stays; what it leaves open is chosen.
 """
@@ -157,7 +157,7 @@ def _chosen(search: Trials, scene: Scene) -> Plan:
     if frames:
         shares.append(Share("frames", frames, DEARER * asked))
     if not (left_open or open_beams(scene) or open_meshes(scene)):
-        search.notes.append("the scene states all meshes; the run tells their error")
+        search.notes.append("the scene states all meshes; the run reports their error")
         if not open_step(scene) and not open_segments(scene):
             return Plan(
                 with_analysis(scene, accuracy="quick"), asked, 1.0, tuple(shares), tuple(search.notes)

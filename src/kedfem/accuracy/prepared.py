@@ -7,7 +7,7 @@ from hashlib import sha256
 
 from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.nominal import drive_range
+from kedfem.dynamics.rigid_body import drive_range
 from kedfem.links.record import Link
 from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import Linkage, linkage
@@ -59,9 +59,9 @@ def moving(scene: Scene) -> tuple[Linkage, Path]:
 
 def key(scene: Scene) -> str:
     """A digest of everything in a scene that a plan or a reduced model depends on, the contents of its files too."""
-    said = scene.model_dump(mode="json", exclude={"title", "fatigue"})
-    said["output"] = said["output"]["probes"]
-    digest = sha256(json.dumps(said).encode())
+    described = scene.model_dump(mode="json", exclude={"title", "fatigue"})
+    described["output"] = described["output"]["probes"]
+    digest = sha256(json.dumps(described).encode())
     shapes = (link.shape for link in scene.links.values())
     digest.update(contents(scene.folder / x.file for x in shapes if isinstance(x, Cad | MeshFile | Part)))
     return digest.hexdigest()

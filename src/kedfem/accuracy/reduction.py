@@ -31,8 +31,8 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.bases import bases, reduced_at
 from kedfem.dynamics.modes.reduction import Basis, enriched, static_parts
 from kedfem.dynamics.modes.residual import residual_deflections
-from kedfem.dynamics.nominal import instants
 from kedfem.dynamics.reduced_model import reduced_model, restored_model, stored_model
+from kedfem.dynamics.rigid_body import instants
 from kedfem.errors import SceneError
 from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
@@ -200,7 +200,7 @@ def _count(link: Link, basis: Basis, tolerance: float) -> int:
 def first_reduced(
     full: Prepared, tolerance: float, known: Sequence[Float[np.ndarray, "_ _"] | None] | None = None
 ) -> Prepared:
-    """All large links of a prepared scene reduced about as far as a tolerance allows; the error is not looked at.
+    """All large links of a prepared scene reduced about as far as a tolerance allows; the error is not examined.
 
     None is where the drive leaves motions free.
 

@@ -11,7 +11,7 @@ from kedfem.accuracy.prepared import Prepared
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.reduction import frozen_frequencies, static_parts
-from kedfem.dynamics.nominal import instants
+from kedfem.dynamics.rigid_body import instants
 from kedfem.dynamics.stepping.scheme import Scheme, generalised_alpha
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import rigid_motion

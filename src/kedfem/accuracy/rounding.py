@@ -6,7 +6,8 @@ with the stiffness, while the forces of the linkage do not. Most of it comes fro
 
     S W Φ − c_M Yᵀ M Φ        zero but for rounding, Φ the rigid motions of the link: K0 Φ = 0 there
 
-which the factored step uses; of the literal solver it is K0 Φ. Both are found once, as the march begins. Over a run they
+which the factored step uses; of the monolithic solver it is K0 Φ. Both are found once, as the march begins. Over a run
+they
 are multiplied with the link's rigid motion at each time; the largest, of the largest force at a port, is the estimate.
 
 Co-rotational frames take the rigid motion away first, and with it all but eps of how far the link's points are from where
@@ -33,17 +34,19 @@ from kedfem.links.record import Link, in_space, mass_times
 from kedfem.links.reduced import rigid_modes
 from kedfem.results import Peak
 
-NOTICED = 1e-5  # of the forces: what is less is not told; scenes of links of one stiffness have 1e-9
+REPORTED = 1e-5  # of the forces: what is less is not reported; scenes of links of one stiffness have 1e-9
 LEFT = {"beam": 2.0, "plane": 4.0, "solid": 4.0, "spatial_beam": 16.0}
 """Times what S leaves: in the mean of a two- or four-link scene errors are a tenth to ten times that (test_rounding)."""
-NODAL = 8.0  # of what K0 leaves: the literal solver's factor loses more than its matrix (measured, 5 to 17)
+NODAL = (
+    8.0  # of what K0 leaves: the monolithic solver's factor loses more than its matrix (measured, 5 to 17)
+)
 IDLE = "no link is stressed at all: the scene has no gravity, load, spring or acceleration that acts on them"
 #: of the least E: more than rounding leaves where nothing acts (3e-14), less than a grain feels of its weight
 UNSTRESSED = 1e-12
 FOLLOWED = {"beam": 4.0, "plane": 4.0, "solid": 3.0, "spatial_beam": 0.5}
 """Times eps · size · max |S| of co-rotational links: errors are a tenth to four times that (test_rounding)."""
 EPSILON = float(np.finfo(float).eps)
-INSTANTS = 64  # of a block that are looked at
+INSTANTS = 64  # of a block that are examined
 
 
 def rigid_part(link: Link) -> Float[np.ndarray, "r N"]:
@@ -139,10 +142,13 @@ class Rounding:
 
     def share(self, kinds: Sequence[str]) -> Share | None:
         """Its part of the error; None where it is next to nothing."""
-        if not self.relative > NOTICED:
+        if not self.relative > REPORTED:
             return None
         link = self.model.links[int(self.forces.argmax())].name
-        how = f"link {link} is so stiff beside its neighbours that its numbers do not tell a rigid motion from a strain"
+        how = (
+            f"link {link} is so stiff beside its neighbours that its numbers do not distinguish a rigid motion from "
+            "a strain"
+        )
         return Share(
             "rounding",
             dict.fromkeys(kinds, self.relative),

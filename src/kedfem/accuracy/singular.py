@@ -1,6 +1,6 @@
 """Singular positions that an undriven mechanism passes: there rigid links get a kick, and the error is not of order 2.
 
-A drive's path is searched before a run; what nothing drives goes where it goes. So the run's own positions are looked at:
+A drive's path is searched before a run; what nothing drives goes where it goes. So the run's own positions are examined:
 the mean frames of the links put into the constraint equations, whose derivatives lose rank where two motions meet, as in
 a four-bar with equal links that folds. Links that hardly bend are then held with little leverage: joint forces of a kite
 of steel beams, 0.3 and 0.2 m, change by 120 % of their peak between 400 and 800 steps and still by 12 % between 3,200 and
@@ -20,7 +20,7 @@ from kedfem.motion.values import Poses, features, jacobian
 
 NEAR = 0.05  # of its largest value: singular value that vanishes at a singular position (others: 0.19 and more, measured)
 LOOKED_AT = 32  # of a block's time points at first; all of them around the smallest values
-CLOSER = 0.3  # of the largest value so far, below which all are looked at
+CLOSER = 0.3  # of the largest value so far, below which all are examined
 
 
 @dataclass
@@ -74,7 +74,7 @@ class SingularPasses:
         return np.asarray(s[:, self._rank - 1] / s[:, 0])
 
     def _poses(self, block: Block, which: np.ndarray) -> Poses:
-        """The mean frames of all bodies; the ground's is as drawn."""
+        """The mean frames of all bodies; the ground's is in the reference position."""
         model, linkage = self.ready.model, self.ready.linkage
         R = np.tile(np.eye(3), (len(which), len(linkage.bodies), 1, 1))
         p = np.zeros((len(which), len(linkage.bodies), 3))

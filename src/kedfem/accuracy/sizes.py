@@ -27,7 +27,7 @@ APART = 1e4  # longest of shortest link
 class Sizes:
     """What a scene is like, in SI.
 
-    overall : largest extent of the linkage as drawn [m]
+    overall : largest extent of the linkage in the reference position [m]
     lengths, masses : of each link by name [m, kg]; sliders without a shape have no length
     moduli : Young's modulus of each material in use [Pa]
     turns, speeds : of drives at a constant (final) speed [rpm, m/s]
@@ -45,7 +45,7 @@ def sizes(scene: Scene, model: Model) -> Sizes:
     """The sizes of a scene and its model."""
     nodes: dict[str, list[np.ndarray]] = {}
     masses = {slider.name: slider.mass for slider in model.sliders}
-    for link in [*model.links, *(carried.link for carried in model.carried)]:
+    for link in [*model.links, *(prescribed.link for prescribed in model.prescribed)]:
         nodes.setdefault(link.name, []).append((link.full or link).nodes)
         masses[link.name] = masses.get(link.name, 0.0) + float(link.one @ link.m1[:, 0])
     every = {name: np.concatenate(parts) for name, parts in nodes.items()}

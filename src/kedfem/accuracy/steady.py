@@ -12,7 +12,7 @@ from kedfem.dynamics.system.period.search import Periodic
 from kedfem.scene import Scene, time_grid, turn_steps
 
 RESOLVED = (
-    0.2  # oscillations in a step, five steps each: of faster ones a step does not tell whether they grow
+    0.2  # oscillations in a step, five steps each: of faster ones a step does not determine whether they grow
 )
 GROWS = 1e-6  # by which a period multiplies more than one: rounding and the step's error are less
 SLOW = 0.999  # a vibration that falls by less in a period is as good as undamped
@@ -47,7 +47,7 @@ class Steady:
     vibration: str = ""
     passed: float = 0.0
 
-    def told(self, frequency: float, words: str, step: float) -> "Steady":
+    def reported(self, frequency: float, words: str, step: float) -> "Steady":
         """With the vibration that grows; its growth is not known where steps [s] do not resolve its frequency [Hz].
 
         Several levels in time that agree do resolve it.
@@ -113,7 +113,7 @@ def unstable(steady: Steady | None) -> str:
         + (
             ""
             if len(steady.levels) > 1
-            else "; that the steps are short enough for this only extrapolation_levels = 2 tells"
+            else "; that the steps are short enough for this only extrapolation_levels = 2 shows"
         )
     )
 
@@ -124,14 +124,14 @@ def steady_warning(steady: Steady | None) -> tuple[str, ...]:
         return ()
     if steady.growth is None and steady.passed:
         return (
-            "steady motion: whether it is stable cannot be told with steps as long as these: a vibration "
+            "steady motion: whether it is stable cannot be determined with steps as long as these: a vibration "
             f"{steady.vibration}, is multiplied by {steady.levels[0]:.3g} in a period, but {steady.passed:.2g} of its "
             "oscillations pass in a step, and the growth may be the method's doing; take smaller steps",
         )
     if steady.growth is None and len(steady.levels) > 1:
         least, most = min(steady.levels), max(steady.levels)
         return (
-            "steady motion: whether it is stable cannot be told with steps as long as these: at the levels in time "
+            "steady motion: whether it is stable cannot be determined with steps as long as these: at the levels in time "
             f"vibrations are multiplied by {least:.3g} and {most:.3g} in a period, which is the method's doing; "
             "take smaller steps",
         )

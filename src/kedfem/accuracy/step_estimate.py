@@ -39,7 +39,7 @@ class StepEstimate:
         second differences in time: small where the order shows, 1 where that motion is out of step
     running : what local errors of the steps add up to, of the largest displacement [-]; all that a single level knows
         while it runs, which puts twice of it for the error of every channel; a march beside it, with steps twice as
-        long, tells more (`single_errors`)
+        long, shows more (`single_errors`)
     local : the largest local error of a step, of the largest displacement [-]
     """
 
@@ -82,7 +82,7 @@ def cheapest(
     D falls with h², what two levels leave, about q D, with h⁴, three, q² D, with h⁶, as long as the fastest motion stays
     in step: q, which falls with h², no more than IN_STEP. Where it is more in the trial levels gain nothing: what the
     finest one leaves falls as D did in the trial, by which another trial is found. D and q are those of the trial's
-    finest pair of levels. A single level has another march beside it, with steps twice as long, which tells its error.
+    finest pair of levels. A single level has another march beside it, with steps twice as long, which shows its error.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ class StepWatch:
 
     @property
     def estimate(self) -> StepEstimate:
-        """Of what was looked at so far."""
+        """Of what was examined so far."""
         analysis = self.ready.scene.analysis
         running, local, h = self.running.total, self.running.relative, time_grid(self.ready.scene).step
         if (analysis.extrapolation_levels or 1) == 1:

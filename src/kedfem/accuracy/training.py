@@ -1,4 +1,4 @@
-"""Instants at which a linkage is looked at before its modes are chosen, and at which the residual of a run is taken."""
+"""Instants at which a linkage is examined before its modes are chosen, and at which the residual of a run is taken."""
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -12,14 +12,14 @@ from kedfem.scene import (
     turn_steps,
 )
 
-INSTANTS = 16  # where the linkage is looked at before the first run
+INSTANTS = 16  # where the linkage is examined before the first run
 
 
 MOMENTS = 16  # of a run where its residual is taken
 
 
 def training_motion(full: Prepared) -> RigidMotion:
-    """Rigid motion at the instants where the linkage is looked at: over the whole time, the last turn more closely."""
+    """Rigid motion at the instants where the linkage is examined: over the whole time, the last turn more closely."""
     scene, grid = full.scene, time_grid(full.scene)
     per_turn = turn_steps(scene)
     half = INSTANTS // 2

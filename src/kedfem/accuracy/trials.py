@@ -13,7 +13,7 @@ from kedfem.accuracy.resolution import step_error
 from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
 from kedfem.accuracy.variants import shortened
 from kedfem.dynamics.elastic_model import elastic_model
-from kedfem.dynamics.nominal import drive_range
+from kedfem.dynamics.rigid_body import drive_range
 from kedfem.links.build import bare_links
 from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage

@@ -45,7 +45,7 @@ def moved(scene: Scene) -> Scene:
     """
     if scene.driven is None:
         raise MotionError(
-            "drive: is required for kinematics, got none: without one the linkage rests as drawn "
+            "drive: is required for kinematics, got none: without one the linkage rests in the reference position "
             "(kedfem run moves it by its forces)"
         )
     if scene.analysis.kind != "static":

@@ -135,7 +135,7 @@ def mesh(
     words = "the mesh, for ParaView or shape.kind = 'mesh'"
     out.print(f"{target / 'mesh.vtu'}  {words}", markup=False, soft_wrap=True)
     try:
-        write_mesh_picture([(part.name, made)], target / "mesh.png", f"{part.name}: {made.way}", found)
+        write_mesh_picture([(part.name, made)], target / "mesh.png", f"{part.name}: {made.method}", found)
     except OutputError as error:
         err.print(f"warning: {error}", style="yellow", markup=False)
     else:

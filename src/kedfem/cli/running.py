@@ -32,9 +32,9 @@ def run(
     file = loaded.results_folder / "results.h5"
     before = _version(file)
     if not resume and (rows := abandoned_rows(file)) is not None:
-        said = f"{file}: an earlier run was killed after {rows} rows; they stay until this run's first rows replace them"
-        said += "; --resume would go on with it" * has_state(file.parent)
-        err.print(f"warning: {said}", style="yellow", markup=False, soft_wrap=True)
+        message = f"{file}: an earlier run was killed after {rows} rows, kept until the first of this run replaces them"
+        message += "; --resume would go on with it" * has_state(file.parent)
+        err.print(f"warning: {message}", style="yellow", markup=False, soft_wrap=True)
     try:
         with progress() as watch:
             done = analyse(loaded, watch, resume, states)
@@ -45,13 +45,13 @@ def run(
     show(run_tables(loaded, done), done.warnings)
     say_where(done.folder)
     if done.results.status == "doubtful":
-        said = f"doubtful: {done.results.reason}; these results mean nothing"
-        err.print(said, style="red", markup=False, soft_wrap=True)
+        message = f"doubtful: {done.results.reason}; these results mean nothing"
+        err.print(message, style="red", markup=False, soft_wrap=True)
         raise typer.Exit(DOUBTFUL)
 
 
 def with_plain_defaults(scene: Any) -> Any:
-    """The scene with plain defaults for what it leaves open; the step is stated where no turns of a drive tell it."""
+    """The scene with plain defaults for what it leaves open; the step is stated where no turns of a drive show it."""
     from kedfem.scene import time_grid
     from kedfem.scene.questions.timing import scene_speed
 

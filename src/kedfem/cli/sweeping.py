@@ -73,10 +73,10 @@ def sweep(
         with progress() as watch:
             done = swept_by(base, axes, asked, folder, watch, executor)
     except KeyboardInterrupt:
-        said = (
+        message = (
             f"finished points are in {folder or sweep_folder(base)}; the same command goes on with the others"
         )
-        err.print(f"interrupted; {said}", style="yellow", markup=False, soft_wrap=True)
+        err.print(f"interrupted; {message}", style="yellow", markup=False, soft_wrap=True)
         raise typer.Exit(INTERRUPTED) from None
     show(*sweep_tables(done))
     for name in ("sweep.h5", "sweep.csv", "edges.csv", "sweep.png"):

@@ -11,7 +11,7 @@ class Mixing:
     """Anderson acceleration of iterations: the step whose change, extrapolated from the last few iterations, is smallest.
 
     Anderson (1965), as Walker and Ni (2011) write it. It costs a few products and settles what single iterations do not:
-    bent segments, whose stiffness as drawn in their mean frame is not quite theirs.
+    bent segments, whose stiffness in the reference position in their mean frame is not quite theirs.
     """
 
     def __init__(self) -> None:

@@ -15,12 +15,12 @@ RIDGE = 1e-13  # of a pair's own square: pairs that repeat each other
 
 
 @inner
-def mixed(memory, counts, sweep, change):  # type: ignore[no-untyped-def]
+def mixed(memory, counts, iteration, change):  # type: ignore[no-untyped-def]
     """Anderson acceleration, see `dynamics.anderson.Mixing`: the change asked for becomes the step to take."""
     pairs, products, last, room = memory
     depth, N = pairs.shape[1:]
     known, slot = int(counts[2]), int(counts[3])
-    if sweep > 0:
+    if iteration > 0:
         known = min(depth, known + 1)
         for x in range(N):
             d = change[x] - last[1, x]

@@ -1,11 +1,12 @@
 """Planar beams whose frames follow the tangent at each Gauss point, compiled by numba: strains, and the force they make.
 
-At a point, with x' the derivative of the position by arc length as drawn, where |x'| = 1, and θ the angle it has turned,
+At a point, with x' the derivative of the position by arc length in the reference position, where |x'| = 1, and θ the
+angle it has turned,
 
     ε = |x'| − 1,   γ = θ − ψ,   κ = ψ'
 
 exactly what `dynamics.frames` finds with a frame at each point, see `links.segments.beam_segments`. World components:
-ψ and θ count from the rigid-body motion, so that x' = R t + u' with t the tangent as drawn.
+ψ and θ count from the rigid-body motion, so that x' = R t + u' with t the tangent in the reference position.
 
     segment, body : (b,) number of each, and of its rotation
     at, stride : (b,) where its coordinates begin, and the number of one component

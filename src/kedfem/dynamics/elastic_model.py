@@ -8,11 +8,11 @@ from jaxtyping import Float
 
 from kedfem.dynamics.joints.attachments import SharedCut
 from kedfem.dynamics.joints.constraint_joints import needs_rows
-from kedfem.dynamics.joints.constraint_ports import Ways
+from kedfem.dynamics.joints.constraint_ports import LinkageLayout
 from kedfem.dynamics.joints.coupling import joined
-from kedfem.dynamics.joints.places import on_part, part_seat, slider_axis, slider_guide
+from kedfem.dynamics.joints.places import on_part, part_surface, slider_axis, slider_guide
 from kedfem.dynamics.joints.rigid_couplings import with_stiff_ports
-from kedfem.dynamics.joints.slots import slot_ways
+from kedfem.dynamics.joints.slots import slot_travels
 from kedfem.dynamics.loads import patterns, slider_pattern
 from kedfem.dynamics.model import Model, PrescribedBody, Slider
 from kedfem.dynamics.moving_ground import moving_ground
@@ -30,9 +30,9 @@ from kedfem.links.surfaces.coupling_surfaces import (
     CouplingSurface,
     holds,
     is_flat,
-    joint_seat,
+    joint_surface,
     port_weights,
-    rigid_seat,
+    rigid_link_surface,
 )
 from kedfem.motion.joint_equations import joint_axis, unit
 from kedfem.motion.linkage import Linkage
@@ -83,16 +83,16 @@ def elastic_model(
         if body.link in cut or body.link in ground:
             on, carrier = with_scene_body(scene, f"bodies.{key}", body, links)
             links[on] = carrier
-    carried = tuple(
+    prescribed = tuple(
         PrescribedBody(_prescribed(links.pop(name)), linkage.bodies.index(name), hub, ())
         for name in [*cut, *ground] if (hub := hub_of(scene, name)) is not None
     )  # fmt: skip
     if not links:
         wanted = "must hold a link that the drive does not simply carry along, got rigid ones only"
         raise SceneError([Fault(("links",), wanted)])
-    carried = tuple(
+    prescribed = tuple(
         replace(x, loads=patterns(scene, {x.link.name: x.link}, prescribed=True)[x.link.name])
-        for x in carried
+        for x in prescribed
     )
     numbers = {key: k for k, key in enumerate(links)}
     sliders = tuple(
@@ -104,15 +104,17 @@ def elastic_model(
     links = made_rigid(scene, links, thicken=elements)
     sliders = tuple(slider_on(slider, list(links.values())[slider.carrier]) for slider in sliders)
     cuts = [shared for name, link in cut.items() for shared in _shared(name, link)]
-    ways = Ways({name: k for k, name in enumerate(linkage.bodies)}, slot_ways(scene, linkage, along))
-    held = joined(scene, links, cuts, ways, elements, bars=elements)
+    layout = LinkageLayout(
+        {name: k for k, name in enumerate(linkage.bodies)}, slot_travels(scene, linkage, along)
+    )
+    held = joined(scene, links, cuts, layout, elements, bars=elements)
     loads = patterns(scene, links)
     for slider in sliders:
         loads[list(links)[slider.carrier]] += slider.loads
     return Model(
         links=tuple(links.values()), bodies=tuple(linkage.bodies.index(x.name) for x in links.values()),
         joints=tuple(held.attachments[key] for key in links), loads=tuple(loads[key] for key in links),
-        sliders=sliders, damping=Rayleigh(*rayleigh(scene.damping)), carried=carried,
+        sliders=sliders, damping=Rayleigh(*rayleigh(scene.damping)), prescribed=prescribed,
         rows=held.rows, cuts=tuple(cuts),
     )  # fmt: skip
 
@@ -158,10 +160,12 @@ def with_scene_body(scene: Scene, where: str, body: Body, links: Mapping[str, Li
     axis = next((unit(j.axis) for j in here if j.axis and j.kind != "prismatic"), None)
     faces = next((j.face_names(body.link) for j in here if body.link in j.faces), ())
     if scene.links[body.link].model == "rigid" and links[body.link].kind == "solid":
-        return body.link, _carrying(links[body.link], rigid_seat(links[body.link], at), where, body, axis)
+        return body.link, _carrying(
+            links[body.link], rigid_link_surface(links[body.link], at), where, body, axis
+        )
     try:
-        key, seat = on_part(
-            links, body.link, at, lambda link: joint_seat(link, f"{where}.at", at, axis, faces)
+        key, surface = on_part(
+            links, body.link, at, lambda link: joint_surface(link, f"{where}.at", at, axis, faces)
         )
     except MeshError:
         if not isinstance(body, PointMass):
@@ -169,23 +173,23 @@ def with_scene_body(scene: Scene, where: str, body: Body, links: Mapping[str, Li
         key, point = on_part(links, body.link, at, lambda link: point_rows(link, f"{where}.at", at))
         require_on_axis(links[key], f"{where}.at", at, point.X, "planar beam")
         return key, with_point_mass(links[key], point.value, body.mass)
-    return key, _carrying(links[key], seat, where, body, axis)
+    return key, _carrying(links[key], surface, where, body, axis)
 
 
 def _carrying(
-    link: Link, seat: CouplingSurface, where: str, body: Body, axis: Float[np.ndarray, "3"] | None
+    link: Link, surface: CouplingSurface, where: str, body: Body, axis: Float[np.ndarray, "3"] | None
 ) -> Link:
     at = np.asarray(body.at)
     match body:
         case Flywheel(mass=mass, inertia=inertia):
             spin = unit((0, 0, 1)) if axis is None else axis
-            if not link.planar and not holds(seat, spin):
-                raise MeshError(f"{where}.at: a flywheel must sit on {_wide_seat(link)}")
-            return with_body(link, seat, mass, at, flywheel_tensor(seat, spin, inertia))
+            if not link.planar and not holds(surface, spin):
+                raise MeshError(f"{where}.at: a flywheel must sit on {_wide_surface(link)}")
+            return with_body(link, surface, mass, at, flywheel_tensor(surface, spin, inertia))
         case PointMass(mass=mass):
-            return with_body(link, seat, mass, at, np.zeros((3, 3)))
+            return with_body(link, surface, mass, at, np.zeros((3, 3)))
         case RigidBody(mass=mass, inertia=inertia, centre=centre):
-            if is_flat(seat):
+            if is_flat(surface):
                 wanted, got = (
                     ("an end or a corner", "another node")
                     if link.kind == "spatial_beam"
@@ -194,10 +198,10 @@ def _carrying(
                 raise MeshError(
                     f"{where}.at: a rigid body with full inertia must sit on {wanted}, got {got} of '{link.name}'"
                 )
-            return with_body(link, seat, mass, np.asarray(centre), euler_tensor(inertia_tensor(inertia)))
+            return with_body(link, surface, mass, np.asarray(centre), euler_tensor(inertia_tensor(inertia)))
 
 
-def _wide_seat(link: Link) -> str:
+def _wide_surface(link: Link) -> str:
     if link.kind == "spatial_beam":
         return "an end or a corner of the beam, or have its axis across the beam"
     return "a bore, or on a flat face that contains its axis"
@@ -216,8 +220,8 @@ def _slider(scene: Scene, name: str, links: dict[str, Link], numbers: dict[str, 
             f"links.{name}: a rigid slider must be joined to an elastic link, got none: give it a shape"
         )
     key, other = held[0]
-    carrier, seat = part_seat(scene, key, links, other)
-    weights = port_weights(seat, np.array([joints[key].at]))[0]
+    carrier, surface = part_surface(scene, key, links, other)
+    weights = port_weights(surface, np.array([joints[key].at]))[0]
     extra = sum(body.mass for body in scene.bodies.values() if body.link == name)
     loads = tuple(
         slider_pattern(links[carrier], load, x, weights)

@@ -1,7 +1,7 @@
-"""The record of an action: a force that depends on how the mechanism moves; where its ends are, and how they move.
+"""The record of a force element: a force that depends on how the mechanism moves; where its ends are, and how they move.
 
-An action has two ends. An end is up to two vectors of a link, linear in its state: a point, or directions across a hinge.
-`force_elements_kernel` makes forces on these vectors from their positions and velocities.
+A force element has two ends. An end is up to two vectors of a link, linear in its state: a point, or directions across a
+hinge. `force_elements_kernel` makes forces on these vectors from their positions and velocities.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,7 +31,7 @@ NO_CURVE = Pieces()
 
 @dataclass(frozen=True, slots=True)
 class End:
-    """One end of an action: vectors x_i = nominal_i + mask * Σ_a w_ia u_a, u the link's state in world components.
+    """One end of a force element: vectors x_i = rigid_i + mask * Σ_a w_ia u_a, u the link's state in world components.
 
     k : number of the link in the model; -1: nothing but the rigid-body motion moves it (the ground, what the drive
     carries)
@@ -39,7 +39,7 @@ class End:
     form : POINT: one point; PAIR: two directions across a hinge, e1 × e2 its axis; SINGLE: one direction across, and the
         axis; ANGLE: (0, 0, ψ) of a planar beam
     weights : (m, n) on the rows of the state; (m, 0) for k = -1
-    X : (m, 3) the vectors as drawn [m; -]
+    X : (m, 3) the vectors in the reference position [m; -]
     mask : (3,) which components of the state's rows the vectors are made of; forces on them likewise
     offset : (3,) from the point of the link, to which X belongs, to the end itself; does not turn [m]
     link : name of the link in the scene, where that is not the model's: a slider, what the drive carries
@@ -65,7 +65,7 @@ class ForceElement:
     stiffness, damping, free : of a spring, free where it has no force
     factor : of a spring, times (T,) and the drive's angles (T,) → what its stiffness is multiplied by; none: one
     limits : of a stop, between which it has no force; none: no stop
-    axis : of a hinge or slide, as drawn
+    axis : of a hinge or slide, in the reference position
     over, curve : force along the coordinate, of a motor or beside a spring's; none: no points
     """
 
@@ -86,29 +86,29 @@ Table = tuple[np.ndarray, ...]
 
 
 def kernel_table(every: Sequence[ForceElement]) -> Table:
-    """What the kernel takes of actions: kinds, forms, numbers, over, first, at, cubics, periods."""
+    """What the kernel takes of force elements: kinds, forms, numbers, over, first, at, cubics, periods."""
     numbers = np.zeros((len(every), 16))
-    for row, action in zip(numbers, every, strict=True):
-        row[:2] = action.stiffness, action.damping
-        row[2], row[14] = action.limits or (action.free, action.free)
-        e1, e2 = perpendiculars(action.axis)
-        row[3:12] = np.concatenate([action.axis, e1, e2])
-        if action.kind == TURN:
-            row[12:14] = _drawn_angles(action, e1, e2)
+    for row, element in zip(numbers, every, strict=True):
+        row[:2] = element.stiffness, element.damping
+        row[2], row[14] = element.limits or (element.free, element.free)
+        e1, e2 = perpendiculars(element.axis)
+        row[3:12] = np.concatenate([element.axis, e1, e2])
+        if element.kind == TURN:
+            row[12:14] = _drawn_angles(element, e1, e2)
     return (
-        np.array([action.kind for action in every], int),
-        np.array([[end.form for end in action.ends] for action in every], int).reshape(-1, 2),
+        np.array([element.kind for element in every], int),
+        np.array([[end.form for end in element.ends] for element in every], int).reshape(-1, 2),
         numbers,
-        np.array([action.over for action in every], int),
-        np.concatenate([[0], np.cumsum([len(action.curve.at) for action in every], dtype=int)]),
-        np.array([x for action in every for x in action.curve.at], float),
-        np.array([c for action in every for c in action.curve.coefficients], float).reshape(-1, 4),
-        np.array([action.curve.period for action in every], float),
+        np.array([element.over for element in every], int),
+        np.concatenate([[0], np.cumsum([len(element.curve.at) for element in every], dtype=int)]),
+        np.array([x for element in every for x in element.curve.at], float),
+        np.array([c for element in every for c in element.curve.coefficients], float).reshape(-1, 4),
+        np.array([element.curve.period for element in every], float),
     )
 
 
 def stiffness_factors(every: Sequence[Factor | None], t: Times, phi: Times) -> Float[np.ndarray, "T A"]:
-    """What the stiffness of each action, or law, is multiplied by over time; one where it has no factor."""
+    """What the stiffness of each force element, or law, is multiplied by over time; one where it has no factor."""
     out = np.ones((len(t), len(every)))
     for i, factor in enumerate(every):
         if factor is not None:
@@ -116,15 +116,15 @@ def stiffness_factors(every: Sequence[Factor | None], t: Times, phi: Times) -> F
     return out
 
 
-def _drawn_angles(action: ForceElement, e1: Vector, e2: Vector) -> list[float]:
-    """Angles from the second end's directions to the first's, as drawn."""
+def _drawn_angles(element: ForceElement, e1: Vector, e2: Vector) -> list[float]:
+    """Angles from the second end's directions to the first's, in the reference position."""
     drawn = []
     for k in range(2):
         a, b = (
             {PAIR: end.X[k % len(end.X)], SINGLE: end.X[0], ANGLE: (e1, e2)[k]}[end.form]
-            for end in action.ends
+            for end in element.ends
         )
-        drawn.append(float(np.arctan2(action.axis @ np.cross(b, a), a @ b)))
+        drawn.append(float(np.arctan2(element.axis @ np.cross(b, a), a @ b)))
     return drawn
 
 
@@ -132,7 +132,7 @@ Vectors = tuple[Float[np.ndarray, "T 2 3"], Float[np.ndarray, "T 2 3"]]
 """Two vectors of an end over time, and their rates; the second is zero where there is none."""
 
 
-def nominal_vectors(end: End, motion: RigidMotion) -> Vectors:
+def rigid_vectors(end: End, motion: RigidMotion) -> Vectors:
     """What an end's vectors and their rates would be if its link did not deform or leave the rigid-body motion."""
     R, omega, m = motion.R[:, end.body], motion.omega[:, end.body], len(end.X)
     x, v = np.zeros((2, len(motion.t), 2, 3))
@@ -150,9 +150,9 @@ def nominal_vectors(end: End, motion: RigidMotion) -> Vectors:
 def vectors(every: Sequence[ForceElement], block: Block) -> tuple[Float[np.ndarray, "T A 2 2 3"], ...]:
     """Positions and velocities of all ends over a block of time points, as the kernel takes them."""
     x, v = np.zeros((2, len(block), len(every), 2, 2, 3))
-    for i, action in enumerate(every):
-        for e, end in enumerate(action.ends):
-            x[:, i, e], v[:, i, e] = nominal_vectors(end, block.motion)
+    for i, element in enumerate(every):
+        for e, end in enumerate(element.ends):
+            x[:, i, e], v[:, i, e] = rigid_vectors(end, block.motion)
             if end.k >= 0:
                 history = block.links[end.k]
                 x[:, i, e] += elastic_vectors(end, history.u)

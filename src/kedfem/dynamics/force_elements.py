@@ -1,4 +1,4 @@
-"""Motors, springs and limits of a scene as actions on a model, and hinges whose turn is looked at."""
+"""Motors, springs and limits of a scene as force elements on a model, and hinges whose turn is examined."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,7 +20,7 @@ from kedfem.dynamics.force_element import (
     ForceElement,
     Vector,
 )
-from kedfem.dynamics.joints.places import seat_of, slider_axis
+from kedfem.dynamics.joints.places import slider_axis, surface_of
 from kedfem.dynamics.model import Model, Slider, on_segment
 from kedfem.errors import MeshError
 from kedfem.links.point_rows import point_rows, require_on_axis
@@ -31,7 +31,7 @@ from kedfem.motion.joint_equations import joint_axis
 from kedfem.scene import GROUND, Limit, LineSpring, Motor, Scene, Spring, TravelLimit, factor_law, pieces
 
 
-def actions(scene: Scene, model: Model) -> tuple[ForceElement, ...]:
+def force_elements(scene: Scene, model: Model) -> tuple[ForceElement, ...]:
     """All motors, springs and limits of a scene.
 
     Raises
@@ -42,7 +42,7 @@ def actions(scene: Scene, model: Model) -> tuple[ForceElement, ...]:
     return _all(_Ends(scene, model))
 
 
-def rigid_actions(scene: Scene, bodies: Sequence[str]) -> tuple[ForceElement, ...]:
+def rigid_elements(scene: Scene, bodies: Sequence[str]) -> tuple[ForceElement, ...]:
     """The same on links that do not deform, moving as given.
 
     Parameters
@@ -60,7 +60,7 @@ def _all(find: "_Ends | _RigidEnds") -> tuple[ForceElement, ...]:
 
 
 def hinges(scene: Scene, model: Model) -> tuple[ForceElement, ...]:
-    """An action without a force for each revolute joint: its turn is looked at."""
+    """A force element without a force for each revolute joint: its turn is examined."""
     find = _Ends(scene, model)
     names = [name for name, joint in scene.joints.items() if joint.kind == "revolute"]
     return tuple(_hinge(find, f"joints/{name}", name) for name in names)
@@ -77,7 +77,7 @@ class _Ends:
         """The body that a link without unknowns moves with; None of others."""
         if name == GROUND or slider_axis(self.scene, name) is not None:
             return 0
-        return next((x.body for x in self.model.carried if x.link.name == name), None)
+        return next((x.body for x in self.model.prescribed if x.link.name == name), None)
 
     def point(self, where: str, name: str, at: Vector) -> End:
         """A point of a link, the ground or a slider."""
@@ -107,14 +107,14 @@ class _Ends:
         body = self.body(name)
         if body is not None:
             return End(-1, body, PAIR, np.zeros((2, 0)), both, link=name)
-        k, seat = on_segment(self.model, name, at, lambda link: seat_of(self.scene, joint, link))
+        k, surface = on_segment(self.model, name, at, lambda link: surface_of(self.scene, joint, link))
         link, here = self.model.links[k], self.model.bodies[k]
         if link.kind == "beam":
-            return End(k, here, ANGLE, seat.fit[:1], np.zeros((1, 3)), (0.0, 0.0, 1.0))
-        if all(holds(seat, e) for e in both):
-            return End(k, here, PAIR, both @ seat.fit[1:], both, _plane(link))
-        known = np.array([_in_face(f"joints.{joint}", link, seat, axis), axis])
-        return End(k, here, SINGLE, known @ seat.fit[1:], known, _plane(link))
+            return End(k, here, ANGLE, surface.fit[:1], np.zeros((1, 3)), (0.0, 0.0, 1.0))
+        if all(holds(surface, e) for e in both):
+            return End(k, here, PAIR, both @ surface.fit[1:], both, _plane(link))
+        known = np.array([_in_face(f"joints.{joint}", link, surface, axis), axis])
+        return End(k, here, SINGLE, known @ surface.fit[1:], known, _plane(link))
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,10 +143,10 @@ def _plane(link: Link) -> tuple[float, float, float]:
     return (1.0, 1.0, 0.0) if link.planar else IN_SPACE
 
 
-def _in_face(where: str, link: Link, seat: CouplingSurface, axis: Vector) -> Vector:
+def _in_face(where: str, link: Link, surface: CouplingSurface, axis: Vector) -> Vector:
     """The direction within a flat coupling surface across an axis."""
-    t = np.cross(face_normal(seat), axis)
-    if np.linalg.norm(t) < 1e-6 or not holds(seat, t):
+    t = np.cross(face_normal(surface), axis)
+    if np.linalg.norm(t) < 1e-6 or not holds(surface, t):
         raise MeshError(
             f"{where}: must sit on a bore of link '{link.name}' to be turned, got a face across its axis"
         )
@@ -159,14 +159,14 @@ def _ordered(links: tuple[str, str]) -> tuple[str, str]:
 
 
 def _hinge(find: _Ends | _RigidEnds, name: str, joint: str) -> ForceElement:
-    """An action on the turn of a hinge, without a force yet."""
+    """A force element on the turn of a hinge, without a force yet."""
     one, other = _ordered(find.scene.joints[joint].links)
     ends = (find.across(joint, one), find.across(joint, other))
     return ForceElement(name, TURN, ends, axis=joint_axis(find.scene.joints[joint]))
 
 
 def _slide(find: _Ends | _RigidEnds, name: str, joint: str) -> ForceElement:
-    """An action on the travel of a slide, without a force yet: the port of its link against the other."""
+    """A force element on the travel of a slide, without a force yet: the port of its link against the other."""
     at = np.asarray(find.scene.joints[joint].at)
     one, other = _ordered(find.scene.joints[joint].links)
     axis, end = joint_axis(find.scene.joints[joint]), find.point(f"joints.{joint}", other, at)
@@ -176,11 +176,11 @@ def _slide(find: _Ends | _RigidEnds, name: str, joint: str) -> ForceElement:
 
 
 def _port(find: _Ends | _RigidEnds, joint: str, name: str, at: Vector) -> End:
-    """The middle of a joint on a link: the affine fit of its seat, as where joints hold it."""
+    """The middle of a joint on a link: the affine fit of its coupling surface, as where joints hold it."""
     if isinstance(find, _RigidEnds) or find.body(name) is not None:
         return find.point(f"joints.{joint}", name, at)
-    k, seat = on_segment(find.model, name, at, lambda link: seat_of(find.scene, joint, link))
-    link, weights = find.model.links[k], port_weights(seat, at[None])
+    k, surface = on_segment(find.model, name, at, lambda link: surface_of(find.scene, joint, link))
+    link, weights = find.model.links[k], port_weights(surface, at[None])
     return End(k, find.model.bodies[k], POINT, weights, at[None], _plane(link))
 
 

@@ -1,12 +1,13 @@
 """Forces of motors, springs, dampers and stops from positions and velocities, compiled by numba.
 
-Each action has one coordinate q of the positions x of its two ends: the turn of a hinge, the travel of a slide, the
+Each force element has one coordinate q of the positions x of its two ends: the turn of a hinge, the travel of a slide,
+the
 distance of two points. Its generalised force Q(t, q, q') acts on the ends as Q ∂q/∂x: its virtual work is Q δq, whatever
 moves. As q does not change where all turns or moves together, the forces balance.
 
-A : actions; every array has a row per action
+A : force elements; every array has a row per force element
 
-    x, v : (A, 2, 2, 3) two vectors of each of two ends, world components, and their rates; see `actions.End`
+    x, v : (A, 2, 2, 3) two vectors of each of two ends, world components, and their rates; see `force_elements.End`
     factors : (A,) what the stiffness of each is multiplied by
     before : (A,) q at the time point before, so that turns are counted on beyond ±π
     forces : (A, 2, 2, 3) out
@@ -14,8 +15,8 @@ A : actions; every array has a row per action
 
     kinds : (A,) TURN, SLIDE, DISTANCE
     forms : (A, 2) POINT, PAIR, SINGLE, ANGLE: what the vectors of an end are
-    numbers : (A, 16) stiffness, damping, lower q without force; axis, e1, e2 as drawn; of each pair of directions its
-        angle as drawn; upper q without force, of a spring the lower one
+    numbers : (A, 16) stiffness, damping, lower q without force; axis, e1, e2 in the reference position; of each pair of
+        directions its angle in the reference position; upper q without force, of a spring the lower one
     over : (A,) TIME, SPEED, POSITION: what the curve is over
     first : (A + 1,) where the points of its curve begin
     at : (c,), cubics : (c, 4) the curves, one after the other, as `Pieces` has them
@@ -32,7 +33,7 @@ STIFFNESS, DAMPING, LOWER, AXIS, E1, E2, DRAWN, UPPER = 0, 1, 2, 3, 6, 9, 12, 14
 
 @compiled
 def evaluate(t, factors, x, v, before, table, forces, values):  # type: ignore[no-untyped-def]
-    """Forces and values of all actions at one time, into `forces` and `values`."""
+    """Forces and values of all force elements at one time, into `forces` and `values`."""
     kinds, forms, numbers, over, first, at, cubics, periods = table
     for i in range(len(kinds)):
         gradient = forces[i]
@@ -115,11 +116,11 @@ def travel(x, numbers, gradient):  # type: ignore[no-untyped-def]
 def turn(x, forms, numbers, before, gradient):  # type: ignore[no-untyped-def]
     """Turn of the first end against the second about the hinge's axis n, and its gradient.
 
-    The mean over two pairs of directions a, b of the ends, drawn across n and looked at along n, of
+    The mean over two pairs of directions a, b of the ends, drawn across n and seen along n, of
 
         θ = atan2(s, c),   s = n · (b × a),   c = a · b − (n · a)(n · b)
 
-    less the angle as drawn, counted on from `before`. n moves with the first end that shows it.
+    less the angle in the reference position, counted on from `before`. n moves with the first end that shows it.
     """
     n, size, end = axis_of(x, forms, numbers)
     q = 0.0
@@ -146,7 +147,7 @@ def turn(x, forms, numbers, before, gradient):  # type: ignore[no-untyped-def]
 
 @compiled
 def axis_of(x, forms, numbers):  # type: ignore[no-untyped-def]
-    """The axis of a hinge now, the length of the vector it is made of, and the end that shows it; −1: as drawn."""
+    """The axis of a hinge now, the length of the vector it is made of, and the end that shows it; −1: none."""
     for e in range(2):
         if forms[e] == PAIR or forms[e] == SINGLE:
             m = cross(x[e, 0], x[e, 1]) if forms[e] == PAIR else x[e, 1].copy()

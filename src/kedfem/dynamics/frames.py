@@ -19,7 +19,7 @@ from kedfem.links.beams.metric import pulled_back, strains_of
 from kedfem.links.record import Frame, Link
 from kedfem.motion.newton import rotation as exponential
 
-NUDGE = 1e-5  # of a link's size: what it moves by to tell the rate of its deformation, rounding and error 1e-10 of it
+NUDGE = 1e-5  # of a link's size: what it moves by to show the rate of its deformation, rounding and error 1e-10 of it
 
 
 def frames_of(link: Link) -> tuple[Frame, ...]:
@@ -30,7 +30,7 @@ def frames_of(link: Link) -> tuple[Frame, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class Followed:
+class Deformed:
     """One frame at one time: Q (d, d), the angle of a planar link [rad], deformation g and its rates, (n, d) each."""
 
     Q: Float[np.ndarray, "d d"]
@@ -57,7 +57,7 @@ def rotation(
     A = y.T @ fit
     left, _, right = np.linalg.svd(A)
     Q = left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))]) @ right
-    # once more by Newton: a slender segment tells its twist by small numbers
+    # once more by Newton: a slender segment shows its twist by small numbers
     U = Q.T @ A
     axial = np.array([U[2, 1] - U[1, 2], U[0, 2] - U[2, 0], U[1, 0] - U[0, 1]])
     return Q @ exponential(np.linalg.solve(np.trace(U) * np.eye(3) - (U + U.T) / 2, axial)), 0.0
@@ -93,7 +93,7 @@ def planar_rotation(angle: float, d: int) -> Float[np.ndarray, "d d"]:
 def deformation(link: Link, y: Nodal, Q: Float[np.ndarray, "d d"], angle: float) -> Nodal:
     """g = Qᵀ y − X without its mean, which strains nothing; of a planar beam ψ less the frame's angle.
 
-    Of a beam in space a displacement that has its strains, which no frame needs to tell.
+    Of a beam in space a displacement that has its strains, which no frame needs to show.
     """
     if link.element is not None:
         return np.asarray(link.element.share @ strains_of(link.element, y)).reshape(y.shape)
@@ -105,7 +105,7 @@ def deformation(link: Link, y: Nodal, Q: Float[np.ndarray, "d d"], angle: float)
     return np.asarray(g)
 
 
-def seen_from(link: Link, frame: Frame, y: Nodal, y1: Nodal | None = None) -> Followed:
+def seen_from(link: Link, frame: Frame, y: Nodal, y1: Nodal | None = None) -> Deformed:
     """A frame within half a turn of the rigid-body one, with what it sees of a rate.
 
     Parameters
@@ -121,10 +121,10 @@ def seen_from(link: Link, frame: Frame, y: Nodal, y1: Nodal | None = None) -> Fo
             deformation(link, z, *rotation(link, frame.fit, z, angle)) for z in (y + part * y1, y - part * y1)
         )
         g1 = (ahead - behind) / (2 * part)
-    return Followed(Q, angle, g, g1, np.zeros_like(g))
+    return Deformed(Q, angle, g, g1, np.zeros_like(g))
 
 
-def frame_force(link: Link, frame: Frame, now: Followed, y: Nodal, beta: float) -> tuple[Nodal, float]:
+def frame_force(link: Link, frame: Frame, now: Deformed, y: Nodal, beta: float) -> tuple[Nodal, float]:
     """Internal force of a frame in the rigid-body frame: (∂g/∂y)ᵀ K0 (g + β g'), and its strain energy."""
     Kg = _times(frame.K0, now.g)
     energy = 0.5 * float(np.vdot(now.g, Kg))

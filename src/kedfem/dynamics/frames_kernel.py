@@ -104,7 +104,7 @@ def rotation(i, kind, fit, y, Q, angle, A, U, change):  # type: ignore[no-untype
         size = max(abs(change[0]), abs(change[1]), abs(change[2]))
         if (
             size > 0.5
-        ):  # a slender segment tells its twist by small numbers: Newton's step may be far too long
+        ):  # a slender segment shows its twist by small numbers: Newton's step may be far too long
             for b in range(3):
                 change[b] *= 0.5 / size
         rodrigues(change, Q[i], U)

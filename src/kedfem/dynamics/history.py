@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.dynamics.stepping.state import LinkState, Nominal
+from kedfem.dynamics.stepping.state import ForcingAt, LinkState
 from kedfem.motion.rigid import RigidMotion
 
 
@@ -24,9 +24,9 @@ class Forcing:
     F: Float[np.ndarray, "T n d"]
     stress: Float[np.ndarray, "T m"] | None = None
 
-    def at(self, k: int) -> Nominal:
+    def at(self, k: int) -> ForcingAt:
         """At the k-th of the times."""
-        return Nominal(self.R[k], self.F[k], None if self.stress is None else self.stress[k])
+        return ForcingAt(self.R[k], self.F[k], None if self.stress is None else self.stress[k])
 
     def first(self, T: int) -> "Forcing":
         """Over the first of the times."""
@@ -39,7 +39,7 @@ class Products:
 
     Mv : M δ', world components [kg m/s]
     Kg, Cg : K0 g [N] and C0 g [N s], link frame; Cg is None without damping,
-        or where the mass is 1 and K0 g tells it
+        or where the mass is 1 and K0 g shows it
     """
 
     Mv: Float[np.ndarray, "T _ _"]
@@ -125,7 +125,7 @@ class Exerted:
         its point there, and that point
     effort : (T, J) along the coordinate of a joint's drive, and of gears along that of their first joint
     spring : (T, 2, s) deflection and force of the springs of bushings and shafts; stiffness, damping : (s,) of each
-    element : (T, 3, A) coordinate, its rate and force along it of motors and springs, in the order of `actions`
+    element : (T, 3, A) coordinate, its rate and force along it of motors and springs, in the order of `force_elements`
     ends : (T, A, 2, 2, 3) force and moment about the world's origin at both ends of each
     ports : (T, m) forces on interface points of joints by constraint equations, side by side
     """

@@ -41,7 +41,7 @@ class RigidLoad:
     """One load on one body.
 
     body : its number
-    force : (3,) Σ f at factor one, as drawn [N]
+    force : (3,) Σ f at factor one, in the reference position [N]
     moment : (3, 3) Σ X ⊗ f, X from the linkage's centre [N m]
     couple : about z, of planar beams [N m]
     follows, factor, share : as in `Pattern`
@@ -58,7 +58,7 @@ class RigidLoad:
 
 @dataclass(slots=True)
 class Inertias:
-    """Moments of mass of all bodies (ground first), as drawn, X from the linkage's centre, and the loads.
+    """Moments of mass of all bodies (ground first), reference X from the linkage's centre, and the loads.
 
     mass : (B,) [kg]
     first : (B, 3) ∫ρ X dV [kg m]
@@ -104,7 +104,7 @@ class Inertias:
         )
 
     def centre_of(self, body: int) -> Vector | None:
-        """Centre of mass of a body, as drawn [m]; None without mass."""
+        """Centre of mass of a body, in the reference position [m]; None without mass."""
         if not self.mass[body] > 0:
             return None
         return np.asarray(self.centre + self.first[body] / self.mass[body])
@@ -118,9 +118,9 @@ def inertias_of_model(scene: Scene, linkage: Linkage, model: Model) -> Inertias:
     for link, body, loads, last in zip(model.links, model.bodies, model.loads, riding, strict=True):
         out.add_link(body, link)
         _add_loads(out, body, link, loads[first : len(loads) - last])
-    for carried in model.carried:
-        out.add_link(carried.body, carried.link)
-        _add_loads(out, carried.body, carried.link, carried.loads[first:])
+    for prescribed in model.prescribed:
+        out.add_link(prescribed.body, prescribed.link)
+        _add_loads(out, prescribed.body, prescribed.link, prescribed.loads[first:])
     for slider in model.sliders:
         carrier = model.links[slider.carrier]
         at = slider.weights @ carrier.X

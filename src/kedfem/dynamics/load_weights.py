@@ -11,7 +11,7 @@ from kedfem.links.point_rows import point_rows, require_on_axis
 from kedfem.links.record import Link
 from kedfem.links.surfaces.coupling_surfaces import (
     CouplingSurface,
-    face_seat,
+    face_surface,
     is_flat,
     same_face,
     surface_weights,
@@ -38,7 +38,9 @@ def load_weights(
         case BodyLoad():
             return {key: link.volume for key, link in parts.items()}
         case SurfaceLoad():
-            return {key: surface_weights(parts[key], seat) for key, seat in face(where, load, parts).items()}
+            return {
+                key: surface_weights(parts[key], surface) for key, surface in face(where, load, parts).items()
+            }
 
 
 def at_point(
@@ -65,9 +67,9 @@ def face(
             raise SceneError(
                 f"{where}: a {load.kind} needs a solid or a plane link, got the beam '{link.name}'"
             )
-    key, seat = on_part(parts, load.link, at, lambda x: face_seat(x, f"{where}.at", at))
-    found = {key: seat}
-    for other in parts.keys() - {key} if is_flat(seat) else ():
-        if (same := same_face(parts[other], seat)) is not None:
+    key, surface = on_part(parts, load.link, at, lambda x: face_surface(x, f"{where}.at", at))
+    found = {key: surface}
+    for other in parts.keys() - {key} if is_flat(surface) else ():
+        if (same := same_face(parts[other], surface)) is not None:
             found[other] = same
     return found

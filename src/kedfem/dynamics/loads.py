@@ -1,6 +1,6 @@
 """Loads P of the general equation: every one is constant patterns of the link times factors over time.
 
-[KED, eqs. (15)(16)]: body, surface and concentrated forces, all through Nᵀ; couples on the turn of a seat.
+[KED, eqs. (15)(16)]: body, surface and concentrated forces, all through Nᵀ; couples on the turn of a coupling surface.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -10,14 +10,14 @@ from typing import Protocol
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.joints.places import on_part, seat_of
+from kedfem.dynamics.joints.places import on_part, surface_of
 from kedfem.dynamics.load_weights import Vector, at_point, face, load_weights, point_weights
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import Link, as_rows
 from kedfem.links.surfaces.coupling_surfaces import (
     face_normals,
-    joint_seat,
-    seat_couples,
+    joint_surface,
+    surface_couples,
 )
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import (
@@ -37,7 +37,7 @@ from kedfem.scene import (
 )
 
 MISSED = 0.05  # of a load's integral over time; a jump between two steps is less
-FINER, MOST = 16, 400_000  # points in a step, and in all, at which factors over an angle are looked at
+FINER, MOST = 16, 400_000  # points in a step, and in all, at which factors over an angle are examined
 
 Times = Float[np.ndarray, " t"]
 
@@ -49,8 +49,9 @@ class Pattern:
     forces : (n, d) at factor one, reference components [N]
     follows : turns with the link
     factor : times (t,) and angles of the drive (t,) → factors (t,)
-    share : unit vectors of the link as drawn and of the world: the factor times their cosine, once the link has turned
-    own : turns as the link itself does, which no rigid-body orientation tells: `system.forces.turning_loads`
+    share : unit vectors of the link in the reference position and of the world: the factor times their cosine, once the
+        link has turned
+    own : turns as the link itself does, which no rigid-body orientation shows: `system.forces.turning_loads`
     load : its name in the scene; of gravity none
     """
 
@@ -132,7 +133,7 @@ def _load_patterns(
             return _torque(scene, where, load, parts)
         case PressureLoad() if parts:
             faces = face(where, load, parts)
-            pushed = {key: face_normals(parts[key], seat) for key, seat in faces.items()}
+            pushed = {key: face_normals(parts[key], surface) for key, surface in faces.items()}
             return {key: [Pattern(-load.pressure * x, True, factor)] for key, x in pushed.items()}
         case ForceLoad() | BodyLoad() | SurfaceLoad():
             follows, vector = load.frame == "link", np.asarray(load.vector)
@@ -147,7 +148,7 @@ def _load_patterns(
 def _torque(
     scene: Scene, where: str, load: TorqueLoad, parts: Mapping[str, Link]
 ) -> dict[str, list[Pattern]]:
-    """A couple on the segment that has its seat; of fixed direction m it is Σ (m · R e_k) times the one about R e_k."""
+    """A couple on the segment of its coupling surface; of fixed direction m it is Σ (m · R e_k) of that about R e_k."""
     m, factor = np.asarray(load.vector), factor_law(load.factor)
     at = np.asarray(scene.joints[load.joint].at if load.joint is not None else load.at)
     key, couples = on_part(parts, load.link, at, lambda link: _couples(scene, where, load, link, at))
@@ -160,19 +161,19 @@ def _torque(
 def _couples(
     scene: Scene, where: str, load: TorqueLoad, link: Link, at: Vector
 ) -> Float[np.ndarray, "3 n d"]:
-    """Forces of unit couples about x, y and z on a link's seat."""
+    """Forces of unit couples about x, y and z on a link's coupling surface."""
     if link.kind == "beam":
         out = np.zeros((3, link.n, 3))
         out[2, :, 2] = point_weights(where, link, at)
         return out
     if load.joint is not None:
-        return seat_couples(link, seat_of(scene, load.joint, link), where)
+        return surface_couples(link, surface_of(scene, load.joint, link), where)
     axis = np.asarray(load.vector) / (np.linalg.norm(load.vector) or 1.0)
     try:
-        seat = joint_seat(link, f"{where}.at", at, axis if np.any(axis) else None)
+        surface = joint_surface(link, f"{where}.at", at, axis if np.any(axis) else None)
     except MeshError:
-        seat = joint_seat(link, f"{where}.at", at, None)  # a bore or journal across the torque
-    return seat_couples(link, seat, where)
+        surface = joint_surface(link, f"{where}.at", at, None)  # a bore or journal across the torque
+    return surface_couples(link, surface, where)
 
 
 def initial_forces(scene: Scene, links: Sequence[Link]) -> list[Float[np.ndarray, "n d"]]:
@@ -202,7 +203,7 @@ def slider_pattern(link: Link, name: str, load: ForceLoad, weights: Float[np.nda
     return Pattern(forces, False, factor_law(load.factor), load=name)
 
 
-def nominal_acceleration(link: Link, motion: RigidMotion, body: int) -> Float[np.ndarray, "T d"]:
+def rigid_acceleration(link: Link, motion: RigidMotion, body: int) -> Float[np.ndarray, "T d"]:
     """p'' of a link over time; of a planar beam (x'', y'', θ'')."""
     if link.kind == "beam":
         return np.concatenate([motion.p2[:, body, :2], motion.alpha[:, body, 2:]], axis=1)
@@ -243,7 +244,7 @@ def applied(
     body : the link's number in the motion
     """
     F = link.mX @ -motion.R2[:, body, : link.d].transpose(0, 2, 1)
-    F -= link.m1 * nominal_acceleration(link, motion, body)[:, None]
+    F -= link.m1 * rigid_acceleration(link, motion, body)[:, None]
     for load in loads:
         if load.own:
             continue

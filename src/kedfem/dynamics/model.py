@@ -61,7 +61,7 @@ class Model:
 
     bodies : number of each link in the linkage
     joints, loads : per link
-    carried : rigid links that move with the drive
+    prescribed : rigid links that move with the drive
     rows : joints enforced by constraint equations
     cuts : where segments of a link meet, by `link_keys`
     """
@@ -72,7 +72,7 @@ class Model:
     loads: tuple[tuple[Pattern, ...], ...]
     sliders: tuple[Slider, ...]
     damping: Rayleigh
-    carried: tuple[PrescribedBody, ...] = ()
+    prescribed: tuple[PrescribedBody, ...] = ()
     rows: tuple[ConstraintJoint, ...] = ()
     cuts: tuple[SharedCut, ...] = ()
 
@@ -105,10 +105,10 @@ def segments(model: Model) -> dict[str, list[Link]]:
     return out
 
 
-def ways(model: Model) -> dict[str, str]:
+def mesh_methods(model: Model) -> dict[str, str]:
     """How the links that are parts from CAD were meshed, in words."""
-    links = [*model.links, *(carried.link for carried in model.carried)]
-    return {link.name: way for link in links if (way := (link.full or link).way)}
+    links = [*model.links, *(prescribed.link for prescribed in model.prescribed)]
+    return {link.name: method for link in links if (method := (link.full or link).method)}
 
 
 def on_segment(

@@ -9,7 +9,7 @@ from kedfem.links.bodies import with_body
 from kedfem.links.record import Link
 from kedfem.links.reduced import rigid
 from kedfem.links.solid import solid_link
-from kedfem.links.surfaces.coupling_surfaces import rigid_seat
+from kedfem.links.surfaces.coupling_surfaces import rigid_link_surface
 from kedfem.mesh import link_mesh
 from kedfem.motion.linkage import scene_size
 from kedfem.scene import Bar, LinkScene, Material, Scene
@@ -36,4 +36,8 @@ def moving_ground(scene: Scene, name: str, hub: str) -> Link:
         link, mass=(none,) * 3, m1=np.zeros_like(link.m1), mX=np.zeros_like(link.mX), volume=np.zeros(link.n)
     )
     mass = scene.links[name].mass
-    return with_body(massless, rigid_seat(massless, at), mass, at, np.zeros((3, 3))) if mass else massless
+    return (
+        with_body(massless, rigid_link_surface(massless, at), mass, at, np.zeros((3, 3)))
+        if mass
+        else massless
+    )

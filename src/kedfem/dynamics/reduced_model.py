@@ -43,8 +43,8 @@ def restored_model(model: Model) -> Model:
 
 
 def _with_links(model: Model, changed: Callable[[Link], Link]) -> Model:
-    carried = tuple(replace(x, link=changed(x.link)) for x in model.carried)
-    return replace(model, links=tuple(map(changed, model.links)), carried=carried)
+    prescribed = tuple(replace(x, link=changed(x.link)) for x in model.prescribed)
+    return replace(model, links=tuple(map(changed, model.links)), prescribed=prescribed)
 
 
 def _joint_on(joint: Attachment, link: Link) -> Attachment:

@@ -10,7 +10,7 @@ from kedfem.errors import Fault, SceneError
 from kedfem.links.bodies import with_body, with_mass
 from kedfem.links.record import Link
 from kedfem.links.reduced import RIGID, reach, rigid, rigid_functions, wave_frequency
-from kedfem.links.surfaces.coupling_surfaces import rigid_seat
+from kedfem.links.surfaces.coupling_surfaces import rigid_link_surface
 from kedfem.scene import AngleLimit, Scene, TorsionSpring, pieces, time_grid, without_vibration
 
 LIGHT = 1e-3  # second moment of a planar beam's mass beside inertia of its sections, below which this is spread over it
@@ -44,8 +44,8 @@ def made_rigid(scene: Scene, links: Mapping[str, Link], thicken: bool = False) -
         highest = RIGID * max(map(wave_frequency, elastic or [links[key]]))
         if not elastic and any(soft):
             highest = min(highest, MOUNTED * _mounted(link, *soft))
-        followed = link.fit is not None and not without_vibration(scene)
-        out[key] = rigid(link, min(highest, RESOLVED / time_grid(scene).step) if followed else highest)
+        corotational = link.fit is not None and not without_vibration(scene)
+        out[key] = rigid(link, min(highest, RESOLVED / time_grid(scene).step) if corotational else highest)
     return out
 
 
@@ -55,7 +55,7 @@ def _thickened(link: Link) -> Link:
     if second[0] >= 2 * LAMINA * second[-1] or link.d < 3 or link.kind == "beam":
         return link
     centre = link.centre
-    return with_body(link, rigid_seat(link, centre), 0.0, centre, 2 * LAMINA * second[-1] * np.eye(3))
+    return with_body(link, rigid_link_surface(link, centre), 0.0, centre, 2 * LAMINA * second[-1] * np.eye(3))
 
 
 def _spread(link: Link) -> Link:
@@ -84,7 +84,7 @@ def _second_moments(link: Link) -> Float[np.ndarray, " e"]:
 def _with_extent(link: Link) -> None:
     """Refuse a rigid link whose mass has no extent along one of its directions, or nearly none at all.
 
-    Nothing tells its functions along it; and as it is made as stiff as it is heavy, its joints would give.
+    Nothing shows its functions along it; and as it is made as stiff as it is heavy, its joints would give.
 
     Raises
     ------

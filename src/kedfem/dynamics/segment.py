@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.frames import Followed, frame_force, frames_of, rotation
+from kedfem.dynamics.frames import Deformed, frame_force, frames_of, rotation
 from kedfem.dynamics.stepping.state import Nodal
 from kedfem.links.record import Link
 
@@ -30,7 +30,7 @@ def internal_force(
     link: Link,
     y: Nodal,
     R: Float[np.ndarray, "d d"],
-    frames: Sequence[Followed],
+    frames: Sequence[Deformed],
     damped: np.ndarray,
     beta: float,
 ) -> tuple[Nodal, float]:

@@ -19,7 +19,7 @@ from kedfem.dynamics.joints.ports import Rotation, port_columns
 from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.matrices.substructure import Substructure, factored, mass_matrix
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.stepping.state import LinkState, Nodal, Nominal
+from kedfem.dynamics.stepping.state import ForcingAt, LinkState, Nodal
 from kedfem.links.record import Link, Matrix
 from kedfem.links.reduced import rigid_modes
 from kedfem.links.stress_stiffness import stress_stiffness, turned_directions
@@ -79,11 +79,11 @@ class Stiffening:
             )
         ]
 
-    def turnings(self, at: Sequence[Nominal]) -> list[Turning]:
+    def turnings(self, at: Sequence[ForcingAt]) -> list[Turning]:
         """g → k g P of all links at one time."""
         return [modes.turning(_given(now)) for modes, now in zip(self.modes, at, strict=True)]
 
-    def stiffness(self, at: Sequence[Nominal]) -> list[Matrix]:
+    def stiffness(self, at: Sequence[ForcingAt]) -> list[Matrix]:
         """k ⊗ R P Rᵀ of all links at one time, world frame, (dn, dn)."""
         return [
             sp.kron(modes.stiffness(_given(now)), now.R @ modes.P @ now.R.T, format="csr")
@@ -201,7 +201,7 @@ def with_turnings(states: Sequence[LinkState], turnings: Sequence[Turning]) -> l
     return [replace(s, f=s.f + k(s.g)) for s, k in zip(states, turnings, strict=True)]
 
 
-def _given(now: Nominal) -> Float[np.ndarray, " m"]:
+def _given(now: ForcingAt) -> Float[np.ndarray, " m"]:
     if now.stress is None:
         raise ValueError("stress factors must be there, got none")
     return now.stress

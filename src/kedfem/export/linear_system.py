@@ -89,7 +89,7 @@ def state_space(
     free: bool = False,
     stage: Callable[[str], None] = lambda name: None,
 ) -> tuple[StateSpace, tuple[str, ...]]:
-    """The linear system of a scene's mechanism frozen at a position, and warnings; all links in full.
+    """The linear system of a scene's mechanism frozen at a position, and warnings; all links unreduced.
 
     Parameters
     ----------

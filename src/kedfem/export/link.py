@@ -9,14 +9,14 @@ from jaxtyping import Bool, Float, Int
 
 from kedfem.accuracy.plan import plan_for
 from kedfem.accuracy.reduction import prepared
-from kedfem.dynamics.joints.places import seat_of
+from kedfem.dynamics.joints.places import surface_of
 from kedfem.dynamics.matrices.dense import as_dense
 from kedfem.dynamics.model import segments
 from kedfem.errors import Fault, MeshError, SceneError
 from kedfem.export.files import read_record, write_record
 from kedfem.links.record import Link
 from kedfem.links.reduced import rigid_modes
-from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, port_weights, seat_couples
+from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, port_weights, surface_couples
 from kedfem.motion.assembly import assembled
 from kedfem.results.modelled import element_words
 from kedfem.scene import Scene, corotational, rayleigh, require_elastic
@@ -29,19 +29,19 @@ FORMAT = "kedfem link 1"
 
 @dataclass(frozen=True, slots=True)
 class ExportedLink:
-    """A link alone, in its own frame, which is the world's axes as drawn: M q'' + (α M + β K) q' + K q = Tᵀ F + Θᵀ N.
+    """A link alone, in its frame, the world's axes in its reference position: M q'' + (α M + β K) q' + K q = Tᵀ F + Θᵀ N.
 
     name, model : of the link; what it was made from, in words
     mass, stiffness : (k, k) M [kg], K [N/m]
     damping : (2,) α [1/s], β [s]
     ports : (p,) names of its joints
-    places : (p, 3) of the joints as drawn [m]
+    places : (p, 3) of the joints in the reference position [m]
     translation : (p, 3, k) T: displacement of each port [-]
     rotation : (p, 3, k) Θ: small rotation of each port [1/m]; zero where `turns` is false
     turns : (p, 3) whether the port's rotation about x, y, z is known: not of a single node, of planar links about z alone
     rigid : (k, r) small motions without strain: 1 m along x, y, z, 1 rad about x, y, z through the origin; of planar
         links along x, y and about z
-    nodes : (n, 3) of the mesh as drawn [m]; none of beams
+    nodes : (n, 3) of the mesh in the reference position [m]; none of beams
     modes : (n, s) node a moves by Σ_m modes[a, m] q[d m : d m + d], d = k / s directions
     cells : (e, m) elements, nodes in VTK's order
     """
@@ -97,9 +97,9 @@ def _exported(scene: Scene, name: str, link: Link) -> ExportedLink:
     translation, rotation = np.zeros((2, len(joints), 3, k))
     turns = np.zeros((len(joints), 3), bool)
     for p, (key, joint) in enumerate(joints.items()):
-        seat = seat_of(scene, key, link)
-        translation[p] = _translation(link, seat, np.asarray(joint.at))
-        turns[p], rotation[p] = _rotation(link, seat)
+        surface = surface_of(scene, key, link)
+        translation[p] = _translation(link, surface, np.asarray(joint.at))
+        turns[p], rotation[p] = _rotation(link, surface)
     shown, meshed = link.full or link, link.meshed
     modes = link.Q if link.Q is not None else np.eye(link.n)
     places = np.array([joint.at for joint in joints.values()], float).reshape(-1, 3)
@@ -124,23 +124,25 @@ def _rigid(link: Link) -> Float[np.ndarray, "k r"]:
     return found if link.planar else found[:, [0, 1, 2, 4, 5, 3]]
 
 
-def _translation(link: Link, seat: CouplingSurface, at: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 k"]:
+def _translation(
+    link: Link, surface: CouplingSurface, at: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "3 k"]:
     """Of the affine field of a coupling surface at a joint's place."""
-    weights = port_weights(seat, at[None])[0]
+    weights = port_weights(surface, at[None])[0]
     out = np.zeros((3, link.n, link.d))
     for c in range(2 if link.planar else 3):
         out[c, :, c] = weights
     return out.reshape(3, -1)
 
 
-def _rotation(link: Link, seat: CouplingSurface) -> tuple[Bool[np.ndarray, "3"], Float[np.ndarray, "3 k"]]:
+def _rotation(link: Link, surface: CouplingSurface) -> tuple[Bool[np.ndarray, "3"], Float[np.ndarray, "3 k"]]:
     """Of the affine field of a coupling surface, of a planar beam its section's; about which axes it is known."""
     out = np.zeros((3, link.n, link.d))
     if link.kind == "beam":
-        out[2, :, 2] = seat.fit[0]
+        out[2, :, 2] = surface.fit[0]
         return np.array([False, False, True]), out.reshape(3, -1)
     try:
-        out[:] = seat_couples(link, seat, "joint")
+        out[:] = surface_couples(link, surface, "joint")
     except MeshError:
         return np.zeros(3, bool), np.zeros((3, link.unknowns))
     return np.array([not link.planar, not link.planar, True]), out.reshape(3, -1)

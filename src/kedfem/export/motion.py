@@ -4,7 +4,7 @@ from pathlib import Path
 
 from kedfem.accuracy.prepared import moving
 from kedfem.accuracy.variants import moved
-from kedfem.dynamics.nominal import all_motions
+from kedfem.dynamics.rigid_body import all_motions
 from kedfem.export.files import require_ending
 from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.motion.counted_turns import require_counted
@@ -25,5 +25,7 @@ def export_motion(scene: Scene, path: Path) -> tuple[int, tuple[str, ...]]:
     linked, along = moving(scene)
     require_counted(scene, linked, along)
     count = write_motion(path, scene, linked, (motion for _, motion in all_motions(scene, linked, along)))
-    free = (f"free motions ({linked.mobility}) are held as drawn",) if linked.mobility else ()
+    free = (
+        (f"free motions ({linked.mobility}) are held in the reference position",) if linked.mobility else ()
+    )
     return count, (*assembly_warning(assembly), *free)

@@ -51,7 +51,7 @@ class Crossing:
     """Speeds [rad/s] at which a harmonic of the drive meets a natural frequency somewhere in the turn.
 
     mode, harmonic : numbers from 1
-    fastest : infinite where some position's frequency is met beyond the speeds that were looked at
+    fastest : infinite where some position's frequency is met beyond the speeds that were examined
     """
 
     mode: int

@@ -39,10 +39,10 @@ from kedfem.scene import Scene, path_parameter, time_grid, turn_steps
 from kedfem.scene.records.units import RPM
 
 Watch = Callable[[str, int, int], None]
-#: of the drive's, at which stiffening is looked at; a Campbell plot ends with the last
+#: of the drive's, at which stiffening is examined; a Campbell plot ends with the last
 SPEEDS = (0.0, 0.5, 1.0, 1.5, 2.0)
 POINTS = 41  # of its curves
-BUCKLED = "frequencies: links buckle by the stresses of the motion between {:.4g} and {:.4g} rpm; nothing is told beyond"
+BUCKLED = "frequencies: links buckle by the stresses of motion between {:.4g} and {:.4g} rpm; none is reported beyond"
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +97,7 @@ def frequencies(
     folder: FilePath | None = None,
     watch: Watch = lambda stage, done, total: None,
 ) -> Frequencies:
-    """Natural frequencies of a scene's linkage over a turn, or over the whole run; all links in full.
+    """Natural frequencies of a scene's linkage over a turn, or over the whole run; all links unreduced.
 
     Parameters
     ----------
@@ -226,7 +226,7 @@ def _shapes(
     firsts = [found.frequencies[0] if len(found.frequencies) else np.inf for found in every]
     k = int(np.argmin(firsts))
     modes, model = every[k], system.model
-    recoveries = [stress_recovery(link) for link in (*model.links, *(x.link for x in model.carried))]
+    recoveries = [stress_recovery(link) for link in (*model.links, *(x.link for x in model.prescribed))]
 
     def fields(mode: int, factor: float, exaggeration: float) -> Sequence[LinkField]:
         states = []

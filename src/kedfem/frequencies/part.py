@@ -116,7 +116,7 @@ def _facets(link: Link, face: str | ChosenFace) -> Int[np.ndarray, " f"]:
 
 
 def link_of_scene(scene: Scene, name: str, joints: Sequence[str] = ()) -> Part:
-    """A link of a scene, in full, with its bodies; held where some of its joints sit, free at the others.
+    """A link of a scene, unreduced, with its bodies; held where some of its joints sit, free at the others.
 
     Parameters
     ----------

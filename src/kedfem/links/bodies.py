@@ -21,22 +21,22 @@ def inertia_of(euler: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
 
 
 def flywheel_tensor(
-    seat: CouplingSurface, axis: Float[np.ndarray, "3"], inertia: float
+    surface: CouplingSurface, axis: Float[np.ndarray, "3"], inertia: float
 ) -> Float[np.ndarray, "3 3"]:
     """Euler tensor of a flywheel with moment of inertia J about an axis [kg m²].
 
     On a bore a thin disc, ½ J (1 − a aᵀ). A flat face does not know how its displacement changes along its normal, so
     there the same J stands across the axis within the face: J t tᵀ. In a plane both have xx + yy = J.
     """
-    if not is_flat(seat):
+    if not is_flat(surface):
         return np.asarray(inertia / 2 * (np.eye(3) - np.outer(axis, axis)))
-    t = np.cross(face_normal(seat), axis)
+    t = np.cross(face_normal(surface), axis)
     return np.asarray(inertia * np.outer(t, t))
 
 
 def with_body(
     link: Link,
-    seat: CouplingSurface,
+    surface: CouplingSurface,
     mass: float,
     centre: Float[np.ndarray, "3"],
     euler: Float[np.ndarray, "3 3"],
@@ -54,15 +54,15 @@ def with_body(
     direction to it
     euler : (3, 3) Euler tensor ∫ ρ x xᵀ dV about the centre [kg m²]
     """
-    c = centre - seat.origin
+    c = centre - surface.origin
     G = euler + mass * np.outer(c, c)
     if link.kind == "beam":
-        return _with_node_body(link, seat, mass, float(inertia_of(G)[2, 2]))
+        return _with_node_body(link, surface, mass, float(inertia_of(G)[2, 2]))
     gamma = np.zeros((4, 4))
     gamma[0, 0] = mass
     gamma[0, 1:] = gamma[1:, 0] = mass * c
     gamma[1:, 1:] = G
-    W4 = sp.csr_array(seat.fit)
+    W4 = sp.csr_array(surface.fit)
     m = sp.csr_array(link.mass[0] + W4.T @ sp.csr_array(gamma) @ W4)
     return with_mass(link, (m,) * link.d)
 
@@ -75,8 +75,8 @@ def with_point_mass(link: Link, weights: Float[np.ndarray, " n"], mass: float) -
     return with_mass(link, (m, m, link.mass[2]) if link.kind == "beam" else (m,) * link.d)
 
 
-def _with_node_body(link: Link, seat: CouplingSurface, mass: float, inertia: float) -> Link:
-    w = sp.csr_array(seat.fit[:1])
+def _with_node_body(link: Link, surface: CouplingSurface, mass: float, inertia: float) -> Link:
+    w = sp.csr_array(surface.fit[:1])
     lump = sp.csr_array(w.T @ w)
     xy = sp.csr_array(link.mass[0] + mass * lump)
     return with_mass(link, (xy, xy, sp.csr_array(link.mass[2] + inertia * lump)))

@@ -16,7 +16,7 @@ from kedfem.links.record import Link
 from kedfem.links.segments import Interval, Segments, along, corotational, most_slices, segmented
 from kedfem.links.solid import solid_link
 from kedfem.links.surfaces.choosing import with_chosen_faces
-from kedfem.links.surfaces.coupling_surfaces import joint_seat
+from kedfem.links.surfaces.coupling_surfaces import joint_surface
 from kedfem.mesh import SolidMesh, link_mesh, plane_mesh, side_by_side
 from kedfem.scene import (
     Bar,
@@ -141,7 +141,7 @@ def touched(scene: Scene, name: str) -> tuple[tuple[tuple[float, float, float], 
 
 
 def parted(scene: Scene, name: str, link: Link) -> Segments:
-    """A link as the dynamics takes it: whole where its frame is the nominal one, else in segments that follow.
+    """A link as the dynamics takes it: whole with a rigid-body frame, else in segments with co-rotational ones.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def parted(scene: Scene, name: str, link: Link) -> Segments:
 
 
 def _ends(scene: Scene, name: str) -> Float[np.ndarray, "p 3"]:
-    """Joints of a link, as drawn [m]."""
+    """Joints of a link, in the reference position [m]."""
     return np.array([x.at for x in scene.joints.values() if name in x.links]).reshape(-1, 3)
 
 
@@ -211,10 +211,10 @@ def _whole(scene: Scene, name: str, link: Link, e: Float[np.ndarray, "3"]) -> li
     for at, axis, faces in places:
         about = None if axis is None else np.asarray(axis) / np.linalg.norm(axis)
         try:
-            seat = joint_seat(link, f"links.{name}", np.asarray(at), about, faces)
+            surface = joint_surface(link, f"links.{name}", np.asarray(at), about, faces)
         except MeshError:
             continue  # is said where the joint is made
-        if seat.facets is not None:
-            s = link.X[link.cells[link.basis.mesh.f2t[0, seat.facets]]] @ e
+        if surface.facets is not None:
+            s = link.X[link.cells[link.basis.mesh.f2t[0, surface.facets]]] @ e
             out.append((float(s.min()), float(s.max())))
     return out

@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 
 from kedfem.links.record import Link
 from kedfem.links.recovery import StressRecovery
-from kedfem.links.surfaces.surface import boundary, surface
+from kedfem.links.surfaces.surface import boundary, surface_quadrature
 
 ROUNDING = 1e-9  # of a function whose largest value is one
 
@@ -42,7 +42,7 @@ def free_surface(recovery: StressRecovery) -> FreeSurface:
 
 def _of_solid(link: Link) -> FreeSurface:
     facets, _, _ = boundary(link)
-    of = surface(link, facets)
+    of = surface_quadrature(link, facets)
     on = (np.abs(of.N) > ROUNDING).any(axis=1)  # (f, m) functions of nodes on a facet: others are zero there
     normals = np.zeros((link.n, 3))
     mean = np.einsum("fq,fqk->fk", of.dA, of.normals)

@@ -6,7 +6,7 @@ one than the element's own. Their difference in the energy norm, of the whole, i
     η² = ∫ (σ* − σ_h) : C⁻¹ : (σ* − σ_h) / (∫ σ_h : C⁻¹ : σ_h + the same)
 
 A displacement under the loads, that is a compliance, errs by η². At an edge that points inwards without a fillet, and
-under a force at a point, the exact stress has no bound: nothing converges there, which `re_entrant` tells.
+under a force at a point, the exact stress has no bound: nothing converges there, which `re_entrant` shows.
 """
 
 from dataclasses import dataclass

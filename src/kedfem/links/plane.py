@@ -55,5 +55,5 @@ def plane_link(name: str, mesh: QuadMesh, material: Material, axes: Float[np.nda
         name=name, kind="plane", X=X, one=one, cells=cells, cell_type="quad9", axes=axes, mass=mass,
         K0=elastic_stiffness(gradient_products(basis, on), (t * lam, t * mu)), m1=m1, mX=mX,
         volume=m1[:, 0] / material.density, E=material.youngs_modulus, lame=(lam, mu), basis=basis, thickness=t,
-        way=mesh.way,
+        method=mesh.method,
     )  # fmt: skip

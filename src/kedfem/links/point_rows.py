@@ -20,7 +20,7 @@ from kedfem.links.recovery import nodal_gradients, stress_of_gradient
 from kedfem.mesh.elements.simplices import barycentric
 
 POINT_TOLERANCE = 1e-3  # how far outside its link a probe may lie, of the link's size
-ON_AXIS = 1e-6  # of a planar beam's size: farther beside its axis its state tells no displacement
+ON_AXIS = 1e-6  # of a planar beam's size: farther beside its axis its state shows no displacement
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,7 @@ def require_on_axis(
 
     Parameters
     ----------
-    at, nearest : the point as drawn, and the nearest of the link [m]
+    at, nearest : the point in the reference position, and the nearest of the link [m]
     noun, purpose : what a message calls the link, and says of what the point is for
 
     Raises

@@ -23,7 +23,7 @@ Kind = Literal["solid", "plane", "beam", "spatial_beam"]
 class BeamPoint:
     """A Gauss point of a planar beam, whose frame follows the tangent there.
 
-    tangent : (2,) as drawn
+    tangent : (2,) in the reference position
     strains : (3, 3n) rows of ε, γ, κ from what is seen in the frame
     rigidity : (3,) EA, κGA, EI times the length that belongs to the point
     share : (3n, 3) what ε, γ, κ here add to the deformation of the segment from which stresses come
@@ -40,11 +40,13 @@ class BeamElement:
     """An element in space with E Gauss points, m nodes, K gradient functions and s strains: `links.beams.metric`.
 
     tangents : (E, n) x' at the Gauss points from the position; gradients : (K, n) the g_k of all nodes from it
-    node, drawn : (K,) whose they are, (K, 3) as drawn; directors : (m, 2, 3) n1, n2 as drawn
-    N, D : (E, m) interpolation and its derivative by arc length; bend : (E, 4) n1'·t, n2'·t, n1'·n2, n2'·n1 as drawn
+    node, drawn : (K,) whose they are, (K, 3) in the reference position; directors : (m, 2, 3) n1, n2 in the reference
+        position
+    N, D : (E, m) interpolation and its derivative by arc length; bend : (E, 4) n1'·t, n2'·t, n1'·n2, n2'·n1 in the
+        reference position
     pairs : (P, 2) which gradient functions the strains within sections pair
     stiffness : (s,) of the strains, with the length that belongs to a Gauss point; s = 6 E + P
-    drawn_strains : (s,) what the formulas give as drawn
+    drawn_strains : (s,) what the formulas give in the reference position
     rows, share : (s, 3n) strains for small displacements; (3n, s) a displacement that has given strains
     """
 
@@ -91,7 +93,7 @@ class LinkFace:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A link as the dynamics sees it; all arrays are for the drawn (reference) position, R = I.
+    """A link as the dynamics sees it; all arrays are for the reference position, R = I.
 
     name : key of the link in the scene.
     kind : ``solid``, ``spatial_beam``: rows of a state are (u, v, w); ``plane``: (u, v); ``beam``: (u, v, ψ),
@@ -117,7 +119,7 @@ class Link:
     frames : of a segment that several frames follow: its strain energy in parts, K0 their sum
     element : of a segment of a beam in space: its strains, exact for any turn, K0 their linearisation
     faces : those with names, of a solid from CAD or from a mesh file with groups
-    way : how the mesh of a part from CAD was made, or what is to be told of another's, in words
+    method : how the mesh of a part from CAD was made, or what is to be reported of another's, in words
     cuts : (c,) facets of the basis at which a segment ends and another one begins: no surface of the link
     """
 
@@ -146,7 +148,7 @@ class Link:
     frames: tuple[Frame, ...] = ()
     element: BeamElement | None = None
     faces: tuple[LinkFace, ...] = ()
-    way: str = ""
+    method: str = ""
     cuts: Int[np.ndarray, " c"] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     @property
@@ -176,7 +178,7 @@ class Link:
 
     @property
     def centre(self) -> Float[np.ndarray, "3"]:
-        """Centre of mass as drawn, attached bodies among it [m]."""
+        """Centre of mass in the reference position, attached bodies among it [m]."""
         return np.asarray(self.one @ self.mX / (self.one @ self.m1[:, 0]))
 
     @property

@@ -16,7 +16,7 @@ from kedfem.errors import MeshError
 from kedfem.links.plane import plane_link
 from kedfem.links.record import Link
 from kedfem.links.solid import solid_link
-from kedfem.links.surfaces.coupling_surfaces import facet_seat, port_weights
+from kedfem.links.surfaces.coupling_surfaces import facet_surface, port_weights
 from kedfem.links.surfaces.surface import boundary
 from kedfem.mesh import QuadMesh, SolidMesh
 from kedfem.mesh.elements.hexahedra import Face
@@ -79,7 +79,7 @@ def segmented(
     ----------
     link : without attached bodies
     count : number of slices
-    ends : joints of the link, as drawn [m]
+    ends : joints of the link, in the reference position [m]
     whole : ranges along `along(ends)` that no cut may divide, those of bores and other coupling surfaces [m]
 
     Raises
@@ -223,7 +223,7 @@ def _slice(
         part = plane_link(link.name, QuadMesh(link.X[used], cells, link.thickness), material, link.axes)
     else:
         faces = _slice_faces(link, elements, used)
-        part = solid_link(link.name, SolidMesh(link.X[used], cells, faces, link.way), material, link.axes)
+        part = solid_link(link.name, SolidMesh(link.X[used], cells, faces, link.method), material, link.axes)
     # the function space numbers its functions in its own way
     distance, same = cKDTree(link.X).query(part.X)
     if distance.max() > SAME * link.size:
@@ -254,11 +254,11 @@ def _cut(a: Link, b: Link, e: Float[np.ndarray, "3"], number: int, even: bool) -
     if not len(here):
         return None
     one, other = (part.basis.mesh.boundary_facets()[sides] for part, sides in ((a, here), (b, nearest[here])))
-    seats = facet_seat(a, one, e), facet_seat(b, other, e)
-    first = seats[0]
+    surfaces = facet_surface(a, one, e), facet_surface(b, other, e)
+    first = surfaces[0]
     off = first.spread[: a.d - 1, None] * first.directions[: a.d - 1]
     points = first.origin + np.concatenate([np.zeros((1, 3)), off])
-    weights = (port_weights(seats[0], points), port_weights(seats[1], points))
+    weights = (port_weights(surfaces[0], points), port_weights(surfaces[1], points))
     return Cut((number, number + 1), weights[0] @ a.X, weights, (one, other), even)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from kedfem.links.record import Link
-from kedfem.links.surfaces.surface import boundary, neighbours, surface
+from kedfem.links.surfaces.surface import boundary, neighbours, surface_quadrature
 
 SHARP = np.cos(np.radians(20))  # between facets at their edge; those of rounds differ by a few degrees there
 
@@ -17,7 +17,7 @@ def re_entrant(link: Link) -> Bool[np.ndarray, " n"]:
         return out
     facets, corners, _ = boundary(full)
     first, second = neighbours(full, facets)
-    of, mesh = surface(full, facets), full.basis.mesh
+    of, mesh = surface_quadrature(full, facets), full.basis.mesh
     numbers = mesh.facets[:, facets].T
     common = (numbers[first][:, :, None] == numbers[second][:, None, :]).any(axis=2)
     edge = np.nanmean(np.where(common[:, :, None], corners[first], np.nan), axis=1)
@@ -48,7 +48,7 @@ def around(link: Link, at: Float[np.ndarray, "k 3"]) -> Bool[np.ndarray, " n"]:
 
     Parameters
     ----------
-    at : (k, 3) the places, as drawn [m]
+    at : (k, 3) the places, in the reference position [m]
     """
     full = link.full or link
     out = np.zeros(full.n, bool)
@@ -65,7 +65,7 @@ def around(link: Link, at: Float[np.ndarray, "k 3"]) -> Bool[np.ndarray, " n"]:
 def reach(link: Link) -> float:
     """Volume over surface: half the thickness of a plate, a quarter of a square bar's width [m]. No mesh changes it."""
     facets, _, _ = boundary(link)
-    area = float(surface(link, facets).dA.sum())
+    area = float(surface_quadrature(link, facets).dA.sum())
     if link.d == 2:  # edges times the thickness, and both sides
         area += 2 * float(link.volume.sum()) / link.thickness
     return float(link.volume.sum()) / area

@@ -180,5 +180,5 @@ def solid_link(name: str, mesh: SolidMesh, material: Material, axes: Float[np.nd
         name=name, kind="solid", X=X, one=one, cells=vtk_cells(basis), cell_type=CELL_TYPES[len(basis.element_dofs)],
         axes=axes, mass=mass, K0=elastic_stiffness(gradient_products(basis, on), material.lame()), m1=m1, mX=mX,
         volume=m1[:, 0] / material.density,
-        E=material.youngs_modulus, lame=material.lame(), basis=basis, faces=link_faces(basis, mesh), way=mesh.way,
+        E=material.youngs_modulus, lame=material.lame(), basis=basis, faces=link_faces(basis, mesh), method=mesh.method,
     )  # fmt: skip

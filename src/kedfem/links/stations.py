@@ -15,9 +15,9 @@ from kedfem.errors import MeshError
 from kedfem.links.record import Link
 
 BESIDE = 1e-6  # of the link's size: nodes so far off a line are on it
-SPARE = 2  # stations beyond the way of the slider, where the link has them
+SPARE = 2  # stations beyond the travel of the slider, where the link has them
 FEWEST, MOST = 4, 48
-KNOWN = 1e-3  # of the ball: a spread below cannot tell a gradient
+KNOWN = 1e-3  # of the ball: a spread below cannot determine a gradient
 APART = 1e-3  # of the largest singular value of stations that move apart: 0.1 of two elements, 2e-6 of one, 1 of beams
 
 
@@ -26,7 +26,7 @@ class Stations:
     """Stations on a line of a link.
 
     s : (k,) places along the line from its origin, increasing [m]
-    points : (k, 3) the same as drawn [m]
+    points : (k, 3) the same in the reference position [m]
     weights : (k, n) scalar weights of the displacement at each, u = weights @ state
     """
 
@@ -51,15 +51,15 @@ def stations(
     where: str,
     origin: Float[np.ndarray, "3"],
     axis: Float[np.ndarray, "3"],
-    way: tuple[float, float],
+    travel: tuple[float, float],
 ) -> Stations:
     """Stations for a slider on a line of a link; each of one that bends can move without the others.
 
     Parameters
     ----------
     where : how messages name the joint
-    origin, axis : of the line, as drawn; axis a unit vector
-    way : least and greatest place of the slider along the line [m]
+    origin, axis : of the line, in the reference position; axis a unit vector
+    travel : least and greatest place of the slider along the line [m]
 
     Raises
     ------
@@ -68,9 +68,9 @@ def stations(
     """
     full, rigid = link.full, link.rigid
     if full is None or link.Q is None:
-        found = _along_line(link, where, origin, axis, way)
+        found = _along_line(link, where, origin, axis, travel)
         return found if rigid or not link.meshed else _apart(link, where, found)
-    found = _along_line(full, where, origin, axis, way)
+    found = _along_line(full, where, origin, axis, travel)
     if full.meshed and not rigid:
         _apart(full, where, found)
     own = Stations(found.s, found.points, found.weights @ link.Q)
@@ -78,16 +78,16 @@ def stations(
 
 
 def _along_line(
-    link: Link, where: str, origin: np.ndarray, axis: np.ndarray, way: tuple[float, float]
+    link: Link, where: str, origin: np.ndarray, axis: np.ndarray, travel: tuple[float, float]
 ) -> Stations:
-    return (_in_balls if link.meshed else _at_nodes)(link, where, origin, axis, way)
+    return (_in_balls if link.meshed else _at_nodes)(link, where, origin, axis, travel)
 
 
 def _apart(link: Link, where: str, found: Stations) -> Stations:
     """Stations, each of which can move without the others: what dependent ones bear is rounding."""
     size = np.linalg.svd(found.weights, compute_uv=False)
-    told = int((size > APART * size[0]).sum())
-    if told == len(found.s):
+    determined = int((size > APART * size[0]).sum())
+    if determined == len(found.s):
         return found
     instead = (
         "give it more basis functions"
@@ -96,12 +96,12 @@ def _apart(link: Link, where: str, found: Stations) -> Stations:
     )
     raise MeshError(
         f"{where}: link '{link.name}' must be able to bend along its line in {len(found.s)} ways, as many as there are "
-        f"stations on it, got {told}: {instead}"
+        f"stations on it, got {determined}: {instead}"
     )
 
 
 def _at_nodes(
-    link: Link, where: str, origin: np.ndarray, axis: np.ndarray, way: tuple[float, float]
+    link: Link, where: str, origin: np.ndarray, axis: np.ndarray, travel: tuple[float, float]
 ) -> Stations:
     """Of a beam: its nodes on the line."""
     along, off = _along(link.X, origin, axis)
@@ -112,15 +112,15 @@ def _at_nodes(
             f"{where}: its line must run along the axis of beam '{link.name}' over {FEWEST} nodes at least, got "
             f"{len(on)} there: draw it along the beam, or give this more elements"
         )
-    _check_way(link, where, (along[on[0]], along[on[-1]]), way)
-    on = on[_near(along[on], way)]
+    _check_travel(link, where, (along[on[0]], along[on[-1]]), travel)
+    on = on[_near(along[on], travel)]
     weights = np.zeros((len(on), link.n))
     weights[np.arange(len(on)), on] = 1.0
     return Stations(along[on], link.X[on], weights)
 
 
 def _in_balls(
-    link: Link, where: str, origin: np.ndarray, axis: np.ndarray, way: tuple[float, float]
+    link: Link, where: str, origin: np.ndarray, axis: np.ndarray, travel: tuple[float, float]
 ) -> Stations:
     """Of a meshed link: means over balls that reach to the next station, as far as the link is wide, or an element long.
 
@@ -135,10 +135,10 @@ def _in_balls(
             f"{where}: its line must run along link '{link.name}', got one that nowhere comes near it"
         )
     reach = (float(along[near].min()), float(along[near].max()))
-    _check_way(link, where, reach, way)
+    _check_travel(link, where, reach, travel)
     long = np.ptp(link.X[link.cells[near.any(axis=1)]] @ axis, axis=1).mean()
     apart = max(width, float(long))
-    low, high = max(reach[0], way[0] - apart), min(reach[1], way[1] + apart)
+    low, high = max(reach[0], travel[0] - apart), min(reach[1], travel[1] + apart)
     count = int(np.clip(np.ceil((high - low) / apart) + 1, FEWEST, MOST))
     s = np.linspace(low, high, count)
     points = origin + np.outer(s, axis)
@@ -196,18 +196,18 @@ def _along(
     return s, np.linalg.norm(x - origin - s[..., None] * axis, axis=-1)
 
 
-def _near(s: Float[np.ndarray, " k"], way: tuple[float, float]) -> slice:
+def _near(s: Float[np.ndarray, " k"], travel: tuple[float, float]) -> slice:
     """The stations that a slider meets, and a few beyond."""
-    first = max(int(np.searchsorted(s, way[0], "right")) - 1 - SPARE, 0)
-    end = min(int(np.searchsorted(s, way[1], "left")) + 1 + SPARE, len(s))
+    first = max(int(np.searchsorted(s, travel[0], "right")) - 1 - SPARE, 0)
+    end = min(int(np.searchsorted(s, travel[1], "left")) + 1 + SPARE, len(s))
     first = max(min(first, end - FEWEST), 0)
     return slice(first, max(end, first + FEWEST))
 
 
-def _check_way(link: Link, where: str, reach: tuple[float, float], way: tuple[float, float]) -> None:
+def _check_travel(link: Link, where: str, reach: tuple[float, float], travel: tuple[float, float]) -> None:
     slack = BESIDE * link.size
-    if way[0] < reach[0] - slack or way[1] > reach[1] + slack:
+    if travel[0] < reach[0] - slack or travel[1] > reach[1] + slack:
         raise MeshError(
             f"{where}: the pin must stay on link '{link.name}', which reaches from {reach[0]:.6g} to {reach[1]:.6g} m "
-            f"along the line, got a way from {way[0]:.6g} to {way[1]:.6g} m"
+            f"along the line, got a travel from {travel[0]:.6g} to {travel[1]:.6g} m"
         )

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.mesh.cad.faces import joined_faces
-from kedfem.mesh.cad.solids import USUAL, CadFace, OtherWayError, Sizing, Solid
+from kedfem.mesh.cad.solids import USUAL, CadFace, OtherMethodError, Sizing, Solid
 from kedfem.mesh.cad.words import with_faces_in_words
 from kedfem.mesh.elements.hexahedra import SolidMesh
 from kedfem.mesh.elements.quality import scaled_jacobian
@@ -73,14 +73,14 @@ def filled_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
 
     Raises
     ------
-    OtherWayError
-        gmsh makes no tetrahedra of the solid; what it said.
+    OtherMethodError
+        gmsh makes no tetrahedra of the solid; what it complaints.
     """
-    said: list[str] = []
+    complaints: list[str] = []
     found: SolidMesh | None = None
     plain, taken, coarser = replace(sizing, hollow=USUAL), 1.0, 1.0
     for _ in range(_STEPS):
-        mesh = _best_of_settings(gmsh, solid, plain, coarser, said)
+        mesh = _best_of_settings(gmsh, solid, plain, coarser, complaints)
         if mesh is not None and (found is None or len(mesh.points) < len(found.points)):
             found, taken = mesh, coarser
         plenty = found is None or 3 * len(found.points) > _PLENTY
@@ -89,16 +89,16 @@ def filled_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
         ratio = (3 * len(found.points) / _PLENTY) ** 0.5
         coarser = min(coarser * np.clip(1.05 * ratio, 1.15, 2.0), _COARSEST)
     if found is not None:
-        found = _with_hollows(gmsh, solid, sizing, (taken, found), said)
+        found = _with_hollows(gmsh, solid, sizing, (taken, found), complaints)
     gmsh.model.mesh.clear()
     if found is None:
-        reasons = "; ".join(dict.fromkeys(said)) or "none at all"
-        raise OtherWayError(f"{solid.name}: gmsh makes no tetrahedra of it: {reasons}")
+        reasons = "; ".join(dict.fromkeys(complaints)) or "none at all"
+        raise OtherMethodError(f"{solid.name}: gmsh makes no tetrahedra of it: {reasons}")
     return found
 
 
 def _with_hollows(
-    gmsh: ModuleType, solid: Solid, sizing: Sizing, usual: tuple[float, SolidMesh], said: list[str]
+    gmsh: ModuleType, solid: Solid, sizing: Sizing, usual: tuple[float, SolidMesh], complaints: list[str]
 ) -> SolidMesh:
     """The mesh with hollow faces as fine as asked for, elsewhere as the usual one, which is so much coarser than asked.
 
@@ -109,7 +109,7 @@ def _with_hollows(
         return found
     least, angle = min(_BAD, _least_jacobian(found)), sizing.hollow
     while angle < USUAL:
-        mesh = _best_of_settings(gmsh, solid, replace(sizing, hollow=angle), coarser, said, _MOST)
+        mesh = _best_of_settings(gmsh, solid, replace(sizing, hollow=angle), coarser, complaints, _MOST)
         ratio = 1.0 if mesh is None or sizing.size is not None else 3 * len(mesh.points) / _MOST
         if mesh is not None and ratio <= 1 and _least_jacobian(mesh) >= least:
             found = mesh
@@ -119,7 +119,7 @@ def _with_hollows(
         return found
     words = "no finer" if angle >= USUAL else f"by {np.degrees(angle):.3g}° an element"
     return replace(
-        found, way=f"{found.way}; fillets and free bores {words}, as others would be bad or too many"
+        found, method=f"{found.method}; fillets and free bores {words}, as others would be bad or too many"
     )
 
 
@@ -128,13 +128,16 @@ def subdivided_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh
 
     Raises
     ------
-    OtherWayError
-        gmsh makes none, with what it said.
+    OtherMethodError
+        gmsh makes none, with what it complaints.
     """
-    said: list[str] = []
+    complaints: list[str] = []
     size = 2 * tetrahedron_size(solid, sizing)
     numbers = _options(size, min(2 * _TURN, np.pi / 3), size / _FINEST, SETTINGS[0])
-    with gmsh_options(gmsh, numbers | {"Mesh.SubdivisionAlgorithm": 2}), _listening(gmsh, said, solid.faces):
+    with (
+        gmsh_options(gmsh, numbers | {"Mesh.SubdivisionAlgorithm": 2}),
+        _listening(gmsh, complaints, solid.faces),
+    ):
         gmsh.model.mesh.clear()
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.setOrder(2)
@@ -143,9 +146,9 @@ def subdivided_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh
         if list(kinds) == [_HEX27]:
             points, tags = numbered_nodes(gmsh)
             mesh = gmsh_hexahedra(gmsh, points, np.searchsorted(tags, nodes[0]).reshape(-1, 27))
-            way = f"gmsh's subdivision of {len(mesh.cells) // 4:,} tetrahedra into four hexahedra each"
-            return replace(mesh, way=way)
-    raise OtherWayError(f"{solid.name}: gmsh's subdivision gives no hexahedra: {'; '.join(said)}")
+            method = f"gmsh's subdivision of {len(mesh.cells) // 4:,} tetrahedra into four hexahedra each"
+            return replace(mesh, method=method)
+    raise OtherMethodError(f"{solid.name}: gmsh's subdivision gives no hexahedra: {'; '.join(complaints)}")
 
 
 def tetrahedron_size(solid: Solid, sizing: Sizing) -> float:
@@ -157,11 +160,16 @@ def tetrahedron_size(solid: Solid, sizing: Sizing) -> float:
 
 
 def _best_of_settings(
-    gmsh: ModuleType, solid: Solid, sizing: Sizing, coarser: float, said: list[str], plenty: int = _PLENTY
+    gmsh: ModuleType,
+    solid: Solid,
+    sizing: Sizing,
+    coarser: float,
+    complaints: list[str],
+    plenty: int = _PLENTY,
 ) -> SolidMesh | None:
     """The first mesh that is good enough, or has too many unknowns, else the best."""
     best: tuple[float, SolidMesh] | None = None
-    for mesh in _tried(gmsh, solid, sizing, coarser, said):
+    for mesh in _tried(gmsh, solid, sizing, coarser, complaints):
         least = _least_jacobian(mesh)
         if best is None or least > best[0]:
             best = least, mesh
@@ -175,7 +183,7 @@ def _least_jacobian(mesh: SolidMesh) -> float:
 
 
 def _tried(
-    gmsh: ModuleType, solid: Solid, sizing: Sizing, coarser: float, said: list[str]
+    gmsh: ModuleType, solid: Solid, sizing: Sizing, coarser: float, complaints: list[str]
 ) -> Iterator[SolidMesh]:
     """gmsh's tetrahedra under one setting after the other, where it makes any that are valid."""
     size = coarser * tetrahedron_size(solid, sizing)
@@ -184,7 +192,7 @@ def _tried(
     for setting in SETTINGS:
         numbers = _options(size, turn, finest, setting)
         with gmsh_options(gmsh, numbers), finer_hollows(gmsh, solid, sizing, turn, finest):
-            mesh = _generated(gmsh, solid, said)
+            mesh = _generated(gmsh, solid, complaints)
         if mesh is not None:
             yield mesh
 
@@ -211,8 +219,8 @@ def _options(size: float, turn: float, finest: float, setting: Setting) -> dict[
 
 
 @contextmanager
-def _listening(gmsh: ModuleType, said: list[str], faces: Sequence[CadFace]) -> Iterator[None]:
-    """Whatever gmsh complains of goes to `said`, faces in words, and it goes on after the block."""
+def _listening(gmsh: ModuleType, complaints: list[str], faces: Sequence[CadFace]) -> Iterator[None]:
+    """Whatever gmsh complains of goes to `complaints`, faces in words, and it goes on after the block."""
     gmsh.logger.start()
     try:
         yield
@@ -221,15 +229,15 @@ def _listening(gmsh: ModuleType, said: list[str], faces: Sequence[CadFace]) -> I
             raise
         lines = [line.partition(":")[2].strip() for line in gmsh.logger.get() if line.startswith("Error")]
         failed = [tag for dim, tag in gmsh.model.mesh.getLastEntityError() if dim == 2]
-        said += [with_faces_in_words(line, faces, failed) for line in lines or [str(error)]]
+        complaints += [with_faces_in_words(line, faces, failed) for line in lines or [str(error)]]
     finally:
         gmsh.logger.stop()
 
 
-def _generated(gmsh: ModuleType, solid: Solid, said: list[str]) -> SolidMesh | None:
-    """A mesh under the settings that gmsh has now, or None; what it complains of goes to `said`."""
+def _generated(gmsh: ModuleType, solid: Solid, complaints: list[str]) -> SolidMesh | None:
+    """A mesh under the settings that gmsh has now, or None; what it complains of goes to `complaints`."""
     points, cells, sides = np.zeros((0, 3)), np.zeros((0, 10), dtype=np.int64), {}
-    with _listening(gmsh, said, solid.faces):
+    with _listening(gmsh, complaints, solid.faces):
         gmsh.model.mesh.clear()
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.setOrder(2)
@@ -243,12 +251,12 @@ def _generated(gmsh: ModuleType, solid: Solid, said: list[str]) -> SolidMesh | N
         return None
     straightened = unfolded(points, cells, _BAD)
     if straightened is None:
-        said.append("flat elements")
+        complaints.append("flat elements")
         return None
     used, numbers = np.unique(cells, return_inverse=True)
     faces = joined_faces(gmsh, solid, {tag: np.searchsorted(used, each) for tag, each in sides.items()})
-    way = f"{len(cells):,} tetrahedra of 10 nodes"
-    return SolidMesh(straightened[used], numbers.reshape(cells.shape), faces, way)
+    method = f"{len(cells):,} tetrahedra of 10 nodes"
+    return SolidMesh(straightened[used], numbers.reshape(cells.shape), faces, method)
 
 
 def _worth_optimising(points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e 10"]) -> bool:

@@ -73,7 +73,7 @@ class _Worker:
 
 
 _idle: list[_Worker] = []
-atexit.register(_idle.clear)  # while there is what loky tells of their end: later, it would write of an error
+atexit.register(_idle.clear)  # while loky still reports their end: later, it would write of an error
 _busy: list[_Worker] = []
 
 

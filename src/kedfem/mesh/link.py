@@ -140,8 +140,8 @@ def link_plate(where: str, link: LinkScene, folder: Path, kept_whole: KeptWhole 
     p, q, r, s = np.moveaxis(points[cells[:, :4]], 1, 0)
     size = math.sqrt(float(np.linalg.det(np.stack([r - p, s - q], axis=1)).mean()) / 2)
     most = float(np.linalg.norm(np.ptp(points, axis=0))) / 2
-    plate, told = nearest(wanted, size * math.sqrt(unknowns(usual) / wanted), most, 2.0, sized)
-    return replace(plate, way="; ".join(filter(None, (plate.way, told))))
+    plate, note = nearest(wanted, size * math.sqrt(unknowns(usual) / wanted), most, 2.0, sized)
+    return replace(plate, method="; ".join(filter(None, (plate.method, note))))
 
 
 def _swept(where: str, link: LinkScene, plate: Plate) -> SolidMesh:
@@ -201,8 +201,8 @@ def extrusion_plate(where: str, shape: Extrusion, mesh: Meshing, kept_whole: Kep
     """A plate of any outline, in a z plane."""
     start = shape.outline[0]
     middle = np.array([0.0, 0.0, (start.to if isinstance(start, Arc) else start)[2] + shape.offset])
-    quads, told = outline_quads(where, profile_outline(shape), _sizing(mesh, kept_whole, middle, np.eye(3)))
-    return Plate(quads, shape.thickness, middle, np.eye(3), told)
+    quads, note = outline_quads(where, profile_outline(shape), _sizing(mesh, kept_whole, middle, np.eye(3)))
+    return Plate(quads, shape.thickness, middle, np.eye(3), note)
 
 
 def part_plate(where: str, shape: Part, mesh: Meshing, folder: Path, kept_whole: KeptWhole) -> Plate:
@@ -212,8 +212,8 @@ def part_plate(where: str, shape: Part, mesh: Meshing, folder: Path, kept_whole:
     outline = turned_outline(profile_outline(part), origin, x_point - origin)
     P, Q = np.array(shape.between)
     axes = frame_along(Q - P)
-    quads, told = outline_quads(where, outline, _sizing(mesh, kept_whole, P, axes))
-    return Plate(quads, part.thickness, P, axes, told)
+    quads, note = outline_quads(where, outline, _sizing(mesh, kept_whole, P, axes))
+    return Plate(quads, part.thickness, P, axes, note)
 
 
 def _sizing(

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from kedfem.errors import MeshError
 from kedfem.mesh.cad.faces import with_faces
 from kedfem.mesh.cad.model import CadKeys, solid_model
-from kedfem.mesh.cad.solids import USUAL, OtherWayError, Sizing, Solid
+from kedfem.mesh.cad.solids import USUAL, OtherMethodError, Sizing, Solid
 from kedfem.mesh.elements.hexahedra import SolidMesh, frame_along, placed, quadratic
 from kedfem.mesh.elements.quality import mesh_quality
 from kedfem.mesh.elements.tetrahedra import FORMS
@@ -23,28 +23,28 @@ from kedfem.mesh.isolated import LONGEST, PART, apart
 from kedfem.mesh.layered.layers import layered_mesh
 from kedfem.mesh.swept.blends import points_in_file, swept_without_blends
 from kedfem.mesh.swept.blocks import block_mesh
-from kedfem.mesh.swept.path_sweep import carried_mesh
+from kedfem.mesh.swept.path_sweep import path_mesh
 from kedfem.mesh.swept.revolved import revolved_mesh
 from kedfem.mesh.unknowns import nearest
 from kedfem.scene import Cad, LinkScene, MeshFile, Meshing
 from kedfem.store import contents, itself, kept
 
-ENOUGH = 0.3  # worst scaled Jacobian of hexahedra with which no other way is tried
+ENOUGH = 0.3  # worst scaled Jacobian of hexahedra with which no other method is tried
 FAIR = 0.2  # of hexahedra that are taken before tetrahedra
 FLAT = 0.005  # of tetrahedra for which the CAD model is healed: edges of some micrometres are in it
 MOST = 150_000  # unknowns of hexahedra above which tetrahedra are taken, where nobody asked for a size
 _POWER = 2.5  # by which of the size unknowns fall, between that of plates and that of lumps
 
-Way = Callable[[ModuleType, Solid, Sizing], SolidMesh]
+Method = Callable[[ModuleType, Solid, Sizing], SolidMesh]
 #: Places of the scene [m] and names of faces at which a part keeps its blends.
 KeptWhole = tuple[tuple[tuple[float, float, float], ...], tuple[str, ...]]
 NOTHING: KeptWhole = ((), ())
 
-SWEEPS: tuple[Way, ...] = (layered_mesh, block_mesh, revolved_mesh, carried_mesh)
+SWEPT: tuple[Method, ...] = (layered_mesh, block_mesh, revolved_mesh, path_mesh)
 #: What is tried in turn, by `mesh.kind` and element.
-WAYS: dict[str | None, tuple[Way, ...]] = {
-    None: (*SWEEPS, swept_without_blends, filled_mesh),
-    "hexahedra": (*SWEEPS, swept_without_blends, subdivided_mesh),
+METHODS: dict[str | None, tuple[Method, ...]] = {
+    None: (*SWEPT, swept_without_blends, filled_mesh),
+    "hexahedra": (*SWEPT, swept_without_blends, subdivided_mesh),
     "tet10": (filled_mesh,),
 }
 
@@ -64,11 +64,17 @@ def cad_mesh(
     Raises
     ------
     MeshError
-        The file cannot be used, or no way gives a mesh.
+        The file cannot be used, or no method gives a mesh.
     """
     file = folder / shape.file
-    said = [name, shape.model_dump(mode="json"), link.mesh.model_dump(mode="json"), link.element, kept_whole]
-    key = sha256(json.dumps(said).encode() + contents([file])).hexdigest()
+    described = [
+        name,
+        shape.model_dump(mode="json"),
+        link.mesh.model_dump(mode="json"),
+        link.element,
+        kept_whole,
+    ]
+    key = sha256(json.dumps(described).encode() + contents([file])).hexdigest()
     mesh: SolidMesh = kept(
         "mesh",
         key,
@@ -92,7 +98,7 @@ def made_mesh(
             gmsh, solid, _sized_or_healed(keys.file, gmsh, solid, link, _wanted(link, shape, kept_whole))
         )
         if solid.mended:
-            mesh = replace(mesh, way=f"{mesh.way}; {solid.mended}")
+            mesh = replace(mesh, method=f"{mesh.method}; {solid.mended}")
     return placed(mesh, np.array(shape.origin), file_axes(shape))
 
 
@@ -109,10 +115,10 @@ def _sized_or_healed(where: str, gmsh: ModuleType, solid: Solid, link: LinkScene
     for mended, words in healed(gmsh, where, solid, tetrahedron_size(solid, asked)):
         try:
             mesh = filled_mesh(gmsh, mended, asked)
-        except OtherWayError:
+        except OtherMethodError:
             continue
         if mesh_quality(mesh).least > FLAT:
-            return replace(mesh, way=f"{mesh.way}; {words}")
+            return replace(mesh, method=f"{mesh.method}; {words}")
     return best or _sized(where, gmsh, solid, link, asked)  # raises again
 
 
@@ -141,21 +147,21 @@ def _wanted(link: LinkScene, shape: Cad, kept_whole: KeptWhole) -> Sizing:
 def _sized(where: str, gmsh: ModuleType, solid: Solid, link: LinkScene, asked: Sizing) -> SolidMesh:
     """The mesh of the size asked for, or of about so many unknowns."""
     wanted, element = link.mesh.unknowns, str(link.element)
-    ways, form = WAYS["tet10" if element == "tet10" else link.mesh.kind], FORMS[element]
+    methods, form = METHODS["tet10" if element == "tet10" else link.mesh.kind], FORMS[element]
     if wanted is None:
-        return best_mesh(where, gmsh, solid, asked, form, ways)
+        return best_mesh(where, gmsh, solid, asked, form, methods)
 
     def sized(size: float) -> tuple[SolidMesh, int]:
-        nonlocal ways
-        mesh = best_mesh(where, gmsh, solid, replace(asked, size=size), form, ways)
+        nonlocal methods
+        mesh = best_mesh(where, gmsh, solid, replace(asked, size=size), form, methods)
         if mesh.tetrahedra:
-            ways = (filled_mesh,)  # what cannot be swept cannot in other sizes
+            methods = (filled_mesh,)  # what cannot be swept cannot in other sizes
         return mesh, 3 * len(form(mesh).points)
 
     nodes_each = {"hex8": 2, "hex20": 8, "hex27": 16, "tet10": 13}[element]  # to a cube of the size
     size = (solid.volume * 3 * nodes_each / wanted) ** (1 / 3)
-    mesh, told = nearest(wanted, size, solid.extent / 2, _POWER, sized)
-    return replace(mesh, way=f"{mesh.way}; {told}") if told else mesh
+    mesh, note = nearest(wanted, size, solid.extent / 2, _POWER, sized)
+    return replace(mesh, method=f"{mesh.method}; {note}") if note else mesh
 
 
 def best_mesh(
@@ -164,38 +170,38 @@ def best_mesh(
     solid: Solid,
     sizing: Sizing,
     form: Callable[[SolidMesh], SolidMesh] = quadratic,
-    ways: tuple[Way, ...] = WAYS[None],
+    methods: tuple[Method, ...] = METHODS[None],
 ) -> SolidMesh:
-    """The mesh by the first way that is good enough, else by the best; in `way` what was done, and why not better.
+    """The mesh by the first method that is good enough, else by the best; in `method` what was done, and why not better.
 
     Parameters
     ----------
     form : what becomes of hexahedra, whose quality counts: of 20 nodes they may be worse than of 27
-    ways : to be tried in turn
+    methods : to be tried in turn
 
     Raises
     ------
     MeshError
-        No way gives a mesh; with the reasons of each.
+        No method gives a mesh; with the reasons of each.
     """
     found: list[tuple[float, SolidMesh]] = []
     reasons: list[str] = []
-    for way in ways:
-        if way in (filled_mesh, subdivided_mesh) and _best_of(found) >= FAIR:
+    for method in methods:
+        if method in (filled_mesh, subdivided_mesh) and _best_of(found) >= FAIR:
             break
         try:
-            mesh = way(gmsh, solid, sizing)
-        except OtherWayError as error:
+            mesh = method(gmsh, solid, sizing)
+        except OtherMethodError as error:
             reasons.append(str(error).removeprefix(f"{solid.name}: "))
             continue
         least = mesh_quality(form(mesh)).least
         many = sizing.size is None and sizing.across <= 2 and 3 * len(form(mesh).points) > MOST
-        told = [mesh.way, *reasons[: way not in SWEEPS]]  # the first says what is in the way, of layers
+        notes = [mesh.method, *reasons[: method not in SWEPT]]  # the first says what is in the way, of layers
         if mesh.tetrahedra or (least >= ENOUGH and not many):
-            return replace(mesh, way="; ".join(told))
-        found.append((least - many, replace(mesh, way="; ".join(told))))  # many: behind all others
+            return replace(mesh, method="; ".join(notes))
+        found.append((least - many, replace(mesh, method="; ".join(notes))))  # many: behind all others
         unfit = f"{3 * len(form(mesh).points):,} unknowns" if many else f"worst scaled Jacobian {least:.2g}"
-        reasons.append(f"{mesh.way}: {unfit}")
+        reasons.append(f"{mesh.method}: {unfit}")
     if not found:
         raise MeshError(
             f"{where}: must be a solid that can be meshed, got none: {'; '.join(reasons)}; "

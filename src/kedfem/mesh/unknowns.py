@@ -33,5 +33,5 @@ def nearest(
             break
         size *= ratio ** (1 / power)
     ratio, mesh = min(found, key=lambda each: abs(np.log(each[0])))
-    told = f"the nearest found to the {wanted:,} unknowns asked for"
-    return mesh, "" if 1 / NEAR < ratio < NEAR else told
+    note = f"the nearest found to the {wanted:,} unknowns asked for"
+    return mesh, "" if 1 / NEAR < ratio < NEAR else note

@@ -8,12 +8,12 @@ import scipy.linalg
 from jaxtyping import Float
 
 from kedfem.errors import MotionError
+from kedfem.motion.closed import Shift, closed_scene
 from kedfem.motion.constraints import GAP, ConstraintEquation, Rows, stacked
 from kedfem.motion.joint_equations import GROUND, scene_centre
 from kedfem.motion.linkage import passive_rows, scene_size
 from kedfem.motion.newton import cross_matrix, rotation
 from kedfem.motion.period import over_one_period
-from kedfem.motion.redrawn import Shift, redrawn
 from kedfem.motion.released_motions import RANK_TOLERANCE
 from kedfem.motion.values import Poses, features, jacobian, residuals
 from kedfem.scene import Scene
@@ -21,7 +21,7 @@ from kedfem.scene import Scene
 MOST = 0.01  # of the linkage's size: larger misfits are faults of the drawing
 CLOSED = 1e-12  # of the size, and in radians: what rows may keep
 ROUNDING = 1e-13  # of the size, and in radians: motions that are none, such as those out of a linkage's plane
-SWEEPS = 60
+ITERATIONS = 60
 Change = Float[np.ndarray, "n 6"]
 
 
@@ -88,7 +88,7 @@ def _closed(scene: Scene) -> tuple[Scene, Assembly]:
         name: Shift(c + middle, size * x[:3], x[3:])
         for name, c, x in zip(scene.links, centres, change, strict=True)
     }
-    return redrawn(scene, shifts), Assembly(
+    return closed_scene(scene, shifts), Assembly(
         misfits, {name: _way(scene, name, shifts[name]) for name in shifts}
     )
 
@@ -101,7 +101,7 @@ def assembly_warning(assembly: Assembly) -> tuple[str, ...]:
     several = "" if len(assembly.misfits) == 1 else f", the most of {len(assembly.misfits)} joints"
     return (
         f"joints.{joint}: its links are drawn {misfit:.3g} m apart{several}; "
-        f"closed by moving links up to {way:.3g} m (kedfem check tells which)",
+        f"closed by moving links up to {way:.3g} m (kedfem check shows which)",
     )
 
 
@@ -110,15 +110,15 @@ def least_change(
 ) -> tuple[Change, Float[np.ndarray, " m"]]:
     """Displacements (of centres, in units of size) and rotation vectors of n bodies that close rows, of the least norm.
 
-    Each sweep solves J(x) x⁺ = J(x) x − r(x) with least |x⁺|. Where that settles, r = 0 and x is in the span of Jᵀ: no
+    Each iteration solves J(x) x⁺ = J(x) x − r(x) with least |x⁺|. At the end r = 0 and x is in the span of Jᵀ: no
     change of first order makes it less.
 
     Returns
     -------
-    (n, 6); and (m,) what rows keep, in units of size and radians, infinite where sweeps have not settled
+    (n, 6); and (m,) what rows keep, in units of size and radians, infinite where iterations have not converged
     """
     x, scale = np.zeros((len(centres), 6)), rows.scale(size)[: rows.count]
-    for _ in range(SWEEPS):
+    for _ in range(ITERATIONS):
         J, r = _linearised(rows, x, centres, size)
         if not np.isfinite(J).all() or np.abs(x).max() > 1:
             return x, np.full(rows.count, np.inf)

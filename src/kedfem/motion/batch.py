@@ -29,7 +29,7 @@ from kedfem.motion.values import Poses, Twists, convective, features
 
 EXACT = 1e-13  # a Newton step, of the linkage's size: rates at the poses before it are those after it
 QUADRATIC = 1e-7  # after such a step the next one would be rounding
-SWEEPS = 12
+ITERATIONS = 12
 SPREAD = 30.0  # how much worse a square set of rows may be conditioned than all rows
 TRIES = 4  # places on a path whose own best rows are tried for all of it
 POINTS, USUAL = (
@@ -134,7 +134,7 @@ def _block(
     rhs[..., 1] = driven_rows(rows, rates[0]) * scale
     rhs[..., 2] = (rows.drive == 0) * scale
     step = before = np.full(len(aim), np.inf)
-    for _ in range(SWEEPS):
+    for _ in range(ITERATIONS):
         f = features(rows, poses, own.near)
         rhs[..., 0] = -scale * remainder(rows, f, own)
         try:

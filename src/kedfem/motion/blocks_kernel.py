@@ -13,7 +13,7 @@ import numpy as np
 
 from kedfem.compiled import compiled, inlined, inner
 
-SWEEPS = 2  # of refinement: each takes off what the squared condition number costs
+REFINEMENTS = 2  # of refinement: each takes off what the squared condition number costs
 TRIES, SETTLED = 60, 1e-5  # of the iterations for extreme singular values: relative change at which they end
 
 
@@ -120,7 +120,7 @@ def refined(value, right, starts, body, columns, below, L, x, left, change):  # 
     x[:] = 0.0
     for r in range(len(left)):
         left[r] = right[r]
-    for _ in range(SWEEPS + 1):
+    for _ in range(REFINEMENTS + 1):
         onto_bodies(value, starts, body, left, change)
         solved(L, columns, below, change)
         for k in range(len(x)):
@@ -155,7 +155,7 @@ def least_norm(values, rhs, starts, body, pairs, columns, below, updates, of_col
             return t
         y[t] = 0.0
         left[:] = rhs[t]
-        for _ in range(SWEEPS + 1):
+        for _ in range(REFINEMENTS + 1):
             solved(L, columns, below, left)
             onto_rows(values[t], starts, body, left, more)
             y[t] += more

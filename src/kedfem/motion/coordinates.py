@@ -28,9 +28,9 @@ class Coordinate:
     joint, name : e.g. ``angle``, ``travel``
     kind : whether it is an angle [rad] or a length [m]
     body, other : numbers of the body that moves and the one that it moves against
-    at : the joint's point as drawn [m]
-    axis : unit vector in the other body, as drawn, that it is about or along
-    mark : of an angle, the direction in the moving body, as drawn, whose turn is measured
+    at : the joint's point in the reference position [m]
+    axis : unit vector in the other body, in the reference position, that it is about or along
+    mark : of an angle, the direction in the moving body, in the reference position, whose turn is measured
     """
 
     joint: str

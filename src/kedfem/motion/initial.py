@@ -38,7 +38,7 @@ class Wanted:
 def initial_twists(
     scene: Scene, linkage: Linkage
 ) -> tuple[Float[np.ndarray, "B 3"], Float[np.ndarray, "B 3"]]:
-    """Velocities that all joints allow, with the speeds asked for, the drive held: they add to the nominal velocities.
+    """Velocities that all joints allow, with the speeds asked for, the drive held: they add to the rigid-body velocities.
 
     What these leave open: joints that are not named move as little against each other as can be, in the sum of squares
     (slides per size of the linkage); after that bodies as little as can be.
@@ -78,15 +78,15 @@ def _least(
     x = scipy.linalg.lstsq(A, b, cond=RANK_TOLERANCE)[0]
     Z = scipy.linalg.null_space(A, rcond=RANK_TOLERANCE)
     if Z.shape[1] and len(C):
-        # of the size of C: where x leaves C x no way to change, C Z is rounding, and its own size tells nothing
+        # of the size of C: where x leaves C x no way to change, C Z is rounding, and its own size shows nothing
         U, s, Vt = np.linalg.svd(C @ Z, full_matrices=False)
-        told = s > RANK_TOLERANCE * np.linalg.norm(C, 2)
-        x = x - Z @ (Vt[told].T @ ((U[:, told].T @ (C @ x)) / s[told]))
+        determined = s > RANK_TOLERANCE * np.linalg.norm(C, 2)
+        x = x - Z @ (Vt[determined].T @ ((U[:, determined].T @ (C @ x)) / s[determined]))
     return np.asarray(x)
 
 
 def _allowed(linkage: Linkage) -> Float[np.ndarray, "k f"]:
-    """Orthonormal basis of the scaled twists that all joints allow as drawn, the drive held but nothing else."""
+    """Orthonormal basis of the scaled twists that all joints allow at first, the drive held but nothing else."""
     bodies = len(linkage.bodies)
     held = len(linkage.joints) - (linkage.mobility if linkage.drive else 0)
     if not held:

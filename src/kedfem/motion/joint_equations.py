@@ -102,7 +102,7 @@ def drive_row(scene: Scene, name: str, bodies: tuple[str, ...], number: int) -> 
 
 
 def joint_free_rows(scene: Scene, name: str, bodies: tuple[str, ...]) -> list[ConstraintEquation]:
-    """Rows of what a joint leaves free."""
+    """Rows of what a joint releases."""
     joint = scene.joints[name]
     axis, point = None if joint.axis is None else unit(joint.axis), np.asarray(joint.at) - scene_centre(scene)
     return free_rows(joint.kind, name, *_pair(joint, bodies), point, axis)

@@ -1,7 +1,7 @@
 """The linkage as rigid bodies and constraint rows; its mobility and redundancy in the reference position.
 
-Where frames follow the links, motions may be left free. Nominally joints that bear them are held as drawn while the drive
-moves the rest; without a drive everything nominally rests.
+With co-rotational frames motions may be left free. In the rigid-body motion the joints that bear them stay in the
+reference position while the drive moves the rest; without a drive it rests.
 """
 
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ MANY = 12  # bodies up to which the rows are solved as one matrix: about as fast
 
 @dataclass(frozen=True, slots=True)
 class Linkage:
-    """Bodies (ground first) and all rows of joints, couplings and drives; also those that hold free motions as drawn.
+    """Bodies (ground first) and all rows of joints, couplings and drives; also those that hold free motions.
 
     bodies : names
     rows : as arrays
@@ -69,7 +69,7 @@ class Linkage:
 
     @property
     def redundant(self) -> tuple[str, ...]:
-        """Joints whose rows repeat what others already hold as drawn, by rank-revealing QR of Jᵀ."""
+        """Joints whose rows repeat what others already hold in the reference position, by rank-revealing QR of Jᵀ."""
         if not self.joints:
             return ()
         _, r, pivot = scipy.linalg.qr(
@@ -87,8 +87,8 @@ def linkage(scene: Scene) -> Linkage:
     SceneError
         A record that was made beside `scene_from`, so that nobody checked its tables against each other.
     MotionError
-        If a driven linkage cannot move, has a dead point as drawn, or keeps a free motion of links with rigid-body
-        frames.
+        If a driven linkage cannot move, has a dead point in the reference position, or keeps a free motion of links with
+        rigid-body frames.
     """
     if not scene.checked:
         raise SceneError(
@@ -114,7 +114,7 @@ def linkage(scene: Scene) -> Linkage:
 
 
 def _well_driven(rows: Rows, plan: Blocks, size: float) -> bool:
-    """Whether joints and drives hold every motion as drawn, and each drive can move alone: nothing is to be refused.
+    """Whether joints and drives hold every motion at first, and each drive can move alone: nothing is to be refused.
 
     J has the rank of its columns, and its least squares leave nothing of the rates at which one drive moves.
     """
@@ -130,7 +130,7 @@ def _well_driven(rows: Rows, plan: Blocks, size: float) -> bool:
 
 
 def _drawn(scene: Scene) -> tuple[list[ConstraintEquation], Drives, Drawn]:
-    """All rows of joints, couplings and drives, and their derivatives as drawn."""
+    """All rows of joints, couplings and drives, and their derivatives in the reference position."""
     bodies = (GROUND, *scene.links)
     centre, size = scene_centre(scene), scene_size(scene)
     driven = drives(scene, size)
@@ -149,7 +149,7 @@ def passive_rows(scene: Scene) -> list[ConstraintEquation]:
 
 
 def drawn_linkage(scene: Scene) -> Drawn:
-    """A scene's linkage to first order as drawn; nothing is refused."""
+    """A scene's linkage to first order in the reference position; nothing is refused."""
     return _drawn(scene)[2]
 
 
@@ -167,7 +167,7 @@ def looser_rows(scene: Scene, drawn: Drawn) -> Looser:
 
 
 def resting_poses(times: int, bodies: int) -> Poses:
-    """All bodies as drawn."""
+    """All bodies in the reference position."""
     return np.tile(np.eye(3), (times, bodies, 1, 1)), np.zeros((times, bodies, 3))
 
 
@@ -188,7 +188,7 @@ def _jacobian(rows: Rows, bodies: int, size: float) -> Float[np.ndarray, "m k"]:
 
 
 def _check_mobility(scene: Scene, drawn: Drawn) -> int:
-    """How many motions the drive leaves free; they must be of links with co-rotational frames."""
+    """How many motions the drive releases; they must be of links with co-rotational frames."""
     k, drives = int(drawn.J.shape[1]), int(drawn.driven.sum())
     free, mobility = k - rank(drawn.J), k - rank(drawn.J[~drawn.driven])
     driven = ", ".join(f"joints.{name}" for name in scene.driven_joints)
@@ -238,7 +238,7 @@ def _other_drives(scene: Scene, drawn: Drawn) -> list[str]:
 def _holding(
     scene: Scene, J: np.ndarray, bodies: tuple[str, ...], size: float, free: int
 ) -> list[ConstraintEquation]:
-    """Rows that hold, as drawn, as many motions of joints as are free: those that these motions change most."""
+    """Rows that hold as many joint motions as are free in the reference position: those that these change most."""
     if not free:
         return []
     rows = [

@@ -12,14 +12,14 @@ from kedfem.scene import Scene
 
 @dataclass(frozen=True, slots=True)
 class Mobility:
-    """Degrees of freedom of a linkage as drawn, and what is amiss with them.
+    """Degrees of freedom of a linkage in the reference position, and what is amiss with them.
 
     freedom : motions that the joints leave, drives free
     drives : how many of them are driven
     equations, redundancy : of the joints, and how many of these others imply
     redundant : what they hold redundantly, by joints
     remedy : how to do without; empty where nothing is redundant
-    free : motions that drives leave free
+    free : motions that drives release
     dead_point : nearest over the drive's range; None where nothing is driven, or no loop is closed that could lock
     """
 

@@ -155,9 +155,9 @@ def orthonormal(R: Float[np.ndarray, "... 3 3"]) -> Float[np.ndarray, "... 3 3"]
     return np.asarray(R)
 
 
-def closed(link: Linkage, poses: Poses, aim: Target, sweeps: int) -> Poses:
+def closed(link: Linkage, poses: Poses, aim: Target, iterations: int) -> Poses:
     """Poses after so many steps of Newton at most, towards those at which all rows vanish."""
-    for _ in range(sweeps):
+    for _ in range(iterations):
         f = features(link.rows, poses, aim.near)
         rest = scaled(link, link.rows, remainder(link.rows, f, aim))
         try:

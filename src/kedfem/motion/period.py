@@ -49,12 +49,12 @@ def over_one_period(scene: Scene) -> Scene:
     count, time = _periods(scene, linkage(scene), base, STEADY)
     stated, turns = scene.analysis.revolutions, turn_steps(scene) is not None
     if stated is not None and abs(stated - count) > WHOLE * count:
-        said = f"must be left out, or the {count:g} of the period of the steady motion, got {stated:g}"
-        raise SceneError(f"analysis.revolutions: {said}")
+        message = f"must be left out, or the {count:g} of the period of the steady motion, got {stated:g}"
+        raise SceneError(f"analysis.revolutions: {message}")
     end = scene.analysis.end_time
     if end is not None and abs(end - time) > WHOLE * time:
-        said = f"must be left out, or the period of the steady motion, {time:.9g} [s], got {end:.9g}"
-        raise SceneError(f"analysis.end_time: {said}")
+        message = f"must be left out, or the period of the steady motion, {time:.9g} [s], got {end:.9g}"
+        raise SceneError(f"analysis.end_time: {message}")
     keys = (
         {"revolutions": float(count), "end_time": None} if turns else {"revolutions": None, "end_time": time}
     )

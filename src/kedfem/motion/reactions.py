@@ -1,6 +1,6 @@
 """Forces of all joints and drives of rigid links: Jᵀ λ balances what acts on the bodies, at many times at once.
 
-Rows that repeat others leave some of λ open: the least λ in scaled rows is taken, and `open_directions` tells what of a
+Rows that repeat others leave some of λ open: the least λ in scaled rows is taken, and `open_directions` shows what of a
 joint's force depends on that choice. All is linear in what acts, with factors that only depend on the pose.
 """
 
@@ -38,7 +38,7 @@ class Reactions:
 
         Parameters
         ----------
-        at : the body's point that the moment is about, as drawn [m]
+        at : the body's point that the moment is about, in the reference position [m]
         """
         rows = rows_of(self.linkage, joint)
         out = np.zeros((2, *self.Q.shape[:2], 3))

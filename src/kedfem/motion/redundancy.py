@@ -2,7 +2,7 @@
 
 A dependent set of rows bears forces in balance with one another without any load: self-stress, the vectors λ with
 Jᵀ λ = 0. What these do at a joint is what the joint holds redundantly, whichever rows are struck out; statics of rigid
-links cannot tell it.
+links cannot determine it.
 """
 
 from collections.abc import Iterator, Mapping

@@ -1,4 +1,4 @@
-"""What a linkage may still do as drawn, in words that name links and joints."""
+"""What a linkage may still do in the reference position, in words that name links and joints."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -146,7 +146,7 @@ class FreeMotion:
 
 
 def free_motions(drawn: Drawn) -> list[FreeMotion]:
-    """What joints and drives leave free, sorted by the smallest groups of links that can do it alone."""
+    """What joints and drives release, sorted by the smallest groups of links that can do it alone."""
     return [_described(drawn, links, basis) for links, basis in _groups(drawn, null_space(drawn.J))]
 
 

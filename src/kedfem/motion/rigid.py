@@ -59,7 +59,7 @@ def joined(parts: Sequence["RigidMotion"]) -> "RigidMotion":
 
 
 def resting(bodies: int, t: Float[np.ndarray, " T"]) -> RigidMotion:
-    """Rigid-body motion of a linkage that nothing drives: all bodies rest as drawn, at given times (T,) [s]."""
+    """Rigid-body motion of a linkage that nothing drives: all rest in the reference position, at given times (T,) [s]."""
     R = np.broadcast_to(np.eye(3), (len(t), bodies, 3, 3)).copy()
     p, omega, alpha, v, p2, omega_phi, v_phi = np.zeros((7, len(t), bodies, 3))
     none = np.zeros((len(t), 0))

@@ -26,7 +26,7 @@ STATIONS = {2: 2, 3: 17}
 
 
 def heights(grid: Any) -> Float[np.ndarray, "e 2"]:
-    """Height and thickness of each beam element as drawn [m]."""
+    """Height and thickness of each beam element in the reference position [m]."""
     lines = np.isin(grid.celltypes, list(LINES))
     least = np.full((lines.sum(), 2), THINNEST * grid.length)
     return np.maximum(grid.cell_data[SECTION][lines, :2], least) if SECTION in grid.cell_data else least

@@ -53,9 +53,9 @@ def peak_warning(peak: Peak | None) -> tuple[str, ...]:
     """A warning where the highest stress is not what it seems, with the highest one elsewhere."""
     if peak is None or not peak.near:
         return ()
-    said = f"the highest stress, {stress_at(peak)}, is at {peak.near}: {reason(peak.near)}"
+    message = f"the highest stress, {stress_at(peak)}, is at {peak.near}: {reason(peak.near)}"
     away = f"; away from {AWAY} it is {stress_at(peak.away)}" if peak.away else ""
-    return (said + away,)
+    return (message + away,)
 
 
 def fatigue_warning(found: Fatigue | None) -> tuple[str, ...]:
@@ -67,14 +67,14 @@ def fatigue_warning(found: Fatigue | None) -> tuple[str, ...]:
         out.append(f"fatigue: no data of {', '.join(found.without)}, which were left out")
     left = {name: n for name, n in found.left_out.items() if n}
     if left:
-        said = ", ".join(f"{n:,} of {name}" for name, n in left.items())
+        message = ", ".join(f"{n:,} of {name}" for name, n in left.items())
         out.append(
-            f"fatigue: points of the surface near {AWAY} were left out, {said}: fatigue.near_joints takes them in"
+            f"fatigue: points of the surface near {AWAY} were left out, {message}: fatigue.near_joints takes them in"
         )
     worst = found.worst
     if worst is not None and worst.utilisation > 1:
         life = f"{found.hours(worst):.3g} h at a safety factor of 1"
-        where = f"link {worst.link} at {place_of(worst.place)} as drawn"
+        where = f"link {worst.link} at {place_of(worst.place)} in the reference position"
         out.append(
             f"fatigue: {where} is loaded to {worst.utilisation:.3g} times of what it may be; life {life}"
         )

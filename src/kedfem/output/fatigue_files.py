@@ -17,7 +17,7 @@ MOST = 300.0  # of powers of ten: life without damage
 
 
 def write_fatigue(folder: Path, found: Fatigue, fields: Sequence[LinkFatigue], table: bool) -> None:
-    """Damage at every point on the links as drawn for ParaView, hot spots as CSV, all points as CSV if asked.
+    """Damage at every point on the undeformed links for ParaView, hot spots as CSV, all points as CSV if asked.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def write_fatigue(folder: Path, found: Fatigue, fields: Sequence[LinkFatigue], t
         names = [(each.recovery.link.name, k) for each, points in every for k in range(len(points))]
         with text_file(folder / POINTS) as file:
             writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(["link", "node", *(f"{c} as drawn [m]" for c in "xyz"), *columns])
+            writer.writerow(["link", "node", *(f"reference {c} [m]" for c in "xyz"), *columns])
             for (link, node), row in zip(names, np.column_stack([X, *columns.values()]), strict=True):
                 writer.writerow([link, node, *map(cell, row)])
 
@@ -58,7 +58,7 @@ def _columns(found: Fatigue, fields: Sequence[LinkFatigue]) -> dict[str, np.ndar
 def _write_spots(path: Path, found: Fatigue) -> None:
     """The places of the highest damage of each link."""
     header = [
-        "link", "rank", *(f"{c} as drawn [m]" for c in "xyz"), "node", "criterion", "damage in a period",
+        "link", "rank", *(f"reference {c} [m]" for c in "xyz"), "node", "criterion", "damage in a period",
         "life [periods]", "life [revolutions]", "life [h]", "utilisation", "amplitude [Pa]", "mean stress [Pa]",
         "disproportion", "support factor", "cycles in a period", "near", "doubt",
     ]  # fmt: skip

@@ -46,7 +46,7 @@ def link_fields(
 
     Parameters
     ----------
-    recoveries : per link, then per carried link
+    recoveries : per link, then per prescribed link
     deformation_scale : factor on the elastic displacement where nodes are drawn, not on the displacement itself [-]
     """
     motion, k = snapshot.motion, snapshot.k
@@ -56,12 +56,12 @@ def link_fields(
             model.links, model.bodies, recoveries[: len(model.links)], snapshot.states, strict=True
         )
     ]
-    for carried, recovery in zip(model.carried, recoveries[len(model.links) :], strict=True):
-        X = recovery.at_points((carried.link.full or carried.link).X)
-        points = motion.p[k, carried.body] + X @ motion.R[k, carried.body].T
+    for prescribed, recovery in zip(model.prescribed, recoveries[len(model.links) :], strict=True):
+        X = recovery.at_points((prescribed.link.full or prescribed.link).X)
+        points = motion.p[k, prescribed.body] + X @ motion.R[k, prescribed.body].T
         none = np.full((len(X), 6), np.nan)
-        name, kind, cells = carried.link.name, recovery.cell_type, recovery.cells
-        section = _section(carried.link)
+        name, kind, cells = prescribed.link.name, recovery.cell_type, recovery.cells
+        section = _section(prescribed.link)
         fields.append(
             LinkField(name, kind, cells, points, np.zeros_like(X), none, none[:, 0], none[:, :2], section)
         )

@@ -56,7 +56,7 @@ def write_motion(path: Path, scene: Scene, linkage: Linkage, blocks: Iterable[Ri
 
 
 def reference_point(scene: Scene, name: str) -> Float[np.ndarray, "3"]:
-    """The place, as drawn, of a link's first joint; the origin of a link without one [m]."""
+    """The place, in the reference position, of a link's first joint; the origin of a link without one [m]."""
     at = (joint.at for joint in scene.joints.values() if name in joint.links)
     return np.asarray(next(at, (0.0, 0.0, 0.0)), float)
 

@@ -41,17 +41,17 @@ shown.SetScalarBarVisibility(view, True)
 $arrows
 position = $position
 if position:
-    said = PythonAnnotation(registrationName="drive", Input=animation)
-    said.ArrayAssociation = "Field Data"
-    said.Expression = "'%s  %.4g' % ('" + position + "', " + paraview.make_name_valid(position) + "[0])"
-    Show(said, view).FontSize = 16
+    note = PythonAnnotation(registrationName="drive", Input=animation)
+    note.ArrayAssociation = "Field Data"
+    note.Expression = "'%s  %.4g' % ('" + position + "', " + paraview.make_name_valid(position) + "[0])"
+    Show(note, view).FontSize = 16
 time = AnnotateTimeFilter(registrationName="time", Input=animation)
 time.Format = "t = {time:.5g} s"
 Show(time, view).WindowLocation = "Upper Right Corner"
 
 envelope = os.path.join(here, "$envelope")
-if os.path.exists(envelope):  # as drawn; switch it on in the pipeline
-    highest = XMLUnstructuredGridReader(registrationName="envelope, as drawn", FileName=[envelope])
+if os.path.exists(envelope):  # in the reference position; switch it on in the pipeline
+    highest = XMLUnstructuredGridReader(registrationName="envelope, undeformed", FileName=[envelope])
     ColorBy(Show(highest, view), ("POINTS", "$kind"))
     Hide(highest, view)
 whole = os.path.join(here, "animation.vtkhdf")

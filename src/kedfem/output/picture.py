@@ -92,18 +92,18 @@ def draw_apart(
             try:
                 if meanwhile is not None:
                     meanwhile()
-                _, said = drawing.communicate(timeout=TIMEOUT)
+                _, output = drawing.communicate(timeout=TIMEOUT)
             except subprocess.TimeoutExpired as error:
                 raise PictureError(f"{ADVICE}, got no picture within {TIMEOUT} s") from error
             finally:
                 drawing.kill()
         if drawing.returncode != 0 or not part.is_file():
-            raise PictureError(_fault(wanted, drawing.returncode, said.decode(errors="replace")))
+            raise PictureError(_fault(wanted, drawing.returncode, output.decode(errors="replace")))
 
 
-def _fault(wanted: str, code: int, said: str) -> str:
+def _fault(wanted: str, code: int, output: str) -> str:
     """Why there is no picture: VTK cannot draw here, or cannot draw this."""
-    lines = said.strip().splitlines()
+    lines = output.strip().splitlines()
     if "Traceback (most recent call last):" not in lines:
         how = f"signal {-code}" if code < 0 else f"exit code {code}"
         return f"{ADVICE}, got no window ({how})"

@@ -22,7 +22,7 @@ class Sight:
     """What is seen of a link.
 
     body : its number
-    points : (n, 3) as drawn [m]
+    points : (n, 3) in the reference position [m]
     cells : (e, k) and meshio's name of them
     """
 

@@ -49,13 +49,13 @@ def _rigid(link: Link) -> Float[np.ndarray, "c 6"]:
 
 
 def write_deck(
-    path: Path, link: Link, material: Material, cases: Sequence[LoadCase], said: Iterable[str]
+    path: Path, link: Link, material: Material, cases: Sequence[LoadCase], comments: Iterable[str]
 ) -> None:
     """The deck.
 
     Parameters
     ----------
-    said : lines of comment for its head
+    comments : lines of comment for its head
 
     Raises
     ------
@@ -64,7 +64,7 @@ def write_deck(
     """
     held = supports(link)
     with text_file(path) as file:
-        file.writelines(f"** {line}\n" for line in said)
+        file.writelines(f"** {line}\n" for line in comments)
         file.write("*NODE, NSET=NALL\n")
         file.writelines(f"{k}, {_numbers(X)}\n" for k, X in enumerate(link.X, start=1))
         file.write(f"*ELEMENT, TYPE={ELEMENTS[link.cell_type]}, ELSET=EALL\n")
@@ -97,7 +97,7 @@ def _numbers(x: Float[np.ndarray, " k"]) -> str:
 
 
 def write_case(path: Path, link: Link, case: LoadCase) -> None:
-    """A load case for ParaView: the link as drawn; forces of each kind, displacement, acceleration and stress at nodes.
+    """A load case for ParaView: the undeformed link; forces of each kind, displacement, acceleration and stress at nodes.
 
     Raises
     ------

@@ -42,16 +42,16 @@ class Extremes:
         for k, name in enumerate(KINDS):
             none = np.isnan(stress[k])
             out[f"{name} stress [Pa]"] = stress[k]
-            for said, values in (
+            for phrase, values in (
                 (f"time of {name} stress [s]", self.when[0]),
                 (f"{what} of {name} stress [{unit}", self.when[1]),
             ):
-                out[said] = np.where(none, np.nan, values[np.where(none, 0, step[k])])
+                out[phrase] = np.where(none, np.nan, values[np.where(none, 0, step[k])])
         return out
 
 
 def write_envelope(folder: Path, extremes: Extremes, table: bool) -> None:
-    """Highest stresses at every point and when they occur, on the links as drawn: for ParaView, and as CSV if asked.
+    """Highest stresses at every point and when they occur, on the undeformed links: for ParaView, and as CSV if asked.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def write_envelope(folder: Path, extremes: Extremes, table: bool) -> None:
     if not table:
         return
     X = np.concatenate([points for _, points in every])
-    header = ["link", "node", *(f"{c} as drawn [m]" for c in "xyz"), *columns, "near"]
+    header = ["link", "node", *(f"reference {c} [m]" for c in "xyz"), *columns, "near"]
     names = [(each.link, k) for each, points in every for k in range(len(points))]
     numbers = np.column_stack([X, *columns.values()])
     words = [word for each in extremes.near for word in each]
@@ -91,7 +91,7 @@ def write_top(folder: Path, every: Mapping[str, Sequence[Peak]], drive: str) -> 
         "link",
         "rank",
         "von Mises stress [Pa]",
-        *(f"{c} as drawn [m]" for c in "xyz"),
+        *(f"reference {c} [m]" for c in "xyz"),
         "time [s]",
         drive,
         "node",

@@ -74,7 +74,7 @@ def picture_axes(
     Parameters
     ----------
     direction : (3,) [-], towards the eye
-    upwards : (3,) [-], about upwards where gravity does not tell
+    upwards : (3,) [-], about upwards where gravity does not determine it
     gravity : (3,) [m/s²]
     """
     if np.linalg.norm(np.cross(gravity, direction)) > 0.5 * np.linalg.norm(gravity) > 0:

@@ -174,7 +174,7 @@ def _laid_out(file: Any, fields: Blocks, arrays: dict[str, np.ndarray], drive: s
 
 
 def _numbers(fields: Blocks) -> Iterator[tuple[str, int]]:
-    """Field data that tell which number of the cell data is which link; "/" would begin a group."""
+    """Field data that show which number of the cell data is which link; "/" would begin a group."""
     names = (field.name if isinstance(field, JointField) else f"link {field.name}" for field in fields)
     return ((name.replace("/", "_"), k) for k, name in enumerate(names))
 

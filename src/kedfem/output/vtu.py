@@ -37,7 +37,7 @@ def write_mesh(mesh: SolidMesh, path: Path) -> None:
 def write_points(
     path: Path, parts: Sequence[tuple[str, np.ndarray, np.ndarray, str]], values: Mapping[str, np.ndarray]
 ) -> None:
-    """Links as drawn with values at their points.
+    """Links in the reference position with values at their points.
 
     Parameters
     ----------
@@ -61,8 +61,8 @@ def write_points(
     with replacing(path) as part:
         vtu.write(str(part), content, binary=True, compression="zlib")
         numbers = "".join(_number(f"link {name}", k) for k, name in enumerate(names))
-        said = f"<UnstructuredGrid><FieldData>{numbers}</FieldData>".encode()
-        part.write_bytes(part.read_bytes().replace(b"<UnstructuredGrid>", said, 1))
+        head = f"<UnstructuredGrid><FieldData>{numbers}</FieldData>".encode()
+        part.write_bytes(part.read_bytes().replace(b"<UnstructuredGrid>", head, 1))
 
 
 def write_frame(path: Path, time: float, fields: Sequence[Block]) -> None:
@@ -80,7 +80,7 @@ def write_frame(path: Path, time: float, fields: Sequence[Block]) -> None:
 def write_cells(
     path: Path, parts: Sequence[tuple[np.ndarray, np.ndarray, str]], name: str, values: Sequence[np.ndarray]
 ) -> None:
-    """Elements as drawn with one value each.
+    """Elements in the reference position with one value each.
 
     Parameters
     ----------
@@ -117,8 +117,8 @@ def write_blocks(path: Path, now: Mapping[str, float], fields: Sequence[Block], 
     vtu.write(str(path), _merged(fields, first), binary=True, compression="zlib")
     stress = f'Name="{STRESS}" NumberOfComponents="{len(STRESS_COMPONENTS)}"'
     named = "".join(f' ComponentName{i}="{name}"' for i, name in enumerate(STRESS_COMPONENTS))
-    text, said = path.read_bytes(), _field_data(now, fields, first).encode()
-    text = text.replace(b"<UnstructuredGrid>", b"<UnstructuredGrid>" + said, 1)
+    text, head = path.read_bytes(), _field_data(now, fields, first).encode()
+    text = text.replace(b"<UnstructuredGrid>", b"<UnstructuredGrid>" + head, 1)
     path.write_bytes(text.replace(stress.encode(), (stress + named).encode(), 1))
 
 

@@ -42,7 +42,7 @@ def with_prefix(value: float, unit: str) -> str:
 
 
 def clock(scene: Scene) -> str:
-    """What tells a moment: the only drive's angle or travel; without one, or with several, the time."""
+    """What shows a moment: the only drive's angle or travel; without one, or with several, the time."""
     if len(scene.driven_joints) != 1:
         return "time"
     (name,) = scene.driven_joints
@@ -66,7 +66,7 @@ def place_of(point: Iterable[float]) -> str:
 
 def stress_at(peak: Peak) -> str:
     """How high, in which link, and where."""
-    return f"{with_prefix(peak.stress, 'Pa')} in link {peak.link} at {place_of(peak.place)} as drawn"
+    return f"{with_prefix(peak.stress, 'Pa')} in link {peak.link} at {place_of(peak.place)} in the reference position"
 
 
 def percent(x: float) -> str:

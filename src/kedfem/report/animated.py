@@ -38,7 +38,7 @@ class Animated:
 
 
 def animated(folder: Path, deformation_scale: float) -> Animated | None:
-    """The surfaces of a run's links in all its frames; of a run without animation as drawn; None without either.
+    """The surfaces of a run's links in all its frames; of a run without animation undeformed; None without either.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def _read(paths: Sequence[Path]) -> Any:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """VTK, and those who tell its messages again, say nothing on the terminal."""
+    """VTK, and those who pass its messages on, say nothing on the terminal."""
     import pyvista
 
     with pyvista.vtk_verbosity("off"), warnings.catch_warnings():
@@ -128,7 +128,7 @@ def _quiet() -> Iterator[None]:
 
 
 def extent(surfaces: Sequence[Surface]) -> Float[np.ndarray, "3"]:
-    """What all links take up along x, y and z, as drawn and in all frames [m]."""
+    """What all links take up along x, y and z, in the reference position and in all frames [m]."""
     low, high = bounds(surfaces, np.eye(3))
     return np.asarray(high - low)
 
@@ -136,7 +136,7 @@ def extent(surfaces: Sequence[Surface]) -> Float[np.ndarray, "3"]:
 def bounds(
     surfaces: Sequence[Surface], axes: Float[np.ndarray, "3 3"]
 ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
-    """Lowest and highest coordinates of all links along axes, the rows, as drawn and in all frames [m]."""
+    """Lowest and highest coordinates of all links along axes, the rows, at the reference and in all frames [m]."""
     every = [points @ axes.T for each in surfaces for points in each.world()]
     low, high = [x.min(axis=0) for x in every], [x.max(axis=0) for x in every]
     return np.asarray(np.min(low, axis=0)), np.asarray(np.max(high, axis=0))

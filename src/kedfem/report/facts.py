@@ -1,4 +1,4 @@
-"""What a report tells in tables, from results and the scene that they are of."""
+"""What a report shows in tables, from results and the scene that they are of."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
@@ -32,12 +32,12 @@ def facts(results: Results, highest: Peak | None, moment: Callable[[float, float
     ):
         if found := _largest(results, beginning, endings):
             name, value, unit, at = found
-            said = f"{name}, {moment(float(results.time[at]), float(results.angle[at]))}"
-            out.append(Fact(what, with_prefix(value, unit), said))
+            message = f"{name}, {moment(float(results.time[at]), float(results.angle[at]))}"
+            out.append(Fact(what, with_prefix(value, unit), message))
     if results.fatigue is not None and (spot := results.fatigue.worst) is not None:
-        said = f"link {spot.link}; life {life_of(spot.damage, results.fatigue)}"
-        said += "; doubtful, see below" if results.fatigue.doubt else ""
-        out.append(Fact("Highest utilisation in fatigue", percent(spot.utilisation), said))
+        message = f"link {spot.link}; life {life_of(spot.damage, results.fatigue)}"
+        message += "; doubtful, see below" if results.fatigue.doubt else ""
+        out.append(Fact("Highest utilisation in fatigue", percent(spot.utilisation), message))
     errors = {
         key.removeprefix(TOGETHER): float(x) for key, x in results.notes.items() if key.startswith(TOGETHER)
     }
@@ -66,22 +66,22 @@ def links_table(scene: Mapping[str, Any], results: Results) -> Table:
     """What each link is and was made of."""
     rows: Rows = []
     for name, link in scene["links"].items():
-        said = results.links.get(name, {})
-        mass, centre = said.get("mass [kg]"), said.get("centre of mass [m]")
+        message = results.links.get(name, {})
+        mass, centre = message.get("mass [kg]"), message.get("centre of mass [m]")
         shape = link.get("shape") or {}
         rows.append(
             (
                 name,
-                str(said.get("model", link.get("model", ""))),
+                str(message.get("model", link.get("model", ""))),
                 str(link.get("material") or "–"),
                 str(shape.get("kind", "–")) + (f" {shape['file']}" if "file" in shape else ""),
-                *(_count(said.get(key)) for key in ("elements", "unknowns")),
+                *(_count(message.get(key)) for key in ("elements", "unknowns")),
                 "–" if mass is None else with_prefix(float(mass), "kg"),
                 "–" if centre is None else place_of(centre),
             )
         )
     head = ("link", "model", "material", "shape", "elements", "unknowns", "mass", "centre of mass")
-    note = "Mass with what is attached; centre of mass as drawn, in the reference position."
+    note = "Mass with what is attached; centre of mass in the reference position."
     return Table("Links", head, rows, note)
 
 
@@ -90,12 +90,12 @@ def _count(number: Any) -> str:
 
 
 def joints_table(scene: Mapping[str, Any]) -> Table:
-    """Where joints are as drawn."""
+    """Where joints are in the reference position."""
     rows: Rows = [
         (name, joint["kind"], " – ".join(joint["links"]), place_of(joint["at"]), _axis(joint))
         for name, joint in scene["joints"].items()
     ]
-    return Table("Joints", ("joint", "kind", "links", "at, as drawn", "axis"), rows)
+    return Table("Joints", ("joint", "kind", "links", "reference position", "axis"), rows)
 
 
 def _axis(joint: Mapping[str, Any]) -> str:
@@ -105,7 +105,7 @@ def _axis(joint: Mapping[str, Any]) -> str:
 
 def peaks_table(results: Results, moment: Callable[[float, float], str]) -> Table:
     """The highest stress of each link, over all steps."""
-    head = ("link", "von Mises stress", "at, as drawn", "when", "near")
+    head = ("link", "von Mises stress", "reference position", "when", "near")
     return Table("Highest stress of each link, over all steps", head, peak_rows(results.peaks, moment))
 
 
@@ -133,16 +133,16 @@ def frequencies_table(found: Summary) -> Table:
         ends = (with_prefix(x, "Hz").replace(" ", "\u00a0") for x in (low, high))
         rows.append((str(mode), *ends, "; ".join(met) or "none"))
     held = "let go of" if found.free else "hold"
-    said = f"The mechanism frozen at {found.positions} positions, drives {held} their joints."
+    message = f"The mechanism frozen at {found.positions} positions, drives {held} their joints."
     if found.still:
-        said += f" {found.still} motions without strain are left out."
+        message += f" {found.still} motions without strain are left out."
     if found.speed:
-        said += f" The scene's drive turns at {found.speed:.4g} rpm."
+        message += f" The scene's drive turns at {found.speed:.4g} rpm."
     return Table(
         "Natural frequencies",
         head if found.speed else head[:3],
         [r if found.speed else r[:3] for r in rows],
-        said,
+        message,
     )
 
 
@@ -167,11 +167,11 @@ def loads_tables(
     return out
 
 
-def _numbers(title: str, what: str, told: Mapping[str, Mapping[str, float]], note: str) -> Table:
+def _numbers(title: str, what: str, reported: Mapping[str, Mapping[str, float]], note: str) -> Table:
     """A line for each name; columns that no line has are left out."""
-    every = dict.fromkeys(key for numbers in told.values() for key in numbers)
-    keys = [key for key in every if any(np.isfinite(x.get(key, np.nan)) for x in told.values())]
-    rows: Rows = [(name, *(number_in(x, key) for key in keys)) for name, x in told.items()]
+    every = dict.fromkeys(key for numbers in reported.values() for key in numbers)
+    keys = [key for key in every if any(np.isfinite(x.get(key, np.nan)) for x in reported.values())]
+    rows: Rows = [(name, *(number_in(x, key) for key in keys)) for name, x in reported.items()]
     return Table(title, (what, *(key.rpartition(" [")[0] for key in keys)), rows, note)
 
 
@@ -194,8 +194,8 @@ def budget_table(notes: Mapping[str, str | float]) -> list[Table]:
         (source, *(percent(cells[source, kind]) if (source, kind) in cells else "–" for kind in kinds))
         for source in dict.fromkeys(source for source, _ in cells)
     ]
-    said = "; ".join(str(x) for key, x in notes.items() if key.startswith(UNKNOWN))
-    note = "Of each channel's largest value." + (f" No estimate of {said}." if said else "")
+    message = "; ".join(str(x) for key, x in notes.items() if key.startswith(UNKNOWN))
+    note = "Of each channel's largest value." + (f" No estimate of {message}." if message else "")
     return [Table("Estimated error", ("from", *kinds), rows, note)]
 
 
@@ -219,10 +219,10 @@ def steady_table(notes: Mapping[str, str | float]) -> list[Table]:
 
 
 def notes_table(notes: Mapping[str, str | float]) -> Table:
-    """All else that the run said of itself."""
-    told = (OF_SOURCE, TOGETHER, UNKNOWN, STEADY)
-    plain = {key: x for key, x in notes.items() if not key.startswith(told)}
-    return named_table("What the run said of itself", plain.items())
+    """All else that the run reported of itself."""
+    reported = (OF_SOURCE, TOGETHER, UNKNOWN, STEADY)
+    plain = {key: x for key, x in notes.items() if not key.startswith(reported)}
+    return named_table("What the run reported of itself", plain.items())
 
 
 def named_table(title: str, items: Iterable[tuple[str, str | float]]) -> Table:

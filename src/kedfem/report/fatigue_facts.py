@@ -9,7 +9,7 @@ ENDLESS = 1e15  # revolutions, hours: as good as for ever
 
 
 FATIGUE_HEAD = (
-    "link", "life", "utilisation", "amplitude", "mean", "criterion", "not proportional", "at, as drawn", "near",
+    "link", "life", "utilisation", "amplitude", "mean", "criterion", "not proportional", "reference position", "near",
 )  # fmt: skip
 
 
@@ -37,17 +37,17 @@ def life_of(damage: float, found: Fatigue) -> str:
 def fatigue_notes(found: Fatigue) -> list[str]:
     """What a reader of the table has to know, in words."""
     turns = f", {found.revolutions:.6g} revolutions" if found.revolutions else ""
-    said = [f"Period {with_prefix(found.period, 's')}{turns}; stresses repeat to {percent(found.repeats)}."]
-    said += [f"DOUBTFUL: {found.doubt}."] if found.doubt else []
-    said += [f"{name}: {words}." for name, words in found.strengths.items()]
+    lines = [f"Period {with_prefix(found.period, 's')}{turns}; stresses repeat to {percent(found.repeats)}."]
+    lines += [f"DOUBTFUL: {found.doubt}."] if found.doubt else []
+    lines += [f"{name}: {words}." for name, words in found.strengths.items()]
     left = {name: n for name, n in found.left_out.items() if n}
     if left:
         points = ", ".join(f"{n:,} of {name}" for name, n in left.items())
-        said.append(f"Left out near corners, point forces and joints: {points} points.")
+        lines.append(f"Left out near corners, point forces and joints: {points} points.")
     empty = [name for name, spots in found.spots.items() if not spots]
-    said += [f"No point of {', '.join(empty)} is left to look at."] if empty else []
-    said += [f"No data of {', '.join(found.without)}."] if found.without else []
-    return said
+    lines += [f"No point of {', '.join(empty)} is left to look at."] if empty else []
+    lines += [f"No data of {', '.join(found.without)}."] if found.without else []
+    return lines
 
 
 def fatigue_table(found: Fatigue) -> Table:

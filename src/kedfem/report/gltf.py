@@ -100,7 +100,7 @@ class _Made:
     times: int | None = None
 
     def link(self, surface: Surface, times: Float[np.ndarray, " f"]) -> Any:
-        """A node with a link's surface as drawn, and its motion."""
+        """A node with a link's surface in the reference position, and its motion."""
         import pygltflib as g
 
         X = surface.points[0]

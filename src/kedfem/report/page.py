@@ -144,10 +144,10 @@ def _frequencies(results: Results, folder: Path, missing: list[str]) -> dict[str
 
 def _moment(scene: Mapping[str, Any], results: Results, time: float, angle: float) -> str:
     """A time, with the drive's position if there is a drive."""
-    said = f"t = {with_prefix(time, 's')}"
+    caption = f"t = {with_prefix(time, 's')}"
     if not (scene.get("drive") or scene.get("drives")):
-        return said
-    return f"{said}, {results.drive.name.replace('_', ' ')} {with_prefix(angle, results.drive.unit)}"
+        return caption
+    return f"{caption}, {results.drive.name.replace('_', ' ')} {with_prefix(angle, results.drive.unit)}"
 
 
 def _moving(
@@ -191,11 +191,13 @@ def _scale_of(highest: float) -> list[str]:
 def _frames(
     scene: Mapping[str, Any], results: Results, shown: Animated, highest: Peak | None
 ) -> Sequence[str]:
-    """What each frame is; after the last one links are as drawn, and no instant."""
+    """What each frame is; after the last one links are in the reference position, and no instant."""
     angles = np.interp(shown.times, results.time, results.angle) if len(results.time) else 0 * shown.times
-    said = [_moment(scene, results, float(t), float(x)) for t, x in zip(shown.times, angles, strict=True)]
-    drawn = "links as drawn" + (", with the highest stress of each point over all steps" if highest else "")
-    return [*said, drawn]
+    captions = [_moment(scene, results, float(t), float(x)) for t, x in zip(shown.times, angles, strict=True)]
+    drawn = "links in the reference position" + (
+        ", with the highest stress of each point over all steps" if highest else ""
+    )
+    return [*captions, drawn]
 
 
 def _marks(scene: Mapping[str, Any], highest: Peak | None) -> list[Mark]:

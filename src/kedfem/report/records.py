@@ -9,7 +9,7 @@ Rows = list[tuple[str, ...]]
 class Table:
     """A table of the page.
 
-    title, head : what it tells; names of its columns, empty of a table of names and values
+    title, head : what it shows; names of its columns, empty of a table of names and values
     rows : texts; the first of each is a name
     note : below it
     """

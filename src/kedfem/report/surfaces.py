@@ -38,7 +38,8 @@ class Surface:
 
     name : of the link
     triangles : (t, 3) of its points
-    points : (n, 3) each, first as drawn [m], then one a frame: in the link's axes, elastic displacement exaggerated
+    points : (n, 3) each, first in the reference position [m], then one a frame: in the link's axes, elastic displacement
+        exaggerated
     stress : (n,) each, first the highest over all steps, then one a frame: von Mises [Pa]; nan where there is none
     placements : one a frame
     """
@@ -55,7 +56,7 @@ class Surface:
         return any(np.isfinite(each).any() for each in self.stress)
 
     def world(self) -> Iterator[Places]:
-        """(n, 3) its points as drawn, and where they are in each frame [m]."""
+        """(n, 3) its points in the reference position, and where they are in each frame [m]."""
         yield self.points[0]
         for points, placed in zip(self.points[1:], self.placements, strict=True):
             yield placed.p + points @ placed.R.T
@@ -68,7 +69,7 @@ class _Source:
     ----------
     part : its elements
     ids : (m,) which points of a frame are its own
-    X : (m, 3) where these are as drawn [m]
+    X : (m, 3) where these are in the reference position [m]
     lift : along z, so that planar links that lie in one plane do not flicker through each other [m]
     """
 
@@ -89,7 +90,7 @@ class _Source:
         return self._keep(outer.compute_normals(cell_normals=False, split_vertices=True, feature_angle=SHARP))
 
     def _outer(self, halvings: int) -> Any:
-        """The surface as drawn, with the numbers of the points that it is made of; empty of a point."""
+        """The surface in the reference position, with the numbers of the points that it is made of; empty of a point."""
         import pyvista
 
         part = self.part.copy()
@@ -126,7 +127,7 @@ class _Source:
         return len(self.kept)
 
     def drawn(self, highest: Float[np.ndarray, " n"]) -> None:
-        """The link as drawn, with the highest stresses over all steps."""
+        """The link in the reference position, with the highest stresses over all steps."""
         self._add(self.X, highest[self.ids])
 
     def frame(self, grid: Any, scale: float) -> None:
@@ -162,7 +163,7 @@ def placement(X: Places, x: Places, flat: bool = False) -> Placement:
 
     Parameters
     ----------
-    flat : whether they stay in a plane z = constant; points on a line do not tell how they turn about it
+    flat : whether they stay in a plane z = constant; points on a line do not determine how they turn about it
     """
     if flat:
         up = np.array([0.0, 0.0, float(np.ptp(X, axis=0).max()) or 1.0])

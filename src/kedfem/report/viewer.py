@@ -55,7 +55,7 @@ class Mark:
     """A point that goes with a link, with its name.
 
     name, link : the link is None for a point of the ground
-    at : (3,) as drawn [m]
+    at : (3,) in the reference position [m]
     hot : whether it is the highest stress
     """
 
@@ -68,7 +68,7 @@ class Mark:
 def viewer(
     shown: Animated, highest: float, marks: Sequence[Mark], gravity: Float[np.ndarray, "3"], first: int
 ) -> str:
-    """An HTML document that is told the frame by messages; after the last one links are as drawn, with highest stresses.
+    """An HTML document that messages give the frame; after the last one links are undeformed, with highest stresses.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def scale() -> list[tuple[float, tuple[float, ...]]]:
 
 
 def _mesh(k3d: Any, surface: Surface, highest: float, fine: float) -> Any:
-    """A link over the frames; after the last one as drawn, with the highest stresses."""
+    """A link over the frames; after the last one in the reference position, with the highest stresses."""
     count = len(surface.placements)
     order = [*range(1, count + 1), 0]
     vertices = _series([(np.round(surface.points[k] / fine) * fine).astype(np.float32) for k in order])
@@ -175,8 +175,8 @@ def _listens(
     axes = np.array([*picture_axes(towards, up, gravity), towards])
     low, high = bounds(shown.surfaces, axes)
     wide, tall, deep = (high - low) / 2
-    told: Mapping[str, Any] = {
+    messages: Mapping[str, Any] = {
         "middle": ((low + high) / 2 @ axes).tolist(), "towards": towards.tolist(), "up": axes[1].tolist(),
         "wide": wide, "high": tall, "deep": deep, "view": FIELD_OF_VIEW, "first": first,
     }  # fmt: skip
-    return LISTENS % json.dumps(told)
+    return LISTENS % json.dumps(messages)

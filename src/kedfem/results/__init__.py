@@ -8,7 +8,7 @@ Nothing half-done is ever taken for whole, and nothing old is lost for a run tha
   A run that fails earlier removes its own file and leaves the old one as it was.
 * The file says ``status = "running"`` from then on, ``"complete"`` only after a clean end, and
   ``"interrupted"`` (with the reason) after an error, Ctrl-C or SIGTERM. A killed process leaves ``"running"``, and no
-  lock: whoever reads the file is told ``"abandoned"``.
+  lock: whoever reads the file gets ``"abandoned"``.
 * Changed bytes are noticed: such a file is refused.
 * Whatever the status, all rows up to the last :meth:`ResultsWriter.append` can be read.
 """

@@ -97,7 +97,7 @@ def add_notes(path: Path, notes: Mapping[str, str | float]) -> None:
 
 
 def add_account(path: Path, warnings: Sequence[str], seconds: Mapping[str, float]) -> None:
-    """Store what the user is told of a run, and the seconds of each of its stages, in a file that is whole.
+    """Store what is reported of a run, and the seconds of each of its stages, in a file that is whole.
 
     Raises
     ------

@@ -26,16 +26,16 @@ from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.motion.rigid import RigidMotion
-from kedfem.results.balance import Balance, Flow, carried_fields, fields_of, flow
+from kedfem.results.balance import Balance, Flow, fields_of, flow, prescribed_fields
 from kedfem.results.forces.constraint_forces import ConstraintForces
 from kedfem.results.forces.constraint_work import row_work
 from kedfem.results.forces.force_elements import Measured
-from kedfem.results.forces.moments import Constants, Nominal, constants, nominal
+from kedfem.results.forces.moments import Constants, RigidRates, constants, rates_of_bodies
 from kedfem.results.forces.resistance import Last, last_of, products, resistance
 from kedfem.results.records import Channel
 
 Rows = Float[np.ndarray, "T c"]
-GROUP = 12  # links whose moments are looked at together: of a thousand time points they fit into a cache
+GROUP = 12  # links whose moments are examined together: of a thousand time points they fit into a cache
 LITTLE = 1e-3  # of the kinetic energy: where less is exchanged, shares of it would be of next to nothing
 UNBALANCED = 0.02  # resolved motion leaves 1e-6 to 3e-3, too long steps 0.1 (docs/theory/evaluation.md)
 ENERGIES = (
@@ -85,16 +85,16 @@ class Account:
 
     REMEMBERED = ("_next", "_sums", "_start", "_last", "_springs", "_largest", "_impulse")
 
-    def __init__(self, model: Model, actions: Measured | None = None) -> None:
-        self.model, self.actions = model, actions
+    def __init__(self, model: Model, force_elements: Measured | None = None) -> None:
+        self.model, self.force_elements = model, force_elements
         joined = zip(model.links, model.joints, model.bodies, strict=True)
         self.of = [constants(*each, model.damping) for each in joined]
-        self.carried = [constants(x.link, NO_PORTS, x.body, Rayleigh()) for x in model.carried]
+        self.prescribed = [constants(x.link, NO_PORTS, x.body, Rayleigh()) for x in model.prescribed]
         self._groups = [group for k in (2, 3) for group in _grouped(self.of, k)]
-        self._carried_groups = [group for k in (2, 3) for group in _grouped(self.carried, k)]
-        every = [*model.links, *(x.link for x in model.carried)]
+        self._prescribed_groups = [group for k in (2, 3) for group in _grouped(self.prescribed, k)]
+        every = [*model.links, *(x.link for x in model.prescribed)]
         nodes = np.concatenate([(link.full or link).nodes for link in every])
-        self._extent = float(np.ptp(nodes, axis=0).max())  # of the linkage as drawn [m]
+        self._extent = float(np.ptp(nodes, axis=0).max())  # of the linkage in the reference position [m]
         self._block: Block | None = None
         self._forces = ConstraintForces(model)
         self._begin()
@@ -181,24 +181,24 @@ class Account:
 
     def _flows(self, block: Block) -> tuple[Flow, Float[np.ndarray, "T 8"]]:
         """Of all links, and what damping takes in each step."""
-        motion, at, flows, taken = block.motion, nominal(block.motion), [], np.zeros((len(block), 8))
+        motion, at, flows, taken = block.motion, rates_of_bodies(block.motion), [], np.zeros((len(block), 8))
         for k, group in enumerate(self._groups):
             of, links = [self.of[i] for i in group], [block.links[i] for i in group]
             found, lost = self._flow_of(k, of, links, motion, at)
             flows.append(found)
             taken += lost
-        for group in self._carried_groups:
-            of, loaded = [self.carried[i] for i in group], [self.model.carried[i] for i in group]
+        for group in self._prescribed_groups:
+            of, loaded = [self.prescribed[i] for i in group], [self.model.prescribed[i] for i in group]
             forces = [applied(x.link, x.loads, motion, x.body) for x in loaded]
-            flows.append(flow(of, carried_fields(of, forces), at.of(_bodies(of), of[0].k)))
+            flows.append(flow(of, prescribed_fields(of, forces), at.of(_bodies(of), of[0].k)))
         found = sum(flows[1:], start=flows[0])
-        if self.actions is not None and self.carried:
-            power = self.actions.power({x.link.name for x in self.model.carried}, block)
+        if self.force_elements is not None and self.prescribed:
+            power = self.force_elements.power({x.link.name for x in self.model.prescribed}, block)
             found = replace(found, loads=found.loads + power, supports=found.supports - power)
         return found, taken
 
     def _flow_of(
-        self, k: int, of: list[Constants], links: Sequence[LinkHistory], motion: RigidMotion, at: Nominal
+        self, k: int, of: list[Constants], links: Sequence[LinkHistory], motion: RigidMotion, at: RigidRates
     ) -> tuple[Flow, Float[np.ndarray, "T 8"] | float]:
         """Of the links of a group, and what damping takes of them."""
         turns = [x.link.fit is None for x in of]
@@ -250,11 +250,11 @@ def balance_warning(found: Balance, stiffened: bool = False) -> tuple[str, ...]:
     """
     energy = {} if stiffened else {"energy": found.energy}
     left = energy | {"momentum": found.linear, "angular momentum": found.angular}
-    said = ", ".join(f"{100 * x:.2g} % of {name}" for name, x in left.items() if x > UNBALANCED)
-    if not said:
+    message = ", ".join(f"{100 * x:.2g} % of {name}" for name, x in left.items() if x > UNBALANCED)
+    if not message:
         return ()
     return (
-        f"the residual of the balance is {said}: the steps are too long for what moves, or numerical "
+        f"the residual of the balance is {message}: the steps are too long for what moves, or numerical "
         "damping takes what they "
         "do not resolve; take shorter ones",
     )

@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from kedfem.dynamics.history import LinkHistory, Products
 from kedfem.dynamics.joints.ports import turned_vectors
-from kedfem.results.forces.moments import Constants, Field, Nominal, dot, in_world, paired, rotated, turned
+from kedfem.results.forces.moments import Constants, Field, RigidRates, dot, in_world, paired, rotated, turned
 
 Scalars = Float[np.ndarray, " T"]
 Vectors = Float[np.ndarray, "3 T"]
@@ -28,7 +28,7 @@ class Flow:
         for what directions that vary in time do on the elastic motion
     force, moment : (3, T) of P and the port forces together [N, N m]
     turning : (3, T) Σ δ × K δ: moment that K's forces have on the bent link, as K turns with the rigid-body frame [N m]
-    neglected : (T,) its power on the nominal rotation [W]
+    neglected : (T,) its power on the rigid-body rotation [W]
     led : (T,) power of the port forces on the elastic motion, where joints are enforced by constraint equations [W]
     """
 
@@ -97,7 +97,7 @@ def fields_of(
     return Fields(rows, arms, elastic, powers)
 
 
-def carried_fields(of: Sequence[Constants], forces: Sequence[Field]) -> Fields:
+def prescribed_fields(of: Sequence[Constants], forces: Sequence[Field]) -> Fields:
     """Of rigid links that the drive carries along; their supports give what their motion asks for, M R0'' − P."""
     S, T, k = len(of), len(forces[0]), of[0].k
     rows = np.zeros((4, len(of[0].fit), S, T))
@@ -107,7 +107,7 @@ def carried_fields(of: Sequence[Constants], forces: Sequence[Field]) -> Fields:
     return Fields(rows, np.zeros((2, k, k, S, T)), None, np.zeros((3, S, T)))
 
 
-def flow(of: Sequence[Constants], found: Fields, at: Nominal) -> Flow:
+def flow(of: Sequence[Constants], found: Fields, at: RigidRates) -> Flow:
     """All links together, from their fields and their rigid-body motion."""
     gram, spin = np.stack([x.gram for x in of], axis=-1), np.array([x.spin for x in of])
     Mv, F, ports, Mu = found.rows[:, :-1].reshape(4, *at.rates.shape[1:])
@@ -141,7 +141,7 @@ def _lengths(x: Float[np.ndarray, "k S T"]) -> Float[np.ndarray, "S T"]:
     return np.asarray(np.sqrt(np.einsum("ist,ist->st", x, x)))
 
 
-def _neglected(found: Fields, at: Nominal) -> tuple[Vectors, Scalars]:
+def _neglected(found: Fields, at: RigidRates) -> tuple[Vectors, Scalars]:
     """Moment of the elastic forces on bent links, and its power."""
     if found.elastic is None:
         T = found.powers.shape[2]

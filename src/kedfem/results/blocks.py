@@ -30,13 +30,13 @@ def not_finite(
 ) -> tuple[int, str] | None:
     """The first row that holds something that is not finite, and what to say of it."""
     first = len(time)
-    said = ""
+    message = ""
     for name, block in values.items():
         bad = ~np.isfinite(block).all(axis=1)
         if bad.any() and (row := int(np.argmax(bad))) < first:
             got = block[row][~np.isfinite(block[row])][0]
-            first, said = (
+            first, message = (
                 row,
                 f"{name}: must be finite, got {got:g} at t = {time[row]:.6g} s; take a shorter step",
             )
-    return (first, said) if said else None
+    return (first, message) if message else None

@@ -1,8 +1,9 @@
 """Two independent accounts of one effort, compared over a run: elastic against rigid links, drives against energy.
 
-They cost a few sums a step; where motions are free, which rigid links hold as drawn, there is nothing to compare.
+They cost a few sums a step; where motions are free, which rigid links hold in the reference position, there is nothing
+to compare.
 Elastic effort e and rigid effort r of one joint or drive agree but for vibration, which over a run has no mean and
-nothing in common with r. So both e ≈ c r with c = ⟨e r⟩/⟨r r⟩ and the mean of e − r tell of an effort that is missing,
+nothing in common with r. So both e ≈ c r with c = ⟨e r⟩/⟨r r⟩ and the mean of e − r reveal an effort that is missing,
 or counted twice, not of one that swings.
 """
 
@@ -72,7 +73,7 @@ class _Pair:
 
 @dataclass(frozen=True, slots=True)
 class _Drive:
-    """A drive: its effort's channel ("" if there is none), its pair of bodies, point and axis as drawn."""
+    """A drive: its effort's channel ("" if there is none), its pair of bodies, reference point and axis."""
 
     effort: str
     bodies: tuple[int, int]
@@ -124,8 +125,8 @@ class CrossChecks:
         ]
         self.drives = [_Drive.of(scene, linkage, known, name) for name in scene.driven_joints]
         self.account = account
-        told = bool(self.drives) and all(each.effort for each in self.drives)
-        self.worked = told and not without_vibration(scene)  # else there is no account of energy
+        all_known = bool(self.drives) and all(each.effort for each in self.drives)
+        self.worked = all_known and not without_vibration(scene)  # else there is no account of energy
         self._last: tuple[float, float] | None = None
         self._work, self._left = 0.0, 0.0
         self.exchanged = 0.0  # largest energy or work so far [J]

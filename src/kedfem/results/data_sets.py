@@ -19,16 +19,20 @@ def as_data_tree(results: Results) -> Any:
     """
     xarray = of_extra("xarray", "Results.to_xarray")
     time = xarray.Variable("time", results.time, {"units": "s", "long_name": "time"})
-    said = {"units": results.drive.unit, "long_name": results.drive.description}
-    along = {"time": time, results.drive.name: xarray.Variable("time", results.angle, said)}
+    attributes = {"units": results.drive.unit, "long_name": results.drive.description}
+    along = {"time": time, results.drive.name: xarray.Variable("time", results.angle, attributes)}
     groups: dict[str, dict[str, Any]] = {}
     for channel, values in results.channels.values():
         group, _, name = channel.name.rpartition("/")
         dimension = columns_dimension(channel.columns)
         dims, array = (("time", dimension), values) if dimension else (("time",), values[:, 0])
-        said = {"units": cf_units(channel.unit), "long_name": channel.description, "frame": channel.frame}
+        attributes = {
+            "units": cf_units(channel.unit),
+            "long_name": channel.description,
+            "frame": channel.frame,
+        }
         labels = {dimension: list(channel.columns)} if dimension else {}
-        found = xarray.DataArray(array, dims=dims, coords=along | labels, attrs=said)
+        found = xarray.DataArray(array, dims=dims, coords=along | labels, attrs=attributes)
         groups.setdefault(group, {})[name] = found
     run = {"status": results.status, "reason": results.reason, "kedfem_version": results.version}
     sets = {group: xarray.Dataset(variables) for group, variables in groups.items()}

@@ -9,13 +9,13 @@ from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model
 from kedfem.links.record import in_space
 from kedfem.motion.linkage import Linkage
-from kedfem.results.followed import Drawn, Followed, followed_point, seen_from
+from kedfem.results.link_points import Drawn, LinkPoint, link_point, seen_from
 from kedfem.results.recorded import Rows
 from kedfem.scene import Probe, Scene
 
 
 def deflection(
-    scene: Scene, model: Model, linked: Linkage, name: str, probe: Probe, point: Followed
+    scene: Scene, model: Model, linked: Linkage, name: str, probe: Probe, point: LinkPoint
 ) -> tuple[Callable[[Block], Rows], str]:
     """Of a point in a frame that goes with its link: its chord, or its mean rigid motion, if it has no two joints."""
     chord = probe.chord or _farthest(scene, probe.link)
@@ -30,7 +30,7 @@ def deflection(
         return from_mean, "deflection from the link's mean rigid motion,"
     where = f"output.probes.{name}.chord"
     first, second = (
-        followed_point(model, linked, f"{where}[{i}]", probe.link, np.asarray(P)) for i, P in enumerate(chord)
+        link_point(model, linked, f"{where}[{i}]", probe.link, np.asarray(P)) for i, P in enumerate(chord)
     )
     drawn = second.X - first.X
 
@@ -65,7 +65,7 @@ def _along(R: Float[np.ndarray, "T 3 3"], drawn: Drawn, now: Rows) -> Float[np.n
 def _mean_motion(
     model: Model, name: str
 ) -> Callable[[Block], tuple[Rows, Drawn, Float[np.ndarray, "T 3 3"]]]:
-    """The rigid motion of least mean square distance, by mass: centre now and as drawn, orientation."""
+    """The rigid motion of least mean square distance, by mass: centre now and in the reference position, orientation."""
     here = [(k, link, model.bodies[k]) for k, link in enumerate(model.links) if link.name == name]
     mass = sum(float(link.one @ link.m1[:, 0]) for _, link, _ in here)
     X = np.sum([link.one @ link.mX for _, link, _ in here], axis=0) / mass

@@ -57,10 +57,13 @@ def lay_dimensions(file: Any, drive: Channel, channels: Sequence[Channel]) -> No
             write_facts(file[name], {"long_name": f"components {', '.join(channel.columns)}"})
             file[name].make_scale(name)
     for channel in (TIME, drive, *channels):
-        rows, said = file[channel.name], {"units": cf_units(channel.unit), "long_name": channel.description}
+        rows, attributes = (
+            file[channel.name],
+            {"units": cf_units(channel.unit), "long_name": channel.description},
+        )
         if channel.columns:
-            said["coordinates"] = drive.name
-        write_facts(rows, said)
+            attributes["coordinates"] = drive.name
+        write_facts(rows, attributes)
         if channel is not TIME:
             rows.dims[0].attach_scale(file[TIME.name])
         if name := columns_dimension(channel.columns):

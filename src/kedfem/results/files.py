@@ -13,9 +13,9 @@ LOCK = ".kedfem.lock"
 
 
 def reason(error: OSError | RuntimeError) -> str:
-    """What the system (or HDF5, which also raises RuntimeError) said, in one line and without paths."""
-    said = error.strerror if isinstance(error, OSError) else None
-    return (said or str(error)).splitlines()[0]
+    """What the system (or HDF5, which also raises RuntimeError) reported, in one line and without paths."""
+    reason = error.strerror if isinstance(error, OSError) else None
+    return (reason or str(error)).splitlines()[0]
 
 
 def results_file(given: Path) -> Path:

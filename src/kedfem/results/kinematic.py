@@ -101,7 +101,7 @@ def rotation_vector(R: Float[np.ndarray, "T 3 3"]) -> Float[np.ndarray, "T 3"]:
 def _point(
     key: str, body: int, at: Float[np.ndarray, "3"], text: str
 ) -> list[tuple[Channel, Callable[[RigidMotion], Rows]]]:
-    """Position, velocity and acceleration of a point of a body, as drawn."""
+    """Position, velocity and acceleration of a point of a body, in the reference position."""
 
     def position(motion: RigidMotion) -> Rows:
         return np.asarray(motion.p[:, body] + motion.R[:, body] @ at)

@@ -152,7 +152,7 @@ def _digest(texts: Iterable[str]) -> UInt8[np.ndarray, "32"]:
 
 
 def _channel_texts(file: Any) -> Iterator[str]:
-    """What is said of the channels, and the scene, in an order of its own."""
+    """Facts of the channels, and the scene, in an order of its own."""
     for key in sorted(file["scene"]):
         yield f"{key} = {read_text(file['scene'][key])}"
     for rows in sorted(series(file), key=lambda each: str(each.name)):
@@ -160,7 +160,7 @@ def _channel_texts(file: Any) -> Iterator[str]:
 
 
 def _note_texts(file: Any) -> Iterator[str]:
-    """What is said of the run."""
+    """Facts of the run."""
     yield from _said("", file)
     yield from _said("notes", file["notes"])
     for name in sorted(file["notes"]):

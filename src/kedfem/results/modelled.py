@@ -30,7 +30,7 @@ def modelled(scene: Scene, linkage: Linkage, model: Model) -> dict[str, Mapping[
     inertias, out = inertias_of_model(scene, linkage, model), dict[str, Mapping[str, Any]]()
     for name, parts in segments(model).items():
         out[name] = element_facts(parts)
-    out |= {carried.link.name: {"model": "rigid, with the drive"} for carried in model.carried}
+    out |= {prescribed.link.name: {"model": "rigid, with the drive"} for prescribed in model.prescribed}
     out |= {slider.name: {"model": "rigid slider"} for slider in model.sliders}
     return {name: {**facts, **_masses(inertias, linkage.bodies.index(name))} for name, facts in out.items()}
 

@@ -12,7 +12,7 @@ from kedfem.links.point_rows import point_rows
 from kedfem.links.recovery import von_mises
 from kedfem.motion.linkage import Linkage, linkage
 from kedfem.results.deflections import deflection
-from kedfem.results.followed import Drawn, Followed, followed_point
+from kedfem.results.link_points import Drawn, LinkPoint, link_point
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import Channel
 from kedfem.scene import ForceLoad, Probe, Scene, TorqueLoad
@@ -45,7 +45,7 @@ def _channel(scene: Scene, model: Model, linked: Linkage, name: str, probe: Prob
     where = f"output.probes.{name}.at"
     if probe.quantity == "stress":
         return _stress(scene, model, where, name, probe)
-    point = followed_point(model, linked, where, probe.link, np.asarray(probe.at))
+    point = link_point(model, linked, where, probe.link, np.asarray(probe.at))
     if probe.quantity == "deflection":
         values, text = deflection(scene, model, linked, name, probe, point)
     else:
@@ -57,7 +57,9 @@ def _channel(scene: Scene, model: Model, linked: Linkage, name: str, probe: Prob
 
 
 def _place(link: str, X: Drawn) -> str:
-    return f"of link {link} at ({', '.join(f'{round(x, 9) + 0.0:.6g}' for x in X)}) m as drawn"
+    return (
+        f"of link {link} at ({', '.join(f'{round(x, 9) + 0.0:.6g}' for x in X)}) m in the reference position"
+    )
 
 
 def _words(linked: Linkage, probe: Probe) -> str:
@@ -70,12 +72,12 @@ def _words(linked: Linkage, probe: Probe) -> str:
         case "total_velocity" | "total_acceleration":
             return f"{probe.quantity.removeprefix('total_')}, rigid and elastic,"
         case quantity if linked.mobility:
-            return f"{quantity}, from the rigid motion with the free motions held as drawn,"
+            return f"{quantity}, from the rigid motion with the free motions held in the reference position,"
         case quantity:
             return f"elastic {quantity}"
 
 
-def _motion(probe: Probe, point: Followed) -> Callable[[Block], Rows]:
+def _motion(probe: Probe, point: LinkPoint) -> Callable[[Block], Rows]:
     """The values of a probe of elastic or total motion."""
     match probe.quantity:
         case "position":

@@ -47,7 +47,7 @@ def read_results(path: Path) -> Results:
 
     Returns
     -------
-    All channels; `status` tells whether the run came to its end.
+    All channels; `status` shows whether the run came to its end.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def _opened(path: Path) -> Any:
 
 
 def _alive(path: Path) -> bool:
-    """Whether a process holds the lock of a file that says that its run is under way; yes, where nobody can tell."""
+    """Whether a process holds the lock of a file that says that its run is under way; yes, where nobody can determine."""
     try:
         opened(path, "r", True).close()
     except OSError:
@@ -136,17 +136,17 @@ def _results(file: Any) -> Results:
     named = {rows.name.removeprefix("/"): rows for rows in every}
     toml = file["scene"].get("toml")
     position = TRAVEL if TRAVEL.name in named else ANGLE
-    drive, said = named.pop(position.name), read_facts(file)
+    drive, facts = named.pop(position.name), read_facts(file)
     return Results(
         time=all_rows(named.pop(TIME.name), n),
         angle=all_rows(drive, n),
         channels={name: _recorded(name, rows, n) for name, rows in named.items()},
-        status=_status(said["status"]),
+        status=_status(facts["status"]),
         scene_json=read_text(file["scene/json"]),
         scene_toml=None if toml is None else read_text(toml),
         notes=read_facts(file["notes"]),
-        reason=said["reason"],
-        version=said["kedfem_version"],
+        reason=facts["reason"],
+        version=facts["kedfem_version"],
         drive=replace(position, description=read_facts(drive)["description"]),
         peaks={name: _peak(group) for name, group in file.get(PEAKS, {}).items()},
         warnings=_warnings(file),
@@ -157,9 +157,9 @@ def _results(file: Any) -> Results:
 
 
 def _warnings(file: Any) -> tuple[str, ...]:
-    """What the user was told, in its order."""
-    said = read_facts(file[WARNINGS]) if WARNINGS in file else {}
-    return tuple(said[key] for key in sorted(said, key=lambda key: int(key.rpartition(" ")[2])))
+    """What was reported to the user, in its order."""
+    facts = read_facts(file[WARNINGS]) if WARNINGS in file else {}
+    return tuple(facts[key] for key in sorted(facts, key=lambda key: int(key.rpartition(" ")[2])))
 
 
 def _status(found: str) -> Status:
@@ -171,43 +171,43 @@ def _status(found: str) -> Status:
 
 
 def _peak(group: Any) -> Peak:
-    said = read_facts(group)
-    x, y, z = map(float, said["place [m]"])
+    facts = read_facts(group)
+    x, y, z = map(float, facts["place [m]"])
     return Peak(
-        float(said["von_mises [Pa]"]), said["link"], (x, y, z), int(said["node"]), int(said["step"]),
-        float(said["time [s]"]), float(said["drive [rad or m]"]), said["near"],
+        float(facts["von_mises [Pa]"]), facts["link"], (x, y, z), int(facts["node"]), int(facts["step"]),
+        float(facts["time [s]"]), float(facts["drive [rad or m]"]), facts["near"],
         _peak(group["away"]) if "away" in group else None,
     )  # fmt: skip
 
 
 def _fatigue(group: Any) -> Fatigue:
-    said = read_facts(group)
+    facts = read_facts(group)
     every = {name: (link, read_facts(link)) for name, link in group.items()}
     return Fatigue(
-        float(said["period [s]"]), float(said["revolutions"]), float(said["repeats to"]), said["doubt"],
+        float(facts["period [s]"]), float(facts["revolutions"]), float(facts["repeats to"]), facts["doubt"],
         {name: _spots(name, link) for name, (link, _) in every.items()},
         {name: facts["strength"] for name, (_, facts) in every.items()},
         {name: int(facts["points left out"]) for name, (_, facts) in every.items()},
-        tuple(said["links without data"].split("\n")) if said["links without data"] else (),
+        tuple(facts["links without data"].split("\n")) if facts["links without data"] else (),
     )  # fmt: skip
 
 
 def _spots(name: str, link: Any) -> tuple[FatigueSpot, ...]:
     found = []
     for rank in sorted(link, key=int):
-        said = read_facts(link[rank])
-        x, y, z = map(float, said["place [m]"])
+        facts = read_facts(link[rank])
+        x, y, z = map(float, facts["place [m]"])
         spot = FatigueSpot(
-            name, (x, y, z), int(said["node"]), said["criterion"], float(said["damage in a period"]),
-            float(said["utilisation"]), float(said["amplitude [Pa]"]), float(said["mean stress [Pa]"]),
-            float(said["disproportion"]), float(said["support factor"]), int(said["cycles in a period"]),
-            said["near"],
+            name, (x, y, z), int(facts["node"]), facts["criterion"], float(facts["damage in a period"]),
+            float(facts["utilisation"]), float(facts["amplitude [Pa]"]), float(facts["mean stress [Pa]"]),
+            float(facts["disproportion"]), float(facts["support factor"]), int(facts["cycles in a period"]),
+            facts["near"],
         )  # fmt: skip
         found.append(spot)
     return tuple(found)
 
 
 def _recorded(name: str, rows: Any, n: int) -> tuple[Channel, Float[np.ndarray, "n c"]]:
-    said = read_facts(rows)
-    channel = Channel(name, tuple(said["columns"]), said["unit"], said["frame"], said["description"])
+    facts = read_facts(rows)
+    channel = Channel(name, tuple(facts["columns"]), facts["unit"], facts["frame"], facts["description"])
     return channel, all_rows(rows, n).reshape(n, len(channel.columns))

@@ -10,7 +10,7 @@ from kedfem.motion.path import Path
 from kedfem.results.audit import Account, energy_channels
 from kedfem.results.forces.constraint_forces import ConstraintForces
 from kedfem.results.forces.drive_forces import drive_channels, gear_channel
-from kedfem.results.forces.force_elements import acting, measured_actions
+from kedfem.results.forces.force_elements import acting, measured_elements
 from kedfem.results.forces.joint_forces import joint_channels
 from kedfem.results.forces.port_forces import Forces
 from kedfem.results.forces.rigid import rigid_forces
@@ -39,9 +39,9 @@ def recording(
         If a probe is outside its link.
     """
     probes = probe_channels(scene, model, linked)
-    actions = account.actions if account else None
-    forces = Forces(ConstraintForces(model), actions or measured_actions(scene, model))
-    account = account or Account(model, forces.actions)
+    force_elements = account.force_elements if account else None
+    forces = Forces(ConstraintForces(model), force_elements or measured_elements(scene, model))
+    account = account or Account(model, forces.force_elements)
     joints = [channel for name in scene.joints for channel in joint_channels(scene, model, name, forces)]
     drive = [
         channel for name in scene.driven_joints for channel in drive_channels(scene, model, name, forces)
@@ -56,7 +56,7 @@ def recording(
         *drive,
         *gears,
         *_rigid(scene, model, along, linked),
-        *acting(scene, forces.actions),
+        *acting(scene, forces.force_elements),
         *energies,
     ]
 

@@ -128,7 +128,7 @@ class Fatigue:
     strengths
         Link → what its material withstands, in words.
     left_out
-        Link → points of its surface that were not looked at, as they are near corners, point forces or joints.
+        Link → points of its surface that were not examined, as they are near corners, point forces or joints.
     without
         Elastic links without data.
     """
@@ -175,13 +175,13 @@ class Results:
     scene_json, scene_toml
         The scene that was analysed; the TOML text is None for a scene made in Python.
     notes
-        What the run said about itself.
+        What the run reported about itself.
     reason
         Why the run was interrupted or is doubtful, else empty.
     version
         The kedfem that wrote the file.
     warnings
-        What the user was told; of a run that came to its end.
+        What was reported to the user; of a run that came to its end.
     seconds
         Stage → what it took [s]; of a run that came to its end.
     peaks
@@ -190,7 +190,8 @@ class Results:
         Name and unit of `angle`; of several drives it is the first one's.
     links
         Link → what it was modelled as: `model` in words, `elements`, `unknowns`, and with what is attached `mass [kg]`,
-        `centre of mass [m]` as drawn, `inertia [kg m^2]` about it: xx, yy, zz, xy, yz, zx; of an elastic run.
+        `centre of mass [m]` in the reference position, `inertia [kg m^2]` about it: xx, yy, zz, xy, yz, zx; of an
+        elastic run.
     fatigue
         Damage, of a whole run of a scene that asks for it.
     """

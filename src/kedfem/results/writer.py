@@ -43,7 +43,7 @@ def installed_version() -> str:
 
 
 class ResultsWriter:
-    """Appends rows to a results file; a context manager that tells how the run ended.
+    """Appends rows to a results file; a context manager that shows how the run ended.
 
     See :mod:`kedfem.results` for what happens to an older file of the same name. Until its first rows it writes to a
     file with a name of its own; if another writer has put rows in place meanwhile, it is refused and leaves them alone.
@@ -156,10 +156,10 @@ class ResultsWriter:
         """
         require_channels(self.channels, len(time), values)
         if (fault := not_finite(time, values)) is not None:
-            row, said = fault
+            row, attributes = fault
             if row:
                 self.append(time[:row], angle[:row], {name: block[:row] for name, block in values.items()})
-            raise SolveError(said)
+            raise SolveError(attributes)
         try:
             require_space(self.path.parent, self._block_space(len(time)))
             for name, block in (*values.items(), (self.drive.name, angle), (TIME.name, time)):
@@ -228,8 +228,10 @@ class ResultsWriter:
         for index, channel in enumerate((TIME, self.drive, *self.channels)):
             width = (len(channel.columns),) if len(channel.columns) > 1 else ()
             rows = new_rows(self._file, channel.name, width)
-            said = {"unit": channel.unit, "frame": channel.frame, "description": channel.description}
-            write_facts(rows, {**said, "columns": list(channel.columns) or [channel.name], "index": index})
+            attributes = {"unit": channel.unit, "frame": channel.frame, "description": channel.description}
+            write_facts(
+                rows, {**attributes, "columns": list(channel.columns) or [channel.name], "index": index}
+            )
         lay_dimensions(self._file, self.drive, self.channels)
         seal(self._file)
 

@@ -64,7 +64,7 @@ def refuse_without_growth(scene: Scene, axis: Axis, width: float) -> None:
     if scene.analysis.kind != "steady" or not scene.analysis.stability:
         given = f"kind = {scene.analysis.kind!r}" if scene.analysis.kind != "steady" else "stability = false"
         raise SceneError(
-            "--edges: must be combined with analysis.kind = 'steady' and its stability, which tell what vibrations are "
+            "--edges: must be combined with analysis.kind = 'steady' and its stability, which show what vibrations are "
             f"multiplied by in a period, got {given}"
         )
     if axis.numbers is None or len(axis.numbers) < 2:

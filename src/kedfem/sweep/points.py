@@ -94,9 +94,9 @@ class Job:
         SceneError
             With all faults of the scene.
         """
-        said = {k: v for k, v in origin(self.scene()).items() if not k.startswith("output.folder")}
+        content = {k: v for k, v in origin(self.scene()).items() if not k.startswith("output.folder")}
         shared = [sorted((place(where), value) for where, value in each.items()) for each in self.ends]
-        parts = [said, self.last, *([shared] if shared else [])]
+        parts = [content, self.last, *([shared] if shared else [])]
         return sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
 
 
@@ -126,9 +126,9 @@ class Row:
 
     def text(self) -> str:
         """As JSON."""
-        said = asdict(replace(self, begun=None))
-        del said["begun"]
-        return json.dumps(said)
+        content = asdict(replace(self, begun=None))
+        del content["begun"]
+        return json.dumps(content)
 
     @classmethod
     def read(cls, text: str) -> "Row":
@@ -139,11 +139,11 @@ class Row:
         ValueError, KeyError, TypeError
             It is another text.
         """
-        said = json.loads(text)
+        content = json.loads(text)
         found: dict[str, tuple[str, Extreme]] = {}
-        for name, (unit, (most, least, rms, when)) in said.pop("extremes").items():
+        for name, (unit, (most, least, rms, when)) in content.pop("extremes").items():
             found[name] = unit, (float(most), float(least), float(rms), float(when))
-        return cls(**said, extremes=found)
+        return cls(**content, extremes=found)
 
 
 def chosen_by_plan(scene: Scene, stage: Stage) -> Chosen:
@@ -229,6 +229,6 @@ def _since(scene: Scene, last: float) -> float:
     if turn is None or scene.analysis.kind != "transient":
         return -0.5 * grid.step
     if last * turn > grid.steps + 0.5:
-        said = f"must be at most the {grid.steps / turn:.3g} revolutions that are run, got {last:g}"
-        raise SceneError(f"--last: {said}")
+        message = f"must be at most the {grid.steps / turn:.3g} revolutions that are run, got {last:g}"
+        raise SceneError(f"--last: {message}")
     return grid.end - (last * turn - 0.5) * grid.step

@@ -84,7 +84,7 @@ def sweep(
     ------
     KedfemError
         The scene is invalid, no point can be planned, the folder cannot be written, a worker was killed. What fails at
-        one point is told in its row.
+        one point is reported in its row.
     """
     if not asked.last > 0:
         raise SceneError(f"--last: must be positive, got {asked.last:g}")

@@ -13,7 +13,7 @@ from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction
 from kedfem.accuracy.resolution import Resolution, resolution
 from kedfem.accuracy.singular import SingularPasses
-from kedfem.dynamics.force_elements import actions
+from kedfem.dynamics.force_elements import force_elements
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.stepping.cost import Cost, estimated_cost, tried_cost
 from kedfem.dynamics.stepping.solvers import Steps
@@ -29,7 +29,7 @@ from kedfem.output.vtu import write_frame
 from kedfem.output.words import NOTHING, with_prefix
 from kedfem.results.audit import Account
 from kedfem.results.cross_checks import CrossChecks
-from kedfem.results.forces.force_elements import measured_actions
+from kedfem.results.forces.force_elements import measured_elements
 from kedfem.results.recording import recording
 from kedfem.scene import Curve, Limit, LineSpring, Motor, Scene, Spring, is_constant, time_grid
 from kedfem.scene.questions.timing import turn_steps
@@ -53,7 +53,7 @@ def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None
         *second,
         _motion(ready),
         mobility_table(ready.scene, ready.linkage, mobility(ready.scene, ready.linkage, ready.path)),
-        *_actions(ready),
+        *_force_elements(ready),
         *third,
         cost,
     ]
@@ -65,19 +65,19 @@ def forecast(ready: Prepared) -> Cost:
     From sizes alone where they cannot be taken.
     """
     scene, model = ready.scene, ready.model
-    every = [*model.links, *(carried.link for carried in model.carried)]
+    every = [*model.links, *(prescribed.link for prescribed in model.prescribed)]
     recoveries = [stress_recovery(link) for link in every]
     seen: list[Snapshot] = []
 
     def run(begun: Scene, solvers: list[Steps]) -> None:
         still = begun.model_copy(update={"output": begun.output.model_copy(update={"animation": None})})
-        account = Account(model, measured_actions(still, model))
+        account = Account(model, measured_elements(still, model))
         recorded = recording(still, model, account, ready.path, ready.linkage)
         efforts = CrossChecks(still, ready.linkage, [each.channel for each in recorded], account)
         watched = Watched(recorded, {}, efforts, recoveries, SingularPasses(ready))
         with TemporaryDirectory() as folder:
-            told = replace(ready, scene=still), solvers, watched, FilePath(folder), _unwatched
-            worst = stepped(*told)[0].worst
+            arguments = replace(ready, scene=still), solvers, watched, FilePath(folder), _unwatched
+            worst = stepped(*arguments)[0].worst
         seen.extend([worst] if worst else [])
 
     try:
@@ -89,7 +89,7 @@ def forecast(ready: Prepared) -> Cost:
 
 
 def _unwatched(stage: str, done: int, total: int) -> None:
-    """Nobody is told of the progress of a trial."""
+    """Nobody is arguments of the progress of a trial."""
 
 
 def _frame(ready: Prepared, recoveries: list[StressRecovery], now: Snapshot) -> float:
@@ -145,9 +145,9 @@ def _over(ready: Prepared) -> str:
     return "repeats every revolution" if round(revolutions) == 1 else f"repeats every {revolutions:.4g} turns"
 
 
-def _actions(ready: Prepared) -> list[Table]:
+def _force_elements(ready: Prepared) -> list[Table]:
     """Motors, springs and limits: where they act and by which law."""
-    actions(ready.scene, ready.model)  # refused where they do not fit
+    force_elements(ready.scene, ready.model)  # refused where they do not fit
     table = Table(
         title="Motors, springs and limits" if ready.scene.limits else "Motors and springs", show_header=False
     )

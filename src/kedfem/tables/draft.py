@@ -133,11 +133,11 @@ def _link(name: str, solid: AssemblySolid, file: str, scale: float | None) -> st
 
 def _as_frame(table: str, name: str) -> str:
     """The table of the link that may be the frame, as a comment."""
-    said = (
+    phrase = (
         f'\n# {name} may be the frame: joints below call it "{GROUND}", and it needs no link. If it shall bend too,\n'
         f'# take this link, put its name in place of "{GROUND}", and weld it to the ground.\n'
     )
-    return said + "".join(f"# {line}\n" for line in table.splitlines())
+    return phrase + "".join(f"# {line}\n" for line in table.splitlines())
 
 
 def _joints(found: Sequence[Meeting], names: Sequence[str], ground: int | None) -> Iterator[str]:
@@ -174,22 +174,22 @@ def _joint(name: str, meeting: Meeting, names: Sequence[str], ground: int | None
     ]
     if chosen:
         lines.append(f"faces = {{ {', '.join(chosen)} }}  # else the bore about the same axis")
-    said = _in_words(meeting, [names[i] for i in meeting.solids])
+    phrase = _in_words(meeting, [names[i] for i in meeting.solids])
     if several > 1:
-        said += _SEVERAL.format(several=several)
-    return f"\n# {said}\n" + "".join(f"#{line}\n" for line in lines)
+        phrase += _SEVERAL.format(several=several)
+    return f"\n# {phrase}\n" + "".join(f"#{line}\n" for line in lines)
 
 
 def _in_words(meeting: Meeting, links: Sequence[str]) -> str:
     """What meets: ``bore of radius 6 mm of rod, pin of radius 6 mm of crank, together along 10 mm``."""
     faces = [_face(face.inward, face.kind, face.radius) for face in meeting.faces]
-    said = ", ".join(f"{face} of {link}" for face, link in zip(faces, links, strict=True))
+    phrase = ", ".join(f"{face} of {link}" for face, link in zip(faces, links, strict=True))
     if meeting.ball:
-        return said
+        return phrase
     return (
-        f"{said}: their pin is not drawn"
+        f"{phrase}: their pin is not drawn"
         if meeting.pinless
-        else f"{said}, together along {_mm(meeting.share)}"
+        else f"{phrase}, together along {_mm(meeting.share)}"
     )
 
 

@@ -26,7 +26,9 @@ def frequencies_tables(scene: Scene, found: Frequencies) -> list[Table]:
         for k in modes:
             table.add_column(str(k + 1), justify="right")
         for t, angle, row in zip(found.time, found.angle, found.values, strict=True):
-            place = "as drawn" if scene.driven is None else moment(scene, float(t), float(angle))
+            place = (
+                "in the reference position" if scene.driven is None else moment(scene, float(t), float(angle))
+            )
             table.add_row(place, *("–" if np.isnan(row[k]) else f"{row[k]:.4g}" for k in modes))
         out.append(table)
     ranges = {(x.mode, x.harmonic): _range(x, found.speed) for x in found.crossings}
@@ -36,10 +38,12 @@ def frequencies_tables(scene: Scene, found: Frequencies) -> list[Table]:
 
 
 def _speeds(found: Frequencies, ranges: Mapping[tuple[int, int], str], harmonics: Sequence[int]) -> Table:
-    said = f"Drive speeds at which its harmonics meet them [rpm]; the drive turns at {found.speed * RPM:.4g}"
+    message = (
+        f"Drive speeds at which its harmonics meet them [rpm]; the drive turns at {found.speed * RPM:.4g}"
+    )
     beyond = any(np.isinf(x.fastest) for x in found.crossings)
-    caption = "* at the drive's speed" + ("; – alone: beyond the speeds looked at" if beyond else "")
-    table = Table(title=Text(said), caption=Text(caption))
+    caption = "* at the drive's speed" + ("; – alone: beyond the speeds examined" if beyond else "")
+    table = Table(title=Text(message), caption=Text(caption))
     table.add_column("mode")
     for k in harmonics:
         table.add_column(f"{k}×", justify="right")

@@ -48,7 +48,7 @@ def _transmissions(scene: Scene, moved: Moved) -> Table:
 
 
 def _forces(scene: Scene, moved: Moved) -> Table:
-    """Largest sizes; what statics do not tell is not there."""
+    """Largest sizes; what statics do not determine is not there."""
     table = Table(title="Largest forces were all links rigid")
     for column in ("of", "largest", f"at {clock(scene)}"):
         table.add_column(column, justify="left" if column == "of" else "right")

@@ -3,7 +3,7 @@
 from rich.table import Table
 from rich.text import Text
 
-from kedfem.dynamics.model import Model, segments, ways
+from kedfem.dynamics.model import Model, mesh_methods, segments
 from kedfem.links.record import Link
 from kedfem.mesh import QuadMesh, SolidMesh, mesh_quality
 from kedfem.results.modelled import element_facts
@@ -17,8 +17,8 @@ def link_table(model: Model) -> Table:
     for name, parts in segments(model).items():
         facts = map(str, element_facts(parts).values())
         table.add_row(name, *facts, _mass(*parts), _quality(*parts))
-    for carried in model.carried:
-        table.add_row(carried.link.name, "rigid, with the drive", "-", "0", _mass(carried.link), "-")
+    for prescribed in model.prescribed:
+        table.add_row(prescribed.link.name, "rigid, with the drive", "-", "0", _mass(prescribed.link), "-")
     for slider in model.sliders:
         table.add_row(
             slider.name,
@@ -36,8 +36,8 @@ def link_table(model: Model) -> Table:
 def way_tables(model: Model) -> list[Table]:
     """How parts from CAD were meshed, and why so."""
     table = Table(title="Meshes of parts from CAD", show_header=False)
-    for name, way in ways(model).items():
-        table.add_row(name, Text(way))
+    for name, method in mesh_methods(model).items():
+        table.add_row(name, Text(method))
     return [table] if table.row_count else []
 
 

@@ -24,8 +24,11 @@ def loads_tables(found: Loads) -> list[Table]:
 
 
 def case_tables(found: LoadCases) -> list[Table]:
-    """Of each instant the resultant of each kind of force, in the link's axes; the highest stress, what is left over."""
-    table, short = Table(title=Text(f"Load cases of {found.link}, in its axes as drawn")), Table()
+    """Of each instant the resultant of each kind of force, in the link's axes; the highest stress, the residual."""
+    table, short = (
+        Table(title=Text(f"Load cases of {found.link}, in its axes in the reference position")),
+        Table(),
+    )
     for name in ("time", "what", "x", "y", "z"):
         table.add_column(name, justify="left" if name == "what" else "right", overflow="fold")
     for name in (

@@ -19,7 +19,7 @@ def mesh_tables(name: str, mesh: SolidMesh, found: Sequence[Offer]) -> list[Tabl
     quality = mesh_quality(mesh)
     table = Table(title=Text(name), show_header=False)
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-    table.add_row("way", Text(mesh.way))
+    table.add_row("method", Text(mesh.method))
     table.add_row("elements", f"{len(mesh.cells)} {ELEMENTS[mesh.cell_type]}")
     table.add_row("unknowns", str(3 * len(mesh.points)))
     table.add_row("extent", " × ".join(with_prefix(float(side), "m") for side in high - low))
@@ -29,10 +29,10 @@ def mesh_tables(name: str, mesh: SolidMesh, found: Sequence[Offer]) -> list[Tabl
     for count, low_end in zip(counts, edges, strict=False):
         if count:
             bars.add_row(f"{low_end:.1f}", str(count), "█" * int(np.ceil(40 * count / counts.max())))
-    return [table, *([_seats(found)] if found else []), bars]
+    return [table, *([_surfaces(found)] if found else []), bars]
 
 
-def _seats(found: Sequence[Offer]) -> Table:
+def _surfaces(found: Sequence[Offer]) -> Table:
     """What a joint can sit on, by the numbers in the picture."""
     table = Table(
         title="What joints can sit on",

@@ -20,7 +20,7 @@ FAR = np.radians(30.0)  # estimates of joints from further away are rough
 
 def mobility_table(scene: Scene, link: Linkage, found: Mobility) -> Table:
     """Degrees of freedom, what is held twice, what is not held, and the nearest dead point."""
-    table = Table(title="Mobility (as drawn)", show_header=False)
+    table = Table(title="Mobility (in the reference position)", show_header=False)
     driven = f"driven at {of_joints(tuple(scene.driven_joints))}" if found.drives else "none driven"
     table.add_row("degrees of freedom", f"{found.freedom}, {driven}")
     twice = f"{found.redundancy} of them redundant" if found.redundancy else "none redundant"

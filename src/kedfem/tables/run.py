@@ -70,7 +70,7 @@ def steady_table(found: Steady) -> Table:
 def stress_table(scene: Scene, peaks: Mapping[str, Peak]) -> Table:
     """The highest stress of each link over all steps, and away from where it is not what it seems."""
     table = Table(title="Highest von Mises stress, over all steps")
-    for column in ("link", "stress", "at, as drawn", clock(scene), "near"):
+    for column in ("link", "stress", "reference position", clock(scene), "near"):
         table.add_column(column, justify="right" if column == "stress" else "left", overflow="fold")
     for row in peak_rows(peaks, partial(moment, scene)):
         table.add_row(*row)
@@ -81,9 +81,18 @@ def fatigue_table(found: Fatigue) -> Table:
     """Life and utilisation at the place of the highest damage of each link."""
     table = Table(title="Fatigue, by the last period")
     turns = "revolutions" if found.revolutions else "periods"
-    for column in ("link", "life, h", turns, "utilisation", "mean ± amplitude", "at, as drawn"):
+    for column in (
+        "link",
+        "life, h",
+        turns,
+        "utilisation",
+        "mean ± amplitude",
+        "reference position",
+    ):
         table.add_column(
-            column, overflow="fold", justify="left" if column in {"link", "at, as drawn"} else "right"
+            column,
+            overflow="fold",
+            justify="left" if column in {"link", "reference position"} else "right",
         )
     for name, (worst, *_) in ((name, spots) for name, spots in found.spots.items() if spots):
         lives = [f"{x:.3g}" if x < ENDLESS else "endless" for x in (found.hours(worst), found.turns(worst))]
@@ -102,9 +111,9 @@ def budget_table(found: Budget) -> Table:
     for share in found.shares:
         table.add_row(share.source, *(_cell(share.errors.get(kind)) for kind in found.kinds))
     table.add_row("together", *(_cell(found.together[kind]) for kind in found.kinds), style="bold")
-    said = [f"mesh of {name}: {percent(eta)} in the energy norm" for name, eta in found.links.items()]
-    said += [f"no estimate of {text}" for text in found.limits]
-    table.caption = Text("\n".join(said))
+    lines = [f"mesh of {name}: {percent(eta)} in the energy norm" for name, eta in found.links.items()]
+    lines += [f"no estimate of {text}" for text in found.limits]
+    table.caption = Text("\n".join(lines))
     return table
 
 

@@ -13,17 +13,17 @@ def size_line(found: Sizes) -> str:
     >>> size_line(Sizes(0.42, lengths, masses, {"steel": 2.1e11}, {"A": 600.0}, {}))
     'sizes: 420 mm overall; links 100 mm (crank) to 300 mm (rod); masses 0.16 to 0.5 kg; E 210 GPa; drive 600 rpm'
     """
-    said = [f"{with_prefix(found.overall, 'm')} overall"]
+    lines = [f"{with_prefix(found.overall, 'm')} overall"]
     if found.lengths:
         low, high = (pick(found.lengths, key=lambda x: found.lengths[x]) for pick in (min, max))
         ends = [f"{with_prefix(found.lengths[x], 'm')} ({x})" for x in dict.fromkeys((low, high))]
-        said.append(f"links {' to '.join(ends)}")
-    said += [f"masses {_range(found.masses.values(), 'kg')}"] if found.masses else []
-    said += [f"E {_range(found.moduli.values(), 'Pa')}"] if found.moduli else []
+        lines.append(f"links {' to '.join(ends)}")
+    lines += [f"masses {_range(found.masses.values(), 'kg')}"] if found.masses else []
+    lines += [f"E {_range(found.moduli.values(), 'Pa')}"] if found.moduli else []
     speeds = [f"{x:.4g} rpm" for x in found.turns.values()]
     speeds += [with_prefix(x, "m/s") for x in found.speeds.values()]
-    said += [f"drive{'s' if len(speeds) > 1 else ''} {', '.join(speeds)}"] if speeds else []
-    return "sizes: " + "; ".join(said)
+    lines += [f"drive{'s' if len(speeds) > 1 else ''} {', '.join(speeds)}"] if speeds else []
+    return "sizes: " + "; ".join(lines)
 
 
 def _range(values: Iterable[float], unit: str) -> str:

@@ -43,20 +43,20 @@ def _said(value: object) -> str:
 
 
 def _failures(done: Swept, failed: list[int]) -> list[str]:
-    said = [f"{_place(done, k)}: failed: {done.rows[k].message}" for k in failed[:SHOWN]]
+    lines = [f"{_place(done, k)}: failed: {done.rows[k].message}" for k in failed[:SHOWN]]
     more = len(failed) - SHOWN
-    return [*said, f"{more} more points failed; sweep.csv has their messages"] if more > 0 else said
+    return [*lines, f"{more} more points failed; sweep.csv has their messages"] if more > 0 else lines
 
 
 def _doubts(done: Swept) -> list[str]:
     loose = [k for k, row in enumerate(done.rows) if row.settled == "no"]
-    said = []
+    lines = []
     if loose:
         worst = max(loose, key=lambda k: done.rows[k].change)
-        said.append(
+        lines.append(
             f"{len(loose)} of {len(done.rows)} points have not settled: their last two turns differ by more than 1 %, by "
             f"{100 * done.rows[worst].change:.2g} % at {_place(done, worst)}; raise analysis.revolutions"
         )
     if doubtful := sum(row.status == "doubtful" for row in done.rows):
-        said.append(f"{doubtful} points are doubtful: their results mean nothing; sweep.csv says why")
-    return said
+        lines.append(f"{doubtful} points are doubtful: their results mean nothing; sweep.csv says why")
+    return lines

@@ -19,8 +19,8 @@ class Attachment:
     B : (q, k) held components, in world axes, from the interface unknowns z
     shares : per link j (dp, q_j): forces at all ports of this link, world axes, from all links' λ in world axes
     from_rows : (dp, m): the same from the forces that rows of joints exert on their links' ports, world axes; m all
-        components of all these ports, and empty where λ alone tells the forces
-    loose : (dp, r) port forces of this link, world axes, that neither tells: statically indeterminate
+        components of all these ports, and empty where λ alone shows the forces
+    loose : (dp, r) port forces of this link, world axes, that neither determines: statically indeterminate
     """
 
     nodes: Int[np.ndarray, " b"]

@@ -26,20 +26,20 @@ Ports = Float[np.ndarray, "p 3"]
 
 @dataclass(frozen=True, slots=True)
 class Side:
-    """What a joint has on one of its links; all in the link frame, as drawn.
+    """What a joint has on one of its links; all in the link frame, in the reference position.
 
     body : number in the linkage
     origin : (3,) X₀ of the coupling surface [m]
-    coupling surface : (p, 6, d) u₀ and θ from the displacements at its ports
+    surface : (p, 6, d) u₀ and θ from the displacements at its ports
     stations : of the link along which a slot's pin slides; its ports are these
     onto : (p, d, k) displacements at the ports, world components, from the interface unknowns z
     shared : whether the ports are the link's; not of a rigid slider, which rides on another link
-    points : (p, 3) the ports as drawn [m]
+    points : (p, 3) the ports in the reference position [m]
     """
 
     body: int
     origin: Float[np.ndarray, "3"]
-    seat: Float[np.ndarray, "p 6 d"]
+    surface: Float[np.ndarray, "p 6 d"]
     onto: Float[np.ndarray, "p d k"]
     stations: Stations | None = None
     shared: bool = True
@@ -51,13 +51,13 @@ class ConstraintJoint:
     """A joint enforced by constraint equations: row r is gap_r · (u_i − u_j) + turn_r · (θ_i − θ_j) at the joint's point
     of link i.
 
-    name, at : of the joint, (3,) [m] as drawn
+    name, at : of the joint, (3,) [m] in the reference position
     bodies : numbers of links i and j in the linkage; directions are fixed in j
     sides : what it has on both, None where a link has no unknowns (the ground, what the drive carries)
-    gap, turn : (r, 3) directions as drawn [-, m]
+    gap, turn : (r, 3) directions in the reference position [-, m]
     cross : of a universal joint the axes in i and in j: the last row turns about the normal of both
     stiffness, damping : (r,) of rows that are springs, infinite and zero of those that hold [N/m, N m; N s/m, N m s]
-    axis : (3,) of the joint, as drawn
+    axis : (3,) of the joint, in the reference position
     plus : rows of other joints that these are combined with, each with its coefficient: gears
     """
 
@@ -88,7 +88,7 @@ def ordered(joint: Joint) -> tuple[str, str]:
 
 
 def bore_axis(joint: Joint, link: str) -> Float[np.ndarray, "3"] | None:
-    """Direction of the bore or journal that a joint looks for on a link; None where its seat may be any face."""
+    """Direction of the bore or journal that a joint looks for on a link; None where any face may be its surface."""
     if joint.axes is not None:
         return unit(joint.axes[joint.links.index(link)])
     if joint.axis is None or joint.kind in {"prismatic", "planar", "slot"}:
@@ -97,7 +97,7 @@ def bore_axis(joint: Joint, link: str) -> Float[np.ndarray, "3"] | None:
 
 
 def held_rows(joint: Joint, driven: bool) -> tuple[Float[np.ndarray, "r 3"], Float[np.ndarray, "r 3"]]:
-    """Directions of what a joint holds, as drawn: gap and turn of each row."""
+    """Directions of what a joint holds, in the reference position: gap and turn of each row."""
     zero, frame = np.zeros(3), joint_frame(joint)
     if joint.kind in {"spherical", "weld", "universal"}:
         turns = {"spherical": [], "weld": list(frame), "universal": [zero]}[joint.kind]  # of a cross later
@@ -119,7 +119,7 @@ def held_rows(joint: Joint, driven: bool) -> tuple[Float[np.ndarray, "r 3"], Flo
 
 
 def joint_frame(joint: Joint) -> Float[np.ndarray, "3 3"]:
-    """Axes x, y, z of a joint as rows, as drawn: z its axis; those of the world without one."""
+    """Axes x, y, z of a joint as rows, in the reference position: z its axis; those of the world without one."""
     if joint.axis is None:
         return np.eye(3)
     axis = unit(joint.axis)
@@ -167,7 +167,9 @@ def in_plane(gap: Float[np.ndarray, "r 3"], turn: Float[np.ndarray, "r 3"]) -> B
     return np.asarray((np.abs(gap[:, :2]).max(axis=1) > 1e-9) | (np.abs(turn[:, 2]) > 1e-9))
 
 
-def seat_ports(seat: CouplingSurface, link: Link, where: str) -> tuple[Ports, Float[np.ndarray, "p 6 d"]]:
+def surface_ports(
+    surface: CouplingSurface, link: Link, where: str
+) -> tuple[Ports, Float[np.ndarray, "p 6 d"]]:
     """Port points of a coupling surface: its middle, and one off it in each direction that it knows; u₀ and θ from them.
 
     With ∂_k u the rate of change along direction e_k,
@@ -186,19 +188,19 @@ def seat_ports(seat: CouplingSurface, link: Link, where: str) -> tuple[Ports, Fl
     if link.kind == "beam":
         one = np.zeros((1, 6, 3))
         one[0, [0, 1, 5], [0, 1, 2]] = 1.0
-        return seat.origin[None], one
-    known = [k for k in range(link.d) if seat.spread[k] > 0]
-    turning = _turning(link, [seat.directions[k] for k in known])
+        return surface.origin[None], one
+    known = [k for k in range(link.d) if surface.spread[k] > 0]
+    turning = _turning(link, [surface.directions[k] for k in known])
     if turning is None:
         raise MeshError(
             f"{where}: must sit on a bore or a face of link '{link.name}', got a coupling surface that knows no turn"
         )
-    points = [seat.origin]
+    points = [surface.origin]
     out = np.zeros((1 + len(known), 6, d))
     out[0, :d] = np.eye(d)
     for p, k in enumerate(known, start=1):
-        length = 2 * seat.spread[k]
-        points.append(seat.origin + length * seat.directions[k])
+        length = 2 * surface.spread[k]
+        points.append(surface.origin + length * surface.directions[k])
         theta = turning[p - 1][:, :d] / length
         out[p, 3:] += theta
         out[0, 3:] -= theta

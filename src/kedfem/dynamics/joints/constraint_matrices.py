@@ -115,10 +115,10 @@ def _side_rows(
     d, R = side.onto.shape[1], motion.R[:, side.body]
     if side.stations is not None:
         N = side.stations.at(travel(joint, motion))
-        c = np.einsum("tp,trb,pba->trpa", N, along.gap @ R, side.seat[:, :3])
+        c = np.einsum("tp,trb,pba->trpa", N, along.gap @ R, side.surface[:, :3])
     else:
         origin = motion.p[:, side.body] + R @ side.origin
         r = (along.point - origin)[:, None]
         on = np.concatenate([along.gap @ R, (cross(r, along.gap) + along.turn) @ R], axis=2)
-        c = np.einsum("trb,pba->trpa", on, side.seat)
+        c = np.einsum("trb,pba->trpa", on, side.surface)
     return np.asarray(c @ R[:, None, :d, :d].transpose(0, 1, 3, 2))

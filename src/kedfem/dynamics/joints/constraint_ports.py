@@ -14,22 +14,22 @@ from kedfem.dynamics.joints.constraint_joints import (
     held_rows,
     in_plane,
     ordered,
-    seat_ports,
     springs,
     station_ports,
+    surface_ports,
 )
-from kedfem.dynamics.joints.places import on_part, part_seat, slider_axis
+from kedfem.dynamics.joints.places import on_part, part_surface, slider_axis
 from kedfem.links.point_rows import point_rows, require_on_axis
 from kedfem.links.record import Link
 from kedfem.links.stations import Stations, stations
-from kedfem.links.surfaces.coupling_surfaces import port_weights, rigid_seat
+from kedfem.links.surfaces.coupling_surfaces import port_weights, rigid_link_surface
 from kedfem.motion.joint_equations import joint_axis
 from kedfem.scene import Limit, LineSpring, Motor, Scene, Spring
 
 
 @dataclass(frozen=True, slots=True)
-class Ways:
-    """How far joints go: numbers of bodies in the linkage by name, and the way of each slot's pin along its line [m].
+class LinkageLayout:
+    """What joints need of the linkage: numbers of bodies by name, and the travel of each slot's pin along its line [m].
 
     Where its stations are known already, these in its place.
     """
@@ -43,7 +43,7 @@ class Own:
     """Port points that one side of a joint has to itself.
 
     key : of the link; slider : name of a rigid slider instead, whose one unknown is its travel
-    points, weights : (p, 3) as drawn, and (p, n)
+    points, weights : (p, 3) in the reference position, and (p, n)
     selection : (dp, c) displacements there from the side's own unknowns, world components
     """
 
@@ -58,7 +58,7 @@ Held = tuple[Float[np.ndarray, "r 3"], Float[np.ndarray, "r 3"]]
 
 
 def gear_joint(
-    scene: Scene, name: str, links: dict[str, Link], ways: Ways
+    scene: Scene, name: str, links: dict[str, Link], layout: LinkageLayout
 ) -> tuple[ConstraintJoint, list[Own | None]]:
     """The row of a pair of gears: motion of the second joint less its transmission times that of the first."""
     gear, zero = scene.gears[name], np.zeros((1, 3))
@@ -66,14 +66,14 @@ def gear_joint(
     for each in gear.joints:
         axis = joint_axis(scene.joints[each])[None]
         slides = scene.joints[each].kind == "prismatic"
-        found.append(row_joint(scene, each, links, ways, (axis, zero) if slides else (zero, axis)))
+        found.append(row_joint(scene, each, links, layout, (axis, zero) if slides else (zero, axis)))
     (first, own), (second, others) = found
     row = replace(second, name=f"gears.{name}", plus=((-gear.transmission, first),))
     return row, [*others, *own]
 
 
 def row_joint(
-    scene: Scene, name: str, links: dict[str, Link], ways: Ways, only: Held | None = None
+    scene: Scene, name: str, links: dict[str, Link], layout: LinkageLayout, only: Held | None = None
 ) -> tuple[ConstraintJoint, list[Own | None]]:
     """A joint enforced by constraint equations, still without the interface unknowns, and the port points of its two
     sides.
@@ -90,8 +90,8 @@ def row_joint(
     joint = scene.joints[name]
     i, j = ordered(joint)
     found = [
-        _side(scene, name, i, links, ways, slot=False),
-        _side(scene, name, j, links, ways, joint.kind == "slot"),
+        _side(scene, name, i, links, layout, slot=False),
+        _side(scene, name, j, links, layout, joint.kind == "slot"),
     ]
     sides, own = zip(*found, strict=True)
     gap, turn = only or held_rows(joint, name in scene.driven_joints)
@@ -105,24 +105,24 @@ def row_joint(
     hard = np.full(len(gap), np.inf), np.zeros(len(gap))
     stiffness, damping = hard if only else springs(scene, name, gap, turn)
     return ConstraintJoint(
-        name, np.asarray(joint.at), (ways.bodies[i], ways.bodies[j]), (sides[0], sides[1]), gap[kept], turn[kept],
+        name, np.asarray(joint.at), (layout.bodies[i], layout.bodies[j]), (sides[0], sides[1]), gap[kept], turn[kept],
         axes, stiffness[kept], damping[kept], joint_axis(joint),
     ), list(own)  # fmt: skip
 
 
 def element_joint(
-    scene: Scene, name: str, element: Spring | Motor | Limit, links: dict[str, Link], ways: Ways
+    scene: Scene, name: str, element: Spring | Motor | Limit, links: dict[str, Link], layout: LinkageLayout
 ) -> tuple[ConstraintJoint, list[Own | None]]:
     """The two sides of a spring, motor or limit, as a joint without rows: on those of its joint, or at two points."""
     if not isinstance(element, LineSpring) or element.between is None:
-        row, own = row_joint(scene, str(element.joint), links, ways, (np.zeros((0, 3)), np.zeros((0, 3))))
+        row, own = row_joint(scene, str(element.joint), links, layout, (np.zeros((0, 3)), np.zeros((0, 3))))
         return replace(row, name=name), own
     found = [
-        _point_side(f"{name}.between[{k}].at", scene, end.link, np.asarray(end.at), links, ways)
+        _point_side(f"{name}.between[{k}].at", scene, end.link, np.asarray(end.at), links, layout)
         for k, end in enumerate(element.between)
     ]
     (one, first), (other, second) = found
-    bodies = tuple(ways.bodies[end.link] for end in element.between)
+    bodies = tuple(layout.bodies[end.link] for end in element.between)
     none = np.zeros((0, 3))
     row = ConstraintJoint(
         name, np.asarray(element.between[0].at), (bodies[0], bodies[1]), (one, other), none, none, None,
@@ -132,33 +132,38 @@ def element_joint(
 
 
 def can_be_bars(link: Link) -> bool:
-    """Whether a link is a rigid one in space, which four of its points tell."""
+    """Whether a link is a rigid one in space, which four of its points show."""
     return link.rigid and link.d == 3 and link.n == 4 and link.kind != "beam"
 
 
-def rigid_points(link: Link, key: str, ways: Ways) -> tuple[ConstraintJoint, list[Own | None]]:
+def rigid_points(link: Link, key: str, layout: LinkageLayout) -> tuple[ConstraintJoint, list[Own | None]]:
     """Four points of a rigid link, its centre of mass and one along each axis, as a joint without rows."""
     centre = link.centre
-    seat, length = rigid_seat(link, centre), link.size / 2
+    surface, length = rigid_link_surface(link, centre), link.size / 2
     points = centre + length * np.concatenate([np.zeros((1, 3)), np.eye(3)])
-    weights = seat.fit[0] + length * np.concatenate([np.zeros((1, link.n)), seat.fit[1:]])
+    weights = surface.fit[0] + length * np.concatenate([np.zeros((1, link.n)), surface.fit[1:]])
     none, every = np.zeros((0, 3)), np.zeros((4, 6, 3))
     every[:, :3] = np.eye(3)
-    side = Side(ways.bodies[link.name], centre, every, np.zeros((4, 3, 0)), points=points)
+    side = Side(layout.bodies[link.name], centre, every, np.zeros((4, 3, 0)), points=points)
     row = ConstraintJoint(
-        f"rigid.{key}", centre, (ways.bodies[link.name], 0), (side, None), none, none, None, none[:, 0], none[:, 0],
+        f"rigid.{key}", centre, (layout.bodies[link.name], 0), (side, None), none, none, None, none[:, 0], none[:, 0],
         np.eye(3)[2],
     )  # fmt: skip
     return row, [Own(key, "", points, weights, np.eye(12)), None]
 
 
 def _point_side(
-    where: str, scene: Scene, on: str, at: Float[np.ndarray, "3"], links: dict[str, Link], ways: Ways
+    where: str,
+    scene: Scene,
+    on: str,
+    at: Float[np.ndarray, "3"],
+    links: dict[str, Link],
+    layout: LinkageLayout,
 ) -> tuple[Side | None, Own | None]:
     """A point of a link; nothing on the ground and on what the drive carries."""
     only_u = np.concatenate([np.eye(3), np.zeros((3, 3))])[None]
     if on in scene.links and (axis := slider_axis(scene, on)) is not None:
-        side = Side(ways.bodies[on], at, only_u, np.zeros((1, 3, 0)), shared=False, points=at[None])
+        side = Side(layout.bodies[on], at, only_u, np.zeros((1, 3, 0)), shared=False, points=at[None])
         return side, Own("", on, at[None], np.zeros((1, 0)), axis[:, None])
     if on not in {link.name for link in links.values()}:
         return None, None
@@ -169,35 +174,35 @@ def _point_side(
     known = only_u[:, :, :d].copy()
     if link.kind == "beam":
         known[0, [2, 5], 2] = 0.0, 1.0  # (u, v, ψ)
-    side = Side(ways.bodies[on], rows.X, known, np.zeros((1, d, 0)), points=rows.X[None])
+    side = Side(layout.bodies[on], rows.X, known, np.zeros((1, d, 0)), points=rows.X[None])
     return side, Own(key, "", rows.X[None], rows.value[None], np.eye(d))
 
 
 def _side(
-    scene: Scene, name: str, on: str, links: dict[str, Link], ways: Ways, slot: bool
+    scene: Scene, name: str, on: str, links: dict[str, Link], layout: LinkageLayout, slot: bool
 ) -> tuple[Side | None, Own | None]:
     """What a joint has on one of its links; nothing on the ground and on what the drive carries."""
     if on in scene.links and (axis := slider_axis(scene, on)) is not None:
         rigid = np.concatenate([np.eye(3), np.zeros((3, 3))])[None]
         side = Side(
-            ways.bodies[on], np.asarray(scene.joints[name].at), rigid, np.zeros((1, 3, 0)), shared=False
+            layout.bodies[on], np.asarray(scene.joints[name].at), rigid, np.zeros((1, 3, 0)), shared=False
         )
         return side, Own("", on, np.zeros((1, 3)), np.zeros((1, 0)), axis[:, None])
     if on not in {link.name for link in links.values()}:
         return None, None
-    where, body = f"joints.{name}", ways.bodies[on]
+    where, body = f"joints.{name}", layout.bodies[on]
     if slot:
         key, link = next((key, link) for key, link in links.items() if link.name == on)
         joint = scene.joints[name]
-        line = ways.slots[name]
+        line = layout.slots[name]
         if not isinstance(line, Stations):
             line = stations(link, where, np.asarray(joint.at), joint_axis(joint), line)
         points, known = station_ports(line, link)
         side = Side(body, line.points[0], known, np.zeros((len(points), link.d, 0)), line, points=points)
         weights = line.weights
     else:
-        key, seat = part_seat(scene, name, links, on)
-        points, known = seat_ports(seat, links[key], where)
-        side = Side(body, seat.origin, known, np.zeros((len(points), links[key].d, 0)), points=points)
-        weights = port_weights(seat, points)
+        key, surface = part_surface(scene, name, links, on)
+        points, known = surface_ports(surface, links[key], where)
+        side = Side(body, surface.origin, known, np.zeros((len(points), links[key].d, 0)), points=points)
+        weights = port_weights(surface, points)
     return side, Own(key, "", points, weights, np.eye(known.shape[2] * len(points)))

@@ -13,8 +13,8 @@ from jaxtyping import Float
 from kedfem.dynamics.joints.attachments import Attachment, SharedCut
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, needs_rows
 from kedfem.dynamics.joints.constraint_ports import (
+    LinkageLayout,
     Own,
-    Ways,
     can_be_bars,
     element_joint,
     gear_joint,
@@ -22,7 +22,7 @@ from kedfem.dynamics.joints.constraint_ports import (
     row_joint,
 )
 from kedfem.dynamics.joints.independent import independent
-from kedfem.dynamics.joints.places import part_seat, slider_axis
+from kedfem.dynamics.joints.places import part_surface, slider_axis
 from kedfem.dynamics.joints.port_points import port_points
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
@@ -87,7 +87,7 @@ class Joined:
 
 
 def joined(
-    scene: Scene, links: dict[str, Link], cuts: Sequence[SharedCut], ways: Ways, elements: bool = False,
+    scene: Scene, links: dict[str, Link], cuts: Sequence[SharedCut], layout: LinkageLayout, elements: bool = False,
     bars: bool = False,
 ) -> Joined:  # fmt: skip
     """All joints of a scene, and cuts between segments, as attachments of its elastic links.
@@ -109,14 +109,14 @@ def joined(
     unknowns = len(sliders)
     rows: list[tuple[ConstraintJoint, list[Own | None]]] = []
     columns: list[list[int]] = []  # of each side's own unknowns
-    held_by_rows = [row_joint(scene, name, links, ways) for name in scene.joints if needs_rows(scene, name)]
-    geared = [gear_joint(scene, name, links, ways) for name in scene.gears]
+    held_by_rows = [row_joint(scene, name, links, layout) for name in scene.joints if needs_rows(scene, name)]
+    geared = [gear_joint(scene, name, links, layout) for name in scene.gears]
     acting = [
-        element_joint(scene, f"{kind}.{name}", element, links, ways)
+        element_joint(scene, f"{kind}.{name}", element, links, layout)
         for kind, every in (("springs", scene.springs), ("motors", scene.motors), ("limits", scene.limits))
         for name, element in (every.items() if elements else ())
     ]
-    stiff = [rigid_points(link, key, ways) for key, link in links.items() if bars and can_be_bars(link)]
+    stiff = [rigid_points(link, key, layout) for key, link in links.items() if bars and can_be_bars(link)]
     for row, own in [*held_by_rows, *geared, *acting, *stiff]:
         if all(each is None for each in own):
             continue
@@ -128,13 +128,13 @@ def joined(
         if needs_rows(scene, name):
             continue
         elastic = {link.name for link in links.values()}
-        seats = dict(part_seat(scene, name, links, link) for link in joint.links if link in elastic)
-        held = list(seats)
+        surfaces = dict(part_surface(scene, name, links, link) for link in joint.links if link in elastic)
+        held = list(surfaces)
         others = [link for link in joint.links if link not in elastic]
         if len({links[link].planar for link in held}) == 2:
-            unknowns += _mixed(scene, name, {link: (ports[link], seats[link]) for link in held}, unknowns)
+            unknowns += _mixed(scene, name, {link: (ports[link], surfaces[link]) for link in held}, unknowns)
             continue
-        points = port_points(scene, name, joint, seats, links) if held else np.zeros((0, 3))
+        points = port_points(scene, name, joint, surfaces, links) if held else np.zeros((0, 3))
         across, travel = _lies_across(joint, points), unknowns
         for k, point in enumerate(points):
             components = _components(scene, name, joint, [links[link] for link in held])
@@ -142,7 +142,7 @@ def joined(
             if across and k and new:  # one travel for all, so that the surface cannot tilt
                 first, new = travel, 0
             for link in held:
-                weights = port_weights(seats[link], point[None, :])[0]
+                weights = port_weights(surfaces[link], point[None, :])[0]
                 ports[link].add(weights, point, name, components, first, block)
             unknowns += new
     for cut in cuts:
@@ -203,11 +203,11 @@ def _mixed(scene: Scene, name: str, held: dict[str, tuple[_Ports, CouplingSurfac
             f"joints.{name}: must be a hinge between a planar link and one in space, "
             f"got a {joint.kind} joint of {kinds}"
         )
-    for link, (ports, seat) in held.items():
-        points = port_points(scene, name, joint, {link: seat}, {link: ports.link})
+    for link, (ports, surface) in held.items():
+        points = port_points(scene, name, joint, {link: surface}, {link: ports.link})
         for point in points:
             components = [0, 1] if ports.link.planar else [0, 1, 2]
-            weights = port_weights(seat, point[None, :])[0]
+            weights = port_weights(surface, point[None, :])[0]
             ports.add(weights, point, name, components, first, np.eye(3)[components, :2])
     return 2
 

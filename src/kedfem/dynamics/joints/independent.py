@@ -90,12 +90,12 @@ def _port_forces(
     -------
     (h, q) μ from λ, (h, o) μ from p of the rows' own unknowns, and (h, r) the μ that neither equation sees
     """
-    told = np.setdiff1d(np.arange(B.shape[1]), riding)  # what holds a slider is left open
-    G = np.vstack([L.T, B.T[told]])
+    determined = np.setdiff1d(np.arange(B.shape[1]), riding)  # what holds a slider is left open
+    G = np.vstack([L.T, B.T[determined]])
     inverse = np.linalg.pinv(G, rcond=DEPENDENT)
     inverse[np.abs(inverse) < DEPENDENT] = 0.0  # rounding
     q = L.shape[1]
-    return inverse[:, :q], inverse[:, q + np.searchsorted(told, np.asarray(own, int))], _null_space(G)
+    return inverse[:, :q], inverse[:, q + np.searchsorted(determined, np.asarray(own, int))], _null_space(G)
 
 
 def _null_space(A: Float[np.ndarray, "m n"]) -> Float[np.ndarray, "n r"]:

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from kedfem.dynamics.joints.constraint_joints import bore_axis
 from kedfem.errors import KedfemError, MeshError, SceneError
 from kedfem.links.record import Link
-from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, joint_seat
+from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, joint_surface
 from kedfem.motion.joint_equations import joint_axis
 from kedfem.scene import GROUND, Scene, moving_grounds
 
@@ -34,11 +34,11 @@ def slider_guide(scene: Scene, name: str) -> str:
     return next((key for key in on if GROUND in scene.joints[key].links), on[0] if on else "")
 
 
-def seat_of(scene: Scene, name: str, link: Link) -> CouplingSurface:
+def surface_of(scene: Scene, name: str, link: Link) -> CouplingSurface:
     """The coupling surface of a joint on a link."""
     joint = scene.joints[name]
     axis = bore_axis(joint, link.name)
-    return joint_seat(link, f"joints.{name}", np.asarray(joint.at), axis, joint.face_names(link.name))
+    return joint_surface(link, f"joints.{name}", np.asarray(joint.at), axis, joint.face_names(link.name))
 
 
 def on_part(
@@ -65,7 +65,9 @@ def on_part(
     raise first or MeshError(f"links.{name}: must be elastic, got no link of that name")
 
 
-def part_seat(scene: Scene, joint: str, links: Mapping[str, Link], name: str) -> tuple[str, CouplingSurface]:
-    """The segment of a link on which a joint sits, and the seat."""
+def part_surface(
+    scene: Scene, joint: str, links: Mapping[str, Link], name: str
+) -> tuple[str, CouplingSurface]:
+    """The segment of a link on which a joint sits, and the coupling surface."""
     at = np.asarray(scene.joints[joint].at)
-    return on_part(links, name, at, lambda link: seat_of(scene, joint, link))
+    return on_part(links, name, at, lambda link: surface_of(scene, joint, link))

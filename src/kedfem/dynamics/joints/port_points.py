@@ -1,4 +1,4 @@
-"""Port points of a joint on a link: where they lie about its place, and what is told where they cannot."""
+"""Port points of a joint on a link: where they lie about its place, and what is reported where they cannot."""
 
 import numpy as np
 from jaxtyping import Float
@@ -12,7 +12,7 @@ from kedfem.scene import Joint, Scene
 
 
 def port_points(
-    scene: Scene, name: str, joint: Joint, seats: dict[str, CouplingSurface], links: dict[str, Link]
+    scene: Scene, name: str, joint: Joint, surfaces: dict[str, CouplingSurface], links: dict[str, Link]
 ) -> Float[np.ndarray, "p 3"]:
     """Points of a joint that its links share: 1 spherical, 2 revolute; in a plane 1 for both.
 
@@ -25,28 +25,28 @@ def port_points(
         If a flat coupling surface cannot hold a point outside its plane.
     """
     at = np.asarray(joint.at)
-    if any(links[link].kind == "beam" for link in seats) or joint.kind == "spherical":
+    if any(links[link].kind == "beam" for link in surfaces) or joint.kind == "spherical":
         return at[None, :]
-    if links[next(iter(seats))].planar:
-        return _plane_points(scene, name, joint, seats)
-    seat = next(iter(seats.values()))
+    if links[next(iter(surfaces))].planar:
+        return _plane_points(scene, name, joint, surfaces)
+    surface = next(iter(surfaces.values()))
     driven = name in scene.driven_joints
     if joint.kind == "revolute":
         axis = joint_axis(joint)
-        half = np.mean([np.sqrt(3) * _spread_along(s, axis) for s in seats.values()]) / 2
-        centre = at + np.mean([(s.origin - at) @ axis for s in seats.values()]) * axis
-        across = _widest_across(seat, axis)
+        half = np.mean([np.sqrt(3) * _spread_along(s, axis) for s in surfaces.values()]) / 2
+        centre = at + np.mean([(s.origin - at) @ axis for s in surfaces.values()]) * axis
+        across = _widest_across(surface, axis)
         directions = [axis, across] if driven else [axis]
         points = [centre + half * axis, centre - half * axis]
-        points += _points_off(centre, seats, [across, np.cross(axis, across)]) if driven else []
+        points += _points_off(centre, surfaces, [across, np.cross(axis, across)]) if driven else []
     else:
-        seat = next((s for s in seats.values() if is_flat(s)), seat)
-        e1, e2 = seat.directions[:2]
+        surface = next((s for s in surfaces.values() if is_flat(s)), surface)
+        e1, e2 = surface.directions[:2]
         directions = [e1, e2]
-        points = [seat.origin + seat.spread[0] * e1 * c + seat.spread[1] * e2 * s
+        points = [surface.origin + surface.spread[0] * e1 * c + surface.spread[1] * e2 * s
                   for c, s in ((1, 0), (-0.5, 0.9), (-0.5, -0.9))]  # fmt: skip
-        points += _points_off(seat.origin, seats, [seat.directions[2]])
-    for link, s in seats.items():
+        points += _points_off(surface.origin, surfaces, [surface.directions[2]])
+    for link, s in surfaces.items():
         if not all(holds(s, d) for d in directions):
             raise MeshError(f"joints.{name}: {_unheld(links[link], joint.kind)}")
     return np.array(points)
@@ -71,41 +71,41 @@ def _unheld(link: Link, kind: str) -> str:
 
 
 def _plane_points(
-    scene: Scene, name: str, joint: Joint, seats: dict[str, CouplingSurface]
+    scene: Scene, name: str, joint: Joint, surfaces: dict[str, CouplingSurface]
 ) -> Float[np.ndarray, "p 3"]:
     """The joint's point and, where turning is held, others: along a slide, else along the narrowest coupling surface, and
     across."""
     at = np.asarray(joint.at)
     if joint.kind == "revolute" and name not in scene.driven_joints:
         return at[None, :]
-    narrow = min(seats.values(), key=lambda seat: float(seat.spread[1]))
+    narrow = min(surfaces.values(), key=lambda surface: float(surface.spread[1]))
     along = joint_axis(joint) if joint.kind == "prismatic" else narrow.directions[0]
-    for link, seat in seats.items():
-        if not holds(seat, along):
+    for link, surface in surfaces.items():
+        if not holds(surface, along):
             raise MeshError(
                 f"joints.{name}: must sit on a bore of link '{link}', or on an edge along its direction "
                 f"({along[0]:.3g}, {along[1]:.3g}, 0), got an edge across that: give the link a bore there"
             )
-    return np.array([at, *_points_off(at, seats, [along, np.cross([0.0, 0.0, 1.0], along)])])
+    return np.array([at, *_points_off(at, surfaces, [along, np.cross([0.0, 0.0, 1.0], along)])])
 
 
 def _points_off(
     centre: Float[np.ndarray, "3"],
-    seats: dict[str, CouplingSurface],
+    surfaces: dict[str, CouplingSurface],
     directions: list[Float[np.ndarray, "3"]],
 ) -> list[Float[np.ndarray, "3"]]:
     """A point off the centre in each direction that all coupling surfaces know, as far as the first coupling surface is
     wide there."""
-    known = [d for d in directions if all(holds(seat, d) for seat in seats.values())]
-    first = next(iter(seats.values()))
+    known = [d for d in directions if all(holds(surface, d) for surface in surfaces.values())]
+    first = next(iter(surfaces.values()))
     return [centre + 2 * _spread_along(first, d) * d for d in known]
 
 
-def _spread_along(seat: CouplingSurface, axis: Float[np.ndarray, "3"]) -> float:
-    return float(np.linalg.norm((seat.directions @ axis) * seat.spread))
+def _spread_along(surface: CouplingSurface, axis: Float[np.ndarray, "3"]) -> float:
+    return float(np.linalg.norm((surface.directions @ axis) * surface.spread))
 
 
-def _widest_across(seat: CouplingSurface, axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
-    candidates = [np.asarray(d - (d @ axis) * axis) for d in seat.directions]
-    widest = max(candidates, key=lambda d: _spread_along(seat, d))
+def _widest_across(surface: CouplingSurface, axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+    candidates = [np.asarray(d - (d @ axis) * axis) for d in surface.directions]
+    widest = max(candidates, key=lambda d: _spread_along(surface, d))
     return widest / np.linalg.norm(widest) if np.linalg.norm(widest) > 1e-9 else perpendiculars(axis)[0]

@@ -3,9 +3,9 @@ these."""
 
 from collections.abc import Mapping
 
-from kedfem.dynamics.joints.places import part_seat
+from kedfem.dynamics.joints.places import part_surface
 from kedfem.links.record import Link
-from kedfem.links.surfaces.rigid_coupling import with_stiff_seat
+from kedfem.links.surfaces.rigid_coupling import with_rigid_coupling
 from kedfem.scene import Scene
 
 
@@ -27,9 +27,9 @@ def with_stiff_ports(scene: Scene, links: Mapping[str, Link]) -> dict[str, Link]
         ):  # a slot's line is no coupling surface
             if link not in meshed or not joint.stiff(link) or scene.links[link].model == "rigid":
                 continue
-            key, seat = part_seat(scene, name, out, link)
-            which = (key, seat.facets.tobytes() if seat.facets is not None else b"")
+            key, surface = part_surface(scene, name, out, link)
+            which = (key, surface.facets.tobytes() if surface.facets is not None else b"")
             if which not in done:
-                out[key] = with_stiff_seat(out[key], seat)
+                out[key] = with_rigid_coupling(out[key], surface)
                 done.add(which)
     return out

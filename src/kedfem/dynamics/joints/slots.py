@@ -13,7 +13,7 @@ from kedfem.scene import Scene
 FINER = 8  # looks between two points of the path
 
 
-def slot_ways(scene: Scene, linkage: Linkage, along: Path | None = None) -> dict[str, tuple[float, float]]:
+def slot_travels(scene: Scene, linkage: Linkage, along: Path | None = None) -> dict[str, tuple[float, float]]:
     """Least and greatest place of each slot's pin along its line, from where it is drawn [m].
 
     Parameters

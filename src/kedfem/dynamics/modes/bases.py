@@ -6,8 +6,8 @@ from kedfem.dynamics.matrices.substructure import Substructure
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.reduction import Basis, energy_sorted, excited, port_functions, static_parts
 from kedfem.dynamics.modes.segment_modes import segment_basis
-from kedfem.dynamics.nominal import instants
 from kedfem.dynamics.reduced_model import reduced_model
+from kedfem.dynamics.rigid_body import instants
 from kedfem.dynamics.stepping.start import Instant
 from kedfem.dynamics.stepping.state import NodalOf
 from kedfem.links.record import Link
@@ -35,7 +35,7 @@ def bases(
 ) -> list[Basis | None]:  # fmt: skip
     """A basis for every link of a model, from instants spread over the analysis; None for links that need none.
 
-    Segments with co-rotational frames are among them: what they do is looked at in rigid-body frames, all segments
+    Segments with co-rotational frames are among them: what they do is examined in rigid-body frames, all segments
     coupled.
 
     Parameters

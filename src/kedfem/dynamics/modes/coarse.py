@@ -10,7 +10,7 @@ from kedfem.motion.path import Path
 from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import Scene, path_parameter, time_grid
 
-INSTANTS = 16  # of the run, at which the linkage is looked at
+INSTANTS = 16  # of the run, at which the linkage is examined
 LEFT_OUT = 1e-4  # of the energy norm of its deflections there
 
 

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
 
 from kedfem.dynamics.elastic_model import with_scene_body
-from kedfem.dynamics.joints.places import seat_of
+from kedfem.dynamics.joints.places import surface_of
 from kedfem.dynamics.joints.rigid_couplings import with_stiff_ports
 from kedfem.dynamics.matrices.cholesky import Cholesky
 from kedfem.dynamics.matrices.substructure import mass_matrix
@@ -22,7 +22,7 @@ from kedfem.dynamics.modes.lanczos import Block, lanczos
 from kedfem.links.build import bare_link
 from kedfem.links.record import Link
 from kedfem.links.reduced import rigid_modes, wave_frequency
-from kedfem.links.surfaces.coupling_surfaces import port_weights, seat_couples
+from kedfem.links.surfaces.coupling_surfaces import port_weights, surface_couples
 from kedfem.links.surfaces.rigid_coupling import surface_gram
 from kedfem.scene import Scene
 
@@ -67,14 +67,14 @@ def held_at(scene: Scene, joint: str, link: Link, turns: Float[np.ndarray, "r 3"
     MeshError
         If the joint finds no coupling surface on the link.
     """
-    seat, at = seat_of(scene, joint, link), np.asarray(scene.joints[joint].on(link.name))
+    surface, at = surface_of(scene, joint, link), np.asarray(scene.joints[joint].on(link.name))
     if link.kind == "beam":  # rows u, v and ψ of its node
-        one = seat.fit[0]
+        one = surface.fit[0]
         unit = np.eye(3)[: 3 if len(turns) and np.abs(turns[:, 2]).max() > NONE else 2]
         return Support(np.array([np.outer(one, e).ravel() for e in unit]), np.zeros(link.n, dtype=bool))
-    weights = port_weights(seat, at[None])[0]
+    weights = port_weights(surface, at[None])[0]
     shifts = [np.outer(weights, e).ravel() for e in np.eye(link.d)]
-    couples = seat_couples(link, seat, f"joints.{joint}").reshape(3, -1)
+    couples = surface_couples(link, surface, f"joints.{joint}").reshape(3, -1)
     about = turns @ couples
     size = np.abs(couples).max()
     rows = [*shifts, *(row for row in about if np.abs(row).max() > NONE * size)]
@@ -88,7 +88,7 @@ def together(link: Link, supports: list[Support]) -> Support:
 
 
 def single_link(scene: Scene, name: str) -> Link:
-    """A link of a scene in full, with its rigid couplings and attached bodies.
+    """A link of a scene unreduced, with its rigid couplings and attached bodies.
 
     Raises
     ------

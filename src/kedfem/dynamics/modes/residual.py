@@ -11,7 +11,7 @@ from kedfem.dynamics.joints.ports import add_port_forces
 from kedfem.dynamics.matrices.interface import static_tie
 from kedfem.dynamics.matrices.substructure import Substructure, coupled_all
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.nominal import forcings
+from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.stepping.start import damping_times
 from kedfem.dynamics.stepping.state import NodalOf, Rayleigh
 from kedfem.links.record import Link, mass_times

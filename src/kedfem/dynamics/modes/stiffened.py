@@ -16,7 +16,7 @@ from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.matrices.substructure import mass_matrix
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.frozen import Frozen, Modes, UnstableError
-from kedfem.dynamics.nominal import forcings
+from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.stiffening import stiffening
 from kedfem.dynamics.system.record import System
 from kedfem.errors import SceneError, SolveError
@@ -135,19 +135,19 @@ def frozen_linkage(
     if not scene.analysis.stiffening:
         return Frozen(system, count, released)
     driven = elastic_model(scene, linkage, along=along)
-    _refuse_carried(driven, free)
+    _refuse_prescribed(driven, free)
     return Stiffened(system, driven, count, released)
 
 
-def _refuse_carried(driven: Model, free: bool) -> None:
+def _refuse_prescribed(driven: Model, free: bool) -> None:
     """Refuse to let go of rigid links that a drive carries: the forces of their joints, which stiffen them, are unknown.
 
     Raises
     ------
     SceneError
     """
-    if free and driven.carried:
-        names = ", ".join(each.link.name for each in driven.carried)
+    if free and driven.prescribed:
+        names = ", ".join(each.link.name for each in driven.prescribed)
         raise SceneError(
             "--free: must be left out with analysis.stiffening where the drive carries rigid links, whose stresses are "
             f"not known, got {names}: take model = 'beam' or 'solid' for it"

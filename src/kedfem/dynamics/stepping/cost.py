@@ -16,7 +16,7 @@ from kedfem.scene import Scene, time_grid
 
 # of a link of N unknowns, from `benchmarks.growth` and slender bars (27-node hexahedra, CHOLMOD)
 FACTOR_FLOPS, SOLVE_BYTES = 1.0e4, 45.0  # times N^1.5
-SWEEPS = 4.0  # times the work of a step with rigid-body frames, where frames follow
+ITERATIONS = 4.0  # times the work of a step with rigid-body frames, with co-rotational ones
 OVERHEAD = 2.5e-4  # seconds of a step beside the links' arrays: coupling, probes
 LOOP = 5e-5  # the same where all links are small: one compiled loop, recording by blocks
 ARRAY_PASSES = 60  # arrays of a link read or written in a step beside the solve
@@ -50,7 +50,7 @@ def estimated_cost(scene: Scene, model: Model) -> Cost:
         (SOLVE_BYTES * fill + 8 * ARRAY_PASSES * N).sum()
     ) / bandwidth
     if any(link.fit is not None for link in model.links):
-        step *= SWEEPS
+        step *= ITERATIONS
     return Cost(
         factor=levels * FACTOR_FLOPS * float(fill.sum()) / rate,
         steps=(2**levels - 1) * time_grid(scene).steps * step,

@@ -8,8 +8,8 @@ import numpy as np
 from kedfem.dynamics.joints.first_rows import FIRST, INSTANTS
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.coarse import coarse_model
-from kedfem.dynamics.nominal import instants, rows_at_start
-from kedfem.dynamics.stepping.literal import LiteralSteps
+from kedfem.dynamics.rigid_body import instants, rows_at_start
+from kedfem.dynamics.stepping.monolithic import MonolithicSteps
 from kedfem.dynamics.stepping.solvers import ByLink, Steps, block_length, dampers_count, steps_of
 from kedfem.dynamics.stepping.start import Deflected, initial_rates, initial_states, quasi_static
 from kedfem.dynamics.stepping.state import LinkState
@@ -46,7 +46,7 @@ def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: S
     start = _begun(scene, linkage, along, model, solver)
     if scene.analysis.kind != "steady":
         return start
-    if isinstance(solver, LiteralSteps) or not isinstance(start, State):
+    if isinstance(solver, MonolithicSteps) or not isinstance(start, State):
         raise ValueError("a steady state must be that of a system, got the monolithic solver's")
 
     over = period_map(scene, linkage, along, model, solver, solver.search.start(start))
@@ -64,7 +64,7 @@ def coarse_map(scene: Scene, linkage: Linkage, along: Path, model: Model) -> Per
         return None
     solver = steps_of(scene, small)
     start = _begun(scene, linkage, along, small, solver)
-    if isinstance(solver, LiteralSteps) or not isinstance(start, State):
+    if isinstance(solver, MonolithicSteps) or not isinstance(start, State):
         raise ValueError("a steady state must be that of a system, got the monolithic solver's")
     return period_map(scene, linkage, along, small, solver, start)
 

@@ -26,8 +26,8 @@ from kedfem.dynamics.history import Block, exerted_together, joined
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.combined import Combination, level_weights
 from kedfem.dynamics.stepping.first_state import started
-from kedfem.dynamics.stepping.literal import LiteralSteps
 from kedfem.dynamics.stepping.marks import Mark, Marks
+from kedfem.dynamics.stepping.monolithic import MonolithicSteps
 from kedfem.dynamics.stepping.scheme import Scheme, generalised_alpha
 from kedfem.dynamics.stepping.solvers import Steps, block_length, steps_of
 from kedfem.dynamics.stepping.transient import transient
@@ -115,7 +115,7 @@ def leveled(
     for each, mark in zip(solvers, marks.levels, strict=True):
         if isinstance(each, CorotationalSteps):
             each.eased = mark.eased
-        if not isinstance(each, LiteralSteps):
+        if not isinstance(each, MonolithicSteps):
             each.steady = mark.steady
     if len(solvers) == 1:
         yield from _single(scene, linkage, along, model, solvers[0], marks)

@@ -3,18 +3,18 @@
 from collections.abc import Sequence
 
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.nominal import POINTS
+from kedfem.dynamics.rigid_body import POINTS
 from kedfem.dynamics.segment import CONVERGED, FREE
-from kedfem.dynamics.stepping.literal import LiteralSteps
+from kedfem.dynamics.stepping.monolithic import MonolithicSteps
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stiffening import stiffening
 from kedfem.dynamics.system.corotational import CorotationalSteps
-from kedfem.dynamics.system.steps import SystemSteps, nominal_system
+from kedfem.dynamics.system.steps import SystemSteps, rigid_frame_system
 from kedfem.scene import Scene, corotational, time_grid
 
 BLOCK_BYTES = 64_000_000
 
-ByLink = LiteralSteps | SystemSteps
+ByLink = MonolithicSteps | SystemSteps
 Steps = ByLink | CorotationalSteps
 
 
@@ -26,17 +26,17 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     SolveError
         If an effective matrix is not positive definite.
     MeshError
-        If a force element finds no coupling surface on its link that tells how it turns.
+        If a force element finds no coupling surface on its link that shows how it turns.
     """
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
     if corotational(scene):
         return CorotationalSteps(scene, model, scheme, FREE if scene.driven is None else CONVERGED)
-    literal = scene.analysis.solver == "monolithic"
+    monolithic = scene.analysis.solver == "monolithic"
     stresses = stiffening(model) if scene.analysis.stiffening else None
     elements = scene.springs or scene.motors or scene.limits
-    if elements or scene.analysis.initial_deflection or dampers_count(model) or not literal:
-        return SystemSteps(scene, nominal_system(scene, model, stresses), model, scheme, literal)
-    return LiteralSteps(model.links, model.joints, scheme, model.damping, stresses)
+    if elements or scene.analysis.initial_deflection or dampers_count(model) or not monolithic:
+        return SystemSteps(scene, rigid_frame_system(scene, model, stresses), model, scheme, monolithic)
+    return MonolithicSteps(model.links, model.joints, scheme, model.damping, stresses)
 
 
 def dampers_count(model: Model) -> bool:

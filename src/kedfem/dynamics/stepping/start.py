@@ -13,7 +13,7 @@ from kedfem.dynamics.joints.ports import Rotation
 from kedfem.dynamics.matrices.interface import Tie
 from kedfem.dynamics.matrices.substructure import Substructure, coupled, factored, mass_substructure
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.stepping.state import LinkState, Nodal, NodalOf, Nominal, Rayleigh
+from kedfem.dynamics.stepping.state import ForcingAt, LinkState, Nodal, NodalOf, Rayleigh
 from kedfem.errors import SolveError
 from kedfem.links.record import Link, mass_times
 from kedfem.motion.constraints import cross
@@ -21,7 +21,7 @@ from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import Linkage
 from kedfem.scene import Scene
 
-TURNING_SWEEPS = 20
+TURNING_ITERATIONS = 20
 KRYLOV = 50  # vectors
 CONVERGED = 1e-9  # change of a iteration, of the deflection
 
@@ -52,7 +52,7 @@ def initial_rates(scene: Scene, linkage: Linkage, model: Model) -> list[Nodal]:
 
 
 def rigid_rates(link: Link, v: Float[np.ndarray, "3"], omega: Float[np.ndarray, "3"]) -> Nodal:
-    """The rate of a link's state where it moves as drawn: v at the origin [m/s], turning by ω [rad/s]."""
+    """The rate of a link's state in the reference position: v at the origin [m/s], turning by ω [rad/s]."""
     rates = np.outer(link.one, v) + cross(omega[None], link.X)
     if link.kind == "beam":
         rates[:, 2] = omega[2] * link.one
@@ -60,7 +60,7 @@ def rigid_rates(link: Link, v: Float[np.ndarray, "3"], omega: Float[np.ndarray, 
 
 
 def initial_states(
-    links: Sequence[Link], joints: Sequence[Attachment], at: Sequence[Nominal], damping: Rayleigh,
+    links: Sequence[Link], joints: Sequence[Attachment], at: Sequence[ForcingAt], damping: Rayleigh,
     deflected: Sequence[Deflected], rows: FirstRows | None = None,
 ) -> list[LinkState]:  # fmt: skip
     """States with given δ, δ' and the acceleration that equation (20) then asks for, joints closed, [KED, eq. (20)].
@@ -103,7 +103,7 @@ def initial_states(
 
 
 def _with_rates(
-    links: Sequence[Link], parts: Sequence[Substructure], at: Sequence[Nominal], given: Sequence[Deflected],
+    links: Sequence[Link], parts: Sequence[Substructure], at: Sequence[ForcingAt], given: Sequence[Deflected],
     rows: FirstRows,
 ) -> list[Deflected]:  # fmt: skip
     """Starts whose rates keep the rows closed; changed as little as can be, in kinetic energy."""
@@ -126,7 +126,7 @@ class Instant:
     tie : of joints enforced by constraint equations
     """
 
-    at: Sequence[Nominal]
+    at: Sequence[ForcingAt]
     spin: Sequence[Rotation]
     turnings: Sequence[Callable[[Nodal], Nodal]] | None = None
     tie: Tie | None = None
@@ -160,7 +160,7 @@ def _turning(links: Sequence[Link], parts: Sequence[Substructure], instant: Inst
     spin = [R_.T @ S @ R_ for S, R_ in zip(instant.spin, R, strict=True)]
     g, _ = coupled(parts, R, load, instant.tie)
     before = np.inf
-    for _ in range(TURNING_SWEEPS if instant.turnings is None else 0):
+    for _ in range(TURNING_ITERATIONS if instant.turnings is None else 0):
         inertia = [mass_times(link.mass, x @ S.T) for link, x, S in zip(links, g, spin, strict=True)]
         new, _ = coupled(parts, R, [b - m for b, m in zip(load, inertia, strict=True)], instant.tie)
         change, size = _change(new, g)

@@ -25,7 +25,7 @@ class Rayleigh:
 
 
 @dataclass(frozen=True, slots=True)
-class Nominal:
+class ForcingAt:
     """What rigid motion and loads do to one link at one time.
 
     R : (d, d) orientation, link to world, of a plane link in its plane

@@ -9,10 +9,10 @@ import numpy as np
 from kedfem.dynamics.history import Block, LinkHistory, Snapshot, history
 from kedfem.dynamics.joints.constraint_matrices import joint_rows
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.nominal import forcings, motions
+from kedfem.dynamics.rigid_body import forcings, motions
 from kedfem.dynamics.stepping.first_state import Start, begun, motion_of, started
-from kedfem.dynamics.stepping.literal import LiteralSteps
 from kedfem.dynamics.stepping.marks import Mark
+from kedfem.dynamics.stepping.monolithic import MonolithicSteps
 from kedfem.dynamics.stepping.solvers import ByLink, Steps, block_length
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.march import HALVINGS, ConvergenceError
@@ -128,7 +128,7 @@ def _positions(
     scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps, mark: Mark
 ) -> Iterator[Block]:
     """All positions of a static or quasi-static analysis, each with the deflection at which all forces balance."""
-    if isinstance(solver, LiteralSteps):
+    if isinstance(solver, MonolithicSteps):
         raise ValueError("a balance must be that of a system, got the monolithic solver's")
     grid, motion_at, of, state = time_grid(scene), motion_of(scene, linkage, along), solver.ready, mark.state
     shared = Instant(of, motion_at, 0.0)

@@ -64,7 +64,7 @@ class TurningLoads(NamedTuple):
 
     body, at : (w,) number, and where its coordinates' share of `force` and twice its functions' of `shown` begin
     planar_beam : (w,) whether an angle shows how it turns
-    drawn : (w, 2, 3) the directions as drawn; shown : weights of functions on what they move by
+    drawn : (w, 2, 3) the directions in the reference position; shown : weights of functions on what they move by
     force : on the body's coordinates, components along the directions' frame
     axis, fixed : (w, 3) in that frame and in the world, whose product a load's amount has for a factor; zero: none
     """

@@ -9,7 +9,7 @@ from kedfem.dynamics.system.state import History, State, Trial, Work
 
 
 def empty_state(bodies: Bodies, of: Constraints) -> State:
-    """A state of zeros, frames as drawn."""
+    """A state of zeros, frames in the reference position."""
     N, L, k, r = int(bodies.at[-1]), len(bodies.motion), len(bodies.first), len(of.law)
     b, _, E = bodies.beams.tangent.shape
     moving = sum(int(n) for n, at in zip(np.diff(bodies.at), bodies.passed, strict=True) if at >= 0) + k

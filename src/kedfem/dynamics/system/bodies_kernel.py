@@ -38,7 +38,7 @@ def right_hand_side(c, bodies, i, R, F, state, out, room):  # type: ignore[no-un
 
 
 @inlined
-def nominal_end(c, bodies, i, R, F, g, Kg, state, history, t, room, Mg):  # type: ignore[no-untyped-def]
+def rigid_frame_end(c, bodies, i, R, F, g, Kg, state, history, t, room, Mg):  # type: ignore[no-untyped-def]
     """End of the step of a body with the rigid-body frame, from g and its balance K g = r + Wᵀ λ = A g."""
     first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
     N = last - first

@@ -135,7 +135,7 @@ class _Builder:
                 self.add(joint.name, (term,), law, joint)
 
     def bars(self, joint: ConstraintJoint) -> None:
-        """A rigid link: all distances between four of its points are as drawn."""
+        """A rigid link: all distances between four of its points are in the reference position."""
         side = joint.sides[0]
         if side is None:
             return
@@ -175,7 +175,7 @@ class _Builder:
                 )
 
     def element(self, joint: ConstraintJoint, element: object) -> None:
-        """The law of a spring, motor or limit on its coordinate, which its links' own motion tells."""
+        """The law of a spring, motor or limit on its coordinate, which its links' own motion shows."""
         law: Law
         if isinstance(element, Motor):
             law = Curve(OVER[element.curve.over], pieces(element.curve))
@@ -217,7 +217,7 @@ class _Builder:
         gaps, turns = CONSTRAINED[made.kind]
         for axis in gaps:
             n = "xyz".index(axis)
-            if self.tells(joint, frame[n], np.zeros(3)):
+            if self.determines(joint, frame[n], np.zeros(3)):
                 yield Term(GAP, i, j, at, at, frame[n]), self.bushing(joint.name, n, turning=False)
         if made.kind == "universal":
             one, other = (np.asarray(bore_axis(made, link)) for link in ordered(made))
@@ -225,12 +225,12 @@ class _Builder:
         for axis in turns:
             n = "xyz".index(axis)
             a, b = (frame[0], frame[1]) if n == 2 else (frame[2], frame[1 - n])
-            if self.tells(joint, np.zeros(3), frame[n]):
+            if self.determines(joint, np.zeros(3), frame[n]):
                 yield Term(TURN, i, j, a, a, b), self.bushing(joint.name, n, turning=True)
         yield from self.threaded(joint, i, j, at)
         yield from self.driven(joint)
 
-    def tells(self, joint: ConstraintJoint, gap: Vector, turn: Vector) -> bool:
+    def determines(self, joint: ConstraintJoint, gap: Vector, turn: Vector) -> bool:
         """Whether a direction says something of a joint's links: of planar ones only what is in their plane."""
         here = [x for x, n in zip(self.model.links, self.model.bodies, strict=True) if n in joint.bodies]
         return not all(link.planar for link in here) or bool(in_plane(gap[None], turn[None])[0])

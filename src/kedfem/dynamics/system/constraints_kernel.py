@@ -11,12 +11,12 @@ from kedfem.dynamics.system.record import CURVE, DISTANCE, DRIVEN, GAP, HELD, RA
 
 
 @inner
-def coordinate(ends, of, r, nominal, place, turned, row, y, w):  # type: ignore[no-untyped-def]
+def coordinate(ends, of, r, rigid_motion, place, turned, row, y, w):  # type: ignore[no-untyped-def]
     """Value of coordinate r, its gradient added to a row on z; and its rate in the rigid-body motion, z constant.
 
     Parameters
     ----------
-    nominal : R (M, 3, 3), v and ω (M, 3) of all bodies of the linkage
+    rigid_motion : R (M, 3, 3), v and ω (M, 3) of all bodies of the linkage
     turned : (terms,) angles as they were, replaced by those they are
     y, w : (16,), (12, 3) room
     """
@@ -37,8 +37,8 @@ def coordinate(ends, of, r, nominal, place, turned, row, y, w):  # type: ignore[
             value = angle(of, t, Q, turned[t], w)
             turned[t] = value
         total += factor * value
-        rate += borne(ends, i, w[6], w[7], factor, nominal, place, row, y, w)
-        rate += borne(ends, j, w[8], w[9], factor, nominal, place, row, y, w)
+        rate += borne(ends, i, w[6], w[7], factor, rigid_motion, place, row, y, w)
+        rate += borne(ends, j, w[8], w[9], factor, rigid_motion, place, row, y, w)
     return total, rate
 
 

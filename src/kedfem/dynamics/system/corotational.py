@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.history import Exerted, Forcing, LinkHistory
-from kedfem.dynamics.joints.constraint_ports import Ways
+from kedfem.dynamics.joints.constraint_ports import LinkageLayout
 from kedfem.dynamics.joints.coupling import joined
 from kedfem.dynamics.joints.ports import port_columns, turned_ports
 from kedfem.dynamics.loads import initial_forces
@@ -47,13 +47,13 @@ def corotational_system(scene: Scene, model: Model) -> tuple[System, Linkage]:
     Raises
     ------
     MeshError
-        If the coupling surface of a force element does not tell how it turns as a whole.
+        If the coupling surface of a force element does not determine how it turns as a whole.
     """
     rigid = linkage(scene)
     if scene.springs or scene.motors or scene.limits:
         links = dict(zip(link_keys(model), model.links, strict=True))
-        ways = Ways({name: k for k, name in enumerate(rigid.bodies)}, {})
-        held = joined(scene, links, model.cuts, ways, elements=True)
+        layout = LinkageLayout({name: k for k, name in enumerate(rigid.bodies)}, {})
+        held = joined(scene, links, model.cuts, layout, elements=True)
         model = replace(model, joints=tuple(held.attachments.values()), rows=held.rows)
     return system_of(scene, rigid, model=model), rigid
 
@@ -71,7 +71,7 @@ class CorotationalSteps:
         system, self.linkage = corotational_system(scene, model)
         self.scene, self.model, self.links = scene, model, model.links
         self.ready = ready(system, scheme, tolerance)
-        self.factorisations, self.eased, self.sweeps = len(self.ready.parts), 0, 0
+        self.factorisations, self.eased, self.iterations = len(self.ready.parts), 0, 0
         self.steady: Periodic | None = None
         self.watch: Watch = lambda marched: None
         self.search = Search()
@@ -125,11 +125,11 @@ class CorotationalSteps:
         Raises
         ------
         ConvergenceError
-            If the iterations of a step do not, in parts neither; `handed_on` tells what was done before.
+            If the iterations of a step do not, in parts neither; `handed_on` shows what was done before.
         """
         before = state.passes.copy()
         state, found = march(self.ready, state, motion, motion_at, loads=[each.F for each in forcing])
-        self.sweeps += int(state.passes[0] - before[0])
+        self.iterations += int(state.passes[0] - before[0])
         self.eased += int(state.passes[1] - before[1])
         return (*self._handed_on(found, forcing, motion), state)
 

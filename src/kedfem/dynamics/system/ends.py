@@ -37,7 +37,7 @@ def end_of(side: Side, joint: ConstraintJoint) -> End:
     p, d, _ = onto.shape
     if side.stations is not None:
         line = Line(side.stations, joint.axis, joint.bodies[0], joint.at)
-        onto = onto * np.atleast_1d(side.seat[:, :3].any(axis=(0, 1)))[:, None]  # of a planar beam not ψ
+        onto = onto * np.atleast_1d(side.surface[:, :3].any(axis=(0, 1)))[:, None]  # of a planar beam not ψ
         return End(side.body, LINE, side.points[0], np.eye(3), np.ones(3), 0, onto, line)
     directions, lengths, known = np.eye(3), np.ones(3), p - 1
     arms = side.points[1:] - side.points[0]
@@ -64,4 +64,4 @@ def _form(side: Side, d: int, known: int) -> int:
     """What an end knows of its orientation."""
     if known:
         return PLANAR if d == 2 else {2: FACE, 3: SOLID}[known]
-    return PLANAR_BEAM if side.shared and d == 3 and side.seat[0, 5].any() else POINT
+    return PLANAR_BEAM if side.shared and d == 3 and side.surface[0, 5].any() else POINT

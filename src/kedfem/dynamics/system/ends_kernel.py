@@ -1,7 +1,8 @@
 """Ends of constraints, compiled by numba: place and orientation from the interface unknowns, and forces back onto them.
 
 The orientation of a coupling surface is the rotation Q of A = Σ D_k ⊗ e_k = Q U, D_k the directions as they are now, e_k
-as drawn. Of a surface of which two directions are known the third is its normal. With G = tr(U) 1 − U a moment τ on Q is
+in the reference position. Of a surface of which two directions are known the third is its normal. With G = tr(U) 1 − U a
+moment τ on Q is
 
     τ · ω = Σ q_k · δD_k,   q_k = Q (t × e_k),   t = G⁻¹ Qᵀ τ
 
@@ -176,19 +177,19 @@ def stretched(e, D, Q, U, w):  # type: ignore[no-untyped-def]
 
 
 @inner
-def borne(ends, e, force, moment, factor, nominal, place, row, y, w):  # type: ignore[no-untyped-def]
+def borne(ends, e, force, moment, factor, rigid_motion, place, row, y, w):  # type: ignore[no-untyped-def]
     """Add to a row on z a force and a moment on an end, both times a factor.
 
     Parameters
     ----------
-    nominal : R (M, 3, 3), v and ω (M, 3) of all bodies of the linkage
+    rigid_motion : R (M, 3, 3), v and ω (M, 3) of all bodies of the linkage
 
     Returns
     -------
     Their power in the rigid-body motion, z constant
     """
     _, Q, D, U = place
-    R, v, omega = nominal
+    R, v, omega = rigid_motion
     form, d, body = ends.form[e], ends.components[e], ends.body[e]
     times(R[body], ends.origin[e], w[0])
     cross(omega[body], w[0], w[1])

@@ -85,17 +85,19 @@ def evaluated(c, ends, of, driving, t, state, trial, work):  # type: ignore[no-u
         return
     if not of.linear.all():
         placed(ends, driving.R[t], driving.p[t], trial.z, trial.moving, work.end, work.vectors)
-    nominal = (driving.R[t], driving.v[t], driving.omega[t])
+    rigid_motion = (driving.R[t], driving.v[t], driving.omega[t])
     for a in range(r):
         trial.C[a] = 0.0
         if of.linear[a]:
-            coordinate(ends, of, a, nominal, trial.fixed, trial.turned, trial.C[a], work.end, work.vectors)
+            coordinate(
+                ends, of, a, rigid_motion, trial.fixed, trial.turned, trial.C[a], work.end, work.vectors
+            )
             e, moving = 0.0, 0.0
             for m in range(len(trial.z)):
                 e += trial.C[a, m] * trial.z[m]
         else:
             e, moving = coordinate(
-                ends, of, a, nominal, trial.moving, trial.turned, trial.C[a], work.end, work.vectors
+                ends, of, a, rigid_motion, trial.moving, trial.turned, trial.C[a], work.end, work.vectors
             )
             if of.drive[a] >= 0:
                 e -= driving.drives[t, of.drive[a]]

@@ -7,15 +7,15 @@ from kedfem.compiled import compiled, inlined
 from kedfem.dynamics.system.algebra_kernel import copied
 from kedfem.dynamics.system.ends_kernel import on_lines, placed
 from kedfem.dynamics.system.interface_kernel import evaluated, gathered, interface_solved, offset, pushed
-from kedfem.dynamics.system.nominal_kernel import (
+from kedfem.dynamics.system.reference import reference
+from kedfem.dynamics.system.rigid_frame_kernel import (
     constraints_end,
     interface_end,
-    nominal_begin,
-    nominal_finish,
     ported,
     ports_end,
+    rigid_frame_begin,
+    rigid_frame_finish,
 )
-from kedfem.dynamics.system.reference import reference
 
 
 @compiled
@@ -34,10 +34,10 @@ def marched_linear(c, bodies, ends, of, driving, state, trial, work, history, so
         copied(state.turned, trial.turned)
         for i in range(len(bodies.motion)):
             R, F = driving.R[t, bodies.motion[i]], driving.F[t]
-            nominal_begin(c, bodies, i, R, F, state, trial, work, solved)
+            rigid_frame_begin(c, bodies, i, R, F, state, trial, work, solved)
         solved_at_once(c, bodies, ends, of, driving, t, state, trial, work)
         for i in range(len(bodies.motion)):
-            nominal_finish(c, bodies, i, driving.F[t], trial, state, history, t, work)
+            rigid_frame_finish(c, bodies, i, driving.F[t], trial, state, history, t, work)
             ports_end(c, bodies, i, trial, state, history, t, work.room)
         constraints_end(c, ends, of, driving, t, state, trial, work, history)
         interface_end(c, driving, t, trial, state, history)

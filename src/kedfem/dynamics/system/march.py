@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from kedfem.dynamics.force_element import stiffness_factors
 from kedfem.dynamics.matrices.dense import rows_of, work_over_time
-from kedfem.dynamics.nominal import forcing_of, forcings
+from kedfem.dynamics.rigid_body import forcing_of, forcings
 from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.dynamics.system.arrays import Bodies, Coefficients, Constraints, Ends
 from kedfem.dynamics.system.blank import empty_history, empty_trial, room

@@ -83,9 +83,9 @@ def law_at(law: Law, t: Times, phi: Times) -> Law:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """The line of a slot on a body: its stations, its direction as drawn, and the body whose pin slides along it.
+    """The line of a slot on a body: its stations, its reference direction, and the body whose pin slides along it.
 
-    at : (3,) the pin as drawn [m]
+    at : (3,) the pin in the reference position [m]
     """
 
     stations: Stations
@@ -102,8 +102,8 @@ class End:
     form : RIGID: moves with the rigid-body motion; POINT: no orientation of its own; PLANAR_BEAM: (u, v, ψ) of a node;
         PLANAR, FACE, SOLID: a coupling surface of which one or two directions in a plane, two or three in space are
         known; LINE: the place of a pin among the stations of a line, in the rigid-body motion
-    origin : (3,) its point as drawn [m]
-    directions : (3, 3) rows e_k as drawn, of which the first `known` are followed by interface points
+    origin : (3,) its point in the reference position [m]
+    directions : (3, 3) rows e_k in the reference position, of which the first `known` are followed by interface points
     lengths : (3,) how far off the origin these points are [m]
     onto : (p, d, k) displacements of the interface points, world components, from the interface unknowns z
     """
@@ -120,7 +120,7 @@ class End:
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """A scalar function of two ends, by their numbers: directions and points as drawn.
+    """A scalar function of two ends, by their numbers: directions and points in the reference position.
 
     kind : GAP: b · (x_i − x_j), b fixed in j; TURN: a · b, a fixed in i; ANGLE: twist of i against j about b from a_j in
         j to a in i (see `motion.values`); DISTANCE: |x_i − x_j|
@@ -141,7 +141,7 @@ class Constraint:
     """A coordinate, the sum of its terms, and the law that it obeys.
 
     name : of the joint or force element
-    linear : whether the rigid-body motion tells its directions, so that it is linear in z; else the bodies themselves do
+    linear : whether the rigid-body motion shows its directions, so that it is linear in z; else the bodies themselves do
     """
 
     name: str

@@ -28,16 +28,16 @@ from kedfem.dynamics.system.interface_kernel import (
     offset,
     pushed,
 )
-from kedfem.dynamics.system.nominal_kernel import (
-    constraints_end,
-    interface_end,
-    nominal_begin,
-    nominal_finish,
-    ported,
-    ports_end,
-)
 from kedfem.dynamics.system.record import NOMINAL, RIGID_BODY, STRESSED
 from kedfem.dynamics.system.reference import reference
+from kedfem.dynamics.system.rigid_frame_kernel import (
+    constraints_end,
+    interface_end,
+    ported,
+    ports_end,
+    rigid_frame_begin,
+    rigid_frame_finish,
+)
 from kedfem.dynamics.system.stress_kernel import combined, stressed_begin, stressed_end, stressed_side
 
 MET = -2  # instead of a body: a stop was met, and the step is to be divided
@@ -93,7 +93,7 @@ def begin(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type:
         trial.z[m] = state.z[0, m] + h * state.z[1, m] + h * h / 2 * state.z[2, m]
     for i in range(len(bodies.motion)):
         if bodies.frame[i] == NOMINAL:
-            nominal_begin(c, bodies, i, R[bodies.motion[i]], driving.F[t], state, trial, work, solved)
+            rigid_frame_begin(c, bodies, i, R[bodies.motion[i]], driving.F[t], state, trial, work, solved)
             continue
         for x in range(bodies.at[i], bodies.at[i + 1]):
             trial.u[x] = state.u[x] + h * state.v[x] + h * h / 2 * state.a[x]
@@ -119,21 +119,21 @@ def passes(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type
     """Pass after pass, until none asks for a change; whether that came, and the body that moved most."""
     memory = (state.pairs, state.products, state.last, trial.mixing)
     R, worst, count = driving.R[t], -1, 0
-    for sweep in range(PASSES):
-        count = sweep + 1
-        asked(c, bodies, ends, of, driving, t, sweep, state, trial, work, solved)
+    for iteration in range(PASSES):
+        count = iteration + 1
+        asked(c, bodies, ends, of, driving, t, iteration, state, trial, work, solved)
         size, reached, worst = sizes(c, bodies, state, trial)
-        allowed = c.tolerance if sweep < PATIENCE else EASIER * c.tolerance
+        allowed = c.tolerance if iteration < PATIENCE else EASIER * c.tolerance
         settled = size <= allowed * allowed * reached + c.floor * c.floor
         if not settled:
-            mixed(memory, state.counts, sweep, trial.change)
+            mixed(memory, state.counts, iteration, trial.change)
         taken(c, bodies, trial)
         if not np.isfinite(size) or size > 1e30:
             break
         internal_forces(c, bodies, R, driving.amounts[t], state, trial, work)
         if settled:
             state.passes[0] += count
-            state.passes[1] += 1 if sweep >= PATIENCE else 0
+            state.passes[1] += 1 if iteration >= PATIENCE else 0
             state.passes[2] = max(state.passes[2], count)
             return True, worst
     state.passes[0] += count
@@ -142,7 +142,7 @@ def passes(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type
 
 
 @inlined
-def asked(c, bodies, ends, of, driving, t, sweep, state, trial, work, solved):  # type: ignore[no-untyped-def]
+def asked(c, bodies, ends, of, driving, t, iteration, state, trial, work, solved):  # type: ignore[no-untyped-def]
     """The change of bodies with frames of their own, and of z, that a pass asks for."""
     trial.right[:] = 0.0
     for m in range(len(trial.z)):
@@ -165,7 +165,7 @@ def asked(c, bodies, ends, of, driving, t, sweep, state, trial, work, solved):  
         offset(bodies, i, work.y, trial, own)
         pushed(bodies, i, trial)
     evaluated(c, ends, of, driving, t, state, trial, work)
-    interface_solved(bodies, trial, sweep == 0)
+    interface_solved(bodies, trial, iteration == 0)
     for i in range(len(bodies.motion)):
         ported(bodies, i, trial)
         if bodies.frame[i] != NOMINAL:
@@ -230,7 +230,7 @@ def finish(c, bodies, ends, of, driving, t, state, trial, work, history):  # typ
         if bodies.frame[i] > RIGID_BODY:
             own_end(c, bodies, i, R, F, trial.u, state, trial, history, t, work)
         else:
-            nominal_finish(c, bodies, i, F, trial, state, history, t, work)
+            rigid_frame_finish(c, bodies, i, F, trial, state, history, t, work)
         if bodies.frame[i] == STRESSED:
             stressed_end(bodies, i, trial, state, history.g[t], work)
         ports_end(c, bodies, i, trial, state, history, t, work.room)

@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 from kedfem.dynamics.history import Forcing, LinkHistory, Products
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
-from kedfem.dynamics.joints.constraint_ports import Ways
+from kedfem.dynamics.joints.constraint_ports import LinkageLayout
 from kedfem.dynamics.joints.coupling import joined
 from kedfem.dynamics.joints.ports import port_columns, turned_ports
 from kedfem.dynamics.loads import initial_forces
@@ -41,12 +41,12 @@ from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import Scene
 
 if TYPE_CHECKING:
-    from kedfem.dynamics.system.oracle.literal import Now
+    from kedfem.dynamics.system.oracle.monolithic import Now
 
 Rows = Float[np.ndarray, "T _ _"]
 
 
-def nominal_system(scene: Scene, model: Model, stresses: Stiffening | None = None) -> System:
+def rigid_frame_system(scene: Scene, model: Model, stresses: Stiffening | None = None) -> System:
     """The system of a scene whose links have rigid-body frames.
 
     Parameters
@@ -56,11 +56,11 @@ def nominal_system(scene: Scene, model: Model, stresses: Stiffening | None = Non
     Raises
     ------
     MeshError
-        If a force element finds no coupling surface on its link that tells how it turns.
+        If a force element finds no coupling surface on its link that shows how it turns.
     """
     names, rigid = [link.name for link in model.links], linkage(scene)
-    ways = Ways({name: k for k, name in enumerate(rigid.bodies)}, _lines(model))
-    held = joined(scene, dict(zip(names, model.links, strict=True)), (), ways, elements=True)
+    layout = LinkageLayout({name: k for k, name in enumerate(rigid.bodies)}, _lines(model))
+    held = joined(scene, dict(zip(names, model.links, strict=True)), (), layout, elements=True)
     here = replace(model, joints=tuple(held.attachments[name] for name in names), rows=held.rows)
     return replace(system_of(scene, rigid, model=here), stiffening=stresses)
 
@@ -102,7 +102,7 @@ class SystemSteps:
     Parameters
     ----------
     model : of the links whose states are handed on, without interface points for force elements
-    literal : whether the oracle takes the steps
+    monolithic : whether the oracle takes the steps
 
     Raises
     ------
@@ -111,7 +111,7 @@ class SystemSteps:
     """
 
     def __init__(
-        self, scene: Scene, system: System, model: Model, scheme: Scheme, literal: bool = False
+        self, scene: Scene, system: System, model: Model, scheme: Scheme, monolithic: bool = False
     ) -> None:
         self.scene, self.model, self.links = scene, model, model.links
         self.ready = ready(system, scheme)
@@ -120,8 +120,8 @@ class SystemSteps:
         self.watch: Watch = lambda marched: None
         self.search = Search()
         self.oracle = None
-        if literal:
-            from kedfem.dynamics.system.oracle.literal_steps import oracle
+        if monolithic:
+            from kedfem.dynamics.system.oracle.monolithic_steps import oracle
 
             self.oracle = oracle(self.ready)
         self.stiffening = system.stiffening
@@ -181,9 +181,9 @@ class SystemSteps:
             If the iterations of a step do not converge.
         """
         if self.oracle is not None:
-            from kedfem.dynamics.system.oracle.literal_steps import literal_march
+            from kedfem.dynamics.system.oracle.monolithic_steps import monolithic_march
 
-            later, found = literal_march(self.ready, self.oracle, state, motion)
+            later, found = monolithic_march(self.ready, self.oracle, state, motion)
             return self.handed_on(found, forcing, motion), later
         if not isinstance(state, State):
             raise ValueError("a march must begin with a state of the system, got one of the oracle")

@@ -15,7 +15,7 @@ def still_forces(c, bodies, R, amounts, state, trial, work):  # type: ignore[no-
     ----------
     c : with Newmark's numbers and damping zero
     R : (M, 3, 3) of the rigid-body motion; amounts : (w,) of loads that turn with bodies
-    state : as drawn
+    state : in the reference position
     """
     c, bodies, state, trial, work = (
         reference(c),

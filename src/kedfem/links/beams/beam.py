@@ -95,7 +95,7 @@ def strain_rows(x: Float[np.ndarray, "m 2"], r: float) -> tuple[Float[np.ndarray
 
 
 def tangent_fit(x: Float[np.ndarray, "m 2"], r: float) -> Float[np.ndarray, "m 3"]:
-    """Weights with which an element's nodes tell how its axis has turned at r: Σ x_a ⊗ fit_a = x' ⊗ t, t as drawn.
+    """Weights with which an element's nodes show how its axis has turned at r: Σ x_a ⊗ fit_a = x' ⊗ t, undeformed t.
 
     Parameters
     ----------

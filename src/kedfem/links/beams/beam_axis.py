@@ -76,7 +76,7 @@ def smooth_axis(
     frame[:, 1] = tangent / np.linalg.norm(tangent, axis=1, keepdims=True)
     frame[0, 1:] = directions(frame[0, 1], up)
     for k in range(1, len(s)):
-        frame[k, 2] = carried(frame[k - 1, 2], frame[k - 1, 1], frame[k, 1])
+        frame[k, 2] = transported(frame[k - 1, 2], frame[k - 1, 1], frame[k, 1])
         frame[k, 3] = np.cross(frame[k, 1], frame[k, 2])
     return Axis(frame, number, line_cells(number[: -1 : nodes - 1], nodes), number % steps == 0)
 
@@ -91,7 +91,7 @@ def directions(along: Float[np.ndarray, "3"], up: Float[np.ndarray, "3"] | None)
     return np.stack([x, y, np.cross(x, y)])
 
 
-def carried(
+def transported(
     v: Float[np.ndarray, "3"], before: Float[np.ndarray, "3"], after: Float[np.ndarray, "3"]
 ) -> Float[np.ndarray, "3"]:
     """A direction turned by the smallest rotation that takes one tangent into the next."""

@@ -12,7 +12,7 @@ from kedfem.links.beams.metric import beam_element
 from kedfem.links.beams.spatial_beam import rigidities, spatial_beam_link
 from kedfem.links.record import BeamPoint, Frame, Link
 from kedfem.links.segments import Cut, Segments, corotational
-from kedfem.links.surfaces.coupling_surfaces import joint_seat, port_weights
+from kedfem.links.surfaces.coupling_surfaces import joint_surface, port_weights
 from kedfem.scene import Material
 
 
@@ -92,8 +92,10 @@ def _space_part(link: Link, axis: Axis, cell: Int[np.ndarray, " m"], material: M
 
 
 def _node_cut(a: Link, b: Link, number: int, point: Float[np.ndarray, "3"]) -> Cut:
-    seats = [joint_seat(part, f"links.{a.name}", point, None) for part in (a, b)]
-    known = [d for d, spread in zip(seats[0].directions, seats[0].spread, strict=True) if spread > 0]
-    off = seats[0].spread[0] * np.array(known)
+    surfaces = [joint_surface(part, f"links.{a.name}", point, None) for part in (a, b)]
+    known = [d for d, spread in zip(surfaces[0].directions, surfaces[0].spread, strict=True) if spread > 0]
+    off = surfaces[0].spread[0] * np.array(known)
     points = np.concatenate([point[None], point + off])
-    return Cut((number, number + 1), points, (port_weights(seats[0], points), port_weights(seats[1], points)))
+    return Cut(
+        (number, number + 1), points, (port_weights(surfaces[0], points), port_weights(surfaces[1], points))
+    )

@@ -12,7 +12,7 @@ from kedfem.links.beams.spatial_beam import spatial_beam_link
 from kedfem.links.record import Link
 from kedfem.scene import Bar, LinkScene, PointMass, Polyline, RectangleSection, Scene
 
-SEATED = ("revolute", "spherical", "weld", "universal")  # joints that hold a point of a beam for good
+JOINED = ("revolute", "spherical", "weld", "universal")  # joints that hold a point of a beam for good
 SAME = 1e-6  # of a segment's length: what is so near is at one place
 
 
@@ -54,7 +54,7 @@ def beam_points(scene: Scene, name: str, spatial: bool) -> Float[np.ndarray, "p 
     points = np.array(shape.between if isinstance(shape, Bar) else getattr(shape, "points", ()))
     if getattr(shape, "smooth", False):
         return points
-    held = [x.on(name) for x in scene.joints.values() if name in x.links and x.kind in SEATED]
+    held = [x.on(name) for x in scene.joints.values() if name in x.links and x.kind in JOINED]
     light = [x.at for x in scene.bodies.values() if x.link == name and isinstance(x, PointMass)]
     heavy = [x.at for x in scene.bodies.values() if x.link == name and not isinstance(x, PointMass)]
     elements = link.mesh.elements if isinstance(link.mesh.elements, int) else 1

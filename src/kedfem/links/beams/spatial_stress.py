@@ -23,7 +23,7 @@ T, N1, N2, N1_S, N2_S = range(5)  # the fields x', n1, n2, n1', n2'
 
 
 def metric(e: Float[np.ndarray, "5 3"]) -> Float[np.ndarray, "6 5 5"]:
-    """Coefficients c of the strains (ε, γ1, γ2, κ1, κ2, τ) in the scalar products of the fields e, as drawn."""
+    """Coefficients c of the strains (ε, γ1, γ2, κ1, κ2, τ) in the scalar products of the undeformed fields e."""
     t, n1, n2, n1_s, n2_s = e
     a, b, c, stretch, shear_1, shear_2, bend_1, bend_2, twist_1, twist_2 = (
         _product(*pair)

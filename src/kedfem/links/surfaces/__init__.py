@@ -1,1 +1,1 @@
-"""Surfaces of links: what they offer to joints, how joints find and hold them, what is told where nothing is found."""
+"""Surfaces of links: what they offer to joints, how joints find and hold them, messages where nothing is found."""

@@ -12,10 +12,17 @@ from jaxtyping import Bool, Float, Int
 
 from kedfem.links.record import Link, LinkFace
 from kedfem.links.surfaces.round_surfaces import CLOSED
-from kedfem.links.surfaces.surface import PLANE_TOLERANCE, SMOOTH, boundary, components, neighbours, surface
+from kedfem.links.surfaces.surface import (
+    PLANE_TOLERANCE,
+    SMOOTH,
+    boundary,
+    components,
+    neighbours,
+    surface_quadrature,
+)
 
 FITS = 0.01  # of the radius: how far corners may be off the cylinder or ball that they are taken for
-FEWEST = 3  # facets that a cylinder or a ball is told from
+FEWEST = 3  # facets that a cylinder or a ball is found from
 ROUNDED = (
     0.02  # least mean square of normals along any direction, of a ball; less along the axis of a cylinder
 )
@@ -141,7 +148,7 @@ def _bent(
 ) -> Bool[np.ndarray, " f"]:
     """Facets that are curved; of 8-node hexahedra, which have none, those with a smooth edge to one turned from them."""
     level = PLANE_TOLERANCE * link.size
-    x = surface(link, facets).x
+    x = surface_quadrature(link, facets).x
     height = np.abs(np.einsum("fqk,fk->fq", x - corners[:, :1], normals)).max(axis=1)
     bent = np.asarray(height > level)
     if len(link.basis.element_dofs) == 8:

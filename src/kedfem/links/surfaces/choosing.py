@@ -73,11 +73,11 @@ def chosen_surface(
         if second > CLEARLY * first + slack:
             return meant[0]
     alike = [each for each in ordered if each.form == choice.form]
-    told = meant or alike or [each for each in ordered if each.form != "other"]
+    offered = meant or alike or [each for each in ordered if each.form != "other"]
     those = ", ".join(
-        f"{each.kind} {as_choice(link, each)} {length(far[id(each)])} away" for each in told[:MOST]
+        f"{each.kind} {as_choice(link, each)} {length(far[id(each)])} away" for each in offered[:MOST]
     )
-    more = f", and {len(told) - MOST} more" if len(told) > MOST else ""
+    more = f", and {len(offered) - MOST} more" if len(offered) > MOST else ""
     if meant:
         wanted, got = f"mean one face of link '{link.name}'", f"{len(meant)} such faces"
         advice = "say which is meant by `near`, a point on it; several are given as a list"

@@ -11,7 +11,13 @@ from kedfem.errors import MeshError
 from kedfem.links.record import Link
 from kedfem.links.surfaces.facet_selection import named_facets, picked
 from kedfem.links.surfaces.missing import in_its_plane, not_touching
-from kedfem.links.surfaces.surface import PLANE_TOLERANCE, boundary, flat_face, smooth_face, surface
+from kedfem.links.surfaces.surface import (
+    PLANE_TOLERANCE,
+    boundary,
+    flat_face,
+    smooth_face,
+    surface_quadrature,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,34 +43,34 @@ class CouplingSurface:
     dimensions: int = 3
 
 
-def port_weights(seat: CouplingSurface, points: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, "p n"]:
+def port_weights(surface: CouplingSurface, points: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, "p n"]:
     """Scalar weights W of port points: u(points) = W u.
 
     Parameters
     ----------
     points : (p, 3) reference positions [m]; each row of the result sums to one.
     """
-    return np.asarray(seat.fit[0] + (points - seat.origin) @ seat.fit[1:])
+    return np.asarray(surface.fit[0] + (points - surface.origin) @ surface.fit[1:])
 
 
-def holds(seat: CouplingSurface, direction: Float[np.ndarray, "3"]) -> bool:
+def holds(surface: CouplingSurface, direction: Float[np.ndarray, "3"]) -> bool:
     """Whether the affine fit knows how the displacement changes along a direction (a flat face: not its normal)."""
-    known = seat.spread > PLANE_TOLERANCE * max(seat.spread[0], 1e-300)
-    return bool(np.linalg.norm(seat.directions[~known] @ direction) < 1e-6)
+    known = surface.spread > PLANE_TOLERANCE * max(surface.spread[0], 1e-300)
+    return bool(np.linalg.norm(surface.directions[~known] @ direction) < 1e-6)
 
 
-def is_flat(seat: CouplingSurface) -> bool:
+def is_flat(surface: CouplingSurface) -> bool:
     """Whether the coupling surface is a plane face, of a plane link a straight edge, of a spatial beam a section between
     its hubs."""
-    return bool(seat.spread[0] > 0 and seat.spread[seat.dimensions - 1] == 0)
+    return bool(surface.spread[0] > 0 and surface.spread[surface.dimensions - 1] == 0)
 
 
-def face_normal(seat: CouplingSurface) -> Float[np.ndarray, "3"]:
+def face_normal(surface: CouplingSurface) -> Float[np.ndarray, "3"]:
     """Direction across a flat coupling surface, along which its affine fit knows nothing."""
-    return np.asarray(seat.directions[seat.dimensions - 1])
+    return np.asarray(surface.directions[surface.dimensions - 1])
 
 
-def joint_seat(
+def joint_surface(
     link: Link,
     where: str,
     point: Float[np.ndarray, "3"],
@@ -84,20 +90,22 @@ def joint_seat(
     Raises
     ------
     MeshError
-        If the link has no node, bore or face there, or several between which nothing tells.
+        If the link has no node, bore or face there, or several that nothing distinguishes.
     """
     if link.full is not None and link.Q is not None:
-        seat = joint_seat(link.full, where, point, axis, faces)
-        return replace(seat, fit=seat.fit @ link.Q)
+        surface = joint_surface(link.full, where, point, axis, faces)
+        return replace(surface, fit=surface.fit @ link.Q)
     if link.kind == "beam":
-        return _node_seat(link, where, point)
+        return _node_surface(link, where, point)
     if link.kind == "spatial_beam":
-        return _section_seat(link, where, point)
-    return facet_seat(link, named_facets(link, where, faces) if faces else picked(link, where, point, axis))
+        return _section_surface(link, where, point)
+    return facet_surface(
+        link, named_facets(link, where, faces) if faces else picked(link, where, point, axis)
+    )
 
 
-def rigid_seat(link: Link, at: Float[np.ndarray, "3"]) -> CouplingSurface:
-    """The coupling surface that a rigid solid offers at any point: its affine field, told by four of its nodes.
+def rigid_link_surface(link: Link, at: Float[np.ndarray, "3"]) -> CouplingSurface:
+    """The coupling surface that a rigid solid offers at any point: its affine field, determined by four of its nodes.
 
     Parameters
     ----------
@@ -111,7 +119,7 @@ def rigid_seat(link: Link, at: Float[np.ndarray, "3"]) -> CouplingSurface:
     return CouplingSurface(fit, np.asarray(at, float), np.eye(3), np.full(3, link.size))
 
 
-def face_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> CouplingSurface:
+def face_surface(link: Link, where: str, point: Float[np.ndarray, "3"]) -> CouplingSurface:
     """The flat or cylindrical face of a link that passes through a point, e.g. to carry a surface force.
 
     Raises
@@ -120,37 +128,37 @@ def face_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Coupling
         If no face does.
     """
     if link.full is not None and link.Q is not None:
-        seat = face_seat(link.full, where, point)
-        return replace(seat, fit=seat.fit @ link.Q)
+        surface = face_surface(link.full, where, point)
+        return replace(surface, fit=surface.fit @ link.Q)
     seen = in_its_plane(link, point)
     facets = flat_face(link, seen)
     if not len(facets):
         facets = smooth_face(link, seen)
     if not len(facets):
         raise MeshError(not_touching(link, where, point))
-    return facet_seat(link, facets)
+    return facet_surface(link, facets)
 
 
-def same_face(link: Link, seat: CouplingSurface) -> CouplingSurface | None:
+def same_face(link: Link, surface: CouplingSurface) -> CouplingSurface | None:
     """What another segment of a link has of a plane face, None if it has none of it.
 
     Parameters
     ----------
-    coupling surface : the face on the segment where it was found
+    surface : the face on the segment where it was found
     """
     if link.full is not None and link.Q is not None:
-        found = same_face(link.full, seat)
+        found = same_face(link.full, surface)
         return None if found is None else replace(found, fit=found.fit @ link.Q)
     _, corners, normals = boundary(link)
-    height = np.abs((corners - seat.origin) @ face_normal(seat)).max(axis=1)
-    along = np.abs(normals @ face_normal(seat)) > 1 - 1e-6
+    height = np.abs((corners - surface.origin) @ face_normal(surface)).max(axis=1)
+    along = np.abs(normals @ face_normal(surface)) > 1 - 1e-6
     for point in corners.mean(axis=1)[(height <= PLANE_TOLERANCE * link.size) & along]:
         if len(facets := flat_face(link, point)):
-            return facet_seat(link, facets)
+            return facet_surface(link, facets)
     return None
 
 
-def surface_weights(link: Link, seat: CouplingSurface) -> Float[np.ndarray, " n"]:
+def surface_weights(link: Link, surface: CouplingSurface) -> Float[np.ndarray, " n"]:
     """Area integrals ∫ N_a dΓ of a coupling surface's surface, [KED, eqs. (15)(16)]: a force φ per area gives weights ⊗
     φ.
 
@@ -158,16 +166,16 @@ def surface_weights(link: Link, seat: CouplingSurface) -> Float[np.ndarray, " n"
     -------
     (n,) [m²]
     """
-    if seat.facets is None:
+    if surface.facets is None:
         return np.zeros(link.n)
     if link.full is not None and link.Q is not None:
-        return np.asarray(surface_weights(link.full, seat) @ link.Q)
-    on = surface(link, seat.facets)
+        return np.asarray(surface_weights(link.full, surface) @ link.Q)
+    on = surface_quadrature(link, surface.facets)
     local = np.einsum("fqm,fq->fm", on.N, on.dA)
     return np.bincount(on.dofs.ravel(), weights=local.ravel(), minlength=link.n)
 
 
-def face_normals(link: Link, seat: CouplingSurface) -> Float[np.ndarray, "n d"]:
+def face_normals(link: Link, surface: CouplingSurface) -> Float[np.ndarray, "n d"]:
     """Area integrals ∫ N_a n dΓ of a coupling surface's surface, n its outward normal: a pressure p gives forces −p times
     them.
 
@@ -175,17 +183,17 @@ def face_normals(link: Link, seat: CouplingSurface) -> Float[np.ndarray, "n d"]:
     -------
     (n, d) [m²]
     """
-    if seat.facets is None:
+    if surface.facets is None:
         return np.zeros((link.n, link.d))
     if link.full is not None and link.Q is not None:
-        return np.asarray(link.Q.T @ face_normals(link.full, seat))
-    on = surface(link, seat.facets)
+        return np.asarray(link.Q.T @ face_normals(link.full, surface))
+    on = surface_quadrature(link, surface.facets)
     local = np.einsum("fqm,fq,fqk->kfm", on.N, on.dA, on.normals)
     rows = [np.bincount(on.dofs.ravel(), weights=x.ravel(), minlength=link.n) for x in local[: link.d]]
     return np.stack(rows, axis=1)
 
 
-def seat_couples(link: Link, seat: CouplingSurface, where: str) -> Float[np.ndarray, "3 n d"]:
+def surface_couples(link: Link, surface: CouplingSurface, where: str) -> Float[np.ndarray, "3 n d"]:
     """Forces of unit couples about x, y, z that work on the turn of a coupling surface's affine fit; they have no
     resultant force.
 
@@ -196,7 +204,7 @@ def seat_couples(link: Link, seat: CouplingSurface, where: str) -> Float[np.ndar
     ----------
     where : how messages name the load
     """
-    D, known = seat.directions, seat.spread > 0
+    D, known = surface.directions, surface.spread > 0
     if link.d == 2:
         known = known & [True, True, False]
     couples = np.zeros((3, link.n, 3))
@@ -207,7 +215,7 @@ def seat_couples(link: Link, seat: CouplingSurface, where: str) -> Float[np.ndar
         both = 0.5 if known[i] and known[j] else 1.0
         turn = both * (np.outer(D[i], D[j]) * known[i] - np.outer(D[j], D[i]) * known[j])
         about = np.linalg.det(D) * D[k]
-        couples += about[:, None, None] * (seat.fit[1:].T @ turn)
+        couples += about[:, None, None] * (surface.fit[1:].T @ turn)
     return couples[:, :, : link.d]
 
 
@@ -220,18 +228,18 @@ def _node_at(link: Link, where: str, point: Float[np.ndarray, "3"]) -> int:
     return node
 
 
-def _node_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> CouplingSurface:
+def _node_surface(link: Link, where: str, point: Float[np.ndarray, "3"]) -> CouplingSurface:
     node = _node_at(link, where, point)
     fit = np.zeros((4, link.n))
     fit[0, node] = 1.0
     return CouplingSurface(fit, link.X[node], np.eye(3), np.zeros(3))
 
 
-def _section_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> CouplingSurface:
+def _section_surface(link: Link, where: str, point: Float[np.ndarray, "3"]) -> CouplingSurface:
     """The section at a node of a spatial beam: between its hubs it does not know how a field changes along the axis.
 
     Its spread is of the link's size, not the section's: ports are part of it apart, and the nearer they were, the less
-    could be told of the section's turn from their difference.
+    could be determined of the section's turn from their difference.
     """
     node = _node_at(link, where, point)
     following = np.flatnonzero(link.one[node + 1 :])
@@ -246,7 +254,7 @@ def _section_seat(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Coup
     )
 
 
-def facet_seat(
+def facet_surface(
     link: Link, facets: Int[np.ndarray, " f"], across: Float[np.ndarray, "3"] | None = None
 ) -> CouplingSurface:
     """The coupling surface that some boundary facets of a meshed link make.
@@ -256,7 +264,7 @@ def facet_seat(
     across : unit vector; facets count with their area across it, and the field is affine over a plane across it. So what
         it bears is spread as the tension and bending of a prism would be over facets that are no plane
     """
-    on = surface(link, facets)
+    on = surface_quadrature(link, facets)
     x, dA = on.x.transpose(2, 0, 1), on.dA  # (3, f, q), (f, q)
     if across is not None:
         dA = dA * (on.normals @ across)

@@ -12,7 +12,7 @@ from kedfem.errors import MeshError
 from kedfem.links.record import Link, read_only
 from kedfem.links.surfaces.candidates import round_candidates
 from kedfem.links.surfaces.missing import ambiguous, in_its_plane, not_touching
-from kedfem.links.surfaces.round_surfaces import Round, ball, rounds, seated
+from kedfem.links.surfaces.round_surfaces import Round, ball, nearest_rounds, rounds
 from kedfem.links.surfaces.surface import CYLINDER_TOLERANCE, flat_face
 
 Facets = Int[np.ndarray, " f"]
@@ -72,7 +72,7 @@ def _picked(
     Raises
     ------
     MeshError
-        If there is nothing of that, or if it cannot be told which.
+        If there is nothing of that, or if it cannot be determined which.
     """
     seen = in_its_plane(link, point)
     if axis is None and link.d == 3 and len(found := ball(link, point)):
@@ -106,7 +106,7 @@ def _told(link: Link, where: str, point: Float[np.ndarray, "3"], found: list[Rou
     MeshError
         If there are several of different radius.
     """
-    chosen = seated(found, link.d == 2)
+    chosen = nearest_rounds(found, link.d == 2)
     size = [each.radius for each in chosen]
     if max(size) - min(size) > CYLINDER_TOLERANCE * max(size):
         raise MeshError(ambiguous(link, where, point, chosen))

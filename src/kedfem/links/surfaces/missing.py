@@ -10,7 +10,7 @@ from kedfem.links.surfaces.candidates import Candidate, candidates
 from kedfem.links.surfaces.round_surfaces import Round
 
 MOST = 8  # candidates in a message
-SMALL = 0.1  # [m]: shorter lengths are told in millimetres
+SMALL = 0.1  # [m]: shorter lengths are reported in millimetres
 STRAIGHT = 0.05  # [deg]: axes within are one direction
 ASKEW = 45.0  # [deg]: axes further off are others
 SCALES = (1000.0, 0.001)
@@ -31,7 +31,7 @@ def not_touching(link: Link, where: str, point: Vector, axis: Vector | None = No
     nearest = link.nodes[np.linalg.norm(link.nodes - point, axis=1).argmin()]
     gap = float(np.linalg.norm(nearest - point))
     what = "a node of" if not link.meshed else "a bore or a flat face of"
-    told = (
+    text = (
         f"{where}: must sit on {what} link '{link.name}' at {shown(point)}, "
         f"got none there (nearest node {shown(nearest)}, {gap:.3g} m away)"
     )
@@ -46,7 +46,7 @@ def not_touching(link: Link, where: str, point: Vector, axis: Vector | None = No
         _beside(point, axis, offered),
         _listed(offered, point),
     ]
-    return "; ".join([told, *(hint for hint in hints if hint)])
+    return "; ".join([text, *(hint for hint in hints if hint)])
 
 
 def ambiguous(link: Link, where: str, point: Vector, found: Sequence[Round]) -> str:
@@ -71,8 +71,8 @@ def _units(
         if np.linalg.norm(point) < 0.1 * scale * link.size:
             continue  # much of what is large is near the origin
         boxed = bool(((scale * (low - room) <= point) & (point <= scale * (high + room))).all())
-        seated = any(each.cylindrical and _fits(each, point / scale, axis) for each in offered)
-        if seated or (boxed and gap > link.size):
+        nearest_rounds = any(each.cylindrical and _fits(each, point / scale, axis) for each in offered)
+        if nearest_rounds or (boxed and gap > link.size):
             word = "larger" if scale > 1 else "smaller"
             return f"the part seems to be in other units: 1000 times {word} it would fit (scale = {scale:g})"
     return None
@@ -105,22 +105,22 @@ def _listed(offered: Sequence[Candidate], point: Vector) -> str | None:
     """Cylinders and balls, plane faces if there are none, other faces if there are none of these either."""
     for kinds in ({"bore", "journal", "ball seat", "ball"}, {"plane face"}, {"face"}):
         if of_kind := [each for each in offered if each.kind in kinds]:
-            told = ", ".join(
+            text = ", ".join(
                 f"{described(each)} {length(each.distance(point))} away" for each in of_kind[:MOST]
             )
             more = len(of_kind) - MOST
-            return f"it has {told}" + (f", and {more} more" if more > 0 else "")
+            return f"it has {text}" + (f", and {more} more" if more > 0 else "")
     return None
 
 
 def described(each: Candidate) -> str:
     """A candidate in words: ``bore 'pin' of radius 6 mm about (0, 0, 1) at (0.1, 0, 0)``."""
-    told = each.kind + _quoted(each)
+    text = each.kind + _quoted(each)
     if np.isfinite(each.radius):
-        told += f" of radius {length(each.radius)}"
+        text += f" of radius {length(each.radius)}"
     if np.isfinite(each.direction).all():
-        told += f" {'about' if each.cylindrical else 'facing'} {shown(each.direction)}"
-    return f"{told} at {shown(each.centre)}"
+        text += f" {'about' if each.cylindrical else 'facing'} {shown(each.direction)}"
+    return f"{text} at {shown(each.centre)}"
 
 
 def _quoted(each: Candidate) -> str:

@@ -11,7 +11,7 @@ from kedfem.links.record import Link, LinkFace
 from kedfem.links.solid import link_faces, solid_basis, vtk_cells
 from kedfem.links.surfaces.facet_selection import picked
 from kedfem.links.surfaces.round_surfaces import CLOSED
-from kedfem.links.surfaces.surface import flat_face, surface
+from kedfem.links.surfaces.surface import flat_face, surface_quadrature
 from kedfem.mesh import SolidMesh
 from kedfem.mesh.elements.hexahedra import CELL_TYPES, Face
 
@@ -54,7 +54,7 @@ def offers(mesh: SolidMesh) -> list[Offer]:
     for each in link.faces:
         kind = face_kind(mesh, each.face)
         if kind in KINDS and len(each.facets):
-            rows.append((KINDS.index(kind), -float(surface(link, each.facets).dA.sum()), each))
+            rows.append((KINDS.index(kind), -float(surface_quadrature(link, each.facets).dA.sum()), each))
     rows = sorted(rows, key=lambda row: row[:2])[:MOST]
     listed = [each for _, _, each in rows]
     return [

@@ -14,9 +14,9 @@ from jaxtyping import Float, Int
 from kedfem.links.record import Link
 from kedfem.links.reduced import reduced
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface
-from kedfem.links.surfaces.surface import surface
+from kedfem.links.surfaces.surface import surface_quadrature
 
-#: κ in E per radius of the seat. The shape's error falls with 1/STIFF, rounding grows with it: here a bore deforms by
+#: κ in E per radius of the surface. The shape's error falls with 1/STIFF, rounding grows with it: here a bore deforms by
 #: 5e-4 of what an averaged one does, deflections are within 2e-4 of those about rigid pins (docs/ports.md).
 STIFF = 1e3
 FLAT = 1e-5  # of the radius: what a coupling surface's nodes leave a plane by
@@ -24,7 +24,7 @@ EQUAL = 1e-6  # of the largest distance: rounding does not choose between nodes
 NOTHING = 1e-12  # of the largest value: functions that vanish on the coupling surface
 
 
-def with_stiff_seat(link: Link, seat: CouplingSurface, times: float = STIFF) -> Link:
+def with_rigid_coupling(link: Link, surface: CouplingSurface, times: float = STIFF) -> Link:
     """A link whose coupling surface keeps its shape; beams and rigid links are returned as they are, since theirs do.
 
     K0 ← K0 + κ [((1 − L P)ᵀ G (1 − L P)) ⊗ I + Pᵀ (D − D B (Bᵀ D B)⁻¹ Bᵀ D) P], κ = times · E / radius [N/m³], with
@@ -37,11 +37,11 @@ def with_stiff_seat(link: Link, seat: CouplingSurface, times: float = STIFF) -> 
     times : how stiff, where another than STIFF is to be tried [-]
     """
     if link.full is not None and link.Q is not None:
-        return reduced(with_stiff_seat(link.full, seat, times), link.Q)
-    if seat.facets is None or link.rigid:
+        return reduced(with_rigid_coupling(link.full, surface, times), link.Q)
+    if surface.facets is None or link.rigid:
         return link
-    nodes, G = surface_gram(link, seat.facets)
-    x, unit = (link.X[nodes] - seat.origin) / radius(seat), sp.eye_array(link.d)
+    nodes, G = surface_gram(link, surface.facets)
+    x, unit = (link.X[nodes] - surface.origin) / radius(surface), sp.eye_array(link.d)
     few = _far_apart(x)
     L, P = _affine(x, few), _choice(few, len(x))
     off = sp.csr_array(sp.eye_array(len(x)) - sp.csr_array(L) @ P)
@@ -50,7 +50,7 @@ def with_stiff_seat(link: Link, seat: CouplingSurface, times: float = STIFF) -> 
     on_few = sp.csr_array(sp.kron(P, unit))
     within = sp.kron(off.T @ G @ off, unit) + on_few.T @ sp.csr_array(bent) @ on_few
     at = sp.csr_array(sp.kron(_choice(nodes, link.n), unit))
-    added = times * link.E / radius(seat) * sp.csr_array(at.T @ within @ at)
+    added = times * link.E / radius(surface) * sp.csr_array(at.T @ within @ at)
     return replace(link, K0=sp.csr_array(link.K0 + (added + added.T) / 2))
 
 
@@ -66,7 +66,7 @@ def _affine(x: Float[np.ndarray, "b 3"], few: Int[np.ndarray, " k"]) -> Float[np
 
 
 def _far_apart(x: Float[np.ndarray, "b 3"]) -> Int[np.ndarray, " k"]:
-    """Nodes that tell an affine field: four, three of a plane face, two of a straight edge; the first of equals."""
+    """Nodes that show an affine field: four, three of a plane face, two of a straight edge; the first of equals."""
     chosen: list[int] = []
     left = x - x.mean(axis=0)
     for _ in range(4):
@@ -82,15 +82,15 @@ def _far_apart(x: Float[np.ndarray, "b 3"]) -> Int[np.ndarray, " k"]:
     return np.array(chosen)
 
 
-def radius(seat: CouplingSurface) -> float:
+def radius(surface: CouplingSurface) -> float:
     """How large a coupling surface is across: the radius of a bore; of other surfaces what that would be from their
     spread [m]."""
-    return float(np.sqrt(2) * seat.spread[seat.spread > 0][:2][-1])
+    return float(np.sqrt(2) * surface.spread[surface.spread > 0][:2][-1])
 
 
 def surface_gram(link: Link, facets: Int[np.ndarray, " f"]) -> tuple[Int[np.ndarray, " b"], sp.csr_array]:
     """The functions that do not vanish on facets, and G_ab = ∫ N_a N_b dΓ of these [m²]."""
-    on = surface(link, facets)
+    on = surface_quadrature(link, facets)
     size = np.abs(on.N).max(axis=1)  # (f, m)
     nodes = np.unique(on.dofs[size > NOTHING * size.max()])
     place = np.full(link.n, -1)

@@ -13,7 +13,7 @@ from kedfem.links.surfaces.surface import (
     boundary,
     components,
     neighbours,
-    surface,
+    surface_quadrature,
 )
 
 FAR = 5.0  # lengths and radii of a bore: a joint further off along its axis does not sit in it
@@ -69,7 +69,7 @@ def rounds(link: Link, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3
     round_ = (np.ptp(radii, axis=1) <= CYLINDER_TOLERANCE * mean) & (out > AROUND * mean)
     round_ &= mean > PLANE_TOLERANCE * np.ptp(link.X, axis=0).max()
     some = np.flatnonzero(round_)
-    x = surface(link, facets[some]).x - point
+    x = surface_quadrature(link, facets[some]).x - point
     within = np.linalg.norm(x - (x @ axis)[..., None] * axis, axis=2).min(axis=1)
     round_[some] = within >= (1 - SUNK) * mean[some]
     facing = np.einsum("fk,fk->f", normals, middle)
@@ -101,8 +101,8 @@ def _pieces(
     return [which[label == k] for k in range(label.max() + 1)]
 
 
-def seated(found: list[Round], flat: bool) -> list[Round]:
-    """Those of some bores, or of some journals, that a joint sits on: several only where it cannot be told.
+def nearest_rounds(found: list[Round], flat: bool) -> list[Round]:
+    """Those of some bores, or of some journals, that a joint sits on: several only where it cannot be determined.
 
     One whose extent contains the joint's point, of bores the narrowest; else the nearest along the axis.
 
@@ -136,5 +136,5 @@ def _domed(
     link: Link, facets: Int[np.ndarray, " f"], point: Float[np.ndarray, "3"]
 ) -> Bool[np.ndarray, " f"]:
     """Whether facets are as far from a point within as at their corners."""
-    distance = np.linalg.norm(surface(link, facets).x - point, axis=2)
+    distance = np.linalg.norm(surface_quadrature(link, facets).x - point, axis=2)
     return np.asarray(np.ptp(distance, axis=1) <= DOMED * distance.max(axis=1))

@@ -33,7 +33,7 @@ class Surface:
     normals: Float[np.ndarray, "f q 3"]
 
 
-def surface(link: Link, facets: Int[np.ndarray, " f"]) -> Surface:
+def surface_quadrature(link: Link, facets: Int[np.ndarray, " f"]) -> Surface:
     """Gauss points on facets: the area element of [KED, eqs. (15)(16)], √(a_r a_s − a_rs²) = |x_r × x_s|.
 
     Of a plane link it is |x_r| times the thickness.
@@ -129,7 +129,7 @@ def flat_face(link: Link, point: Float[np.ndarray, "3"]) -> Int[np.ndarray, " f"
     height = np.abs(np.einsum("fck,fk->fc", corners - point, normals)).max(axis=1)
     touching = height <= PLANE_TOLERANCE * size
     # a point at a corner of a curved facet lies in the plane of its corners, too
-    x = surface(link, facets[touching]).x
+    x = surface_quadrature(link, facets[touching]).x
     bulge = np.abs(np.einsum("fqk,fk->fq", x - corners[touching, :1], normals[touching]))
     touching[touching] = bulge.max(axis=1) <= PLANE_TOLERANCE * size
     reach = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)

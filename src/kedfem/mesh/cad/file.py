@@ -33,7 +33,7 @@ _READING, _READING_MB = (
     10.0,
 )  # seconds of processor time that reading may take, and more per megabyte of the file
 _ENDLESS = 1e50  # OpenCASCADE's box of a face without an edge
-_GAPS = (1e-4, 3e-4, 1e-3)  # of the part's size: wider ones, closed by mending, which is told
+_GAPS = (1e-4, 3e-4, 1e-3)  # of the part's size: wider ones, closed by mending, which is reported
 _SEWING = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5)  # [m], gaps between faces that are closed, the least that will do
 
 

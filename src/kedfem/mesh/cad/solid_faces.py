@@ -20,7 +20,7 @@ _SKEW = 1e-3
 _FINENESS = (5, 11, 25)  # places along each parameter, until some are within the face
 _ASIDE = 0.4627  # where in its part of a grid a place is: not in the middle, where edges of holes often are
 _LEAST = 4  # places within a face that are enough
-_MOST, _FEWEST = 12, 3  # places at which the two sides of a face are looked at
+_MOST, _FEWEST = 12, 3  # places at which the two sides of a face are examined
 _IN_ALL = 100  # such places in all: of a part with many faces a look takes up to 10 ms
 SAME_VOLUME = 1e-3  # two ways to a volume: faces from a translator leave gaps
 _STEP_OFF = 1e-5  # of the solid's size: from a face to its two sides
@@ -30,7 +30,7 @@ _LEAST_STEP = 2e-7  # [m], above what OpenCASCADE counts as on the face
 
 @dataclass(frozen=True, slots=True)
 class Places:
-    """Where a face is looked at: parameters (q, 2), points (q, 3) [m] and gmsh's unit normals (q, 3)."""
+    """Where a face is examined: parameters (q, 2), points (q, 3) [m] and gmsh's unit normals (q, 3)."""
 
     at: Float[np.ndarray, "q 2"]
     points: Float[np.ndarray, "q 3"]

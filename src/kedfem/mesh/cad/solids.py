@@ -9,8 +9,8 @@ from jaxtyping import Float
 from kedfem.errors import KedfemError
 
 
-class OtherWayError(KedfemError):
-    """A solid cannot be meshed this way; the reason is told to the user if no way is left, or a worse one taken."""
+class OtherMethodError(KedfemError):
+    """A solid cannot be meshed this way; the reason is reported if no way is left, or a worse one taken."""
 
 
 @dataclass(frozen=True, slots=True)

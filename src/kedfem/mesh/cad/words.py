@@ -49,7 +49,7 @@ def face_in_words(face: CadFace) -> str:
 
 
 def with_faces_in_words(text: str, faces: Iterable[CadFace], failed: Iterable[int] = ()) -> str:
-    """What gmsh said, its numbers of surfaces in words; else with those that it failed on.
+    """What gmsh reported, its numbers of surfaces in words; else with those that it failed on.
 
     Parameters
     ----------
@@ -61,9 +61,9 @@ def with_faces_in_words(text: str, faces: Iterable[CadFace], failed: Iterable[in
         face = known.get(int(found[1]))
         return found[0] if face is None else face_in_words(face)
 
-    told = re.sub(r"(?i)\bsurfaces? (\d+)", words, text)
+    in_words = re.sub(r"(?i)\bsurfaces? (\d+)", words, text)
     named = [face_in_words(known[tag]) for tag in failed if tag in known]
-    return told if told != text or not named else f"{text} at the {', '.join(named[:3])}"
+    return in_words if in_words != text or not named else f"{text} at the {', '.join(named[:3])}"
 
 
 def direction_in_words(direction: Float[np.ndarray, "3"]) -> str:

@@ -51,7 +51,7 @@ def determinant_bounds(
 def valid_everywhere(
     points: Float[np.ndarray, "n d"], cells: Int[np.ndarray, "e k"]
 ) -> Bool[np.ndarray, " e"]:
-    """Which elements are proven to have det J > 0 all over: by a cheap test if it can tell, else by the bounds.
+    """Which elements are proven to have det J > 0 all over: by a cheap test if it suffices, else by the bounds.
 
     Shapes are those of :func:`determinant_bounds`.
     """

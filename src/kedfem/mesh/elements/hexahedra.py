@@ -34,7 +34,7 @@ class Face:
     radius : float [m]
         Of a cylinder or sphere; else nan.
     inward : bool
-        Whether the material is outside of a cylinder or sphere: a bore or a seat, not a journal or a ball.
+        Whether the material is outside of a cylinder or sphere: a bore or a coupling surface, not a journal or a ball.
     sides : (f, 4), of tetrahedra (f, 3)
         Corner nodes of the sides of elements on the face, in any order.
     chosen : bool
@@ -66,14 +66,14 @@ class SolidMesh:
         Node numbers in VTK order (meshio: hexahedron, hexahedron20, hexahedron27, tetra10, tetra).
     faces : tuple of Face
         Faces that have a name, as far as they are known.
-    way : str
+    method : str
         How the mesh was made and why so, in words; empty where there is no choice.
     """
 
     points: Float[np.ndarray, "n 3"]
     cells: Int[np.ndarray, "e k"]
     faces: tuple[Face, ...] = ()
-    way: str = ""
+    method: str = ""
 
     def __post_init__(self) -> None:
         for name, kind in (("points", np.float64), ("cells", np.int64)):

@@ -163,13 +163,13 @@ def _with_sets(text: str) -> str:
         name = re.search(_NAME, block[1])
         lines: dict[str, None] = {}  # in their order, once each
         for line in block[2].splitlines(keepends=True):
-            said = line
+            line_of_set = line
             match = re.fullmatch(r"\s*(\d+)\s*,\s*[Ss](\d)\s*,?\s*", line)
             if name and match:
                 of_side = f"{name[1]}:S{match[2]}"
                 sets.setdefault(of_side, []).append(match[1])
-                said = f"{of_side}, S{match[2]}\n"
-            lines[said] = None
+                line_of_set = f"{of_side}, S{match[2]}\n"
+            lines[line_of_set] = None
         return block[0].replace(block[2], "".join(lines)) if lines else block[0]
 
     changed = re.sub(_SURFACES, of_sets, text)

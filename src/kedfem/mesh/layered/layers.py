@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.errors import KedfemError
-from kedfem.mesh.cad.solids import CadFace, OtherWayError, Sizing, Solid
+from kedfem.mesh.cad.solids import CadFace, OtherMethodError, Sizing, Solid
 from kedfem.mesh.cad.words import direction_in_words, face_in_words
 from kedfem.mesh.elements.hexahedra import SolidMesh
 from kedfem.mesh.elements.quality import mesh_quality
@@ -29,7 +29,7 @@ _UNKNOWNS_EACH = 24  # of a 27-node hexahedron in a large mesh
 _SAMPLES = np.linspace(0.0, 1.0, 7)
 
 
-class TooManyError(OtherWayError):
+class TooManyError(OtherMethodError):
     """Sweeping along a direction gives far too many elements: smaller ones give more."""
 
 
@@ -56,7 +56,7 @@ def layered_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
 
     Raises
     ------
-    OtherWayError
+    OtherMethodError
         No such direction, with the face that is in the way; or the section gives no mesh of quality, with the
         place.
     """
@@ -82,7 +82,7 @@ def layered_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
         if least >= GOOD:
             break
     if best is None:
-        raise OtherWayError(refusals[0])
+        raise OtherMethodError(refusals[0])
     return not_too_bad(solid, best[1])
 
 
@@ -91,7 +91,7 @@ def layer_directions(gmsh: ModuleType, solid: Solid) -> tuple[Float[np.ndarray, 
 
     Raises
     ------
-    OtherWayError
+    OtherMethodError
         There is none; the largest face that is in the way of the best direction.
     """
     found: list[Float[np.ndarray, "3"]] = []
@@ -107,7 +107,7 @@ def layer_directions(gmsh: ModuleType, solid: Solid) -> tuple[Float[np.ndarray, 
             obstacles.append((sum(face.area for face in slanted), words))
     if not found:
         obstacle = min(obstacles)[1] if obstacles else "it has no plane face"
-        raise OtherWayError(f"{solid.name}: no layers along one direction, as {obstacle}")
+        raise OtherMethodError(f"{solid.name}: no layers along one direction, as {obstacle}")
     return tuple(found)
 
 
@@ -171,7 +171,7 @@ def _mesh_along(
     mesh = swept(flat, plan, layers)
     if filled > 0:
         words += f"; cusps between touching edges filled, {100 * filled:.2g} % of the volume"
-    return SolidMesh(mesh.points, mesh.cells, way=words)
+    return SolidMesh(mesh.points, mesh.cells, method=words)
 
 
 def _check_count(
@@ -203,7 +203,7 @@ def not_too_bad(solid: Solid, mesh: SolidMesh) -> SolidMesh:
     """The mesh itself, unless another way may do better."""
     quality = mesh_quality(mesh)
     if quality.least < _LEAST:
-        raise OtherWayError(
+        raise OtherMethodError(
             f"{solid.name}: a sweep must give a scaled Jacobian of at least {_LEAST:g}, got {quality.least:.3g} "
             f"at {in_mm(quality.centre)}"
         )

@@ -7,7 +7,7 @@ from types import ModuleType
 import numpy as np
 
 from kedfem.errors import MeshError
-from kedfem.mesh.cad.solids import OtherWayError, Sizing
+from kedfem.mesh.cad.solids import OtherMethodError, Sizing
 from kedfem.mesh.elements.quality import scaled_jacobian
 from kedfem.mesh.layered.cusps import without_cusps
 from kedfem.mesh.layered.division import plan_size
@@ -37,7 +37,7 @@ def outline_quads(where: str, outline: Outline, sizing: Sizing) -> tuple[Quads, 
     (n, 2) [m] and (e, 9)
         Plane nodes; cells in VTK order, anticlockwise.
     str
-        What is to be told of them: which share of the area cusps are that were cut off.
+        What is to be reported of them: which share of the area cusps are that were cut off.
 
     Raises
     ------
@@ -54,10 +54,10 @@ def outline_quads(where: str, outline: Outline, sizing: Sizing) -> tuple[Quads, 
                 lambda share: _meshed(f"{where}.shape", plan, share * size, sizing),
                 lambda made: float(scaled_jacobian(made[0].points, made[0].cells).min()),
             )
-        except OtherWayError as error:
+        except OtherMethodError as error:
             raise MeshError(f"{error}; change mesh.size or the outline") from error
-    told = f"cusps between touching edges cut off, {100 * lost:.2g} % of the area" if lost > 0 else ""
-    return (plan.extent * flat.points, flat.cells), told
+    note = f"cusps between touching edges cut off, {100 * lost:.2g} % of the area" if lost > 0 else ""
+    return (plan.extent * flat.points, flat.cells), note
 
 
 def _meshed(where: str, plan: Plan, size: float, sizing: Sizing) -> tuple[PlanMesh, float]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.mesh.cad.solids import OtherWayError, Sizing
+from kedfem.mesh.cad.solids import OtherMethodError, Sizing
 from kedfem.mesh.layered.cusps import CUSP, cusps
 from kedfem.mesh.layered.division import Division, divided
 from kedfem.mesh.layered.fills import Rim, mapped
@@ -46,7 +46,7 @@ def plan_mesh(where: str, plan: Plan, size: float, sizing: Sizing) -> PlanMesh:
 
     Raises
     ------
-    OtherWayError
+    OtherMethodError
         A region has a cusp, or quadrilaterals do not fill it; with its place.
     """
     _check_cusps(where, plan)
@@ -77,7 +77,7 @@ def _check_cusps(where: str, plan: Plan) -> None:
         i, forward = region.loops[cusp.loop][cusp.place]
         point = plan.curves[i].samples[0 if forward else -1]
         place = plan.in_space(point, plan.heights[int(np.argmax(region.material))])
-        raise OtherWayError(
+        raise OtherMethodError(
             f"{where}: edges of its layers must meet at angles of at least {np.degrees(CUSP):.0f}°, got two that "
             f"touch at {in_mm(place)}"
         )
@@ -106,7 +106,7 @@ def _filled(
             best, algorithm = other, SETTINGS[other.tried].algorithm
     if best is None:
         x = plan.in_space(rim.points.mean(axis=0), plan.heights[int(np.argmax(region.material))])
-        raise OtherWayError(
+        raise OtherMethodError(
             f"{where}: quadrilaterals must fill the sections of its layers, got none around "
             "({:.6g}, {:.6g}, {:.6g})".format(*x)
         )

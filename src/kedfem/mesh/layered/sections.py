@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.errors import KedfemError
-from kedfem.mesh.cad.solids import OtherWayError, Solid
+from kedfem.mesh.cad.solids import OtherMethodError, Solid
 from kedfem.mesh.layered.partition import Curve, Loop, Plan, Region, loop_samples, signed_area
 from kedfem.mesh.session import gmsh_copy
 
@@ -51,7 +51,7 @@ def plan_of_slabs(gmsh: ModuleType, solid: Solid, direction: Float[np.ndarray, "
 
     Raises
     ------
-    OtherWayError
+    OtherMethodError
         The sections do not fill the solid's volume: its faces are not what they seem.
     """
     axes, extent = plan_axes(direction), solid.extent
@@ -60,7 +60,7 @@ def plan_of_slabs(gmsh: ModuleType, solid: Solid, direction: Float[np.ndarray, "
         try:
             plan = _cut_plan(other, axes, extent, heights)
         except Exception as error:  # gmsh raises nothing more special
-            raise OtherWayError(
+            raise OtherMethodError(
                 f"{solid.name}: its layers must have sections across {axes[2].round(6).tolist()}, "
                 f"got none from OpenCASCADE: {error}"
             ) from error
@@ -117,14 +117,14 @@ def _slab_section(
 
 
 @contextmanager
-def told(solid: Solid, must: str) -> Iterator[None]:
-    """What OpenCASCADE cannot cut is told with what must be."""
+def reporting(solid: Solid, must: str) -> Iterator[None]:
+    """What OpenCASCADE cannot cut is reported with what must be."""
     try:
         yield
     except KedfemError:
         raise
     except Exception as error:  # gmsh raises nothing more special
-        raise OtherWayError(f"{solid.name}: {must}, got none from OpenCASCADE: {error}") from error
+        raise OtherMethodError(f"{solid.name}: {must}, got none from OpenCASCADE: {error}") from error
 
 
 def section(gmsh: ModuleType, solid: int, corners: Float[np.ndarray, "4 3"]) -> list[tuple[int, int]]:
@@ -296,4 +296,4 @@ def check_volume(solid: Solid, plan: Plan) -> None:
     """Refuses sections that do not make up the solid."""
     share = plan.volume * plan.extent**3 / solid.volume
     if abs(share - 1) > _LOST:
-        raise OtherWayError(f"{solid.name}: its sections, swept, must fill its volume, got {share:.6g} of it")
+        raise OtherMethodError(f"{solid.name}: swept sections must fill its volume, got {share:.6g} of it")

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from kedfem.errors import KedfemError
-from kedfem.mesh.cad.solids import OtherWayError
+from kedfem.mesh.cad.solids import OtherMethodError
 
 GOOD = 0.3  # scaled Jacobian from which no smaller size is tried
 SHARES = (1.0, 0.75, 0.5)  # of the size that is asked for
@@ -22,7 +22,7 @@ def first_good(mesh_of: Callable[[float], T], quality: Callable[[T], float]) -> 
 
     Raises
     ------
-    OtherWayError
+    OtherMethodError
         None is made; why not of the whole size.
     """
     found: list[tuple[float, T]] = []
@@ -37,5 +37,5 @@ def first_good(mesh_of: Callable[[float], T], quality: Callable[[T], float]) -> 
         if found[-1][0] >= GOOD:
             return found[-1]
     if not found:
-        raise OtherWayError(refusals[0])
+        raise OtherMethodError(refusals[0])
     return max(found, key=lambda each: each[0])

@@ -21,14 +21,14 @@ class QuadMesh:
         Node numbers in VTK order, anticlockwise (meshio: quad9).
     thickness : float [m]
         Extent along z, half of it to either side.
-    way : str
-        What is to be told of how it was made.
+    method : str
+        What is to be reported of how it was made.
     """
 
     points: Float[np.ndarray, "n 3"]
     cells: Int[np.ndarray, "e 9"]
     thickness: float
-    way: str = ""
+    method: str = ""
 
     def __post_init__(self) -> None:
         for name, kind in (("points", np.float64), ("cells", np.int64)):
@@ -49,24 +49,24 @@ class Plate:
         Extent along z.
     origin, axes : (3,) [m], (3, 3)
         Where the frame's origin goes, and its x, y, z as rows.
-    way : str
-        What is to be told of how its mesh was made.
+    method : str
+        What is to be reported of how its mesh was made.
     """
 
     quads: Quads
     thickness: float
     origin: Float[np.ndarray, "3"]
     axes: Float[np.ndarray, "3 3"]
-    way: str = ""
+    method: str = ""
 
 
 def swept_mesh(plate: Plate, layers: int) -> SolidMesh:
     """hex27 mesh of a plate, with that many elements through its thickness."""
-    mesh = replace(extruded(*plate.quads, plate.thickness, layers), way=plate.way)
+    mesh = replace(extruded(*plate.quads, plate.thickness, layers), method=plate.method)
     return placed(mesh, plate.origin, plate.axes)
 
 
 def middle_mesh(plate: Plate) -> QuadMesh:
     """quad9 mesh of a plate's middle plane."""
     points, cells = plate.quads
-    return QuadMesh(plate.origin + points @ plate.axes[:2], cells, plate.thickness, plate.way)
+    return QuadMesh(plate.origin + points @ plate.axes[:2], cells, plate.thickness, plate.method)

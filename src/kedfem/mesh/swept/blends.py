@@ -1,4 +1,4 @@
-"""Parts that could be swept but for small rounds, chamfers and grooves: swept without these, which are told."""
+"""Parts that could be swept but for small rounds, chamfers and grooves: swept without these, which are reported."""
 
 from collections.abc import Sequence
 from types import ModuleType
@@ -10,7 +10,7 @@ from kedfem.errors import MeshError
 from kedfem.mesh.cad.faces import beyond, with_faces
 from kedfem.mesh.cad.model import leave_only
 from kedfem.mesh.cad.solid_faces import cad_faces
-from kedfem.mesh.cad.solids import CadFace, OtherWayError, Sizing, Solid
+from kedfem.mesh.cad.solids import CadFace, OtherMethodError, Sizing, Solid
 from kedfem.mesh.elements.hexahedra import SolidMesh
 from kedfem.mesh.layered.layers import layered_mesh, slanted_faces
 from kedfem.mesh.session import gmsh_copy
@@ -18,7 +18,7 @@ from kedfem.mesh.session import gmsh_copy
 SHARE = 0.015  # of the part's size: convex blends smaller than that are left out by themselves
 MOST = 0.5  # % of the volume that they may change by themselves
 _ARC = 1.6  # width of a round over its radius (π/2), of a chamfer over its sides (√2), at most
-_MANY = 60  # blends that are looked at one by one
+_MANY = 60  # blends that are examined one by one
 _SAME = 1e-4  # of the part's size: how far apart the same face of two models may be
 
 
@@ -39,11 +39,11 @@ def swept_without_blends(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> Soli
     Returns
     -------
     SolidMesh
-        With faces; `way` lists what is left out and by what that changes the volume.
+        With faces; `method` lists what is left out and by what that changes the volume.
 
     Raises
     ------
-    OtherWayError
+    OtherMethodError
         Something else is in the way of layers too, or OpenCASCADE cannot leave the blends out.
     """
     small = SHARE * solid.extent if sizing.ignore is None else sizing.ignore
@@ -51,17 +51,17 @@ def swept_without_blends(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> Soli
         if all(_width(gmsh, face) <= small for face in faces) and not _near(gmsh, faces, sizing, small):
             break
     else:
-        raise OtherWayError(f"{solid.name}: more than small blends is in the way of layers")
+        raise OtherMethodError(f"{solid.name}: more than small blends is in the way of layers")
     with gmsh_copy(gmsh, 1.0) as copy:
         bare = _without(copy, solid, faces, concave=sizing.ignore is not None)
         mesh = with_faces(copy, bare, layered_mesh(copy, bare, sizing))
     change = 100 * (bare.volume / solid.volume - 1)
     if sizing.ignore is None and change > MOST:
-        raise OtherWayError(f"{solid.name}: its small blends are {change:.2g} % of the volume")
+        raise OtherMethodError(f"{solid.name}: its small blends are {change:.2g} % of the volume")
     count = "1 blend" if len(faces) == 1 else f"{len(faces)} blends"
     names = ", ".join(face.name for face in faces[:6]) + (", …" if len(faces) > 6 else "")
     words = f"left out: {count} below {1e3 * small:.3g} mm ({names}), {change:+.2g} % of the volume"
-    return SolidMesh(mesh.points, mesh.cells, mesh.faces, f"{mesh.way}; {words}")
+    return SolidMesh(mesh.points, mesh.cells, mesh.faces, f"{mesh.method}; {words}")
 
 
 def _width(gmsh: ModuleType, face: CadFace) -> float:
@@ -96,7 +96,7 @@ def _without(gmsh: ModuleType, solid: Solid, faces: Sequence[CadFace], concave: 
 
     Raises
     ------
-    OtherWayError
+    OtherMethodError
         OpenCASCADE cannot, or a blend is concave and those are to stay.
     """
     ((_, tag),) = gmsh.model.getEntities(3)
@@ -106,7 +106,7 @@ def _without(gmsh: ModuleType, solid: Solid, faces: Sequence[CadFace], concave: 
         for group in _groups(gmsh, goes) if len(goes) <= _MANY else [goes]:
             with gmsh_copy(gmsh, 1.0) as trial:  # tags of a copy of a copy are the same again
                 if _defeatured(trial, solid, group).volume < solid.volume:
-                    raise OtherWayError(f"{solid.name}: a concave fillet is in the way of layers")
+                    raise OtherMethodError(f"{solid.name}: a concave fillet is in the way of layers")
     bare = _defeatured(gmsh, solid, goes)
     names = {
         face.tag: (_same(face, solid.faces, solid.extent, loose=True) or face).name for face in bare.faces
@@ -125,14 +125,14 @@ def _defeatured(gmsh: ModuleType, solid: Solid, faces: Sequence[int]) -> Solid:
         leave_only(gmsh, tag)
         found = cad_faces(gmsh, solid.name, tag, solid.extent, {})
     except (MeshError, ValueError) as error:
-        raise OtherWayError(f"{solid.name}: its blends cannot be left out: {error}") from error
+        raise OtherMethodError(f"{solid.name}: its blends cannot be left out: {error}") from error
     except Exception as error:
         if type(error) is not Exception:  # gmsh raises nothing more special
             raise
-        raise OtherWayError(f"{solid.name}: OpenCASCADE cannot leave its blends out: {error}") from error
+        raise OtherMethodError(f"{solid.name}: OpenCASCADE cannot leave its blends out: {error}") from error
     volume = float(gmsh.model.occ.getMass(3, tag))
     if abs(volume / solid.volume - 1) > 0.2 or len(found) > len(solid.faces) - len(faces):
-        raise OtherWayError(f"{solid.name}: OpenCASCADE leaves another part than its blends out")
+        raise OtherMethodError(f"{solid.name}: OpenCASCADE leaves another part than its blends out")
     return Solid(tag, solid.name, volume, solid.low, solid.high, found)
 
 

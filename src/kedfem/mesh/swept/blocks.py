@@ -5,7 +5,7 @@ from types import ModuleType
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
+from kedfem.mesh.cad.solids import OtherMethodError, Sizing, Solid
 from kedfem.mesh.elements.hexahedra import SolidMesh, without_spare_nodes
 from kedfem.mesh.elements.quality import mesh_quality
 from kedfem.mesh.elements.shape_functions import HEX27, node_numbers
@@ -44,7 +44,7 @@ def block_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
 
     Raises
     ------
-    OtherWayError
+    OtherMethodError
         The solid is no block, or gives elements of poor quality.
     """
     with gmsh_copy(gmsh, 1 / solid.extent) as copy:
@@ -53,15 +53,17 @@ def block_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
         try:
             mesh = _transfinite(copy, groups, counts)
         except Exception as error:  # gmsh raises nothing more special
-            raise OtherWayError(f"{solid.name}: one block must be mapped, got from gmsh: {error}") from error
+            raise OtherMethodError(
+                f"{solid.name}: one block must be mapped, got from gmsh: {error}"
+            ) from error
     mesh = SolidMesh(
         solid.extent * mesh.points,
         mesh.cells,
-        way="one mapped block of {} × {} × {} elements".format(*sorted(counts, reverse=True)),
+        method="one mapped block of {} × {} × {} elements".format(*sorted(counts, reverse=True)),
     )
     quality = mesh_quality(mesh)
     if quality.least < _LEAST:
-        raise OtherWayError(
+        raise OtherMethodError(
             f"{solid.name}: one block must give a scaled Jacobian of at least {_LEAST:g}, "
             f"got {quality.least:.3g} at " + "({:.6g}, {:.6g}, {:.6g})".format(*quality.centre)
         )
@@ -81,7 +83,7 @@ def _edge_groups(gmsh: ModuleType, solid: Solid) -> list[set[int]]:
             groups = [group for group in groups if group not in ours] + [set().union(*ours)]
     vertices = set().union(*ends.values()) if ends else set()
     if (len(faces), len(vertices), [len(group) for group in groups]) != (6, 8, [4, 4, 4]):
-        raise OtherWayError(
+        raise OtherMethodError(
             f"{solid.name}: one block must have six faces with four edges each, got {len(faces)} faces"
         )
     return groups
@@ -132,7 +134,7 @@ def _transfinite(gmsh: ModuleType, groups: list[set[int]], counts: list[int]) ->
         model.setOrder(2)
     kinds, _, nodes = model.getElements(3)
     if list(kinds) != [_HEX27]:
-        raise OtherWayError("other elements than hexahedra")
+        raise OtherMethodError("other elements than hexahedra")
     points, tags = numbered_nodes(gmsh)
     return gmsh_hexahedra(gmsh, points, np.searchsorted(tags, nodes[0]).reshape(-1, len(HEX27)))
 

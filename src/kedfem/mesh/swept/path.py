@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.mesh.cad.looks import OFF, Looks, common_axes, looks
-from kedfem.mesh.cad.solids import CadFace, OtherWayError, Solid
+from kedfem.mesh.cad.solids import CadFace, OtherMethodError, Solid
 from kedfem.mesh.layered.sections import plan_axes
 
 _SAMPLES = np.linspace(0, 1, 9)  # along each edge
@@ -78,7 +78,7 @@ def path(gmsh: ModuleType, solid: Solid) -> tuple[Leg, ...]:
 
     Raises
     ------
-    OtherWayError
+    OtherMethodError
         No plane face is an end of that kind.
     """
     every = looks(gmsh, solid)
@@ -86,7 +86,7 @@ def path(gmsh: ModuleType, solid: Solid) -> tuple[Leg, ...]:
     for end in planes[:_ENDS]:
         if legs := _walked(gmsh, solid, every, end):
             return legs
-    raise OtherWayError(f"{solid.name}: no plane end sweeps it along lines and arcs to another end")
+    raise OtherMethodError(f"{solid.name}: no plane end sweeps it along lines and arcs to another end")
 
 
 def _walked(gmsh: ModuleType, solid: Solid, every: dict[int, Looks], end: CadFace) -> tuple[Leg, ...]:

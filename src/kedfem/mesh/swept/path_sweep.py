@@ -7,12 +7,12 @@ from types import ModuleType
 
 import numpy as np
 
-from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
+from kedfem.mesh.cad.solids import OtherMethodError, Sizing, Solid
 from kedfem.mesh.elements.hexahedra import SolidMesh, stacked, without_spare_nodes
 from kedfem.mesh.layered.division import plan_size
 from kedfem.mesh.layered.partition import Plan
 from kedfem.mesh.layered.plan_mesh import plan_mesh
-from kedfem.mesh.layered.sections import check_volume, laid_over, section, told
+from kedfem.mesh.layered.sections import check_volume, laid_over, reporting, section
 from kedfem.mesh.session import gmsh_copy
 from kedfem.mesh.swept.path import Frame, Leg, path
 from kedfem.mesh.swept.shares import sized
@@ -21,7 +21,7 @@ _TURN = np.radians(18)  # of an arc per element where no size is asked for, as a
 _LONG = 2.5  # an element's length along the path by its size in the section, where no size is asked for
 
 
-def carried_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
+def path_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
     """Hexahedra of a solid that one section sweeps from end to end: bent bars and pipes, elbows, ring segments.
 
     Parameters
@@ -41,12 +41,12 @@ def carried_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
 
     Raises
     ------
-    OtherWayError
+    OtherMethodError
         There is no such path, or the elements are poor.
     """
     legs = path(gmsh, solid)
     if not any(leg.radius for leg in legs):
-        raise OtherWayError(f"{solid.name}: a path of lines alone is one of layers")
+        raise OtherMethodError(f"{solid.name}: a path of lines alone is one of layers")
 
     def mesh_of(share: float) -> SolidMesh:
         with _section_plan(gmsh, solid, legs) as plan:
@@ -63,7 +63,7 @@ def carried_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
         )
         kind = "quadrilaterals" if flat.settings else "mapped blocks,"
         words = f"{kind} carried along {_in_words(legs)} in {layers} elements"
-        return without_spare_nodes(SolidMesh(points, mesh.cells, way=words))
+        return without_spare_nodes(SolidMesh(points, mesh.cells, method=words))
 
     return sized(solid, sizing, mesh_of)
 
@@ -90,7 +90,7 @@ def _section_plan(gmsh: ModuleType, solid: Solid, legs: tuple[Leg, ...]) -> Iter
     """The plan of the section half way along the first leg, about its centre, as thick as the path is long."""
     frame = legs[0].at(0.5)
     with gmsh_copy(gmsh, 1 / solid.extent) as copy:
-        with told(solid, "it must have a section across its path"):
+        with reporting(solid, "it must have a section across its path"):
             faces = _section(copy, solid, frame)
             length = sum(leg.length for leg in legs) / solid.extent
             plan = laid_over(copy, [faces], frame.axes, solid.extent, np.array([0.0, length]))

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.mesh.cad.looks import Axis, Looks, common_axes, looks
-from kedfem.mesh.cad.solids import OtherWayError, Solid
+from kedfem.mesh.cad.solids import OtherMethodError, Solid
 from kedfem.mesh.cad.words import direction_in_words, face_in_words
 
 
@@ -32,7 +32,7 @@ def revolution(gmsh: ModuleType, solid: Solid) -> Revolution:
 
     Raises
     ------
-    OtherWayError
+    OtherMethodError
         There is none; the largest face that is in the way.
     """
     every = list(looks(gmsh, solid).values())
@@ -45,7 +45,7 @@ def revolution(gmsh: ModuleType, solid: Solid) -> Revolution:
         reason = f"the {words} does not turn about {direction_in_words(axis[1])}"
         obstacles.append((sum(face.area for face in others), reason))
     reason = min(obstacles)[1] if obstacles else "no face turns about an axis"
-    raise OtherWayError(f"{solid.name}: no solid of revolution, as {reason}")
+    raise OtherMethodError(f"{solid.name}: no solid of revolution, as {reason}")
 
 
 def _framed(gmsh: ModuleType, solid: Solid, every: list[Looks], axis: Axis) -> Revolution:

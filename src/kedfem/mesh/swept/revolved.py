@@ -8,14 +8,14 @@ from types import ModuleType
 import numpy as np
 from jaxtyping import Bool, Float
 
-from kedfem.mesh.cad.solids import OtherWayError, Sizing, Solid
+from kedfem.mesh.cad.solids import OtherMethodError, Sizing, Solid
 from kedfem.mesh.cad.words import direction_in_words
 from kedfem.mesh.elements.hexahedra import SolidMesh, stacked, without_spare_nodes
 from kedfem.mesh.layered.cusps import without_spare_curves
 from kedfem.mesh.layered.division import plan_size
 from kedfem.mesh.layered.partition import Plan, Region
 from kedfem.mesh.layered.plan_mesh import PlanMesh, plan_mesh
-from kedfem.mesh.layered.sections import check_volume, laid_over, section, told
+from kedfem.mesh.layered.sections import check_volume, laid_over, reporting, section
 from kedfem.mesh.session import gmsh_copy
 from kedfem.mesh.swept.core import NEAR, core_mesh, core_radius
 from kedfem.mesh.swept.revolution import Revolution, revolution
@@ -61,7 +61,7 @@ def revolved_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
 
     Raises
     ------
-    OtherWayError
+    OtherMethodError
         The solid is not of revolution, with the face that is in the way, or gives elements of poor quality.
     """
     turn = revolution(gmsh, solid)
@@ -81,7 +81,7 @@ def _mesh_about(gmsh: ModuleType, solid: Solid, turn: Revolution, sizing: Sizing
     return SolidMesh(
         turn.origin + solid.extent * mesh.points @ turn.axes,
         mesh.cells,
-        way=f"{words} swept about {direction_in_words(turn.axes[0])} in {around} elements{by}",
+        method=f"{words} swept about {direction_in_words(turn.axes[0])} in {around} elements{by}",
     )
 
 
@@ -93,7 +93,7 @@ def _meridian(
     radial = np.array([0, np.cos(_ASIDE), np.sin(_ASIDE)]) @ turn.axes
     axes = np.stack([turn.axes[0], radial, np.cross(turn.axes[0], radial)])
     with gmsh_copy(gmsh, 1 / solid.extent) as copy:
-        with told(solid, "it must have a section through its axis"):
+        with reporting(solid, "it must have a section through its axis"):
             faces = _section(copy, solid, turn, axes)
             whole = _plan(copy, solid, turn, axes, faces)
             check_volume(solid, whole)
@@ -203,4 +203,4 @@ def _check_shared(shared: Bool[np.ndarray, " n"], core: SolidMesh, meridian: _Me
     """Refuse a core that does not fit what is around it."""
     outer = np.linalg.norm(core.points[:, 1:], axis=1) > meridian.radius - NEAR
     if shared.sum() != wanted or not np.array_equal(shared, outer):
-        raise OtherWayError(f"the core must share {wanted} nodes, got {shared.sum()}")
+        raise OtherMethodError(f"the core must share {wanted} nodes, got {shared.sum()}")

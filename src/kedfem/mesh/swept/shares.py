@@ -23,7 +23,7 @@ def sized(solid: Solid, sizing: Sizing, mesh_of: Callable[[float], SolidMesh]) -
 
     Raises
     ------
-    OtherWayError
+    OtherMethodError
         None is made, or all are poor.
     """
     least, mesh = first_good(mesh_of, lambda each: mesh_quality(each).least)

@@ -113,7 +113,7 @@ def _returned(link: Linkage, start: Stand, here: Stand) -> bool:
 
 
 def _assembled(link: Linkage, grid: list[Stand], period: float) -> Path:
-    """The path through grid points, not looked at yet."""
+    """The path through grid points, not examined yet."""
     phi = np.array([g.tau for g in grid])
     R, p, near = (np.concatenate(x) for x in zip(*((*g.poses, g.near) for g in grid), strict=True))
     first, second = (

@@ -12,7 +12,7 @@ from kedfem.motion.path.continuation import quintics, shapes
 from kedfem.motion.path.record import Path, aimed, predicted
 
 FINE = 3e-14  # of the size: error of a prediction from which rates can be taken
-NEAR = 1e-8  # of large linkages: one more sweep of Newton costs less than a finer grid
+NEAR = 1e-8  # of large linkages: one more iteration of Newton costs less than a finer grid
 REFINEMENTS, MOST_POINTS = 5, 20_000
 
 

@@ -48,7 +48,7 @@ def _closer(link: Linkage, along: Path, low: float, high: float) -> Path:
     for _ in range(7):
         tau = np.linspace(low, high, 33)
         aim = aimed(link, along, tau)
-        poses = closed(link, predicted(along, tau), aim, sweeps=2)
+        poses = closed(link, predicted(along, tau), aim, iterations=2)
         weakness, _ = _weakness(factored(link, features(link.rows, poses, aim.near)))
         k = int(weakness.argmin())
         low, high = tau[max(k - 1, 0)], tau[min(k + 1, 32)]

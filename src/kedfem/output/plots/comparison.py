@@ -60,8 +60,8 @@ def _write_picture(
     scale, unit = prefixed(float(each.peaks.max()), channel.unit)
     if unit == "rad":
         scale, unit = np.pi / 180, "°"
-    said = channel.description or channel.name
-    title = f"{said[:1].upper()}{said[1:]}\n{channel.name}".replace("$", r"\$")
+    title = channel.description or channel.name
+    title = f"{title[:1].upper()}{title[1:]}\n{channel.name}".replace("$", r"\$")
     with figure_saved(folder / f"{channel.name.replace('/', '-')}.png", title) as figure:
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1])
         for k, (name, values) in enumerate(zip(names, each.values, strict=True)):

@@ -37,7 +37,7 @@ COMPRESSION = 3
 """Of PNGs: files a fifth larger than with the usual 6, written in a third of the time."""
 
 MARK = "kedfem plot"
-"""What a PNG of this room says of itself, so that stale ones are told from a user's own."""
+"""What a PNG of this room says of itself, so that stale ones are distinguished from a user's own."""
 
 
 def _largest(values: Float[np.ndarray, "..."]) -> float:
@@ -45,7 +45,7 @@ def _largest(values: Float[np.ndarray, "..."]) -> float:
 
 
 def worth_drawing(results: Results) -> Iterator[Picture]:
-    """All pictures but those of rounding only, which the table of a run tells as ≈ 0; nothing at all is drawn, once."""
+    """All pictures but those of rounding only, which the table of a run reports as ≈ 0; nothing at all is drawn, once."""
     highest: dict[str, float] = {}
     for channel, values in results.channels.values():
         highest[channel.unit] = max(highest.get(channel.unit, 0.0), _largest(values))
@@ -57,7 +57,7 @@ def worth_drawing(results: Results) -> Iterator[Picture]:
 
 
 def drawn_over(results: Results) -> Abscissa:
-    """The drive angle or time; time alone where channels tell of a drive that slides, or of several."""
+    """The drive angle or time; time alone where channels are of a drive that slides, or of several."""
     of_drives = [name.split("/")[1:] for name in results.channels if name.startswith("drive/")]
     slides = results.drive.unit == "m"
     if slides or any(len(parts) > 1 or parts[0] in {"force", "rigid_force"} for parts in of_drives):
@@ -198,8 +198,8 @@ def _save(figure: Any, file: Path | io.BytesIO, title: str, kind: str) -> None:
         figure.set_layout_engine(
             "none"
         )  # it stays: saving would find it anew, by drawing all of it once more
-    said = {"Software": MARK} if kind == "png" else {"Creator": MARK, "Date": None}
+    metadata = {"Software": MARK} if kind == "png" else {"Creator": MARK, "Date": None}
     packed = {"pil_kwargs": {"compress_level": COMPRESSION}} if kind == "png" else {}
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph")  # a letter that the font lacks is drawn as a box
-        figure.savefig(file, format=kind, metadata=said, **packed)
+        figure.savefig(file, format=kind, metadata=metadata, **packed)

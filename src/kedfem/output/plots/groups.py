@@ -90,11 +90,11 @@ def _file(name: str) -> str:
 def _shared(channel: Channel, kind: str) -> str:
     """What a description of the first says of all: ``position of the joint …`` → ``motion of the joint …``."""
     words = {"position": "position, velocity and acceleration", "rotation": "rotation and its rates"}
-    said = channel.description
+    title = channel.description
     for beginning in ("rotation vector", "turn", kind):
-        if said.startswith(beginning):
-            return words[kind] + said.removeprefix(beginning)
-    return said
+        if title.startswith(beginning):
+            return words[kind] + title.removeprefix(beginning)
+    return title
 
 
 def _single(channel: Channel, values: Float[np.ndarray, "n c"]) -> list[Panel]:

@@ -17,7 +17,7 @@ SHEARED, SOME = (
     0.05,
     1e-3,
 )  # of the most sheared plane, and of the normal stress: planes whose shear is more than rounding
-NEITHER = 0.05  # share of the mean stress below which tension is not told from compression
+NEITHER = 0.05  # share of the mean stress below which tension is not distinguished from compression
 
 
 def _to_tensor() -> Float[np.ndarray, "6 6"]:

@@ -57,13 +57,13 @@ class Strength:
         """What it is, for tables."""
         known = self.data
         if known.strain_life is not None:
-            said = "strain-life data with Neuber's rule"
+            source = "strain-life data with Neuber's rule"
         elif known.group is not None:
             rough = f"Rz {1e6 * known.roughness:.3g} µm" if known.roughness > POLISHED else "polished"
-            said = f"FKM {known.group.replace('_', ' ')}, Rm {1e-6 * (known.tensile_strength or 0):.4g} MPa, {rough}"
+            source = f"FKM {known.group.replace('_', ' ')}, Rm {1e-6 * (known.tensile_strength or 0):.4g} MPa, {rough}"
         else:
-            said = "S-N curve as given"
-        return f"{said}: {1e-6 * self.endurance:.4g} MPa at {self.cycles:.3g} cycles, M = {self.M:.3g}"
+            source = "S-N curve as given"
+        return f"{source}: {1e-6 * self.endurance:.4g} MPa at {self.cycles:.3g} cycles, M = {self.M:.3g}"
 
 
 def require_fatigue(where: str) -> None:

@@ -104,7 +104,7 @@ class Stressed:
 class Look:
     """At one link or segment: its surface, and the history of its stress.
 
-    highest : stress over the period, of all that is looked at [Pa]
+    highest : stress over the period, of all that is examined [Pa]
     repeats : by how much it differs from the period before, of the highest
     left_out : points that are near to something
     """

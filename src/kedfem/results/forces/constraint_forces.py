@@ -75,7 +75,7 @@ def of_joint(joints: Sequence[ConstraintJoint], name: str) -> tuple[ConstraintJo
 
 
 def known(model: Model, name: str) -> tuple[bool, bool]:
-    """Whether statics tell the force and the moment of a joint enforced by constraint equations, as drawn.
+    """Whether statics determine the force and the moment of a joint enforced by constraint equations.
 
     What a planar link holds of a solid out of the plane, other joints hold already; nothing there loads either.
     """
@@ -94,7 +94,7 @@ def known(model: Model, name: str) -> tuple[bool, bool]:
 
 
 def shared_rows(model: Model, name: str) -> list[str]:
-    """Joints whose constraints repeat those of a joint, as drawn."""
+    """Joints whose constraints repeat those of a joint, in the reference position."""
     found = _null_space(model)
     if found is None or not any(joint.name == name for joint in model.rows):
         return []
@@ -105,7 +105,7 @@ def shared_rows(model: Model, name: str) -> list[str]:
 
 
 def _null_space(model: Model) -> tuple[Float[np.ndarray, "r k"], Float[np.ndarray, "r n"]] | None:
-    """Rows of all joints as drawn, and the combinations of them that say nothing; None without rows."""
+    """Rows of all joints in the reference position, and the combinations of them that say nothing; None without rows."""
     bodies = 1 + max((b for joint in model.rows for b in joint.bodies), default=0)
     rows = joint_rows(model.rows, resting(bodies, np.zeros(1)))
     if rows is None:

@@ -25,9 +25,9 @@ def drive_channels(scene: Scene, model: Model, driven: str, forces: Forces) -> l
     if any(row.name == driven for row in model.rows):
         return [_row_drive(scene, model, driven, forces)]
     joint = scene.joints[driven]
-    carried = next((x for x in model.carried if x.hub == driven), None)
-    if carried is not None:
-        return _hub_drive(scene, model, carried, forces)
+    prescribed = next((x for x in model.prescribed if x.hub == driven), None)
+    if prescribed is not None:
+        return _hub_drive(scene, model, prescribed, forces)
     name = next(link for link in joint.links if link != "ground")
     axis, at = joint_axis(joint), np.asarray(joint.at)
     wrench = port_wrench(model, holder(model, name, driven), driven, at, forces)
@@ -35,22 +35,22 @@ def drive_channels(scene: Scene, model: Model, driven: str, forces: Forces) -> l
     return [Recorded(channel, lambda block: wrench(block)[1] @ axis[:, None])]
 
 
-def _hub_drive(scene: Scene, model: Model, carried: PrescribedBody, forces: Forces) -> list[Recorded]:
+def _hub_drive(scene: Scene, model: Model, prescribed: PrescribedBody, forces: Forces) -> list[Recorded]:
     """Torque, of a slide force, of the drive that moves a prescribed body, on the joint's first link, along its axis."""
-    joint, first = scene.joints[carried.hub], partner(scene, carried)
+    joint, first = scene.joints[prescribed.hub], partner(scene, prescribed)
     axis, which = joint_axis(joint), 0 if joint.kind == "prismatic" else 1
-    wrench, others = hub_wrench(scene, model, carried, forces)
+    wrench, others = hub_wrench(scene, model, prescribed, forces)
     if not all(negligible(loose(model, *each)[which] @ axis) for each in others):
         return []
     on = next(link for link in joint.links if link != GROUND)
-    sign = 1.0 if on == carried.link.name else -1.0
-    bodies = {x.link.name: x.body for x in model.carried}
+    sign = 1.0 if on == prescribed.link.name else -1.0
+    bodies = {x.link.name: x.body for x in model.prescribed}
 
     def along(block: Block) -> Rows:
         direction = block.motion.R[:, bodies.get(first, 0)] @ axis
         return np.asarray(sign * (wrench(block)[which] * direction).sum(axis=1, keepdims=True))
 
-    return [Recorded(_drive_channel(scene, carried.hub, on), along)]
+    return [Recorded(_drive_channel(scene, prescribed.hub, on), along)]
 
 
 def _drive_channel(scene: Scene, driven: str, on: str) -> Channel:

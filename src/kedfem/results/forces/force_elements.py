@@ -19,7 +19,7 @@ from kedfem.dynamics.force_element import (
     stiffness_factors,
     vectors,
 )
-from kedfem.dynamics.force_elements import actions, hinges
+from kedfem.dynamics.force_elements import force_elements, hinges
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model
 from kedfem.motion.constraints import cross
@@ -32,7 +32,7 @@ POSITION, SPEED, EFFORT = 0, 1, 2
 
 @dataclass
 class Measured:
-    """Values of actions over successive blocks, turns counted on from block to block; worked out once for each block."""
+    """Values of force elements over successive blocks, turns counted on; worked out once for each block."""
 
     every: Sequence[ForceElement]
     table: Table
@@ -43,12 +43,12 @@ class Measured:
     forces: Float[np.ndarray, "T A 2 2 3"] = field(default_factory=lambda: np.zeros((0, 0, 2, 2, 3)))
 
     def wrenches(self, block: Block) -> Iterator[tuple[End, Rows, Rows]]:
-        """Force and moment about the world's origin (T, 3) of every end of all actions."""
+        """Force and moment about the world's origin (T, 3) of every end of all force elements."""
         if self.every:
             self.of(block)
         known = 0 if block.exerted is None else block.exerted.ends.shape[1]
-        for i, action in enumerate(self.every):
-            for e, end in enumerate(action.ends):
+        for i, element in enumerate(self.every):
+            for e, end in enumerate(element.ends):
                 if block.exerted is not None and i < known:
                     yield end, block.exerted.ends[:, i, e, 0], block.exerted.ends[:, i, e, 1]
                     continue
@@ -60,7 +60,7 @@ class Measured:
                     yield end, np.zeros_like(moment), np.asarray(moment)
 
     def on(self, link: str, block: Block, about: Rows) -> tuple[Rows, Rows]:
-        """Force and moment of all actions on a link that has no unknowns of its own: a slider, what the drive carries.
+        """Force and moment of all force elements on a link without unknowns of its own: a slider, a prescribed one.
 
         Parameters
         ----------
@@ -73,7 +73,7 @@ class Measured:
         return force, moment
 
     def power(self, links: Collection[str], block: Block) -> Float[np.ndarray, " T"]:
-        """Power of all actions on links that move as given [W]."""
+        """Power of all force elements on links that move as given [W]."""
         out, motion = np.zeros(len(block)), block.motion
         for end, f, m in self.wrenches(block):
             if end.link in links:
@@ -82,7 +82,7 @@ class Measured:
         return out
 
     def of(self, block: Block) -> Float[np.ndarray, "T A 4"]:
-        """Coordinate, rate, force and stored energy of all actions; blocks in the order of time."""
+        """Coordinate, rate, force and stored energy of all force elements; blocks in the order of time."""
         if block is not self.block:
             from kedfem.dynamics.force_elements_kernel import evaluate_all
 
@@ -107,7 +107,7 @@ class Measured:
         self.values[:, :known, 3] = 0.5 * stiffness * (q - np.clip(q, lower, upper)) ** 2
 
 
-def measured_actions(scene: Scene, model: Model) -> Measured:
+def measured_elements(scene: Scene, model: Model) -> Measured:
     """Motors, springs and limits of a scene and, without a drive, the turns of its hinges.
 
     Raises
@@ -116,7 +116,7 @@ def measured_actions(scene: Scene, model: Model) -> Measured:
         If a force element does not fit its link.
     """
     turns = () if scene.driven is not None else hinges(scene, model)
-    every = (*actions(scene, model), *turns)
+    every = (*force_elements(scene, model), *turns)
     return Measured(every, kernel_table(every))
 
 
@@ -124,8 +124,8 @@ def acting(scene: Scene, measured: Measured) -> list[Recorded]:
     """How motors, springs, limits and, without a drive, hinges move, and what force they exert."""
     return [
         Recorded(channel, partial(_column, measured, i, which, sign))
-        for i, action in enumerate(measured.every)
-        for channel, which, sign in _channels(scene, action)
+        for i, element in enumerate(measured.every)
+        for channel, which, sign in _channels(scene, element)
     ]
 
 
@@ -133,31 +133,31 @@ def _column(measured: Measured, i: int, which: int, sign: float, block: Block) -
     return np.asarray(sign * measured.of(block)[:, i, which, None])
 
 
-def _channels(scene: Scene, action: ForceElement) -> list[tuple[Channel, int, float]]:
-    """Channels of one action: which value it is, with which sign."""
-    kind, name = action.name.split("/")
+def _channels(scene: Scene, element: ForceElement) -> list[tuple[Channel, int, float]]:
+    """Channels of one force element: which value it is, with which sign."""
+    kind, name = element.name.split("/")
     if kind == "joints":
         one, other = scene.joints[name].links
         one, other = (other, one) if one == "ground" else (one, other)
         text = f"rotation of joint {name}: link {one} against {other}, from the reference position"
-        return [(Channel(f"{action.name}/angle", ("angle",), "rad", "", text), POSITION, 1.0)]
+        return [(Channel(f"{element.name}/angle", ("angle",), "rad", "", text), POSITION, 1.0)]
     what = f"{kind.removesuffix('s')} {name}"
-    if action.kind == DISTANCE:
-        length = Channel(f"{action.name}/length", ("length",), "m", "", f"length of {what}")
-        force = Channel(f"{action.name}/force", ("force",), "N", "", f"pull of {what} and its damper")
+    if element.kind == DISTANCE:
+        length = Channel(f"{element.name}/length", ("length",), "m", "", f"length of {what}")
+        force = Channel(f"{element.name}/force", ("force",), "N", "", f"pull of {what} and its damper")
         return [(length, POSITION, 1.0), (force, EFFORT, -1.0)]
-    hinge = action.kind == TURN
+    hinge = element.kind == TURN
     place, unit = ("angle", "rad") if hinge else ("travel", "m")
     effort, force_unit = ("torque", "N m") if hinge else ("force", "N")
     out = [
         (
-            Channel(f"{action.name}/{place}", (place,), unit, "", f"{place} of the joint of {what}"),
+            Channel(f"{element.name}/{place}", (place,), unit, "", f"{place} of the joint of {what}"),
             POSITION,
             1.0,
         ),
-        (Channel(f"{action.name}/{effort}", (effort,), force_unit, "", f"{effort} of {what}"), EFFORT, 1.0),
+        (Channel(f"{element.name}/{effort}", (effort,), force_unit, "", f"{effort} of {what}"), EFFORT, 1.0),
     ]
     if kind == "motors":
-        speed = Channel(f"{action.name}/speed", ("speed",), f"{unit}/s", "", f"speed of the joint of {what}")
+        speed = Channel(f"{element.name}/speed", ("speed",), f"{unit}/s", "", f"speed of the joint of {what}")
         out.insert(1, (speed, SPEED, 1.0))
     return out

@@ -20,43 +20,43 @@ from kedfem.results.recorded import Rows
 from kedfem.scene import Scene
 
 
-def partner(scene: Scene, carried: PrescribedBody) -> str:
+def partner(scene: Scene, prescribed: PrescribedBody) -> str:
     """What a prescribed body's driven joint holds it on: the ground, or a moving part of it."""
-    first, second = scene.joints[carried.hub].links
-    return second if first == carried.link.name else first
+    first, second = scene.joints[prescribed.hub].links
+    return second if first == prescribed.link.name else first
 
 
 Held = tuple[int, str, Float[np.ndarray, "3"]]  # link, joint and its point
 
 
-def constrained_joints(scene: Scene, model: Model, carried: PrescribedBody) -> list[str]:
-    """Joints of a carried link enforced by constraint equations."""
+def constrained_joints(scene: Scene, model: Model, prescribed: PrescribedBody) -> list[str]:
+    """Joints of a prescribed link enforced by constraint equations."""
     joints = scene.joints
-    return [x.name for x in model.rows if x.name in joints and carried.link.name in joints[x.name].links]
+    return [x.name for x in model.rows if x.name in joints and prescribed.link.name in joints[x.name].links]
 
 
 def hub_wrench(
-    scene: Scene, model: Model, carried: PrescribedBody, forces: Forces
+    scene: Scene, model: Model, prescribed: PrescribedBody, forces: Forces
 ) -> tuple[Wrench, list[Held]]:
-    """What holds a carried link in balance: P − M R0'', motors, springs, other joints, and the hub's; these joints."""
-    link, hub = carried.link, np.asarray(scene.joints[carried.hub].at)
+    """What holds a prescribed link in balance: P − M R0'', motors, springs, other joints, and the hub's; these joints."""
+    link, hub = prescribed.link, np.asarray(scene.joints[prescribed.hub].at)
     held: list[Held] = []
-    sliding = constrained_joints(scene, model, carried)
+    sliding = constrained_joints(scene, model, prescribed)
     for name, joint in scene.joints.items():
         elastic = [x.name for x in model.links if x.name in joint.links]
         if link.name in joint.links and elastic and name not in sliding:
             held.append((holder(model, elastic[0], name), name, np.asarray(joint.at)))
     others = [(port_wrench(model, *each, forces), each[2]) for each in held]
     riders = [
-        (x, *hub_wrench(scene, model, x, forces)) for x in model.carried if partner(scene, x) == link.name
+        (x, *hub_wrench(scene, model, x, forces)) for x in model.prescribed if partner(scene, x) == link.name
     ]
     held += [each for _, _, below in riders for each in below]
 
     def wrench(block: Block) -> tuple[Rows, Rows]:
-        F, R = _on_carried(carried, block), block.motion.R[:, carried.body]
+        F, R = _on_prescribed(prescribed, block), block.motion.R[:, prescribed.body]
         arms = (link.X - np.outer(link.one, hub)) @ R.transpose(0, 2, 1)
-        centre = block.motion.p[:, carried.body] + R @ hub
-        force, moment = forces.actions.on(link.name, block, centre)
+        centre = block.motion.p[:, prescribed.body] + R @ hub
+        force, moment = forces.force_elements.on(link.name, block, centre)
         force = -force - in_space(link, np.tensordot(F, link.one, (1, 0)))
         moment = -moment - resultant(link, arms, F)[1]
         for other, at in others:
@@ -71,16 +71,16 @@ def hub_wrench(
             f, m, point = forces.rows.wrench(name, block)
             sign = -1.0 if ordered(scene.joints[name])[0] == link.name else 1.0  # on the other link
             force, moment = force + sign * f, moment + sign * (m + cross(point - centre, f))
-        f, m = _geared(scene, model, carried, forces, block, centre)
+        f, m = _geared(scene, model, prescribed, forces, block, centre)
         return force - f, moment - m
 
     return wrench, held
 
 
 def _geared(
-    scene: Scene, model: Model, carried: PrescribedBody, forces: Forces, block: Block, about: Rows
+    scene: Scene, model: Model, prescribed: PrescribedBody, forces: Forces, block: Block, about: Rows
 ) -> tuple[Rows, Rows]:
-    """Force and moment about points that gears exert on a carried link: along the coordinates of their joints."""
+    """Force and moment about points that gears exert on a prescribed link: along the coordinates of their joints."""
     force, moment = np.zeros((2, len(block), 3))
     rows = {row.name: row for row in model.rows}
     for gears in scene.gears:
@@ -88,7 +88,7 @@ def _geared(
         effort = forces.rows.between_gears(gears, block)[:, None]
         for share, joint in ((1.0, row), *row.plus):
             i, j = joint.bodies
-            sign = share * ((carried.body == i) - (carried.body == j))
+            sign = share * ((prescribed.body == i) - (prescribed.body == j))
             along = sign * effort * (block.motion.R[:, j] @ joint.axis)
             if joint.gap.any():  # a rack's push goes through the point of link i
                 place = block.motion.p[:, i] + block.motion.R[:, i] @ joint.at
@@ -98,6 +98,6 @@ def _geared(
     return force, moment
 
 
-def _on_carried(carried: PrescribedBody, block: Block) -> Float[np.ndarray, "T n d"]:
-    """P − M R0'' of a carried link."""
-    return applied(carried.link, carried.loads, block.motion, carried.body)
+def _on_prescribed(prescribed: PrescribedBody, block: Block) -> Float[np.ndarray, "T n d"]:
+    """P − M R0'' of a prescribed link."""
+    return applied(prescribed.link, prescribed.loads, block.motion, prescribed.body)

@@ -1,4 +1,4 @@
-"""Forces and moments of joints that no channel tells, because statics does not determine them, and why."""
+"""Forces and moments of joints that no channel shows, because statics do not determine them, and why."""
 
 from collections.abc import Collection, Iterator
 

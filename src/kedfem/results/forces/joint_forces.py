@@ -26,13 +26,13 @@ from kedfem.scene import GROUND, Scene
 
 
 def joint_channels(scene: Scene, model: Model, name: str, forces: Forces) -> list[Recorded]:
-    """Force and moment (about the joint's nominal point) that a joint exerts on one of its links."""
+    """Force and moment (about the joint's point of the rigid-body motion) that a joint exerts on one of its links."""
     slider = next((s for s in model.sliders if name in (s.guide, s.joint)), None)
     if any(row.name == name for row in model.rows) and slider is None:
         return _row_joint(scene, model, name, forces)
     if slider is not None:
         return _slider_force(scene, model, slider, name, forces)
-    hub = next((x for x in model.carried if x.hub == name), None)
+    hub = next((x for x in model.prescribed if x.hub == name), None)
     if hub is not None:
         return _hub(scene, model, hub, forces)
     held = [link for link in scene.joints[name].links if link in {x.name for x in model.links}]
@@ -40,7 +40,7 @@ def joint_channels(scene: Scene, model: Model, name: str, forces: Forces) -> lis
         return []
     k = holder(model, held[0], name)
     first, second = scene.joints[name].links
-    opposite = first in {x.link.name for x in model.carried}  # it has no ports of its own
+    opposite = first in {x.link.name for x in model.prescribed}  # it has no ports of its own
     on, other = (first, second) if held[0] == first or opposite else (second, first)
     sign = -1.0 if opposite else 1.0
     label = f"of joint {name} on link {on} from {other}"
@@ -48,10 +48,10 @@ def joint_channels(scene: Scene, model: Model, name: str, forces: Forces) -> lis
     wrench = port_wrench(model, k, name, at, forces)
     return [
         Recorded(channel, partial(_part_of, wrench, which, sign))
-        for which, (channel, told) in enumerate(
+        for which, (channel, determined) in enumerate(
             zip(_force_and_moment(name, label), determinate(model, k, name, at), strict=True)
         )
-        if told
+        if determined
     ]
 
 
@@ -64,8 +64,8 @@ def _row_joint(scene: Scene, model: Model, name: str, forces: Forces) -> list[Re
     channels = zip(_force_and_moment(name, label), known(model, name), strict=True)
     return [
         Recorded(channel, partial(_row_part, forces, name, which, sign))
-        for which, (channel, told) in enumerate(channels)
-        if told
+        for which, (channel, determined) in enumerate(channels)
+        if determined
     ]
 
 
@@ -80,22 +80,22 @@ def _part_of(wrench: Wrench, which: int, sign: float, block: Block) -> Rows:
 
 
 def _force_and_moment(joint: str, label: str) -> tuple[Channel, Channel]:
-    about = f"moment {label}, about the joint's nominal point"
+    about = f"moment {label}, about the joint's point of the rigid-body motion"
     return (
         Channel(f"joints/{joint}/force", XYZ, "N", "world", f"force {label}"),
         Channel(f"joints/{joint}/moment", XYZ, "N m", "world", about),
     )
 
 
-def _hub(scene: Scene, model: Model, carried: PrescribedBody, forces: Forces) -> list[Recorded]:
+def _hub(scene: Scene, model: Model, prescribed: PrescribedBody, forces: Forces) -> list[Recorded]:
     """Force and moment that the driven joint exerts on a rigid link that moves with it."""
-    wrench, others = hub_wrench(scene, model, carried, forces)
-    told = [all(negligible(loose(model, *x)[which]) for x in others) for which in (0, 1)]
-    rows = [known(model, name) for name in constrained_joints(scene, model, carried)]
-    told = [told[which] and all(x[which] and x[0] for x in rows) for which in (0, 1)]
-    label = f"of joint {carried.hub} on link {carried.link.name} from {partner(scene, carried)}"
-    channels = enumerate(_force_and_moment(carried.hub, label))
-    return [Recorded(channel, partial(_part_of, wrench, k, 1.0)) for k, channel in channels if told[k]]
+    wrench, others = hub_wrench(scene, model, prescribed, forces)
+    determined = [all(negligible(loose(model, *x)[which]) for x in others) for which in (0, 1)]
+    rows = [known(model, name) for name in constrained_joints(scene, model, prescribed)]
+    determined = [determined[which] and all(x[which] and x[0] for x in rows) for which in (0, 1)]
+    label = f"of joint {prescribed.hub} on link {prescribed.link.name} from {partner(scene, prescribed)}"
+    channels = enumerate(_force_and_moment(prescribed.hub, label))
+    return [Recorded(channel, partial(_part_of, wrench, k, 1.0)) for k, channel in channels if determined[k]]
 
 
 def _slider_force(scene: Scene, model: Model, slider: Slider, name: str, forces: Forces) -> list[Recorded]:
@@ -121,12 +121,12 @@ def _slider_force(scene: Scene, model: Model, slider: Slider, name: str, forces:
 
     def pin(block: Block) -> Rows:
         motion, body = block.motion, model.bodies[slider.carrier]
-        nominal = motion.p2[:, body] + motion.R2[:, body] @ (slider.weights @ carrier.X)
+        rigid = motion.p2[:, body] + motion.R2[:, body] @ (slider.weights @ carrier.X)
         elastic = np.tensordot(block.links[slider.carrier].a, slider.weights, (1, 0))
-        a = nominal + in_space(carrier, elastic)
+        a = rigid + in_space(carrier, elastic)
         force = wrenches[0](block)[0] - slider.mass * (a - gravity)
         for x in slider.loads:
             force += np.outer(x.factor(motion.t, motion.phi), in_space(carrier, carrier.one @ x.forces))
-        return np.asarray(force + forces.actions.on(slider.name, block, np.zeros((len(block), 3)))[0])
+        return np.asarray(force + forces.force_elements.on(slider.name, block, np.zeros((len(block), 3)))[0])
 
     return [Recorded(Channel(f"joints/{name}/force", XYZ, "N", "world", description), pin)]

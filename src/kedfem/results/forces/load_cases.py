@@ -35,7 +35,7 @@ NOTHING = 1e-9  # of the largest force: rounding
 
 @dataclass(frozen=True, slots=True)
 class LoadCase:
-    """A link at an instant; all in its axes: the world's as drawn in the reference position.
+    """A link at an instant; all in its axes: the world's in the reference position in the reference position.
 
     time, angle : [s]; drive angle [rad] or travel [m]
     parts : (n, 3) forces at the nodes by what exerts them [N]
@@ -167,6 +167,6 @@ def _force_elements(model: Model, k: int, at: Snapshot, now: LinkMoment) -> Forc
     if link.full is not None:
         raise SolveError(
             f"links.{link.name}: must not be reduced where springs, motors or limits act on it (its modes do not "
-            "tell at which nodes), got a reduced link: leave out `reduced` for its load cases"
+            "show at which nodes), got a reduced link: leave out `reduced` for its load cases"
         )
     return np.asarray(left @ now.R)

@@ -22,7 +22,7 @@ BALL, ROLLER = 3.0, 10.0 / 3.0
 """Exponents of bearing lives, ISO 281: point and line contact."""
 
 HINGES = ("revolute", "cylindrical", "screw")
-TOLD = 3  # components of a force that is told whole
+REPORTED = 3  # components of a force that is reported whole
 Vectors = Float[np.ndarray, "T 3"]
 Scalars = Float[np.ndarray, " T"]
 
@@ -34,9 +34,9 @@ class JointLoad:
     joint, kind : its name; elastic or rigid: whose links the force is of
     links : the link that `world` acts on, and the other
     world : (T, 3) force on the first link [N]
-    inside : (T, 3) each: force that each link bears, in its own axes, as drawn in the reference position [N]; empty where
-        the motion is not known
-    axis : (3,) of a hinge, as drawn; None of other joints
+    inside : (T, 3) each: force that each link bears, in its own axes, in the reference position in the reference
+        position [N]; empty where the motion is not known
+    axis : (3,) of a hinge, in the reference position; None of other joints
     rate : (T,) speed of one link against the other [rad/s]; None where the motion is not known
     """
 
@@ -131,7 +131,7 @@ def in_axes(x: Vectors, R: Float[np.ndarray, "T 3 3"]) -> Vectors:
 def joint_loads(
     scene: Scene, results: Results, linked: Linkage | None, motion: RigidMotion | None
 ) -> list[JointLoad]:
-    """Of all joints whose whole force the results tell, elastic if they have it, else that of rigid links.
+    """Of all joints whose whole force the results show, elastic if they have it, else that of rigid links.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def joint_loads(
     for name, joint in scene.joints.items():
         for key in ("force", "rigid_force"):
             channel, force = results.channels.get(f"joints/{name}/{key}", (None, None))
-            if channel is None or force is None or len(channel.columns) != TOLD:
+            if channel is None or force is None or len(channel.columns) != REPORTED:
                 continue
             links = acted_links(name, joint, channel.description)
             out.append(_load(name, joint, links, force, (linked, motion)))
@@ -188,7 +188,7 @@ def acted_links(name: str, joint: Joint, description: str) -> tuple[str, str]:
 def drive_loads(
     scene: Scene, results: Results, linked: Linkage | None, motion: RigidMotion | None
 ) -> list[DriveLoad]:
-    """Of all drives whose effort the results tell, elastic if they have it, else that of rigid links."""
+    """Of all drives whose effort the results show, elastic if they have it, else that of rigid links."""
     out = []
     for name in scene.driven_joints:
         prefix = drive_prefix(scene, name)

@@ -73,7 +73,7 @@ def constants(link: Link, joint: Attachment, body: int, damping: Rayleigh) -> Co
 
 
 @dataclass(frozen=True, slots=True)
-class Nominal:
+class RigidRates:
     """Rigid motion of S bodies at T time points, x = p + R X, in k dimensions, time last.
 
     place : (k, 1 + k, S, T) [p R]
@@ -86,19 +86,19 @@ class Nominal:
     omega: Float[np.ndarray, "c S T"]
     alpha: Float[np.ndarray, "c S T"]
 
-    def of(self, bodies: Int[np.ndarray, " S"], k: int = 3) -> "Nominal":
+    def of(self, bodies: Int[np.ndarray, " S"], k: int = 3) -> "RigidRates":
         """Of some of the bodies, in k dimensions."""
         turns = (x[2 * (3 - k) :, bodies] for x in (self.omega, self.alpha))
-        return Nominal(self.place[:k, : 1 + k, bodies], self.rates[:, : 1 + k, :k, bodies], *turns)
+        return RigidRates(self.place[:k, : 1 + k, bodies], self.rates[:, : 1 + k, :k, bodies], *turns)
 
-    def every(self, which: slice) -> "Nominal":
+    def every(self, which: slice) -> "RigidRates":
         """At some of the time points."""
-        return Nominal(
+        return RigidRates(
             self.place[..., which], self.rates[..., which], self.omega[..., which], self.alpha[..., which]
         )
 
 
-def nominal(motion: RigidMotion) -> Nominal:
+def rates_of_bodies(motion: RigidMotion) -> RigidRates:
     """Of all bodies of a motion."""
     T, B = motion.p.shape[:2]
     place, rates = np.empty((3, 4, B, T)), np.empty((2, 4, 3, B, T))
@@ -108,7 +108,7 @@ def nominal(motion: RigidMotion) -> Nominal:
     omega, alpha = (np.ascontiguousarray(x.T) for x in (motion.omega, motion.alpha))
     for k in range(3):
         rates[0, 1 + k] = cross(omega.T, place[:, 1 + k].T).T
-    return Nominal(place, rates, omega, alpha)
+    return RigidRates(place, rates, omega, alpha)
 
 
 def mass_times(of: Constants, u: Field) -> Field:
@@ -140,7 +140,7 @@ def turned(N: Float[np.ndarray, "*z k k S T"]) -> Float[np.ndarray, "*z c S T"]:
     return np.stack([N[..., i, j, :, :] - N[..., j, i, :, :] for i, j in pairs], axis=-3)
 
 
-def rotated(at: Nominal, x: Float[np.ndarray, "c S T"]) -> Float[np.ndarray, "c S T"]:
+def rotated(at: RigidRates, x: Float[np.ndarray, "c S T"]) -> Float[np.ndarray, "c S T"]:
     """R x; what is across a plane stays there."""
     return x if len(x) == 1 else np.einsum("ijst,jst->ist", at.place[:, 1:], x)
 

@@ -25,14 +25,14 @@ class Forces:
     """What acts beside port forces: forces of constraint equations, and of motors and springs."""
 
     rows: ConstraintForces
-    actions: Measured
+    force_elements: Measured
 
 
 Wrench = Callable[[Block], tuple[Rows, Rows]]
 
 
 def port_wrench(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"], forces: Forces) -> Wrench:
-    """Force and moment about `at` of one joint on link k, world components, from the port forces that tell it."""
+    """Force and moment about `at` of one joint on link k, world components, from the port forces that show it."""
     attachment, link = model.joints[k], model.links[k]
     rows = rows_of_joint(attachment, joint)
     arms, placed = _arms(attachment, joint, at), _arms_over_time(model, k, joint, at)
@@ -52,12 +52,12 @@ def port_wrench(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"], fo
 
 
 def _sharing(attachment: Attachment, rows: Int[np.ndarray, " m"]) -> Int[np.ndarray, " l"]:
-    """Links whose port forces tell some of a link's."""
+    """Links whose port forces show some of a link's."""
     if not attachment.shares:
         return np.zeros(0, int)
     ends = np.cumsum([share.shape[1] for share in attachment.shares])
-    told = np.concatenate(attachment.shares, axis=1)[rows].any(axis=0)
-    return np.unique(np.searchsorted(ends, np.flatnonzero(told), side="right"))
+    determined = np.concatenate(attachment.shares, axis=1)[rows].any(axis=0)
+    return np.unique(np.searchsorted(ends, np.flatnonzero(determined), side="right"))
 
 
 def _arms_over_time(
@@ -76,7 +76,7 @@ def _arms_over_time(
     )[0]
     beside = at - among @ drawn
 
-    def nominal(block: Block) -> Float[np.ndarray, "T p 3"]:
+    def undeformed(block: Block) -> Float[np.ndarray, "T p 3"]:
         return np.asarray((drawn - at) @ _turned(block, k, link).transpose(0, 2, 1))
 
     def displaced(block: Block) -> Float[np.ndarray, "T p 3"]:
@@ -85,7 +85,7 @@ def _arms_over_time(
         centre = among @ x + _turned(block, k, link) @ beside
         return np.asarray(x - centre[:, None])
 
-    return nominal if link.fit is None else displaced
+    return undeformed if link.fit is None else displaced
 
 
 def _turned(block: Block, k: int, link: Link) -> Float[np.ndarray, "T 3 3"]:
@@ -96,13 +96,13 @@ def _turned(block: Block, k: int, link: Link) -> Float[np.ndarray, "T 3 3"]:
 
 
 def determinate(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> tuple[bool, bool]:
-    """Whether statics tell the force and the moment that a joint exerts on link k, where ports depend on each other."""
+    """Whether statics determine force and moment that a joint exerts on link k, where ports depend on each other."""
     force, moment = loose(model, k, joint, at)
     return negligible(force), negligible(force) and negligible(moment)
 
 
 def loose(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> tuple[Rows, Rows]:
-    """Forces and moments of a joint that statics leave open, as drawn."""
+    """Forces and moments of a joint that statics leave open, in the reference position."""
     attachment = model.joints[k]
     arms, link = _arms(attachment, joint, at), model.links[k]
     loose = attachment.loose[rows_of_joint(attachment, joint)].T
@@ -121,7 +121,7 @@ def rows_of_joint(attachment: Attachment, joint: str) -> Int[np.ndarray, " m"]:
 
 
 def _arms(attachment: Attachment, joint: str, at: Float[np.ndarray, "3"]) -> Float[np.ndarray, "p 3"]:
-    """From a point to the ports of a joint, as drawn."""
+    """From a point to the ports of a joint, in the reference position."""
     return np.asarray(attachment.points[[name == joint for name in attachment.joints]] - at)
 
 

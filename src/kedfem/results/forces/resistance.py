@@ -10,7 +10,7 @@ from kedfem.dynamics.history import LinkHistory, Products
 from kedfem.results.forces.moments import (
     Constants,
     Field,
-    Nominal,
+    RigidRates,
     dot,
     flat_times,
     in_world,
@@ -44,13 +44,13 @@ class Last:
     """The time point before a block: t, rigid-body motion, each link's g, K0 g, C0 g and `held`; T is one."""
 
     t: Scalars
-    at: Nominal
+    at: RigidRates
     links: Sequence[tuple[Field, Field, Field | None, Field | None]]
 
 
 def resistance(
     of: Sequence[Constants], histories: Sequence[LinkHistory], made: Sequence[Products], turns: Sequence[bool],
-    now: tuple[Scalars, Nominal], before: Last,
+    now: tuple[Scalars, RigidRates], before: Last,
 ) -> Resistance:  # fmt: skip
     """Of damped links over a block, from the time point before it on.
 
@@ -87,7 +87,7 @@ def resistance(
 
 
 def _turning(
-    rows: Float[np.ndarray, "m S T"], arms: Float[np.ndarray, "k k S T"], at: Nominal
+    rows: Float[np.ndarray, "m S T"], arms: Float[np.ndarray, "k k S T"], at: RigidRates
 ) -> tuple[Scalars, Vectors, Vectors]:
     """Drag, impulse and angular impulse of damping forces that turn with the rigid-body motion."""
     y = rows[:-1].reshape(at.rates.shape[1:])
@@ -99,7 +99,7 @@ def _turning(
     return np.asarray(drag), in_world(impulse), in_world(angular)
 
 
-def held(of: Constants, history: LinkHistory, at: Nominal) -> Field | None:
+def held(of: Constants, history: LinkHistory, at: RigidRates) -> Field | None:
     """Of a link with co-rotational frames, the deflection in the rigid-body frame, where α acts; None without."""
     if of.link.fit is None or not of.damping.alpha:
         return None
@@ -108,7 +108,7 @@ def held(of: Constants, history: LinkHistory, at: Nominal) -> Field | None:
 
 
 def last_of(
-    t: Scalars, at: Nominal, of: Sequence[Constants], histories: Sequence[LinkHistory], made: Sequence[Products],
+    t: Scalars, at: RigidRates, of: Sequence[Constants], histories: Sequence[LinkHistory], made: Sequence[Products],
     which: int,
 ) -> Last:  # fmt: skip
     """What the next block needs of one time point of this one."""
@@ -159,7 +159,7 @@ def _change(
     return out
 
 
-def _mean(now: Nominal, before: Nominal) -> Nominal:
+def _mean(now: RigidRates, before: RigidRates) -> RigidRates:
     """Of the two ends of each step."""
     pairs = ((getattr(now, x), getattr(before, x)) for x in ("place", "rates", "omega", "alpha"))
-    return Nominal(*(0.5 * (x + np.concatenate([y, x[..., :-1]], axis=-1)) for x, y in pairs))
+    return RigidRates(*(0.5 * (x + np.concatenate([y, x[..., :-1]], axis=-1)) for x, y in pairs))

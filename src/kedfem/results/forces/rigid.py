@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.force_element import kernel_table
-from kedfem.dynamics.force_elements import rigid_actions
+from kedfem.dynamics.force_elements import rigid_elements
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.inertias import Inertias, acting
 from kedfem.dynamics.joints.places import slider_axis
@@ -27,7 +27,7 @@ Responses = Float[np.ndarray, "T c k"]
 XYZ = ("x", "y", "z")
 OPEN = 1e-9  # of squares: a share that small of what a joint bears is rounding
 ALONG = 1e-6  # sine of an angle between axes that are the same
-FEW = 4  # poses of a linkage of many bodies at which it is seen what statics tell of its joints
+FEW = 4  # poses of a linkage of many bodies at which it is seen what statics determine of its joints
 KEPT = 4000  # time points of a turn whose responses are kept, some kilobytes each
 
 
@@ -36,7 +36,7 @@ class Borne:
     """A channel of what a joint or drive bears.
 
     which : 0 force, 1 moment, 2 effort of the drive
-    body, at : the body that it acts on, and the point that moments are about, as drawn [m]
+    body, at : the body that it acts on, and the point that moments are about, in the reference position [m]
     project : (c, 3) from world components to columns of a force or moment; what statics leave open is not in them
     """
 
@@ -52,7 +52,7 @@ class Borne:
 class RigidForces:
     """Rigid inverse dynamics of a scene; worked out once for each motion.
 
-    actions : motors and springs, which are loads of given motion
+    force_elements : motors and springs, which are loads of given motion
     turn : time steps after which all poses return; 0 if they do not
     """
 
@@ -60,7 +60,7 @@ class RigidForces:
     linkage: Linkage
     inertias: Inertias
     every: tuple[Borne, ...]
-    actions: Measured
+    force_elements: Measured
     turn: int = 0
     _motion: RigidMotion | None = None
     _rows: dict[str, Rows] = field(default_factory=dict)
@@ -76,7 +76,7 @@ class RigidForces:
         if motion is not self._motion:
             force, moment = acting(self.inertias, motion)
             centre = motion.p + motion.R @ self.inertias.centre
-            for end, f, m in self.actions.wrenches(Block(step or 0, motion, [])):
+            for end, f, m in self.force_elements.wrenches(Block(step or 0, motion, [])):
                 force[:, end.body] += f
                 moment[:, end.body] += m - cross(centre[:, end.body], f)
             wrench = np.concatenate([force, moment], axis=2)[:, 1:]
@@ -138,7 +138,7 @@ class RigidForces:
 def rigid_forces(
     scene: Scene, linkage: Linkage, inertias: Inertias, along: Path | None = None
 ) -> RigidForces:
-    """What can be told of a driven scene: its drives, and with a path all joints; nothing where links move freely too.
+    """What can be determined of a driven scene: drives, and with a path all joints; nothing where links move freely too.
 
     A free motion is held in the rigid linkage, by what no link has there.
     """
@@ -148,7 +148,7 @@ def rigid_forces(
             found = reactions(linkage, _on_grid(linkage, along))
             every += [x for name in scene.joints for x in _joint(scene, linkage, found, name)]
         every += [_drive(scene, linkage, name) for name in scene.driven_joints]
-    acted = rigid_actions(scene, linkage.bodies)
+    acted = rigid_elements(scene, linkage.bodies)
     measured = Measured(acted, kernel_table(acted))
     return RigidForces(scene, linkage, inertias, tuple(every), measured, returning(scene, along))
 
@@ -182,24 +182,24 @@ def _joint(scene: Scene, linkage: Linkage, found: Reactions | BlockReactions, na
     other = next(each for each in joint.links if each != link)
     body, at = linkage.bodies.index(link), np.asarray(joint.at)
     label = f"of joint {name} on link {link} from {other} were all links rigid"
-    about = f"moment {label}, about the joint's nominal point"
+    about = f"moment {label}, about the joint's point of the rigid-body motion"
     sums = [found.open_directions(each) for each in found.on(name, body, at)]
     squares = (linkage.size**2, 1.0)  # forces count by the moments that they may make
     shares = [[x * square for x in each] for each, square in zip(sums, squares, strict=True)]
     largest = max(*(float(np.trace(borne)) for _, borne in shares), np.finfo(float).tiny)
     out = []
     for which, (what, text, unit) in enumerate((("force", f"force {label}", "N"), ("moment", about, "N m"))):
-        columns, project, left = told(*(x / largest for x in shares[which]))
+        columns, project, left = determined(*(x / largest for x in shares[which]))
         if columns:
             channel = Channel(f"joints/{name}/rigid_{what}", columns, unit, "world", text + left)
             out.append(Borne(channel, name, which, body, at, project))
     return out
 
 
-def told(
+def determined(
     loose: Float[np.ndarray, "3 3"], borne: Float[np.ndarray, "3 3"]
 ) -> tuple[tuple[str, ...], Float[np.ndarray, "c 3"], str]:
-    """Columns of a joint's force that statics tell, from world components, and in words what they leave out.
+    """Columns of a joint's force that statics determine, from world components, and in words what they leave out.
 
     Parameters
     ----------

@@ -19,10 +19,10 @@ from kedfem.links.reduced import rigid_modes
 
 EXACT = 1e-6  # of a link's highest stress: what may be missing of an envelope
 NOTHING = 1e-13  # of a link's displacement: rounding, which no mode is made for
-DECADES = 1e-4  # of the largest: singular values that one look at a Gram matrix tells
+DECADES = 1e-4  # of the largest: singular values that one look at a Gram matrix shows
 SOME = 64  # steps of which new modes are made at a time
 SAMPLE = 1000  # points at which the stress of a mode is judged
-WAITING = 192_000_000  # bytes of histories, at most, that are looked at together
+WAITING = 192_000_000  # bytes of histories, at most, that are examined together
 STEPS = 2048  # and steps
 HEAD = 1e-3  # of the largest: coordinates below, by what they make of stress, are bounded before they are summed up
 VON_MISES, LARGEST, SMALLEST = range(3)
@@ -129,7 +129,7 @@ class Envelope:
     since : time [s] before which stresses do not count
     kept_since : time [s] from which on the coordinates of all modes are kept; none if not given
     worst : the instant of the highest stress so far
-    looked, evaluated : stresses at a point and a time that were looked at, and that all modes were summed up for
+    looked, evaluated : stresses at a point and a time that were examined, and that all modes were summed up for
     """
 
     model: Model
@@ -169,7 +169,7 @@ class Envelope:
 
     @property
     def waits(self) -> bool:
-        """Whether there are blocks that were not looked at."""
+        """Whether there are blocks that were not examined."""
         return bool(self._waiting)
 
     def flush(self) -> None:
@@ -215,7 +215,7 @@ class Envelope:
         """What was found, per link or segment, then per prescribed rigid link; at the links' own points."""
         self.flush()
         out = []
-        names = [*self.model.links, *(carried.link for carried in self.model.carried)]
+        names = [*self.model.links, *(prescribed.link for prescribed in self.model.prescribed)]
         for i, (link, recovery) in enumerate(zip(names, self.recoveries, strict=True)):
             points = recovery.points
             if i >= len(self._modes) or self._modes[i] is None:
@@ -241,7 +241,7 @@ class Envelope:
         return Kept(modes.parts, self.when()[0, steps], C)
 
     def when(self) -> Float[np.ndarray, "2 T"]:
-        """Time [s] and position of the drive at every step that was looked at."""
+        """Time [s] and position of the drive at every step that was examined."""
         return np.concatenate(self._when, axis=1) if self._when else np.zeros((2, 0))
 
 

@@ -10,7 +10,7 @@ highest, at (3, p) : von Mises, largest principal, minus the smallest principal 
 
 The three are convex in the stress. So within a window they are no larger than at its ends but for what the residual adds,
 component by component: windows that cannot hold an extreme are skipped, others halved. At an instant the head and, by
-Cauchy and Schwarz, a bound of the rest mostly tell that there is no extreme; all modes are summed up where they do not.
+Cauchy and Schwarz, a bound of the rest mostly show that there is no extreme; all modes are summed up where they do not.
 """
 
 import numpy as np
@@ -171,7 +171,7 @@ def sizes_of(heads, parts, i, size):  # type: ignore[no-untyped-def]
 
 @compiled
 def enveloped(heads, parts, C, rest, residuals, first, highest, at):  # type: ignore[no-untyped-def] # noqa: PLR0913, PLR0917
-    """Extremes of all points over more steps; returns how many stresses were looked at, how many with all modes."""
+    """Extremes of all points over more steps; returns how many stresses were examined, how many with all modes."""
     T = len(C)
     (p, m, _), width = heads.shape, 1 << LEVELS
     anchors = (T - 2) // width + 2 if T > 1 else 1

@@ -66,5 +66,5 @@ def places_apart(points: Float[np.ndarray, "p 3"], values: Float[np.ndarray, " p
 
 
 def drawn_points(recovery: StressRecovery) -> Float[np.ndarray, "p 3"]:
-    """Where the points of a link are, as drawn [m]."""
+    """Where the points of a link are, in the reference position [m]."""
     return np.asarray(recovery.at_points((recovery.link.full or recovery.link).X))

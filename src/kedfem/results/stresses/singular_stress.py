@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.joints.places import on_part, part_seat
+from kedfem.dynamics.joints.places import on_part, part_surface
 from kedfem.dynamics.model import Model, link_keys
 from kedfem.errors import KedfemError
 from kedfem.links.point_rows import point_rows
@@ -34,10 +34,10 @@ def doubtful(scene: Scene, model: Model, recoveries: Sequence[StressRecovery]) -
                 if joint.stiff(of) != stiff:
                     continue
                 try:
-                    key, seat = part_seat(scene, name, full, of)
+                    key, surface = part_surface(scene, name, full, of)
                 except KedfemError:  # the line of a slot
                     continue
-                on = np.abs(seat.fit[0]) > 0
+                on = np.abs(surface.fit[0]) > 0
                 link = full[key]
                 what = f"the {'rigid coupling' if stiff else 'surface'} of joint {name}"
                 words[int(key)][around(link, link.X[on]) if stiff else on] = what

@@ -63,7 +63,7 @@ class Refusal:
 
 
 SLOTS = Refusal("joints", {"joint": ("slot",), "frames": ("co-rotational",)}, "{where}.kind",
-    'be another than slot with frames = "co-rotational"', "the pin of a slot slides as the rigid-body motion tells",
+    'be another than slot with frames = "co-rotational"', "the pin of a slot slides as the rigid-body motion shows",
     "a slot", 'take frames = "rigid-body", or a slide with a hinge')  # fmt: skip
 SLIDERS = Refusal("model", {"enforced": (CONSTRAINED,), "link": ("slider",)}, "{where}.links",
     "join links with a shape by a {kind} joint that moves with both", "it is a point mass on another link",

@@ -21,8 +21,8 @@ Told = tuple[str, Facts, Where, Mapping[str, str]]
 def combination_faults(parts: Parts) -> Iterator[Fault]:
     """All combinations of the scene that the table of capabilities refuses."""
     common = common_facts(parts)
-    for told in (joints, drives, gears, elements, analysis, fatigue, links, loads):
-        for of, facts, where, words in told(parts):
+    for reported in (joints, drives, gears, elements, analysis, fatigue, links, loads):
+        for of, facts, where, words in reported(parts):
             for refusal in refusals(of, {**common, **facts}):
                 yield refusal.fault(where, words)
 
@@ -224,7 +224,7 @@ def limited(parts: Parts) -> dict[str, str]:
 
 
 def only(**facts: str) -> dict[str, str]:
-    """Factors of one key of the analysis, beside which those of others were told already."""
+    """Factors of one key of the analysis, beside which those of others were reported already."""
     return {"frames": "", "stiffening": "", "solver": "", **facts}
 
 

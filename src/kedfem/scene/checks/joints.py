@@ -20,7 +20,7 @@ def joint_faults(parts: Parts) -> Iterator[Fault]:
             yield joint.fault("links", "must hold a link, got the ground twice")
         elif len(names) == 2 and names[0] == names[1]:
             yield joint.fault("links", f"must be two different links, got {names[0]!r} twice")
-        yield from seat_faults(joint, parts)
+        yield from surface_faults(joint, parts)
         yield from direction_faults(joint)
     pairs = (
         [link_names(joint) for joint in parts.joints.values()] if parts.driven else []
@@ -60,7 +60,7 @@ def direction_faults(joint: Entry) -> Iterator[Fault]:
         yield joint.fault("lead", "must not be zero [m] (a screw without lead is a revolute joint), got 0")
 
 
-def seat_faults(joint: Entry, parts: Parts) -> Iterator[Fault]:
+def surface_faults(joint: Entry, parts: Parts) -> Iterator[Fault]:
     """Ports and faces of links that the joint does not join, and faces of links that have none."""
     names = link_names(joint)
     for key in ("coupling", "faces"):

@@ -45,7 +45,7 @@ def rigid_faults(link: Entry, parts: Parts) -> Iterator[Fault]:
     slides = slides or link.record is None or link.name in moving_grounds(parts.good)
     if link.has("inertia") or link.has(
         "centre"
-    ):  # a rigid body by numbers, with a fault that its record tells
+    ):  # a rigid body by numbers, with a fault that its record shows
         return
     if link.has("shape"):
         if not link.has("material"):

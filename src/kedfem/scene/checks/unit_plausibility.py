@@ -17,7 +17,7 @@ FAST = (
 
 
 def bare_numbers(raw: Any, hint: Any, where: Where = ()) -> Iterator[str]:
-    """Doubts about numbers without a unit in raw input that was found good; lists of numbers are not looked at.
+    """Doubts about numbers without a unit in raw input that was found good; lists of numbers are not examined.
 
     Parameters
     ----------

@@ -22,5 +22,5 @@ def corotational_links(scene: Scene) -> frozenset[str]:
 
 
 def corotational(scene: Scene) -> bool:
-    """Whether any link's frames follow its own motion: the equation is then not linear."""
+    """Whether any link has co-rotational frames: the equation is then not linear."""
     return bool(corotational_links(scene))

@@ -1,6 +1,6 @@
 """Which beams are planar: those that nothing in the scene moves out of a plane z = constant.
 
-What moves one out of it is told as faults, each with its place, as a beam may be said to be planar.
+What moves one out of it is reported as faults, each with its place, as a beam may be said to be planar.
 """
 
 from __future__ import annotations

@@ -66,7 +66,7 @@ def read_keys(path: Path, *, within: bool = False) -> tuple[dict[str, Any], str]
 
 
 def link_from(raw: Mapping[str, Any]) -> LinkScene:
-    """A solid link on its own, to be meshed; its faults are told by its keys, e.g. ``mesh.size``.
+    """A solid link on its own, to be meshed; its faults are reported by its keys, e.g. ``mesh.size``.
 
     Raises
     ------

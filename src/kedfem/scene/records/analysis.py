@@ -170,7 +170,7 @@ class Output(Record):
     picture: StrictBool = True
     """whether the frame with the worst stress is drawn"""
     report: StrictBool = False
-    """whether all is told in one page for a browser, `report.html`; needs `pip install 'kedfem[report]'`"""
+    """whether all is reported in one page for a browser, `report.html`; needs `pip install 'kedfem[report]'`"""
     animation: Annotated[Animation | None, BeforeValidator(animation_or_none)] = Animation()
     """frames for ParaView; `animation = false` for none"""
     probes: dict[Name, Probe] = Field(default_factory=dict)

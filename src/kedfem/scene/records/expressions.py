@@ -124,8 +124,10 @@ class _Source:
         except ValueError:
             return False
         if name[0] in self.known:
-            said = f"'{unit}{more[1]}{name[0]}' may mean the unit {name[0]!r} or the parameter of that name"
-            raise ValueError(f"{said}; write ({name[0]}) for the parameter, or give it another name")
+            message = (
+                f"'{unit}{more[1]}{name[0]}' may mean the unit {name[0]!r} or the parameter of that name"
+            )
+            raise ValueError(f"{message}; write ({name[0]}) for the parameter, or give it another name")
         return True
 
 
@@ -168,12 +170,12 @@ class _Walk:
         if name in FUNCTIONS:
             raise ValueError(f"{name!r} is a function; write {name}(…)")
         if name not in self.known:
-            said = unknown_name("a parameter", name, list(self.known))
+            message = unknown_name("a parameter", name, list(self.known))
             try:
                 unit_of(name)
             except ValueError:
-                raise ValueError(said) from None
-            raise ValueError(f"{said}; a unit follows its number: 1 {name}")
+                raise ValueError(message) from None
+            raise ValueError(f"{message}; a unit follows its number: 1 {name}")
         return self.known[name]
 
     def _combined(self, op: type[ast.AST], a: Any, b: Any) -> Any:

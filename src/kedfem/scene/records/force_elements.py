@@ -147,7 +147,7 @@ class LineSpring(_Elastic):
     """with what it pulls in the reference position, instead of l0; negative: it pushes"""
     force: PullOver | None = None
     """F: a pull beside these, or instead: a number, or a curve over the length (of a gas spring, a stop of rubber), over
-    the speed (of a damper) or over time (of a cylinder that is told its force): `{ over = "speed", at = [...], value =
+    the speed (of a damper) or over time (of a cylinder whose force is given): `{ over = "speed", at = [...], value =
     [...] }`"""
 
     @model_validator(mode="after")

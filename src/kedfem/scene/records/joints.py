@@ -45,7 +45,7 @@ TurningDampers = Annotated[
 
 
 class Bushing(Record):
-    """What a joint holds, held by springs and dampers; what it leaves free stays free.
+    """What a joint holds, held by springs and dampers; what it releases stays free.
 
     One number for all directions, or three along the axes x, y, z of the joint. z is its `axis`; x is at right angles to
     z and to that world axis which is farthest from it in the reference position (of equals the first), y at right angles

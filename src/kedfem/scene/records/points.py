@@ -24,8 +24,8 @@ from kedfem.scene.records.wording import nearest, shown, unknown_name
 XYZ = tuple[float, float, float]
 AXES: dict[str, XYZ] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 MARKS = {"from", "between", "along", "distances"}
-"""Keys that tell one construction of a point from others."""
-FARTHEST = 1e100  # m: squares of distances can still be told
+"""Keys that distinguish one construction of a point from others."""
+FARTHEST = 1e100  # m: squares of distances can still be formed
 UNIT = (
     1e-15  # a vector whose length is so near one is a unit vector, and stays as it is when it is read again
 )

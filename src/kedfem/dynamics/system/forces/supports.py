@@ -55,7 +55,7 @@ class Supports:
         return [(ends[0], x_i, 0 * x_i, turn), (ends[1], x_j, 0 * x_j, -turn)]
 
     def point(self, each: Constraint, n: int, at: Float[np.ndarray, "3"]) -> Vectors:
-        """Where a point of the body of end n, as drawn, is as a constraint sees it."""
+        """Where a point of the body of end n, in the reference position, is as a constraint sees it."""
         end = self.of.system.ends[n]
         x, Q = poses(end, self.motion, np.zeros_like(self.z) if each.linear else self.z)
         return np.asarray(x + Q @ (at - end.origin))
@@ -63,20 +63,20 @@ class Supports:
     def on_interface(self, rows: Sequence[ConstraintJoint]) -> Float[np.ndarray, "T m"]:
         """What rows of the model exert on interface points of their own, side by side as `coupling` has them.
 
-        Both joints of gears may have one end: what is exerted there is told once.
+        Both joints of gears may have one end: what is exerted there is reported once.
         """
         out = [np.zeros((len(self.z), 0))]
         for row in rows:
-            told: list[End] = []
+            seen: list[End] = []
             for joint in (row, *(other for _, other in row.plus)):
                 for side in joint.sides:
                     if side is not None and side.shared:
                         ends = corners(side) if row.name.startswith("rigid.") else [end_of(side, joint)]
                         for end in ends:
-                            again = any(same_end(end, other) for other in told)
+                            again = any(same_end(end, other) for other in seen)
                             on = self.on_end(row.name, end)
                             out.append((0.0 * on if again else on).reshape(len(self.z), -1))
-                        told += ends
+                        seen += ends
         return np.concatenate(out, axis=1)
 
     def on_end(self, name: str, end: End) -> Float[np.ndarray, "T p d"]:

@@ -1,9 +1,10 @@
 """Loads that turn with bodies whose frames are their own: where a load acts, two directions of the body show how.
 
-They are y_m = R e_m + Σ_a w_ma u_a, e_m as drawn: of a beam in space the section's directions where the load is, of other
+They are y_m = R e_m + Σ_a w_ma u_a, e_m in the reference position: of a beam in space the section's directions where the
+load is, of other
 bodies those of the mean deformation, linear in u. With a = y_1/|y_1|, n = a × y_2/|a × y_2| and G = (a, n × a, n), the
-nodal forces are p G G0ᵀ, G0 as drawn; of a planar beam they turn by ψ where the load is. A torque fixed in the world is
-three loads, the couples about the body's axes e_k, times m · G G0ᵀ e_k.
+nodal forces are p G G0ᵀ, G0 in the reference position; of a planar beam they turn by ψ where the load is. A torque fixed
+in the world is three loads, the couples about the body's axes e_k, times m · G G0ᵀ e_k.
 """
 
 from collections.abc import Sequence
@@ -91,7 +92,7 @@ def axes(y: Float[np.ndarray, "T 2 3"]) -> Float[np.ndarray, "T 3 3"]:
 
 
 def shown_by(link: Link, forces: Float[np.ndarray, "n d"]) -> Shown:
-    """Directions as drawn, and weights of the link's functions on what they move by.
+    """Directions in the reference position, and weights of the link's functions on what they move by.
 
     Raises
     ------

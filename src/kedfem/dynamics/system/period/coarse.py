@@ -46,7 +46,7 @@ class Coarse:
         return self._answer(r, LATER)
 
     def start(self, r: Flat) -> Flat:
-        """The same, as closely as reduced links tell."""
+        """The same, as closely as reduced links show."""
         return self._answer(r, START)
 
     def _answer(self, r: Flat, left: float) -> Flat:

@@ -18,7 +18,7 @@ Nearer = Callable[[Flat], Flat]
 
 @dataclass(frozen=True, slots=True)
 class Watched:
-    """The map, told about."""
+    """The map, reported about."""
 
     map: PeriodMap
     watch: Watch

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.nominal import forcings
+from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.system.arrays import ends_of
 from kedfem.dynamics.system.march import Ready, march
 from kedfem.dynamics.system.starts.instant import TURN, Flat, Instant, Motion, turned
@@ -170,7 +170,7 @@ class PeriodMap:
                 self._weights[name] = HIDDEN * energy / most
 
     def products(self, basis: Sequence[Flat], x: Flat) -> Flat:
-        """u K u₁ + ω² u M u₁ + v M v₁ of vectors with another, and what is `weighed` [J]; links are as stiff as drawn."""
+        """u K u₁ + ω² u M u₁ + v M v₁ of vectors with another, and what is `weighed` [J]; links are undeformed."""
         dual = self._energy(x)
         dual += [(self._at[name], weight * x[self._at[name]]) for name, weight in self._weights.items()]
         return np.array([sum(y[here] @ each for here, each in dual) for y in basis])

@@ -127,7 +127,7 @@ def own_spin(
 ) -> Float[np.ndarray, "3 3"]:
     """[ω]× of the rigid motion nearest to rates of a body: the skew part of their gradient."""
     k = 2 if link.planar else 3
-    if link.kind == "beam":  # its axis alone does not tell
+    if link.kind == "beam":  # its axis alone does not determine it
         return cross_matrix(np.array([0.0, 0.0, link.one @ v[:, 2] / (link.one @ link.one)]))
     X = (link.X @ R.T)[:, :k]
     basis = np.column_stack([link.one, X])

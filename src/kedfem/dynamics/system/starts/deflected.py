@@ -26,7 +26,7 @@ from kedfem.dynamics.system.state import State
 from kedfem.errors import SolveError
 from kedfem.motion.newton import cross_matrix
 
-SWEEPS = 60
+ITERATIONS = 60
 DAMPED = 8  # times that rates of a deflection are found anew where dampers feel them
 DIRECT = (
     2  # iterations of a linear system of dense bodies before its matrix gets rid of what makes it definite
@@ -219,7 +219,7 @@ def _balanced(
     of, mixing, bodies, settled, last = now.of, Mixing(), TurningBodies(now, spins), False, np.inf
     linear, slow = of.c.single, 0
     exact = linear and any(bodies.sparse)
-    for n in range(SWEEPS):
+    for n in range(ITERATIONS):
         exact = exact or (linear and n >= DIRECT)
         f, R = bodies.still.forces(now.motion.R[0], u, now.amounts)
         r = now.F - f + more(u, f) - bodies.inertia(u)

@@ -7,7 +7,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
-from kedfem.dynamics.frames import Followed, frames_of, seen_from
+from kedfem.dynamics.frames import Deformed, frames_of, seen_from
 from kedfem.dynamics.matrices.dense import component_first, coordinates, rows_of, work_on
 from kedfem.dynamics.segment import internal_force, mean_orientation, position
 from kedfem.dynamics.stepping.state import Nodal
@@ -97,7 +97,7 @@ class Inside:
 
     f: Flat
     R: Float[np.ndarray, "3 3"]
-    frames: list[Followed]
+    frames: list[Deformed]
     damped: Float[np.ndarray, "3 n d"]
     g: Nodal
     energy: float
@@ -115,7 +115,7 @@ def own(of: Ready, k: int) -> slice:
 
 
 def drawn(link: Link) -> Nodal:
-    """Position of a body as drawn; ψ of a planar beam has none."""
+    """Position of a body in the reference position; ψ of a planar beam has none."""
     return position(link, np.zeros((link.n, link.d)))
 
 

@@ -169,7 +169,7 @@ def pose(end: End, at: Places, z: Series) -> tuple[Series, Series]:
 
 
 def _at_pin(end: End, line: Line, at: Places, u: Series) -> Series:
-    """Displacement (3, 1, d) where a pin is on a line, from those of its stations; rigid-body motion tells where that
+    """Displacement (3, 1, d) where a pin is on a line, from those of its stations; rigid-body motion shows where that
     is."""
     apart = at.p[:, line.pin] + at.R[:, line.pin] @ line.at - at.p[:, end.body]
     s = product(np.dot, apart, at.R[:, end.body] @ line.axis)

@@ -18,7 +18,12 @@ from kedfem.links.reduced import reduced, rigid_functions
 from kedfem.links.segments import segmented
 from kedfem.links.solid import solid_link
 from kedfem.links.surfaces.candidates import candidates
-from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, face_seat, joint_seat, surface_weights
+from kedfem.links.surfaces.coupling_surfaces import (
+    CouplingSurface,
+    face_surface,
+    joint_surface,
+    surface_weights,
+)
 from kedfem.links.surfaces.round_surfaces import rounds
 from kedfem.mesh import SolidMesh
 from kedfem.motion.linkage import linkage
@@ -52,8 +57,8 @@ PLATE = {
 @pytest.mark.parametrize("layers", [1, 2, 3])
 def test_a_bore_is_found_whole_with_or_without_an_axis(layers: int) -> None:
     link = link_of(PLATE, elements_across=1, layers=layers)
-    with_axis = joint_seat(link, "joints.A", np.zeros(3), np.array([0.0, 0, 1]))
-    without = joint_seat(link, "joints.A", np.zeros(3), None)
+    with_axis = joint_surface(link, "joints.A", np.zeros(3), np.array([0.0, 0, 1]))
+    without = joint_surface(link, "joints.A", np.zeros(3), None)
     assert set(without.facets) == set(with_axis.facets)
     assert_allclose(
         with_axis.origin, 0, atol=1e-7
@@ -66,22 +71,22 @@ def test_a_bore_far_along_its_axis_is_not_the_joints() -> None:
     with pytest.raises(
         KedfemError, match=r"^joints.A: must sit on a bore or a flat face of link 'part' at \(0, 0, 0\)"
     ):
-        joint_seat(link, "joints.A", np.zeros(3), np.array([0.0, 0, 1]))
+        joint_surface(link, "joints.A", np.zeros(3), np.array([0.0, 0, 1]))
 
 
-def test_a_flat_seat_is_one_face_not_all_in_its_plane() -> None:
+def test_a_flat_coupling_surface_is_one_face_not_all_in_its_plane() -> None:
     """A U with two feet in one plane: the joint's foot alone carries it."""
     u = [[0, 0], [0.02, 0], [0.02, 0.08], [0.08, 0.08], [0.08, 0], [0.1, 0], [0.1, 0.1], [0, 0.1]]
     link = link_of({"kind": "extrusion", "thickness": 0.02, "outline": u}, size=0.02)
-    seat = face_seat(link, "loads.push.at", np.array([0.01, 0, 0]))
-    assert_allclose(seat.origin, [0.01, 0, 0], atol=1e-9)
+    surface = face_surface(link, "loads.push.at", np.array([0.01, 0, 0]))
+    assert_allclose(surface.origin, [0.01, 0, 0], atol=1e-9)
 
 
 def test_the_middle_of_a_block_is_no_ball_seat() -> None:
     block = [[0, 0], [0.1, 0], [0.1, 0.1], [0, 0.1]]
     link = link_of({"kind": "extrusion", "thickness": 0.1, "outline": block}, size=0.1)
     with pytest.raises(KedfemError, match="must sit on"):
-        joint_seat(link, "joints.A", np.array([0.05, 0.05, 0]), None)
+        joint_surface(link, "joints.A", np.array([0.05, 0.05, 0]), None)
 
 
 def test_a_body_is_carried_by_its_own_links_hinge() -> None:
@@ -115,7 +120,7 @@ def test_a_node_of_a_domed_face_stands_for_the_whole_face(kind: str) -> None:
     link = bare_links(scene_from(raw))["part"]
     top = np.array([0.105, 0.03, 0.0])
     assert np.linalg.norm(link.X - top, axis=1).min() < 1e-9
-    area = surface_weights(link, face_seat(link, "loads.push.at", top)).sum()
+    area = surface_weights(link, face_surface(link, "loads.push.at", top)).sum()
     # an arc of chord 0.06 and height 0.005: r = 0.0925, half angle arcsin(0.03 / r)
     assert_allclose(area, 2 * 0.0925 * np.arcsin(0.03 / 0.0925) * 0.02, rtol=1e-6)
 
@@ -134,9 +139,9 @@ def test_a_bars_end_is_held_as_a_whole_however_many_elements_it_has(across: int,
     }  # fmt: skip
     link = bare_link(scene_from(raw), "bar")
     for point in (np.zeros(3), end):
-        seat = joint_seat(link, "joints.A", point, np.array([0.0, 0.0, 1.0]))
-        assert seat.facets is not None
-        assert len(seat.facets) == across
+        surface = joint_surface(link, "joints.A", point, np.array([0.0, 0.0, 1.0]))
+        assert surface.facets is not None
+        assert len(surface.facets) == across
 
 
 # -- what a joint finds -------------------------------------------------------------------------------------
@@ -151,13 +156,13 @@ def made(mesh: SolidMesh, motion: Motion | None = None) -> Link:
     return solid_link("part", mesh if motion is None else rotated(mesh, motion), MATERIAL, np.eye(3))
 
 
-def seat_at(link: Link, z: float, faces: Sequence[str] = ()) -> CouplingSurface:
-    return joint_seat(link, "joints.A", np.array([0.0, 0.0, z]), Z, faces)
+def surface_at(link: Link, z: float, faces: Sequence[str] = ()) -> CouplingSurface:
+    return joint_surface(link, "joints.A", np.array([0.0, 0.0, z]), Z, faces)
 
 
 def refusal(link: Link, at: Sequence[float], axis: np.ndarray | None = Z, faces: Sequence[str] = ()) -> str:
     with pytest.raises(MeshError) as found:
-        joint_seat(link, "joints.A", np.array(at, dtype=float), axis, faces)
+        joint_surface(link, "joints.A", np.array(at, dtype=float), axis, faces)
     return str(found.value)
 
 
@@ -169,26 +174,26 @@ def refusal(link: Link, at: Sequence[float], axis: np.ndarray | None = Z, faces:
 def test_a_shaft_is_held_by_the_journal_that_the_joint_is_in_or_next_to(
     nodes: int, z: float, radius: float, middle: float
 ) -> None:
-    seat = seat_at(made(turned(SHAFT, nodes)), z)
-    assert_allclose(seat.origin, [0, 0, middle], atol=1e-7)
+    surface = surface_at(made(turned(SHAFT, nodes)), z)
+    assert_allclose(surface.origin, [0, 0, middle], atol=1e-7)
     # of a circle r/√2, of the 16-gon of hex8 r √((2 + cos 22.5°)/6)
     wanted = {8: np.sqrt((2 + np.cos(np.pi / 8)) / 6)}.get(nodes, np.sqrt(0.5)) * radius
-    assert_allclose(seat.spread[:2], wanted, rtol=2e-3)  # its sides are not quite equal
+    assert_allclose(surface.spread[:2], wanted, rtol=2e-3)  # its sides are not quite equal
 
 
 @pytest.mark.parametrize("z", [0.0, 0.0075, 0.012])
 def test_a_clevis_is_held_by_both_its_lugs_and_not_by_what_is_between(z: float) -> None:
-    seat = seat_at(made(turned(CLEVIS)), z)
-    assert_allclose(seat.origin, [0, 0, 0.0075], atol=1e-7)
+    surface = surface_at(made(turned(CLEVIS)), z)
+    assert_allclose(surface.origin, [0, 0, 0.0075], atol=1e-7)
     # uniform over 15 mm without the middle third
-    assert_allclose(seat.spread[0], 0.015 * np.sqrt((1 - 1 / 27) / (1 - 1 / 3) / 12), rtol=1e-6)
+    assert_allclose(surface.spread[0], 0.015 * np.sqrt((1 - 1 / 27) / (1 - 1 / 3) / 12), rtol=1e-6)
 
 
 def test_a_stepped_bore_is_held_where_the_joint_is_and_nowhere_on_the_step() -> None:
     link = made(turned(STEPPED))
-    assert_allclose(seat_at(link, 0.003).origin[2], 0.005, atol=1e-7)
-    assert_allclose(seat_at(link, 0.012).origin[2], 0.0125, atol=1e-7)
-    assert_allclose(seat_at(link, 0.016).origin[2], 0.0125, atol=1e-7)
+    assert_allclose(surface_at(link, 0.003).origin[2], 0.005, atol=1e-7)
+    assert_allclose(surface_at(link, 0.012).origin[2], 0.0125, atol=1e-7)
+    assert_allclose(surface_at(link, 0.016).origin[2], 0.0125, atol=1e-7)
     assert refusal(link, [0, 0, 0.01]) == (
         "joints.A: must sit on one bore or journal of link 'part' at (0, 0, 0.01), got 2 that are as near: "
         "bore of radius 5 mm, -10 mm to 0 mm along it, bore of radius 9 mm, 0 mm to 5 mm along it; "
@@ -199,15 +204,15 @@ def test_a_stepped_bore_is_held_where_the_joint_is_and_nowhere_on_the_step() -> 
 def test_the_narrowest_of_bores_within_each_other_is_held() -> None:
     """A wheel: its hub's bore, not the inside of its rim, which is about the axis too."""
     wheel = [(0.0, 0.01, 0.005, 0.01), (0.0, 0.004, 0.01, 0.02), (0.0, 0.01, 0.02, 0.025)]
-    seat = seat_at(made(turned(wheel)), 0.007)
-    assert_allclose(seat.spread[2], 0.01 / np.sqrt(12), rtol=1e-6)
-    assert_allclose(seat.spread[0], 0.005 / np.sqrt(2), rtol=1e-3)
+    surface = surface_at(made(turned(wheel)), 0.007)
+    assert_allclose(surface.spread[2], 0.01 / np.sqrt(12), rtol=1e-6)
+    assert_allclose(surface.spread[0], 0.005 / np.sqrt(2), rtol=1e-3)
 
 
 def test_a_face_at_a_shafts_end_is_held_by_joints_without_an_axis() -> None:
     link = made(turned(SHAFT))
-    assert joint_seat(link, "joints.A", np.zeros(3), None).spread[2] == 0.0
-    assert joint_seat(link, "joints.A", np.array([0, 0, 0.005]), None).spread[2] > 0
+    assert joint_surface(link, "joints.A", np.zeros(3), None).spread[2] == 0.0
+    assert joint_surface(link, "joints.A", np.array([0, 0, 0.005]), None).spread[2] > 0
 
 
 @pytest.mark.parametrize("nodes", [8, 10, 20, 27])
@@ -216,10 +221,10 @@ def test_a_ball_with_a_neck_and_an_open_seat_are_held_about_their_centres(
     nodes: int, mesh: Callable[[float, int], SolidMesh], sides: int
 ) -> None:
     link = made(mesh(0.01, nodes))
-    seat = joint_seat(link, "joints.A", np.zeros(3), None)
-    assert seat.facets is not None
-    assert len(seat.facets) == (2 * sides if nodes == 10 else sides)
-    assert_allclose(np.linalg.norm(seat.origin + 0), abs(seat.origin[0]), atol=1e-6)
+    surface = joint_surface(link, "joints.A", np.zeros(3), None)
+    assert surface.facets is not None
+    assert len(surface.facets) == (2 * sides if nodes == 10 else sides)
+    assert_allclose(np.linalg.norm(surface.origin + 0), abs(surface.origin[0]), atol=1e-6)
 
 
 @LAW
@@ -227,8 +232,8 @@ def test_a_ball_with_a_neck_and_an_open_seat_are_held_about_their_centres(
 def test_a_bore_in_any_direction_is_found_without_its_axis(motion: Motion) -> None:
     link = made(turned(STEPPED), motion)
     middle = motion.moved(np.array([[0.0, 0.0, 0.005]]))[0]
-    seat = joint_seat(link, "joints.A", middle, None)
-    assert_allclose(seat.origin, middle, atol=1e-6)
+    surface = joint_surface(link, "joints.A", middle, None)
+    assert_allclose(surface.origin, middle, atol=1e-6)
 
 
 # -- faces by name ------------------------------------------------------------------------------------------
@@ -243,17 +248,17 @@ def with_names(nodes: int = 20) -> SolidMesh:
 
 
 @pytest.mark.parametrize("nodes", [8, 10, 20, 27])
-def test_faces_that_are_named_make_the_seat_wherever_the_joint_is(nodes: int) -> None:
+def test_faces_that_are_named_make_the_coupling_surface_wherever_the_joint_is(nodes: int) -> None:
     link = made(with_names(nodes))
-    assert_allclose(seat_at(link, 0.0, ["wide"]).origin, [0, 0, 0.0125], atol=1e-7)
-    narrow, both = seat_at(link, 0.5, ["narrow"]), seat_at(link, 0.0, ["narrow", "wide"])
-    assert_allclose(narrow.origin, seat_at(link, 0.003).origin, atol=1e-12)
+    assert_allclose(surface_at(link, 0.0, ["wide"]).origin, [0, 0, 0.0125], atol=1e-7)
+    narrow, both = surface_at(link, 0.5, ["narrow"]), surface_at(link, 0.0, ["narrow", "wide"])
+    assert_allclose(narrow.origin, surface_at(link, 0.003).origin, atol=1e-12)
     assert both.facets is not None
     assert len(both.facets) == (64 if nodes == 10 else 32)
     Q = np.column_stack([rigid_functions(link), np.sin(90 * link.X[:, 0])])
     small = reduced(link, Q)
     assert_allclose(
-        seat_at(small, 0.5, ["narrow"]).fit, narrow.fit @ small.Q, atol=1e-9 * np.abs(narrow.fit).max()
+        surface_at(small, 0.5, ["narrow"]).fit, narrow.fit @ small.Q, atol=1e-9 * np.abs(narrow.fit).max()
     )
 
 
@@ -265,7 +270,7 @@ def test_segments_keep_the_names_of_their_faces() -> None:
     assert [[face.face.name for face in part.faces] for part in cut.parts] == [["narrow", "wide"]] * 2
     assert np.sum(there, axis=0).tolist() == [16, 16]
     low, high = cut.parts
-    assert_allclose(seat_at(high, 0, ["wide"]).origin, [0, 0, 0.0125], atol=1e-7)
+    assert_allclose(surface_at(high, 0, ["wide"]).origin, [0, 0, 0.0125], atol=1e-7)
     assert "have elements, got 'wide'" in refusal(low, [0, 0, 0], faces=["wide"])
 
 
@@ -309,7 +314,7 @@ def test_faces_are_found_however_nodes_are_numbered() -> None:
     faces = tuple(replace(face, sides=order[face.sides]) for face in mesh.faces)
     link = made(SolidMesh(points, order[mesh.cells], faces))
     assert [len(face.facets) for face in link.faces] == [16, 16]
-    assert_allclose(seat_at(link, 0.0, ["wide"]).origin, [0, 0, 0.0125], atol=1e-7)
+    assert_allclose(surface_at(link, 0.0, ["wide"]).origin, [0, 0, 0.0125], atol=1e-7)
 
 
 # -- what is said where there is none -----------------------------------------------------------------------
@@ -386,7 +391,7 @@ def test_a_bore_with_rounded_mouths_is_told_by_its_cylinder(nodes: int) -> None:
     assert_allclose(np.abs(bore.direction), Z, atol=1e-9)
     assert_allclose(bore.length, 0.01, rtol=1e-6)
     assert_allclose(
-        joint_seat(link, "joints.A", np.array([0, 0, 0.007]), None).origin, [0, 0, 0.007], atol=1e-7
+        joint_surface(link, "joints.A", np.array([0, 0, 0.007]), None).origin, [0, 0, 0.007], atol=1e-7
     )
 
 
@@ -395,5 +400,5 @@ def test_candidates_are_as_the_part_was_made(nodes: int) -> None:
     ball = [each for each in candidates(made(ball_on_neck(0.01, nodes))) if each.kind != "plane face"]
     assert [each.kind for each in ball] == ["ball"]
     assert_allclose(ball[0].radius, 0.01, rtol=1e-6)
-    seat = [each for each in candidates(made(ball_seat(0.01, nodes))) if each.kind != "plane face"]
-    assert [(each.kind, round(each.radius, 9)) for each in seat] == [("ball seat", 0.01)]
+    surface = [each for each in candidates(made(ball_seat(0.01, nodes))) if each.kind != "plane face"]
+    assert [(each.kind, round(each.radius, 9)) for each in surface] == [("ball seat", 0.01)]

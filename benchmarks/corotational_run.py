@@ -12,7 +12,7 @@ from benchmarks.scenes import four_bar_of
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.history import Forcing
-from kedfem.dynamics.nominal import forcings, motions
+from kedfem.dynamics.rigid_body import forcings, motions
 from kedfem.dynamics.stepping.first_state import begun, started
 from kedfem.dynamics.stepping.solvers import Steps, steps_of
 from kedfem.dynamics.stepping.transient import transient
@@ -36,14 +36,14 @@ class Ran:
 
     curve : stress on the outer side of the rocker's middle at SAMPLES + 1 times [Pa]
     seconds : processor time of all steps, least of some repeats; rigid motion and loads apart
-    sweeps : of a step
+    iterations : of a step
     factorised : matrices, over all step sizes
     """
 
     curve: Curve
     seconds: float
     unknowns: int
-    sweeps: float
+    iterations: float
     factorised: int
 
 
@@ -72,13 +72,13 @@ def run(scene: Scene, repeats: int) -> Ran:
     blocks = transient(ready.scene, ready.linkage, ready.path, ready.model, solver)
     stress = np.concatenate([rows(block)[:, 0] for block in blocks])
     steps = len(stress) - 1
-    sweeps, factorised = getattr(solver, "sweeps", 0) / steps, solver.factorisations
+    iterations, factorised = getattr(solver, "iterations", 0) / steps, solver.factorisations
     times = [stepping(ready, solver, steps) for _ in range(repeats)]
     return Ran(
         stress[:: steps // SAMPLES],
         min(times, default=float("nan")),
         ready.model.unknowns,
-        sweeps,
+        iterations,
         factorised,
     )
 

@@ -8,14 +8,14 @@ from kedfem.dynamics.system.algebra_kernel import (
     ports_turned,
     product,
 )
-from kedfem.dynamics.system.bodies_kernel import nominal_end, right_hand_side
+from kedfem.dynamics.system.bodies_kernel import right_hand_side, rigid_frame_end
 from kedfem.dynamics.system.constraints_kernel import coordinate
 from kedfem.dynamics.system.ends_kernel import placed
 from kedfem.dynamics.system.interface_kernel import newmark_rate
 
 
 @inner
-def nominal_begin(c, bodies, i, R, F, state, trial, work, solved):  # type: ignore[no-untyped-def]
+def rigid_frame_begin(c, bodies, i, R, F, state, trial, work, solved):  # type: ignore[no-untyped-def]
     """The right-hand side of a body, and what it exerts at its interface points while these are held."""
     first, last, of_ports = bodies.at[i], bodies.at[i + 1], bodies.port_at[i]
     frame_copied(R, trial.Rp[i])
@@ -29,7 +29,7 @@ def nominal_begin(c, bodies, i, R, F, state, trial, work, solved):  # type: igno
 
 
 @inner
-def nominal_finish(c, bodies, i, F, trial, state, history, t, work):  # type: ignore[no-untyped-def]
+def rigid_frame_finish(c, bodies, i, F, trial, state, history, t, work):  # type: ignore[no-untyped-def]
     """The displacement of a body, g = G r + Y w and δ = T g, [KED, eq. (5)], and its end of the step."""
     first, last, of_ports = bodies.at[i], bodies.at[i + 1], bodies.port_at[i]
     q, N = bodies.port_at[i + 1] - of_ports, last - first
@@ -40,7 +40,7 @@ def nominal_finish(c, bodies, i, F, trial, state, history, t, work):  # type: ig
     add_transposed(bodies.Y, bodies.Y_at[i], q, N, trial.w[of_ports:], work.y)
     copied(trial.r[first:last], work.turned[:N])
     add_transposed(bodies.W, bodies.Y_at[i], q, N, trial.force[of_ports:], work.turned)
-    nominal_end(
+    rigid_frame_end(
         c, bodies, i, trial.Rp[i], F, work.y, work.turned, state, history, t, work.room, work.strained
     )
 
@@ -89,9 +89,9 @@ def constraints_end(c, ends, of, driving, t, state, trial, work, history):  # ty
                 e += trial.C[a, m] * trial.z[m]
         else:
             trial.part[:] = 0.0
-            nominal = (driving.R[t], driving.v[t], driving.omega[t])
+            rigid_motion = (driving.R[t], driving.v[t], driving.omega[t])
             e, rate = coordinate(
-                ends, of, a, nominal, trial.moving, trial.turned, trial.part, work.end, work.vectors
+                ends, of, a, rigid_motion, trial.moving, trial.turned, trial.part, work.end, work.vectors
             )
             if of.drive[a] >= 0:
                 e -= driving.drives[t, of.drive[a]]

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.system.blank import empty_history
 from kedfem.dynamics.system.march import Ready, displacements
-from kedfem.dynamics.system.oracle.literal import Literal, Now
+from kedfem.dynamics.system.oracle.monolithic import Monolithic, Now
 from kedfem.dynamics.system.starts.instant import renumbered
 from kedfem.dynamics.system.starts.internal import own
 from kedfem.dynamics.system.state import History, State
@@ -19,7 +19,7 @@ from kedfem.motion.rigid import RigidMotion
 MOST = 600  # unknowns of all links: a step solves with a dense matrix of all of them, some seconds there
 
 
-def oracle(of: Ready) -> Literal:
+def oracle(of: Ready) -> Monolithic:
     """The oracle of a system whose links have rigid-body frames.
 
     Raises
@@ -33,10 +33,12 @@ def oracle(of: Ready) -> Literal:
             f"analysis.solver: the monolithic solver with springs, motors or damped bushings must have links of at most "
             f'{MOST} unknowns in all, since it solves with dense tangents, got {count}: take solver = "condensed"'
         )
-    return Literal(of.system, of.scheme)
+    return Monolithic(of.system, of.scheme)
 
 
-def literal_march(of: Ready, solver: Literal, state: State | Now, motion: RigidMotion) -> tuple[Now, History]:
+def monolithic_march(
+    of: Ready, solver: Monolithic, state: State | Now, motion: RigidMotion
+) -> tuple[Now, History]:
     """All steps to the times of a motion; see `march`.
 
     Raises
@@ -60,7 +62,7 @@ def literal_march(of: Ready, solver: Literal, state: State | Now, motion: RigidM
     return now, history
 
 
-def begun(of: Ready, solver: Literal, state: State, motion: RigidMotion) -> Now:
+def begun(of: Ready, solver: Monolithic, state: State, motion: RigidMotion) -> Now:
     """A state in nodal rows; its frames are rigid-body ones.
 
     Parameters

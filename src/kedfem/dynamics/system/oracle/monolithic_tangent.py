@@ -9,11 +9,11 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.linalg import lu_factor, lu_solve, qr
 
-from kedfem.dynamics.system.oracle.literal_places import force
+from kedfem.dynamics.system.oracle.monolithic_places import force
 from kedfem.motion.rigid import RigidMotion
 
 if TYPE_CHECKING:
-    from kedfem.dynamics.system.oracle.literal import Literal, Now
+    from kedfem.dynamics.system.oracle.monolithic import Monolithic, Now
 
 DIFFERENCE = 1e-6  # of differences for tangents: Newton's method needs no better ones
 REPEATED = 1e-9  # singular values of rows of length one that repeat each other
@@ -23,7 +23,7 @@ Inverse = Callable[[Column], Column]
 """Solutions for right sides."""
 
 
-def tangent(of: Literal, now: Now, old: Now, at: RigidMotion, C: Matrix, m: Column) -> Matrix:
+def tangent(of: Monolithic, now: Now, old: Now, at: RigidMotion, C: Matrix, m: Column) -> Matrix:
     """Of all equations by all unknowns.
 
     Parameters
@@ -45,7 +45,7 @@ def tangent(of: Literal, now: Now, old: Now, at: RigidMotion, C: Matrix, m: Colu
     return J
 
 
-def _of_body(of: Literal, n: int, now: Now, old: Now, at: RigidMotion) -> Matrix:
+def _of_body(of: Monolithic, n: int, now: Now, old: Now, at: RigidMotion) -> Matrix:
     """Of the internal force of body n: K + a₁ C with a rigid-body frame, else by differences; world components."""
     model, own, a1 = of.system.model, of.of[n], of.scheme.a1
     link = model.links[n]
@@ -58,7 +58,7 @@ def _of_body(of: Literal, n: int, now: Now, old: Now, at: RigidMotion) -> Matrix
     return np.array(change).T / DIFFERENCE
 
 
-def _of_pull(of: Literal, now: Now, old: Now, at: RigidMotion, m: Column) -> Matrix:
+def _of_pull(of: Monolithic, now: Now, old: Now, at: RigidMotion, m: Column) -> Matrix:
     """Of all constraints' forces Cᵀ m on interface unknowns, by those which a constraint that is not linear sees."""
     out = np.zeros((of.k, of.k))
     varied = [n for n, x in enumerate(of.system.constraints) if not x.linear or n not in of.hard]
@@ -77,7 +77,7 @@ def _of_pull(of: Literal, now: Now, old: Now, at: RigidMotion, m: Column) -> Mat
     return out
 
 
-def _felt(of: Literal, n: int) -> Bool[np.ndarray, " k"]:
+def _felt(of: Monolithic, n: int) -> Bool[np.ndarray, " k"]:
     """Whether interface unknowns move the ends of constraint n."""
     ends = {end for term in of.system.constraints[n].terms for end in (term.i, term.j)}
     each = [np.any(of.system.ends[end].onto != 0.0, axis=(0, 1)) for end in ends]
@@ -90,15 +90,15 @@ def inverse(J: Matrix, C: Matrix) -> Inverse:
     some = size > REPEATED * size.max(initial=0.0)  # one that says nothing is rounding of any direction
     unit = C * np.where(some, 1 / np.where(some, size, 1.0), 0.0)[:, None]
     R, order = qr(unit.T, mode="r", pivoting=True)
-    told = order[: int((np.abs(np.diag(R)) > REPEATED).sum())] if len(C) else order[:0]
+    independent = order[: int((np.abs(np.diag(R)) > REPEATED).sum())] if len(C) else order[:0]
     first = len(J) - len(C)
-    kept = np.concatenate([np.arange(first), first + np.sort(told)])
+    kept = np.concatenate([np.arange(first), first + np.sort(independent)])
     own = J[np.ix_(kept, kept)]
     rows = 1 / np.maximum(np.abs(own).max(axis=1), 1e-300)
     scaled = own * rows[:, None]
     columns = 1 / np.maximum(np.abs(scaled).max(axis=0), 1e-300)
     factors = lu_factor(scaled * columns)
-    least = np.linalg.pinv(C.T, rcond=REPEATED) @ C.T if len(told) < len(C) else np.eye(len(C))
+    least = np.linalg.pinv(C.T, rcond=REPEATED) @ C.T if len(independent) < len(C) else np.eye(len(C))
 
     def solution(right: Column) -> Column:
         out = np.zeros(len(J))

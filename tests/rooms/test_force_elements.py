@@ -24,7 +24,7 @@ from kedfem.dynamics.force_element import (
     ForceElement,
     kernel_table,
 )
-from kedfem.dynamics.force_elements import actions, hinges
+from kedfem.dynamics.force_elements import force_elements, hinges
 from kedfem.dynamics.force_elements_kernel import evaluate, evaluate_all
 from kedfem.dynamics.history import Block, LinkHistory
 from kedfem.dynamics.model import Model
@@ -59,27 +59,27 @@ def hinge(one: int, other: int, axis: np.ndarray, **law: Any) -> ForceElement:
 
 def drawn(every: Sequence[ForceElement]) -> np.ndarray:
     x = np.zeros((len(every), 2, 2, 3))
-    for i, action in enumerate(every):
+    for i, element in enumerate(every):
         for e in (0, 1):
-            x[i, e, : len(action.ends[e].X)] = action.ends[e].X
+            x[i, e, : len(element.ends[e].X)] = element.ends[e].X
     return x
 
 
 def found(
-    action: ForceElement, x: np.ndarray, v: np.ndarray | None = None, t: float = 0.0, before: float = 0.0
+    element: ForceElement, x: np.ndarray, v: np.ndarray | None = None, t: float = 0.0, before: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Forces (2, 2, 3) and values (4,) of one action."""
+    """Forces (2, 2, 3) and values (4,) of one force element."""
     forces, values = np.zeros((1, 2, 2, 3)), np.zeros((1, 4))
     v = np.zeros_like(x) if v is None else v
-    evaluate(t, np.ones(1), x[None], v[None], np.array([before]), kernel_table([action]), forces, values)
+    evaluate(t, np.ones(1), x[None], v[None], np.array([before]), kernel_table([element]), forces, values)
     return forces[0], values[0]
 
 
-def turned(x: np.ndarray, action: ForceElement, turns: Sequence[np.ndarray]) -> np.ndarray:
+def turned(x: np.ndarray, element: ForceElement, turns: Sequence[np.ndarray]) -> np.ndarray:
     """Each end's vectors turned by its own rotation; a planar beam's angle about z added."""
     out = x.copy()
     for e, theta in enumerate(turns):
-        if action.ends[e].form == ANGLE:
+        if element.ends[e].form == ANGLE:
             out[e, 0, 2] += theta[2]
         else:
             out[e] = Rotation.from_rotvec(theta).apply(x[e])
@@ -105,17 +105,17 @@ def unit(seed: int) -> np.ndarray:
 @pytest.mark.parametrize("axis", [Z, -Z], ids=["z", "-z"])
 @pytest.mark.parametrize("angle", [0.0, 1.2, -2.9, 3.1])
 def test_a_hinge_tells_its_turn(one: int, other: int, axis: np.ndarray, angle: float) -> None:
-    action = hinge(one, other, axis)
-    x = turned(drawn([action])[0], action, [(angle + 0.3) * axis, 0.3 * axis])
-    assert found(action, x)[1][0] == pytest.approx(angle, abs=1e-12)
+    element = hinge(one, other, axis)
+    x = turned(drawn([element])[0], element, [(angle + 0.3) * axis, 0.3 * axis])
+    assert found(element, x)[1][0] == pytest.approx(angle, abs=1e-12)
 
 
 @pytest.mark.parametrize(("one", "other"), FORMS + UPRIGHT)
 def test_turns_are_counted_on(one: int, other: int) -> None:
-    action = hinge(one, other, Z)
-    x0, q = drawn([action])[0], 0.0
+    element = hinge(one, other, Z)
+    x0, q = drawn([element])[0], 0.0
     for angle in [*np.arange(0, 20, 1.3), *np.arange(20, -20, -2.9)]:
-        q = float(found(action, turned(x0, action, [angle * Z, 0 * Z]), before=q)[1][0])
+        q = float(found(element, turned(x0, element, [angle * Z, 0 * Z]), before=q)[1][0])
         assert q == pytest.approx(angle, abs=1e-9)
 
 
@@ -126,12 +126,12 @@ def test_a_turn_does_not_depend_on_where_all_of_it_is_turned(
     one: int, other: int, seed: int, whole: np.ndarray, angle: float
 ) -> None:
     axis = unit(seed)
-    action = hinge(one, other, axis, **LAWS)
-    x = turned(drawn([action])[0], action, [angle * axis, 0 * axis])
+    element = hinge(one, other, axis, **LAWS)
+    x = turned(drawn([element])[0], element, [angle * axis, 0 * axis])
     x += 0.1 * np.random.default_rng(seed).normal(size=x.shape)  # hubs deform and tilt
-    f, values = found(action, x, before=angle)
+    f, values = found(element, x, before=angle)
     R = Rotation.from_rotvec(3 * whole)
-    F, turned_values = found(action, np.array([R.apply(e) for e in x]), before=angle)
+    F, turned_values = found(element, np.array([R.apply(e) for e in x]), before=angle)
     np.testing.assert_allclose(turned_values, values, atol=1e-9)
     np.testing.assert_allclose(F, [R.apply(e) for e in f], atol=1e-9)
 
@@ -143,13 +143,13 @@ def test_the_work_of_a_torque_is_that_of_its_turn(one: int, other: int, seed: in
     """Forces · δx = Q δq by central differences, from any deformed and tilted state."""
     rng = np.random.default_rng(seed)
     axis = unit(seed) if ANGLE not in (one, other) else Z
-    action = hinge(one, other, axis, curve=straight((0.0,), (2.5,)))
-    x = turned(drawn([action])[0], action, [rng.uniform(-2, 2) * axis, 0 * axis])
+    element = hinge(one, other, axis, curve=straight((0.0,), (2.5,)))
+    x = turned(drawn([element])[0], element, [rng.uniform(-2, 2) * axis, 0 * axis])
     x += 0.1 * rng.normal(size=x.shape)
     v = rng.normal(size=x.shape)
-    f, values = found(action, x, v)
+    f, values = found(element, x, v)
     h = 1e-5
-    rate = (found(action, x + h * v)[1][0] - found(action, x - h * v)[1][0]) / (2 * h)
+    rate = (found(element, x + h * v)[1][0] - found(element, x - h * v)[1][0]) / (2 * h)
     assert values[1] == pytest.approx(rate, abs=1e-7)
     assert np.vdot(f, v) == pytest.approx(2.5 * rate, abs=1e-7)
 
@@ -158,18 +158,18 @@ def test_the_work_of_a_torque_is_that_of_its_turn(one: int, other: int, seed: in
 def test_torques_on_both_ends_balance(one: int, other: int) -> None:
     """Σ x × f over all directions is the moment; on the first end it is T n where nothing is tilted."""
     axis = unit(3)
-    action = hinge(one, other, axis, curve=straight((0.0,), (2.5,)))
-    x = turned(drawn([action])[0], action, [0.9 * axis, 0.2 * axis])
-    moments = np.cross(x, found(action, x)[0]).sum(axis=1)
+    element = hinge(one, other, axis, curve=straight((0.0,), (2.5,)))
+    x = turned(drawn([element])[0], element, [0.9 * axis, 0.2 * axis])
+    moments = np.cross(x, found(element, x)[0]).sum(axis=1)
     np.testing.assert_allclose(moments, [2.5 * axis, -2.5 * axis], atol=1e-12)
     x += 0.1 * np.random.default_rng(1).normal(size=x.shape)
-    np.testing.assert_allclose(np.cross(x, found(action, x)[0]).sum(axis=(0, 1)), 0, atol=1e-12)
+    np.testing.assert_allclose(np.cross(x, found(element, x)[0]).sum(axis=(0, 1)), 0, atol=1e-12)
 
 
 def test_a_planar_beam_takes_the_torque_on_its_angle() -> None:
     for axis in (Z, -Z):
-        action = hinge(ANGLE, ANGLE, axis, curve=straight((0.0,), (2.5,)))
-        f, _ = found(action, turned(drawn([action])[0], action, [4 * Z, 1 * Z]))
+        element = hinge(ANGLE, ANGLE, axis, curve=straight((0.0,), (2.5,)))
+        f, _ = found(element, turned(drawn([element])[0], element, [4 * Z, 1 * Z]))
         np.testing.assert_allclose(f[:, 0], [2.5 * axis, -2.5 * axis], atol=1e-12)
         assert not f[:, 1].any()
 
@@ -178,38 +178,38 @@ def test_a_planar_beam_takes_the_torque_on_its_angle() -> None:
 
 
 def test_a_torsion_spring_turns_back() -> None:
-    action = hinge(PAIR, PAIR, Z, stiffness=3.0, damping=0.5, free=0.2)
-    x0 = drawn([action])[0]
-    x = turned(x0, action, [1.2 * Z, 0 * Z])
+    element = hinge(PAIR, PAIR, Z, stiffness=3.0, damping=0.5, free=0.2)
+    x0 = drawn([element])[0]
+    x = turned(x0, element, [1.2 * Z, 0 * Z])
     v = np.zeros_like(x)
     v[0] = np.cross(2.0 * Z, x[0])
-    _, values = found(action, x, v)
+    _, values = found(element, x, v)
     np.testing.assert_allclose(values, [1.2, 2.0, -3.0 * 1.0 - 0.5 * 2.0, 0.5 * 3.0 * 1.0**2], atol=1e-12)
 
 
 def test_a_spring_between_points_pulls_along_its_line() -> None:
-    action = ForceElement("s", DISTANCE, (end(POINT, [0, 0, 0]), end(POINT, [3, 4, 0])), 10.0, 2.0, 4.0)
-    x, v = drawn([action])[0], np.zeros((2, 2, 3))
+    element = ForceElement("s", DISTANCE, (end(POINT, [0, 0, 0]), end(POINT, [3, 4, 0])), 10.0, 2.0, 4.0)
+    x, v = drawn([element])[0], np.zeros((2, 2, 3))
     v[1, 0] = [1, 0, 0]  # lengthens it by 3/5
-    f, values = found(action, x, v)
+    f, values = found(element, x, v)
     np.testing.assert_allclose(values, [5, 0.6, -10 * 1 - 2 * 0.6, 5.0])
     np.testing.assert_allclose(f[:, 0], 11.2 * np.array([[0.6, 0.8, 0], [-0.6, -0.8, 0]]))
 
 
 def test_a_spring_of_no_length_has_no_direction() -> None:
-    action = ForceElement("s", DISTANCE, (end(POINT, [1, 0, 0]), end(POINT, [1, 0, 0])), 10.0, 2.0, 0.0)
-    f, values = found(action, drawn([action])[0])
+    element = ForceElement("s", DISTANCE, (end(POINT, [1, 0, 0]), end(POINT, [1, 0, 0])), 10.0, 2.0, 0.0)
+    f, values = found(element, drawn([element])[0])
     assert not f.any()
     assert not values.any()
 
 
 def test_a_slide_is_pushed_along_its_axis() -> None:
     axis = unit(5)
-    action = ForceElement("m", SLIDE, (end(POINT, [1, 2, 3]), end(POINT, [1, 2, 3], -1)), axis=axis,
+    element = ForceElement("m", SLIDE, (end(POINT, [1, 2, 3]), end(POINT, [1, 2, 3], -1)), axis=axis,
                     over=POSITION, curve=straight((0.0, 1.0), (0.0, 8.0)))  # fmt: skip
-    x = drawn([action])[0]
+    x = drawn([element])[0]
     x[0, 0] += 0.25 * axis + 7 * np.array(perpendiculars(axis)[0])
-    f, values = found(action, x)
+    f, values = found(element, x)
     np.testing.assert_allclose(values, [0.25, 0, 2.0, 0], atol=1e-12)
     np.testing.assert_allclose(f[:, 0], [2 * axis, -2 * axis], atol=1e-12)
 
@@ -217,30 +217,30 @@ def test_a_slide_is_pushed_along_its_axis() -> None:
 @pytest.mark.parametrize("over", [0, SPEED, POSITION])
 def test_a_curve_is_linear_between_its_points_and_held_outside(over: int) -> None:
     at, value = (-1.0, 0.5, 2.0), (5.0, -1.0, 3.0)
-    action = hinge(PAIR, PAIR, Z, over=over, curve=straight(at, value))
-    x0 = drawn([action])[0]
+    element = hinge(PAIR, PAIR, Z, over=over, curve=straight(at, value))
+    x0 = drawn([element])[0]
     for s in np.linspace(-2, 3, 21):
-        x = turned(x0, action, [(s if over == POSITION else 0.3) * Z, 0 * Z])
+        x = turned(x0, element, [(s if over == POSITION else 0.3) * Z, 0 * Z])
         v = np.zeros_like(x)
         v[0] = np.cross((s if over == SPEED else 0.1) * Z, x[0])
-        got = found(action, x, v, t=s if not over else 9.0)[1][2]
+        got = found(element, x, v, t=s if not over else 9.0)[1][2]
         assert got == pytest.approx(np.interp(s, at, value), abs=1e-12)
 
 
-def test_several_actions_and_times_at_once_are_as_one_by_one() -> None:
+def test_several_elements_and_times_at_once_are_as_one_by_one() -> None:
     every = [hinge(PAIR, PAIR, Z, **LAWS), ForceElement("s", DISTANCE, (end(POINT, [0, 0, 0]), end(POINT, [1, 0,
     0])), 2.0),
              hinge(ANGLE, PAIR, Z, curve=straight((0.0, 1.0), (1.0, 2.0)))]  # fmt: skip
     x0, t = drawn(every), np.linspace(0, 2, 9)
-    x = np.array([[turned(each, action, [2 * s * Z, -s * Z]) for each, action in zip(x0, every, strict=True)]
+    x = np.array([[turned(each, element, [2 * s * Z, -s * Z]) for each, element in zip(x0, every, strict=True)]
                   for s in t])  # fmt: skip
     values, before = np.zeros((9, 3, 4)), np.zeros(3)
     forces = np.zeros_like(x)
     evaluate_all(t, np.ones((9, 3)), x, np.zeros_like(x), before, kernel_table(every), forces, values)
     q = np.zeros(3)
     for k in range(9):
-        for i, action in enumerate(every):
-            alone = found(action, x[k, i], t=t[k], before=q[i])
+        for i, element in enumerate(every):
+            alone = found(element, x[k, i], t=t[k], before=q[i])
             np.testing.assert_allclose(forces[k, i], alone[0], atol=1e-12)
             np.testing.assert_allclose(values[k, i], alone[1], atol=1e-12)
         q = values[k, :, 0]
@@ -287,11 +287,11 @@ def built(raw: dict[str, Any]) -> tuple[Scene, Model]:
 
 
 def state_of(
-    action: ForceElement, model: Model, motion: Callable[[int, np.ndarray], np.ndarray]
+    element: ForceElement, model: Model, motion: Callable[[int, np.ndarray], np.ndarray]
 ) -> np.ndarray:
-    """Vectors (2, 2, 3) of an action's ends where the functions of link k, at X (n, 3), are moved by motion(k, X)."""
-    x = drawn([action])[0]
-    for e, at in enumerate(action.ends):
+    """Vectors (2, 2, 3) of an element's ends where the functions of link k, at X (n, 3), are moved by motion(k, X)."""
+    x = drawn([element])[0]
+    for e, at in enumerate(element.ends):
         if at.k >= 0:
             u = motion(at.k, model.links[at.k].X)
             x[e, : len(at.X), : u.shape[1]] += (at.weights @ u) * np.array(at.mask)[: u.shape[1]]
@@ -316,15 +316,17 @@ def turning(model: Model, theta: np.ndarray) -> Callable[[int, np.ndarray], np.n
 def test_every_kind_of_link_shows_its_turn_and_takes_the_torque(kind: str, angle: float) -> None:
     """Angles count about the joint's axis, here −z, of the link named first against the ground."""
     scene, model = built(arm(kind))
-    (action,) = actions(scene, model)
+    (element,) = force_elements(scene, model)
     (looked,) = hinges(scene, model)
     link = model.links[0]
-    x = state_of(action, model, turning(model, angle * Z))
-    f, values = found(action, x)
+    x = state_of(element, model, turning(model, angle * Z))
+    f, values = found(element, x)
     assert values[0] == pytest.approx(-angle, abs=1e-9)
     assert found(looked, x)[1][0] == pytest.approx(-angle, abs=1e-9)
-    mask = np.array(action.ends[0].mask)[: link.d]
-    forces = np.einsum("mn,mc->nc", action.ends[0].weights, (f[0, : len(action.ends[0].X), : link.d] * mask))
+    mask = np.array(element.ends[0].mask)[: link.d]
+    forces = np.einsum(
+        "mn,mc->nc", element.ends[0].weights, (f[0, : len(element.ends[0].X), : link.d] * mask)
+    )
     spin = 1e-6
     u = turning(model, (angle + spin) * Z)(0, link.X) - turning(model, (angle - spin) * Z)(0, link.X)
     assert np.vdot(forces, u) / (2 * spin) == pytest.approx(-2.5, rel=1e-6)  # about z
@@ -345,8 +347,8 @@ def test_a_joint_that_names_the_ground_first_turns_its_link_all_the_same() -> No
     raw = arm("beam")
     raw["joints"]["A"]["links"] = ["ground", "arm"]
     scene, model = built(raw)
-    (action,) = actions(scene, model)
-    f, values = found(action, state_of(action, model, turning(model, 0.5 * Z)))
+    (element,) = force_elements(scene, model)
+    f, values = found(element, state_of(element, model, turning(model, 0.5 * Z)))
     assert values[0] == pytest.approx(-0.5)
     np.testing.assert_allclose(f[0, 0], [0, 0, -2.5], atol=1e-12)  # about the axis, −z
 
@@ -362,7 +364,7 @@ def test_a_spring_hangs_on_points_of_links_sliders_and_the_ground() -> None:
     raw["joints"]["S"] = {"kind": "prismatic", "links": ["shoe", "ground"], "at": [1, 0], "axis": "x"}
     raw["motors"]["push"] = {"joint": "S", "force": 4}
     scene, model = built(raw)
-    motor, push, tip, shoe = actions(scene, model)
+    motor, push, tip, shoe = force_elements(scene, model)
     assert [x.name for x in (motor, push, tip, shoe)] == [
         "motors/m",
         "motors/push",
@@ -387,7 +389,7 @@ def test_ends_are_on_the_segments_that_hold_them(kind: str) -> None:
         raw["links"]["arm"]["segments"] = 3
     scene, model = built(raw)
     assert [link.name for link in model.links] == ["arm"] * 3
-    motor, tip = actions(scene, model)
+    motor, tip = force_elements(scene, model)
     assert [motor.ends[0].k, tip.ends[0].k] == [0, 2]
     x = state_of(tip, model, turning(model, 0.3 * Z))
     np.testing.assert_allclose(x[0, 0], 0.98 * np.array([np.cos(0.3), np.sin(0.3), 0]), atol=1e-9)
@@ -398,17 +400,17 @@ def test_ends_must_be_on_their_links() -> None:
     with pytest.raises(
         SceneError, match=r"springs\.tip\.between\[0\]\.at: must lie on the axis of beam 'arm'"
     ):
-        actions(scene, model)
+        force_elements(scene, model)
     scene, model = built(arm("solid", springs={"tip": spring("arm", [7, 0], [1, 2])}))
     with pytest.raises((SceneError, MeshError), match=r"springs\.tip\.between\[0\]\.at"):
-        actions(scene, model)
+        force_elements(scene, model)
 
 
 # -- recorded -----------------------------------------------------------------------------------------------
 
 
 def blocks(model: Model, t: np.ndarray, angle: np.ndarray, length: int) -> list[Block]:
-    """An arm that turns about the origin by an angle over time, nominally at rest, block by block."""
+    """An arm that turns about the origin by an angle over time, at rest in its rigid-body motion, block by block."""
     out, rate = [], np.gradient(angle, t)
     for first in range(0, len(t), length):
         here, histories = range(first, min(first + length, len(t))), []

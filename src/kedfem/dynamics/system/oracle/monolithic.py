@@ -17,13 +17,13 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.frames import Followed, deformation, frame_force, frames_of, rotation
+from kedfem.dynamics.frames import Deformed, deformation, frame_force, frames_of, rotation
 from kedfem.dynamics.joints.ports import port_columns
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.matrices.substructure import mass_matrix
 from kedfem.dynamics.stepping.scheme import Scheme
-from kedfem.dynamics.system.oracle.literal_places import force, placed, turned_load, valued
-from kedfem.dynamics.system.oracle.literal_tangent import Inverse, inverse, tangent
+from kedfem.dynamics.system.oracle.monolithic_places import force, placed, turned_load, valued
+from kedfem.dynamics.system.oracle.monolithic_tangent import Inverse, inverse, tangent
 from kedfem.dynamics.system.record import (
     Driven,
     Held,
@@ -63,7 +63,7 @@ class Now:
 
 
 @dataclass
-class Literal:
+class Monolithic:
     """Steps of a system by assembled tangents; `scheme` as any step's.
 
     keeps : whether steps go on with the tangent of the step before while changes fall with it, which is dear to assemble
@@ -206,7 +206,7 @@ class Literal:
             Q, turn = rotation(link, frame.fit, y, angle)
             g = deformation(link, y, Q, turn)
             rates = self.rates(g, *g0)
-            f += frame_force(link, frame, Followed(Q, turn, g, *rates), y, damping.beta)[0]
+            f += frame_force(link, frame, Deformed(Q, turn, g, *rates), y, damping.beta)[0]
             seen.append((turn, np.stack([g, *rates])))
         own = [load for load in self.system.model.loads[k] if load.own]
         x = u.reshape(link.n, link.d)
@@ -244,7 +244,7 @@ class Literal:
     def _own_rates(self, now: Now, old: Now, at: RigidMotion) -> Column:
         """Rates of all coordinates: Newmark's of linear ones and of those less a drive's travel.
 
-        Of others by differences: the mechanism and z move on, and back, as their rates tell.
+        Of others by differences: the mechanism and z move on, and back, as their rates show.
         """
         from scipy.spatial.transform import Rotation
 

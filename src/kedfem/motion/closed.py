@@ -74,7 +74,7 @@ def _three(x: Float[np.ndarray, "3"]) -> XYZ:
 STILL = Shift(np.zeros(3), np.zeros(3), np.zeros(3))
 
 
-def redrawn(scene: Scene, shifts: Mapping[str, Shift]) -> Scene:
+def closed_scene(scene: Scene, shifts: Mapping[str, Shift]) -> Scene:
     """A scene whose links have moved; joints have one point again, the ground stays.
 
     Raises
@@ -96,16 +96,16 @@ def redrawn(scene: Scene, shifts: Mapping[str, Shift]) -> Scene:
             "joints": {
                 name: _joint(joint, {**shifts, GROUND: STILL}) for name, joint in scene.joints.items()
             },
-            "loads": {name: _carried(load, shifts[load.link]) for name, load in scene.loads.items()},
-            "bodies": {name: _carried(body, shifts[body.link]) for name, body in scene.bodies.items()},
+            "loads": {name: _moved(load, shifts[load.link]) for name, load in scene.loads.items()},
+            "bodies": {name: _moved(body, shifts[body.link]) for name, body in scene.bodies.items()},
             "springs": {name: _spring(spring, shifts) for name, spring in scene.springs.items()},
             "output": scene.output.model_copy(
-                update={"probes": {k: _carried(x, shifts[x.link]) for k, x in scene.output.probes.items()}}
+                update={"probes": {k: _moved(x, shifts[x.link]) for k, x in scene.output.probes.items()}}
             ),
             "analysis": scene.analysis.model_copy(
                 update={
                     "initial_motions": {
-                        name: _carried(motion, shifts[name])
+                        name: _moved(motion, shifts[name])
                         for name, motion in scene.analysis.initial_motions.items()
                     }
                 }
@@ -114,7 +114,7 @@ def redrawn(scene: Scene, shifts: Mapping[str, Shift]) -> Scene:
     )
 
 
-def _carried(record: AnyRecord, shift: Shift) -> AnyRecord:
+def _moved(record: AnyRecord, shift: Shift) -> AnyRecord:
     """What is on a link: its points, a vector in the link's frame, inertia."""
     change: dict[str, Any] = {
         key: shift.point(getattr(record, key))
@@ -133,7 +133,7 @@ def _spring(spring: Spring, shifts: Mapping[str, Shift]) -> Spring:
     """Ends on links go with them."""
     if not isinstance(spring, LineSpring) or spring.between is None:
         return spring
-    ends = tuple(_carried(end, shifts.get(end.link, STILL)) for end in spring.between)
+    ends = tuple(_moved(end, shifts.get(end.link, STILL)) for end in spring.between)
     return spring.model_copy(update={"between": ends})
 
 
@@ -186,7 +186,7 @@ def _link(name: str, link: LinkScene, shift: Shift) -> LinkScene:
             _check_level(where, plate.kind, shift)
             change = {
                 "outline": tuple(_item(item, shift) for item in plate.outline),
-                "holes": tuple(_carried(hole, shift) for hole in plate.holes),
+                "holes": tuple(_moved(hole, shift) for hole in plate.holes),
             }
         case Cad() | MeshFile() as file:
             change = _placing(file, shift)

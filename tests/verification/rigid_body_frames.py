@@ -44,7 +44,7 @@ def linear_errors() -> dict[str, tuple[float, float]]:
     "geometrically exact beams, converged in step and mesh (tests/exact)",
     long=True,
 )
-def nominal_frames() -> list[Row]:
+def rigid_body_frames() -> list[Row]:
     """The linear equation (20) from δ = δ' = 0, 2 % damping at 20 and 200 Hz: stress on the rocker's outer side, three
 
     turns, at 60 rpm one. With damping mesh and step account for no more than 0.015 of the peak."""

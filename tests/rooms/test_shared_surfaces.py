@@ -64,8 +64,8 @@ def assert_same(fast: Run, slow: Run, tolerance: float = 1e-8) -> None:
     peak = max(np.abs(s.u).max() for snapshot in slow[2] for s in snapshot.states)
     for a, b in zip(fast[2], slow[2], strict=True):
         for s, r in zip(a.states, b.states, strict=True):
-            # 1e-8: the bound of test_condensed_is_literal_over_a_whole_turn; plates side by side (OFFSET) also lean
-            # out of plane, where the literal rounding shows: 2e-8 to 1e-7, in a four-bar of such plates too
+            # 1e-8: the bound of test_condensed_is_monolithic_over_a_whole_turn; plates side by side (OFFSET) also lean
+            # out of plane, where the monolithic rounding shows: 2e-8 to 1e-7, in a four-bar of such plates too
             assert_allclose(s.u, r.u, rtol=0, atol=tolerance * peak)
 
 

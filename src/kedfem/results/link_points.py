@@ -1,4 +1,4 @@
-"""Points of links, followed over a run: position, velocity, acceleration and elastic state."""
+"""Points of links over a run: position, velocity, acceleration and elastic state."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ Drawn = Float[np.ndarray, "3"]
 
 
 @dataclass(frozen=True, slots=True)
-class Followed:
+class LinkPoint:
     """A point of a link, as a run knows it.
 
-    body, X : number of its link in the linkage, the point as drawn [m]
+    body, X : number of its link in the linkage, the point in the reference position [m]
     elastic : δ, δ' or δ'' there by their letter, world components (T, 3)
-    axes : (3, 3) of the link, as drawn
+    axes : (3, 3) of the link, in the reference position
     planar : whether the link moves in a plane
     """
 
@@ -52,22 +52,22 @@ class Followed:
         return np.asarray(motion.p2[:, b] + motion.R2[:, b] @ self.X + self.elastic(block, "a"))
 
 
-def followed_point(model: Model, linked: Linkage, where: str, name: str, at: Drawn) -> Followed:
+def link_point(model: Model, linked: Linkage, where: str, name: str, at: Drawn) -> LinkPoint:
     """A point of a link: elastic, rigid, prescribed by a drive, or a slider without a shape, which moves with a pin."""
-    prescribed = next((x for x in model.carried if x.link.name == name), None)
+    prescribed = next((x for x in model.prescribed if x.link.name == name), None)
     if prescribed is not None:
         link = prescribed.link
-        return Followed(prescribed.body, at, _at_rest, link.axes, link.planar)
+        return LinkPoint(prescribed.body, at, _at_rest, link.axes, link.planar)
     slider = next((x for x in model.sliders if x.name == name), None)
     if slider is not None:
         moved = _read(slider.carrier, model.links[slider.carrier], slider.weights)
         planar = model.links[slider.carrier].planar
-        return Followed(linked.bodies.index(name), at, moved, np.eye(3), planar)
+        return LinkPoint(linked.bodies.index(name), at, moved, np.eye(3), planar)
     if all(link.name != name for link in model.links):
         raise SceneError(f"{where.removesuffix('.at')}.link: must name a link with a shape, got {name!r}")
     k, (value, X) = on_segment(model, name, at, lambda link: _value(link, where, at))
     link = model.links[k]
-    return Followed(model.bodies[k], X, _read(k, link, value), link.axes, link.planar)
+    return LinkPoint(model.bodies[k], X, _read(k, link, value), link.axes, link.planar)
 
 
 def _at_rest(block: Block, field: str) -> Rows:

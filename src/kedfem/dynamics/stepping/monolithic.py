@@ -20,7 +20,7 @@ from kedfem.dynamics.joints.ports import Rotation, port_columns, port_rotation, 
 from kedfem.dynamics.matrices.interface import RowState, Tie, after_step, step_tie
 from kedfem.dynamics.matrices.substructure import mass_matrix
 from kedfem.dynamics.stepping.scheme import Scheme
-from kedfem.dynamics.stepping.state import LinkState, Nodal, Nominal, Rayleigh, accelerated
+from kedfem.dynamics.stepping.state import ForcingAt, LinkState, Nodal, Rayleigh, accelerated
 from kedfem.dynamics.stiffening import Stiffening, with_turnings
 from kedfem.links.record import Link
 
@@ -122,7 +122,7 @@ class Begun:
     rows: RowState | None = None
 
 
-class LiteralSteps:
+class MonolithicSteps:
     """Advances all links by generalised-α steps of the assembled system; one sparse LU each step."""
 
     def __init__(
@@ -160,13 +160,13 @@ class LiteralSteps:
             taken.append(links)
         return [history([links[i] for links in taken]) for i in range(len(forcing))], Begun(links, held)
 
-    def step(self, states: Sequence[LinkState], at: Sequence[Nominal]) -> list[LinkState]:
+    def step(self, states: Sequence[LinkState], at: Sequence[ForcingAt]) -> list[LinkState]:
         """States of all links one step later, [KED, eq. (20)]."""
         new = self.tied_step(states, at, None)[0]
         return new if self.stiffening is None else with_turnings(new, self.stiffening.turnings(at))
 
     def tied_step(
-        self, states: Sequence[LinkState], at: Sequence[Nominal], tie: Tie | None
+        self, states: Sequence[LinkState], at: Sequence[ForcingAt], tie: Tie | None
     ) -> tuple[list[LinkState], Float[np.ndarray, " k"], Float[np.ndarray, " r"]]:
         """The same where joints are enforced by constraint equations, which border the system; also the interface
         unknowns and the equations' forces."""
@@ -184,9 +184,9 @@ class LiteralSteps:
         ]
         return new, free[len(free) - self.joints[0].B.shape[1] :], m
 
-    def _matrices(self, at: Sequence[Nominal]) -> list[sp.csr_array]:
+    def _matrices(self, at: Sequence[ForcingAt]) -> list[sp.csr_array]:
         """Effective matrices of all links, world frame; stress stiffness is assembled like the rest."""
-        K = [rotated_stiffness(link.K0, nominal.R) for link, nominal in zip(self.links, at, strict=True)]
+        K = [rotated_stiffness(link.K0, now.R) for link, now in zip(self.links, at, strict=True)]
         A = [self._effective(M, K_) for M, K_ in zip(self.M, K, strict=True)]
         if self.stiffening is None:
             return A
@@ -198,7 +198,7 @@ class LiteralSteps:
         C = d.alpha * M + d.beta * K
         return sp.csr_array((1 - s.alpha_m) * s.a0 * M + (1 - s.alpha_f) * (K + s.a1 * C))
 
-    def _rhs(self, k: int, s: LinkState, at: Nominal) -> Nodal:
+    def _rhs(self, k: int, s: LinkState, at: ForcingAt) -> Nodal:
         scheme = self.scheme
         b0, b1, b2 = scheme.acceleration
         history = (1 - scheme.alpha_m) * (b0 * s.u + b1 * s.v + b2 * s.a) - scheme.alpha_m * s.a
@@ -208,7 +208,7 @@ class LiteralSteps:
             out = out + (1 - scheme.alpha_f) * np.tensordot(scheme.rate, s.C, 1) @ at.R.T
         return np.asarray(out)
 
-    def _next(self, k: int, s: LinkState, at: Nominal, u: Nodal, A: sp.csr_array, rhs: Nodal) -> LinkState:
+    def _next(self, k: int, s: LinkState, at: ForcingAt, u: Nodal, A: sp.csr_array, rhs: Nodal) -> LinkState:
         """State of link k at the end of the step; δ = T g, [KED, eq. (5)]."""
         v, a = accelerated(self.scheme, u, s.u, s.v, s.a)
         g = u @ at.R
