@@ -133,7 +133,7 @@ brackets). Energies apart, nothing is summed up over time.
 | group | attributes |
 |---|---|
 | `/` | `status` (`complete`, `doubtful`, `interrupted`, `running`), `reason`, `kedfem_version`, `Conventions` |
-| `/notes` | what the run reported of itself: unknowns, step, estimated errors (`error of mesh, stress` ...), residuals of energy and momentum |
+| `/notes` | what the run reported of itself: unknowns, step, estimated errors (`error of mesh, stress` ...), the residual of energy |
 | `/notes/LINK` | what a link was modelled as: `model`, `elements`, `unknowns`; with what is attached `mass [kg]`, `centre of mass [m]` in the reference position, `inertia [kg m^2]` about it: xx, yy, zz, xy, yz, zx |
 | `/warnings`, `/timing` | what was reported to the user; seconds of each stage; both of a run that came to its end |
 | `/peaks/LINK` | highest von Mises stress over all steps, its place in the reference position, time, step and drive; `away` from places where it means little |

@@ -28,7 +28,7 @@ A warning never stops a run. It is printed, kept in `results.h5` and shown in th
 | `the drive's harmonic ... meets the first frequency` | resonance somewhere on the revolution | `kedfem frequencies`, another speed, damping ([frequencies](../frequencies.md)) |
 | `estimated error: ...; most of it from the ...` | mesh, step, modes, frames or rounding leave more than 5 %, or more than twice what was asked for | what the warning names; [how far to trust results](../tutorial/trust.md) |
 | `the elastic rotation of links is up to ... deg` | links bend so far that stiffness has to follow them | `frames = "co-rotational"` in `[analysis]` |
-| `the residual of the balance is ...` | energy or momentum is lost or made by the steps | shorter steps |
+| `the residual of the balance is ...` | energy is lost or made by the steps | shorter steps |
 | `the step is too long for rho_inf` | numerical damping is too small for the angle of a step: vibration would grow | as many steps as it says, or a smaller `rho_inf` |
 | `joints/NAME/force: not reported` | a force that rigid-body statics leaves open | looser joints, as `kedfem check` proposes |
 | `the highest stress, ..., is at a sharp re-entrant corner` | stress there grows with every refinement | [peak stress](../how-to/peak-stress.md) |

@@ -72,7 +72,7 @@ class Run:
 
     peaks, peak : highest stress over all steps, of each link that has stress, and of all
     worst : the frame of that instant, a VTU file
-    balance : of energy and momentum, as far as it was kept account of
+    balance : of energy, as far as it was kept account of
     budget : estimated errors of mesh, step, reduction and frames, by kind of channel
     sizes : plain sizes of the scene, for a look at its units
     step : what is known of its step's error

@@ -11,7 +11,7 @@ SOURCES = ("mesh", "step", "reduction", "frames", "rounding")
 WARNED = 0.05  # an error that no run leaves without a warning
 TWICE = 2.0  # of the accuracy asked for: estimates are no better than that
 MEANINGLESS = 3.0  # estimates are right within a factor 3: an error as large as the result
-UNACCOUNTED = 0.5  # of energy or momentum
+UNACCOUNTED = 0.5  # of energy
 UNKNOWNS = 60_000  # of a model, beyond which no mesh is made finer unasked
 LEAST = 0.005  # what no run warns of
 OF_SOURCE, TOGETHER, UNKNOWN = "error of ", "error together, ", "no estimate "  # how notes of a budget begin
@@ -123,14 +123,13 @@ def meaningless(budget: Budget, balance: Balance | None, unworked: float, stiffe
 
     Parameters
     ----------
-    balance : of energy and momentum; none where there are no time steps
+    balance : of energy; none where there are no time steps
     unworked : work of the drives that the account of energy does not have, of the energy exchanged [-]
     stiffened : the run has geometric stiffening, whose work is in the energy's residual too
     """
     worst = {f"estimated error of {kind}": error for kind, error in budget.together.items()}
-    momenta = {"momentum": balance.linear, "angular momentum": balance.angular} if balance else {}
     energy = {"energy": balance.energy} if balance and not stiffened else {}
-    left = momenta | {"the drive's work": unworked} | energy
+    left = {"the drive's work": unworked} | energy
     message = [f"{what} {percent(error)}" for what, error in worst.items() if error >= MEANINGLESS]
     message += [
         f"{percent(share)} of {what} unaccounted for" for what, share in left.items() if share >= UNACCOUNTED

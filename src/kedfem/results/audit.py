@@ -1,4 +1,4 @@
-"""The energy and momentum of a run, kept account of step by step.
+"""The energy of a run, kept account of step by step.
 
 With the absolute rate R0' + δ' the general equation, [KED, eq. (20)], says exactly
 
@@ -81,9 +81,9 @@ class _Sums:
 
 
 class Account:
-    """Energy and momentum of all links from the first block on; a block that does not follow on begins anew."""
+    """Energy of all links from the first block on; a block that does not follow on begins anew."""
 
-    REMEMBERED = ("_next", "_sums", "_start", "_last", "_springs", "_largest", "_impulse")
+    REMEMBERED = ("_next", "_sums", "_start", "_last", "_springs", "_largest")
 
     def __init__(self, model: Model, force_elements: Measured | None = None) -> None:
         self.model, self.force_elements = model, force_elements
@@ -92,9 +92,6 @@ class Account:
         self.prescribed = [constants(x.link, NO_PORTS, x.body, Rayleigh()) for x in model.prescribed]
         self._groups = [group for k in (2, 3) for group in _grouped(self.of, k)]
         self._prescribed_groups = [group for k in (2, 3) for group in _grouped(self.prescribed, k)]
-        every = [*model.links, *(x.link for x in model.prescribed)]
-        nodes = np.concatenate([(link.full or link).nodes for link in every])
-        self._extent = float(np.ptp(nodes, axis=0).max())  # of the linkage in the reference position [m]
         self._block: Block | None = None
         self._forces = ConstraintForces(model)
         self._begin()
@@ -102,11 +99,10 @@ class Account:
     def _begin(self) -> None:
         self._next = -1
         self._sums: _Sums | None = None
-        self._start: Float[np.ndarray, " 7"] = np.zeros(7)
+        self._start = 0.0
         self._last: list[Last | None] = [None] * len(self._groups)
         self._springs: tuple[float, np.ndarray, np.ndarray] | None = None
-        self._largest = np.zeros(9)
-        self._impulse = 0.0
+        self._largest = np.zeros(3)
 
     def rows(self, block: Block) -> dict[str, Rows]:
         """The channels over a block; the same block again is not counted twice.
@@ -124,12 +120,8 @@ class Account:
     @property
     def balance(self) -> Balance:
         """Up to now."""
-        exchanged, momentum, angular, impulse, *left = (float(x) for x in self._largest)
-        momentum = max(momentum, impulse)
-        angular = max(angular, momentum * self._extent)
-        return Balance(*(_share(x, of) for x, of in zip(
-            left, (exchanged, exchanged, momentum, angular, angular), strict=True
-        )))  # fmt: skip
+        exchanged, *left = (float(x) for x in self._largest)
+        return Balance(*(_share(x, exchanged) for x in left))
 
     def _added(self, block: Block) -> dict[str, Rows]:
         """Energies and sums of one more block."""
@@ -140,48 +132,37 @@ class Account:
         if springs is not None:
             # what springs push is no support's work: they store it or take it
             strain, pushed, self._springs = strain + springs.stored, springs.pushed, springs.last
-            taken = taken + springs.dissipated[:, None] * (np.arange(8) == 0)
+            taken = taken + springs.dissipated[:, None] * [1, 0]
         taken = np.column_stack([taken, pushed])
-        state = np.vstack([flow.kinetic + strain, flow.momentum, flow.angular]).T
-        rates = np.vstack(
-            [flow.loads, flow.supports, flow.neglected, flow.force, flow.moment, flow.turning, flow.led]
-        ).T
+        energy = flow.kinetic + strain
+        rates = np.stack([flow.loads, flow.supports, flow.neglected, flow.led], axis=1)
         if self._sums is None:
-            self._sums = _Sums(float(block.motion.t[0]), rates[0], np.zeros(13), np.zeros(9))
-            self._start = state[0]
-        before = self._sums.t
+            self._sums = _Sums(float(block.motion.t[0]), rates[0], np.zeros(4), np.zeros(3))
+            self._start = float(energy[0])
         work, total = self._sums.add(block.motion.t, rates, taken)
-        work, driven = work[:, :12], work[:, 1:2] - work[:, 12:]
-        work = work - total[:, 8:] * (np.arange(12) == 1)
+        loads, supports, neglected, led = work.T
+        dissipated, drag, pushed = total.T
+        driven, supports = supports - led, supports - pushed
         if block.exerted is not None:  # constraints along directions of displaced bodies do no work in all
-            driven = work[:, 1:2]
-        change = state - self._start
-        left = change - np.column_stack([work[:, 0] + work[:, 1], work[:, 3:9]])
-        left += np.column_stack(
-            [total[:, 0] + total[:, 1] + work[:, 2], total[:, 2:5], total[:, 5:8] + work[:, 9:]]
-        )
-        h = np.diff(block.motion.t, prepend=before)
-        passed = self._impulse + np.cumsum(h * flow.sizes[2])
-        self._impulse = float(passed[-1])
-        self._watch(
-            np.vstack([flow.sizes[:2], passed]),
-            np.column_stack([change[:, 0], strain, work[:, :2], total[:, :1], LITTLE * flow.kinetic]),
-            left,
-            work,
-        )
-        return {
-            "kinetic": flow.kinetic[:, None], "strain": strain[:, None], "work": work[:, :2],
-            "dissipated": total[:, :1], "neglected": (work[:, 2] + total[:, 1])[:, None], "residual": left[:, :1],
-            "driven": driven,
+            driven = supports
+        change = energy - self._start
+        left = change - loads - supports + dissipated + drag + neglected
+        exchanged = change, strain, loads, supports, dissipated, LITTLE * flow.kinetic
+        found = (np.abs(exchanged).max(), np.abs(left).max(), np.abs(neglected).max())
+        self._largest = np.maximum(self._largest, found)
+        rows = {
+            "kinetic": flow.kinetic, "strain": strain, "dissipated": dissipated, "neglected": neglected + drag,
+            "residual": left, "driven": driven,
         }  # fmt: skip
+        return {name: x[:, None] for name, x in rows.items()} | {"work": np.stack([loads, supports], axis=1)}
 
     def _mu(self, block: Block) -> Rows:
         """Forces of rows, unless the block knows those of springs."""
         return np.zeros((len(block), 0)) if block.exerted is not None else self._forces.of(block)
 
-    def _flows(self, block: Block) -> tuple[Flow, Float[np.ndarray, "T 8"]]:
+    def _flows(self, block: Block) -> tuple[Flow, Float[np.ndarray, "T 2"]]:
         """Of all links, and what damping takes in each step."""
-        motion, at, flows, taken = block.motion, rates_of_bodies(block.motion), [], np.zeros((len(block), 8))
+        motion, at, flows, taken = block.motion, rates_of_bodies(block.motion), [], np.zeros((len(block), 2))
         for k, group in enumerate(self._groups):
             of, links = [self.of[i] for i in group], [block.links[i] for i in group]
             found, lost = self._flow_of(k, of, links, motion, at)
@@ -199,7 +180,7 @@ class Account:
 
     def _flow_of(
         self, k: int, of: list[Constants], links: Sequence[LinkHistory], motion: RigidMotion, at: RigidRates
-    ) -> tuple[Flow, Float[np.ndarray, "T 8"] | float]:
+    ) -> tuple[Flow, Float[np.ndarray, "T 2"] | float]:
         """Of the links of a group, and what damping takes of them."""
         turns = [x.link.fit is None for x in of]
         made = [products(*each) for each in zip(of, links, turns, strict=True)]
@@ -211,23 +192,7 @@ class Account:
         last = self._last[k] or last_of(motion.t, at, of, links, made, 0)
         lost = resistance(of, links, made, turns, (motion.t, at), last)
         self._last[k] = last_of(motion.t, at, of, links, made, -1)
-        return found, np.vstack([lost.dissipated, lost.drag, lost.impulse, lost.angular]).T
-
-    def _watch(
-        self,
-        sizes: Float[np.ndarray, "3 T"],
-        exchanged: Float[np.ndarray, "T 6"],
-        left: Float[np.ndarray, "T 7"],
-        work: Float[np.ndarray, "T 12"],
-    ) -> None:
-        """Largest values so far: exchanged energy, momenta of all links, what forces passed on, what does not balance."""
-        planar = any(of.link.planar for of in self.of)
-        linear, angular = ([0, 1], [2]) if planar else ([0, 1, 2], [0, 1, 2])
-        found = (
-            exchanged, *sizes, left[:, 0], work[:, 2], _size(left[:, 1:4][:, linear]), _size(left[:, 4:7][:, angular]),
-            _size(work[:, 9:][:, angular]),
-        )  # fmt: skip
-        self._largest = np.maximum(self._largest, [float(np.abs(x).max()) for x in found])
+        return found, np.stack([lost.dissipated, lost.drag], axis=1)
 
 
 def energy_channels(account: Account) -> list[tuple[Channel, Callable[[Block], Rows]]]:
@@ -242,21 +207,17 @@ def energy_channels(account: Account) -> list[tuple[Channel, Callable[[Block], R
 
 
 def balance_warning(found: Balance, stiffened: bool = False) -> tuple[str, ...]:
-    """A warning where the integration loses or makes energy or momentum.
+    """A warning where the integration loses or makes energy.
 
     Parameters
     ----------
-    stiffened : the run has geometric stiffening, whose work is in the residual too: energy is not judged
+    stiffened : the run has geometric stiffening, whose work is in the residual too: it is not judged
     """
-    energy = {} if stiffened else {"energy": found.energy}
-    left = energy | {"momentum": found.linear, "angular momentum": found.angular}
-    message = ", ".join(f"{100 * x:.2g} % of {name}" for name, x in left.items() if x > UNBALANCED)
-    if not message:
+    if stiffened or found.energy <= UNBALANCED:
         return ()
     return (
-        f"the residual of the balance is {message}: the steps are too long for what moves, or numerical "
-        "damping takes what they "
-        "do not resolve; take shorter ones",
+        f"the residual of the balance is {100 * found.energy:.2g} % of energy: the steps are too long for what moves, or "
+        "numerical damping takes what they do not resolve; take shorter ones",
     )
 
 
@@ -268,10 +229,6 @@ def _grouped(of: Sequence[Constants], k: int) -> list[list[int]]:
 
 def _bodies(of: Sequence[Constants]) -> Int[np.ndarray, " S"]:
     return np.array([x.body for x in of])
-
-
-def _size(x: Float[np.ndarray, "T c"]) -> Float[np.ndarray, " T"]:
-    return np.asarray(np.sqrt((x**2).sum(axis=1)))
 
 
 def _share(x: float, of: float) -> float:

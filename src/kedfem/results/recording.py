@@ -29,7 +29,7 @@ def recording(
 
     Parameters
     ----------
-    account : of energy and momentum, if one is kept already
+    account : of energy, if one is kept already
     along : path of the rigid motion, if joint forces of rigid links are wanted beside those of elastic ones
     linked : the scene's linkage, where that is at hand
 

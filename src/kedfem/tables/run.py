@@ -122,14 +122,9 @@ def _cell(error: float | None) -> str:
 
 
 def balance_table(found: Balance) -> Table:
-    """The residual of energy and momentum over the steps, and what energy rigid-body frames make."""
+    """The residual of energy over the steps, and what energy rigid-body frames make."""
     table = Table(title="Balance", show_header=False)
-    for what, share in (
-        ("energy, residual of the steps", found.energy),
-        ("momentum", found.linear),
-        ("angular momentum", found.angular),
-    ):
-        table.add_row(what, f"{100 * share:.2g} % of the largest exchanged")
+    table.add_row("energy, residual of the steps", f"{100 * found.energy:.2g} % of the largest exchanged")
     if found.neglected:
         table.add_row(
             "energy made by rigid-body frames", f"{100 * found.neglected:.3g} % of the largest exchanged"

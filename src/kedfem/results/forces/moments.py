@@ -145,13 +145,6 @@ def rotated(at: RigidRates, x: Float[np.ndarray, "c S T"]) -> Float[np.ndarray, 
     return x if len(x) == 1 else np.einsum("ijst,jst->ist", at.place[:, 1:], x)
 
 
-def in_world(x: Float[np.ndarray, "c S T"]) -> Float[np.ndarray, "3 T"]:
-    """All links together: vectors in space or in a plane, or of one component, across it."""
-    out = np.zeros((3, x.shape[2]))
-    out[2 if len(x) == 1 else 0 :][: len(x)] = x.sum(axis=1)
-    return out
-
-
 def dot(x: Float[np.ndarray, "T ..."], y: Float[np.ndarray, "T ..."]) -> Float[np.ndarray, " T"]:
     """Σ x · y at every time point."""
     return np.asarray(np.einsum("tk,tk->t", x.reshape(len(x), -1), y.reshape(len(y), -1)))

@@ -1,4 +1,4 @@
-"""What damping takes: of energy, and where its forces turn with the rigid-body motion, of momentum."""
+"""What damping takes of energy, and what its forces do on the rigid-body motion where they turn with it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +13,6 @@ from kedfem.results.forces.moments import (
     RigidRates,
     dot,
     flat_times,
-    in_world,
     mass_times,
     paired,
     rotated,
@@ -21,7 +20,6 @@ from kedfem.results.forces.moments import (
 )
 
 Scalars = Float[np.ndarray, " T"]
-Vectors = Float[np.ndarray, "3 T"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,13 +28,10 @@ class Resistance:
 
     dissipated : (T,) h ġᵀ C0 ġ with ġ = (g1 − g0)/h [J]
     drag : (T,) work of the damping forces against the rigid-body motion, where these turn with it [J]
-    impulse, angular : (3, T) of the damping forces, about the world's origin [N s, N m s]
     """
 
     dissipated: Scalars
     drag: Scalars
-    impulse: Vectors
-    angular: Vectors
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,22 +76,19 @@ def resistance(
             arms[:, :, slot] = paired(k, end, Cg) - 0.5 * paired(k, g, Cg)
     taken /= np.where(h > 0, h, 1.0)
     if not len(which):
-        none = np.zeros((3, len(t)))
-        return Resistance(taken, none[0], none, none)
-    return Resistance(taken, *_turning(rows, arms, _mean(at.of(bodies, k), before.at.of(bodies, k))))
+        return Resistance(taken, np.zeros(len(t)))
+    return Resistance(taken, _turning(rows, arms, _mean(at.of(bodies, k), before.at.of(bodies, k))))
 
 
-def _turning(
-    rows: Float[np.ndarray, "m S T"], arms: Float[np.ndarray, "k k S T"], at: RigidRates
-) -> tuple[Scalars, Vectors, Vectors]:
-    """Drag, impulse and angular impulse of damping forces that turn with the rigid-body motion."""
+def _turning(rows: Float[np.ndarray, "m S T"], arms: Float[np.ndarray, "k k S T"], at: RigidRates) -> Scalars:
+    """Drag of damping forces that turn with the rigid-body motion."""
     y = rows[:-1].reshape(at.rates.shape[1:])
     moment = turned(y[1:] + arms)
     moment[-1] += rows[-1]
     impulse, turn = np.einsum("ijst,jst->ist", at.place[:, 1:], y[0]), rotated(at, moment)
-    drag = np.einsum("ist,ist->t", impulse, at.rates[0, 0]) + np.einsum("ist,ist->t", turn, at.omega)
-    angular = turned(at.place[:, :1] * impulse) + turn
-    return np.asarray(drag), in_world(impulse), in_world(angular)
+    return np.asarray(
+        np.einsum("ist,ist->t", impulse, at.rates[0, 0]) + np.einsum("ist,ist->t", turn, at.omega)
+    )
 
 
 def held(of: Constants, history: LinkHistory, at: RigidRates) -> Field | None:
