@@ -72,7 +72,13 @@ class Cell:
     @property
     def within(self) -> float:
         """What its displacements may differ by from the oracle's, of their peak."""
-        return ROUNDED if self.frames == "rigid-body" and not self.plane else WITHIN[self.frames]
+        rounded = not self.plane if self.frames == "rigid-body" else self.stiff_beside
+        return ROUNDED if rounded else WITHIN[self.frames]
+
+    @property
+    def stiff_beside(self) -> bool:
+        """Whether a run with stiffening has a link a thousand times as stiff as others, which costs it digits."""
+        return self.frames == "stiffening" and "rigid" in self.links
 
     @property
     def drawn(self) -> bool:

@@ -357,10 +357,6 @@ def test_what_does_not_suit_such_joints_is_refused() -> None:
         SceneError, match=r"joints\.S\.kind: must be .* with frames = .co-rotational. .*, got a slot"
     ):
         scene_from(inverted(kind="slot", frames="co-rotational"))
-    with pytest.raises(SceneError, match=r"joints\.S\.kind: must not be combined with analysis\.stiffening"):
-        scene_from(inverted(stiffening=True))
-    with pytest.raises(SceneError, match=r"joints\.S\.bushing: must .* got one"):
-        scene_from(bushed(1.0, stiffening=True))
     raw = driven_slide()
     raw["drive"]["shaft_stiffness"] = 1.0
     with pytest.raises(SceneError, match=r"drive\.shaft_stiffness: must be given for a hinge .*, got 'A'"):

@@ -90,7 +90,7 @@ def chosen_frames(search: Trials, scene: Scene) -> tuple[Scene, float]:
     ready = search.ready(trial)
     geometric = GeometricError(ready.model)
     histories(ready, look=geometric.add)
-    error = geometric.estimate
+    error = geometric.worst
     if error <= (FOLLOWED if beams_only(scene) else DEARER) * search.asked:
         return scene, error
     corotational = with_analysis(scene, frames="co-rotational")

@@ -181,9 +181,8 @@ def frames_share(geometric: GeometricError, kinds: Sequence[str]) -> Share | Non
     warned = geometric_warning(geometric)
     remedy = warned[0].rsplit("; ", 1)[-1] if warned else ""
     how = f"the elastic rotation of links is up to {np.degrees(geometric.turn):.2g} deg"
-    return Share(
-        "frames", dict.fromkeys(kinds, geometric.estimate), how, f"{how}; {remedy}" if remedy else ""
-    )
+    errors = {kind: geometric.estimate if kind == "stress" else geometric.worst for kind in kinds}
+    return Share("frames", errors, how, f"{how}; {remedy}" if remedy else "")
 
 
 def step_errors(ready: Prepared, base: Histories) -> dict[str, float]:

@@ -11,6 +11,9 @@ Equation (20) turns K with the rigid-body motion, which leaves two things out:
   a strut that bends between its ends, N over the buckling load of any other in its own shape. No length, section or end
   condition need be known, so it serves links of every kind.
 * **Large turns.** Where N vanishes, as under a force across a cantilever, the error is of second order, c ψ².
+* **Directions of slides.** What slides along an elastic link is held across the link's direction in the rigid-body
+  motion, not across the bent link, which is off by ψ: displacements, joint forces and efforts err by ψ, of first order.
+  Stiffening does not know how their forces turn with the bent link, so that what it leaves is not taken for less.
 
 All links are counted together, because a joint's force on one is the next one's, with the largest sums over time. The
 factor of e is measured, on the four-bar of [KED] (docs/theory/errors.md): 3. One is the change of stiffness itself; the
@@ -114,6 +117,7 @@ class GeometricError:
     axial : ∫ N ψ² ds of these links [J]
     strain : their energy [J]
     turn : ψ of any slice [rad]
+    slid : the same of links along which others slide
     """
 
     model: Model
@@ -121,8 +125,9 @@ class GeometricError:
     axial: float = 0.0
     strain: float = 0.0
     turn: float = 0.0
+    slid: float = 0.0
     _of: list[Slices | None] = field(default_factory=list, repr=False)
-    REMEMBERED: ClassVar = ("axial", "strain", "turn")
+    REMEMBERED: ClassVar = ("axial", "strain", "turn", "slid")
 
     def __post_init__(self) -> None:
         self._of = [
@@ -139,6 +144,7 @@ class GeometricError:
             return
         self.strain = max(self.strain, float(np.sum(looked_at, axis=0).max()))
         some, axial = block.every(max(1, len(block) // INSTANTS)), np.zeros(1)
+        guides = {body for _, body in slides(self.model)}
         joined = zip(
             self.model.links, self.model.joints, self.model.bodies, some.links, self._of, strict=True
         )
@@ -147,7 +153,9 @@ class GeometricError:
                 turned = (slopes(link, of, history, some.motion.R[:, body]) ** 2).sum(axis=2)
                 N = axial_forces(link, joint, of, history, some.motion, body)
                 axial = axial + (N * turned) @ of.lengths
-                self.turn = max(self.turn, float(np.sqrt(turned.max(initial=0.0))))
+                turn = float(np.sqrt(turned.max(initial=0.0)))
+                self.turn = max(self.turn, turn)
+                self.slid = max(self.slid, turn * (body in guides))
         self.axial = max(self.axial, float(np.abs(axial).max()))
 
     @property
@@ -155,7 +163,23 @@ class GeometricError:
         """Of the peak stress."""
         share = self.axial / (2 * self.strain) if self.strain else 0.0
         error = AXIAL * share + TURN * self.turn**2
-        return STIFFENED * error if self.stiffened else error
+        return STIFFENED * error if self.stiffened and not slides(self.model) else error
+
+    @property
+    def worst(self) -> float:
+        """Of the peak of anything: of displacements and joint forces where slides keep their directions."""
+        return self.estimate + self.slid
+
+
+def slides(model: Model) -> list[tuple[str, int]]:
+    """Joints that hold some directions of an elastic link and leave others free, and the link's number in the linkage."""
+    found = []
+    for row in model.rows:
+        if row.sides[1] is not None:
+            planar = model.links[model.bodies.index(row.bodies[1])].planar
+            across = np.linalg.matrix_rank(row.gap[~row.turn.any(axis=1)])
+            found += [(row.name, row.bodies[1])] if 0 < across < (2 if planar else 3) else []
+    return found
 
 
 def slopes(
@@ -180,13 +204,17 @@ def axial_forces(
 
 def geometric_warning(found: GeometricError) -> tuple[str, ...]:
     """A warning where the linear equation is not enough, and what is."""
-    error = found.estimate
+    error = found.worst
     if error < LARGE:
         return ()
     remedy = _remedy(found, error)
+    of = "of the peak stress"
+    if found.slid > found.estimate:
+        names = ", ".join(dict.fromkeys(f"joints.{name}" for name, _ in slides(found.model)))
+        of = f"of the largest displacements and joint forces, as {names} goes on along the undeformed link"
     return (
         f"the elastic rotation of links is up to {np.degrees(found.turn):.2g} deg, which the linear equation takes as "
-        f"small: it is off by about {float(f'{100 * min(error, 1.0):.2g}'):g} % of the peak stress"
+        f"small: it is off by about {float(f'{100 * min(error, 1.0):.2g}'):g} % {of}"
         f"{' or more' if error > 1 else ''}; {remedy}",
     )
 
@@ -201,7 +229,7 @@ def _remedy(found: GeometricError, error: float) -> str:
     corotational = 'analysis.frames = "co-rotational"'
     if error >= MODERATE:
         return f"take {corotational}, which is right at any deflection"
-    known = found.stiffened or rows  # neither once more, nor with constraint equations
+    known = found.stiffened or found.slid > found.estimate  # neither once more, nor against what slides leave
     stiffening = "" if known else "analysis.stiffening = true leaves about a third of it, "
     return f"{stiffening}{corotational} is right at any deflection"
 

@@ -88,7 +88,7 @@ def instants(model: Model, motion: RigidMotion, stresses: Stiffening | None = No
     """Orientation, load, spin and, if given, stress stiffness of all links at each time point."""
     forcing = forcings(model, motion)
     if stresses is not None:
-        forcing = stresses.stressed(forcing)
+        forcing = stresses.over(forcing, motion)
     W = cross_matrix(motion.omega)
     spin = cross_matrix(motion.alpha) + W @ W
     rows = joint_rows(model.rows, motion)

@@ -15,14 +15,18 @@ from jaxtyping import Float, Int
 
 from kedfem.dynamics.history import Forcing
 from kedfem.dynamics.joints.attachments import Attachment
+from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
+from kedfem.dynamics.joints.constraint_matrices import JointRows, joint_rows
 from kedfem.dynamics.joints.ports import Rotation, port_columns
 from kedfem.dynamics.loads import Pattern
+from kedfem.dynamics.matrices.interface import solved, static_tie
 from kedfem.dynamics.matrices.substructure import Substructure, factored, mass_matrix
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.state import ForcingAt, LinkState, Nodal
 from kedfem.links.record import Link, Matrix
 from kedfem.links.reduced import rigid_modes
 from kedfem.links.stress_stiffness import stress_stiffness, turned_directions
+from kedfem.motion.rigid import RigidMotion
 
 BALANCED = 1e-9  # of a load: what is left of one that only accelerates the link is rounding
 INDEPENDENT = 1e-10  # of the largest energy: loads below repeat others
@@ -62,16 +66,24 @@ class StressModes:
 
 @dataclass(frozen=True, slots=True)
 class Stiffening:
-    """Stress modes of all links, and the static linkage that shares the loads out among the joints (A = K0)."""
+    """Stress modes of all links, and the static linkage that shares the loads out among the joints (A = K0).
+
+    joints : those that are enforced by constraint equations
+    """
 
     parts: Sequence[Substructure]
     modes: Sequence[StressModes]
+    joints: Sequence[ConstraintJoint]
 
-    def stressed(self, forcing: Sequence[Forcing]) -> list[Forcing]:
-        """The same over time with the factors s_i of the stress modes."""
+    def over(self, forcing: Sequence[Forcing], motion: RigidMotion) -> list[Forcing]:
+        """The same over the times of a motion with the factors s_i of the stress modes."""
+        return self.stressed(forcing, joint_rows(self.joints, motion))
+
+    def stressed(self, forcing: Sequence[Forcing], rows: JointRows | None) -> list[Forcing]:
+        """The same with the constraint equations known."""
         R = [each.R for each in forcing]
         loads = [each.F @ each.R for each in forcing]
-        forces = port_forces(self.parts, R, loads)
+        forces = port_forces(self.parts, R, loads, rows)
         return [
             replace(each, stress=_factors(modes, part, load, force))
             for each, modes, part, load, force in zip(
@@ -104,7 +116,7 @@ def stiffening(model: Model) -> Stiffening:
         stress_modes(link, part, loads)
         for link, part, loads in zip(model.links, parts, model.loads, strict=True)
     ]
-    return Stiffening(parts, modes)
+    return Stiffening(parts, modes, model.rows)
 
 
 def stress_modes(link: Link, part: Substructure, loads: Sequence[Pattern]) -> StressModes:
@@ -171,15 +183,25 @@ def port_forces(
     parts: Sequence[Substructure],
     R: Sequence[Float[np.ndarray, "T d d"]],
     loads: Sequence[Float[np.ndarray, "T n d"]],
+    rows: JointRows | None = None,
 ) -> list[Float[np.ndarray, "T _"]]:
-    """`coupled` for many times at once, port forces only: λ of all links, link frame."""
+    """`coupled` for many times at once, port forces only: λ of all links, link frame.
+
+    Parameters
+    ----------
+    rows : constraint equations, springs of bushings among them, on the interface unknowns
+    """
     v = [x.reshape(len(x), -1) @ part.Y for x, part in zip(loads, parts, strict=True)]
     RB = [_interface(part, each) for part, each in zip(parts, R, strict=True)]
     if RB[0].shape[2]:
         SRB = [part.S @ b for part, b in zip(parts, RB, strict=True)]
         H = np.sum([b.transpose(0, 2, 1) @ x for b, x in zip(RB, SRB, strict=True)], axis=0)
         f = np.sum([np.einsum("tck,tc->tk", x, y) for x, y in zip(SRB, v, strict=True)], axis=0)
-        z = np.linalg.solve(H, f[..., None])
+        if rows is None:
+            z = np.linalg.solve(H, f[..., None])
+        else:
+            each = enumerate(zip(H, f, strict=True))
+            z = np.stack([solved(H_t, f_t, static_tie(rows, t))[0] for t, (H_t, f_t) in each])[..., None]
         v = [x - (b @ z)[..., 0] for x, b in zip(v, RB, strict=True)]
     return [(-x @ part.S)[:, : len(part.attachment.keep)] for x, part in zip(v, parts, strict=True)]
 

@@ -78,7 +78,7 @@ class Stiffened:
 
     def system_at(self, motion: RigidMotion) -> tuple[System, float]:
         """The system with its links as they are at a position, and s [1/s²] with which K + s M holds each of them."""
-        forcing = self.stresses.stressed(forcings(self.driven, motion))
+        forcing = self.stresses.over(forcings(self.driven, motion), motion)
         links, shift = [], 0.0
         model = self.system.model
         for link, rigid, modes, body, force in zip(

@@ -145,7 +145,7 @@ class MonolithicSteps:
     ) -> tuple[list[LinkHistory], Begun]:
         """All time points of a block, one step after the other."""
         if self.stiffening is not None:
-            forcing = self.stiffening.stressed(forcing)
+            forcing = self.stiffening.stressed(forcing, rows)
         links, held, taken = state.links, state.rows, []
         for k in range(len(forcing[0].R)):
             at = [each.at(k) for each in forcing]
@@ -162,8 +162,7 @@ class MonolithicSteps:
 
     def step(self, states: Sequence[LinkState], at: Sequence[ForcingAt]) -> list[LinkState]:
         """States of all links one step later, [KED, eq. (20)]."""
-        new = self.tied_step(states, at, None)[0]
-        return new if self.stiffening is None else with_turnings(new, self.stiffening.turnings(at))
+        return self.tied_step(states, at, None)[0]
 
     def tied_step(
         self, states: Sequence[LinkState], at: Sequence[ForcingAt], tie: Tie | None
@@ -182,6 +181,8 @@ class MonolithicSteps:
             self._next(k, states[k], at[k], parts[k].reshape(rhs[k].shape), A[k], rhs[k])
             for k in range(len(self.links))
         ]
+        if self.stiffening is not None:
+            new = with_turnings(new, self.stiffening.turnings(at))
         return new, free[len(free) - self.joints[0].B.shape[1] :], m
 
     def _matrices(self, at: Sequence[ForcingAt]) -> list[sp.csr_array]:

@@ -109,7 +109,7 @@ def driving(of: Ready, motion: RigidMotion, loads: Loads | None = None) -> Drivi
         weights,
         stiffness_factors(varied, motion.t, motion.phi),
     )
-    terms = NO_TERMS if of.stressed is None else of.stressed.over(forcing)
+    terms = NO_TERMS if of.stressed is None else of.stressed.over(forcing, motion)
     # other strides would be compiled for anew
     return Driving(*(np.ascontiguousarray(x) for x in (*rows, *terms)))
 

@@ -71,9 +71,6 @@ SLIDERS = Refusal("model", {"enforced": (CONSTRAINED,), "link": ("slider",)}, "{
 REFUSALS = (
     SLOTS,
     SLIDERS,
-    Refusal("joints", {"enforced": (CONSTRAINED,), "stiffening": ("on",)}, "{where}.{key}",
-        "not be combined with analysis.stiffening", "which knows no constraint equations", "{noun}",
-        'take frames = "co-rotational", which know all of it'),
     Refusal("joints", {"enforced": (CONSTRAINED,), "rho_inf": ("1",)}, "analysis.rho_inf",
         "be less than 1 with {where}", "its force would swing from step to step, and grow", "1", "take 0.95"),
     Refusal("joints", {"joint": ("spherical", "slot"), "bushing": ("against rotations",)},
@@ -93,8 +90,6 @@ REFUSALS = (
     Refusal("drives", {"joint": ("prismatic",), "shaft": ("given",)}, "{where}.shaft_stiffness",
         "be given for a hinge", "a shaft gives as it is twisted", "{name!r}, which is prismatic",
         "take a bushing, or a spring along the slide"),
-    Refusal("gears", {"stiffening": ("on",)}, "{where}", "not be combined with analysis.stiffening",
-        "which knows no constraint equations", "it", 'take frames = "co-rotational", which know all of it'),
     Refusal("gears", {"element": ("gear",), "joint": others("revolute")}, "{where}",
         "be revolute, as joints of gears are", "these couple rotations", "{name!r}, which is {kind}", "take hinges"),
     Refusal("gears", {"element": ("rack",), "joint": others("prismatic")}, "{where}",

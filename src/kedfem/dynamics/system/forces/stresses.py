@@ -11,6 +11,7 @@ from kedfem.dynamics.history import Forcing
 from kedfem.dynamics.stiffening import Stiffening, StressModes
 from kedfem.dynamics.system.arrays import Stresses, ends_of
 from kedfem.dynamics.system.sparse import Part, SparsePart
+from kedfem.motion.rigid import RigidMotion
 
 ROUNDING = 1e-14  # of the largest singular value
 
@@ -30,11 +31,11 @@ class Stressed:
     entries: Sequence[Float[np.ndarray, "m z"]]
     size: Sequence[Float[np.ndarray, " m"]]
 
-    def over(self, forcing: Sequence[Forcing]) -> Terms:
+    def over(self, forcing: Sequence[Forcing], motion: RigidMotion) -> Terms:
         """Terms over the times of a motion."""
         every = []
         for each, entries, size in zip(
-            self.stiffening.stressed(forcing), self.entries, self.size, strict=True
+            self.stiffening.over(forcing, motion), self.entries, self.size, strict=True
         ):
             if each.stress is None:
                 raise ValueError("stress factors must be there, got none")
