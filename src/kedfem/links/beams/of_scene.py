@@ -10,9 +10,8 @@ from kedfem.links.beams.beam_axis import Axis, smooth_axis, straight_axis
 from kedfem.links.beams.section import scene_section
 from kedfem.links.beams.spatial_beam import spatial_beam_link
 from kedfem.links.record import Link
-from kedfem.scene import Bar, LinkScene, PointMass, Polyline, RectangleSection, Scene
+from kedfem.scene import Bar, Joint, LinkScene, PointMass, Polyline, RectangleSection, Scene
 
-JOINED = ("revolute", "spherical", "weld", "universal")  # joints that hold a point of a beam for good
 SAME = 1e-6  # of a segment's length: what is so near is at one place
 
 
@@ -54,7 +53,7 @@ def beam_points(scene: Scene, name: str, spatial: bool) -> Float[np.ndarray, "p 
     points = np.array(shape.between if isinstance(shape, Bar) else getattr(shape, "points", ()))
     if getattr(shape, "smooth", False):
         return points
-    held = [x.on(name) for x in scene.joints.values() if name in x.links and x.kind in JOINED]
+    held = [x.on(name) for x in scene.joints.values() if name in x.links and not _is_slot_of(x, name)]
     light = [x.at for x in scene.bodies.values() if x.link == name and isinstance(x, PointMass)]
     heavy = [x.at for x in scene.bodies.values() if x.link == name and not isinstance(x, PointMass)]
     elements = link.mesh.elements if isinstance(link.mesh.elements, int) else 1
@@ -82,3 +81,8 @@ def beam_nodes(link: LinkScene) -> int:
 
 def _of_bar(bar: Bar) -> RectangleSection:
     return RectangleSection(width=bar.width, thickness=bar.thickness)
+
+
+def _is_slot_of(joint: Joint, name: str) -> bool:
+    """Whether a beam has the slot of a joint, whose pin is anywhere along it."""
+    return joint.kind == "slot" and name == joint.links[1]
