@@ -35,7 +35,7 @@ NOTHING = 1e-9  # of the largest force: rounding
 
 @dataclass(frozen=True, slots=True)
 class LoadCase:
-    """A link at an instant; all in its axes: the world's in the reference position in the reference position.
+    """A link at an instant; all in its axes: the world's in the reference position.
 
     time, angle : [s]; drive angle [rad] or travel [m]
     parts : (n, 3) forces at the nodes by what exerts them [N]

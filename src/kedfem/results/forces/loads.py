@@ -34,8 +34,8 @@ class JointLoad:
     joint, kind : its name; elastic or rigid: whose links the force is of
     links : the link that `world` acts on, and the other
     world : (T, 3) force on the first link [N]
-    inside : (T, 3) each: force that each link bears, in its own axes, in the reference position in the reference
-        position [N]; empty where the motion is not known
+    inside : (T, 3) each: force that each link bears, in its own axes, which are the world's in the
+        reference position [N]; empty where the motion is not known
     axis : (3,) of a hinge, in the reference position; None of other joints
     rate : (T,) speed of one link against the other [rad/s]; None where the motion is not known
     """
