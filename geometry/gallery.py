@@ -16,7 +16,7 @@ Written by `python -m geometry.gallery`: every STEP file of geometry/ with defau
 
 ![All parts](pictures/parts.png)
 
-| part | way | elements | unknowns | worst scaled Jacobian | bores and balls found |
+| part | method | elements | unknowns | worst scaled Jacobian | bores and balls found |
 |---|---|---:|---:|---:|---:|
 """
 

@@ -74,7 +74,7 @@ def shortened(scene: Scene) -> Scene:
 
 
 def of_family(link: LinkScene, family: Family, reduced: bool = False) -> LinkScene:
-    """The link meshed in another way, with the usual element and mesh of that way."""
+    """The link meshed by another method, with the usual element and mesh of that method."""
     gone = CHOSEN if family in {"plane", "solid"} else CHOSEN | {"segments"}
     given = {key: getattr(link, key) for key in link.model_fields_set - gone}
     reduction = "modal" if reduced and family != "rigid" else "none"

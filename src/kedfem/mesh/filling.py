@@ -41,7 +41,7 @@ _BRIEF: dict[str, float] = {"Mesh.HighOrderIterMax": 25, "Mesh.HighOrderPassMax"
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """One way to let gmsh make tetrahedra: its 2-D and 3-D algorithm."""
+    """One method by which to let gmsh make tetrahedra: its 2-D and 3-D algorithm."""
 
     plane: int
     solid: int

@@ -10,7 +10,7 @@ from kedfem.errors import KedfemError
 
 
 class OtherMethodError(KedfemError):
-    """A solid cannot be meshed this way; the reason is reported if no way is left, or a worse one taken."""
+    """A solid cannot be meshed by this method; the reason is reported if none is left, or a worse one taken."""
 
 
 @dataclass(frozen=True, slots=True)

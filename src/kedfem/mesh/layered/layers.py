@@ -20,7 +20,7 @@ from kedfem.mesh.layered.sweep import swept
 from kedfem.mesh.places import in_mm
 
 _GAIN = 0.03  # of scaled Jacobian that more elements must bring
-_LEAST = 0.1  # scaled Jacobian below which another way may do better
+_LEAST = 0.1  # scaled Jacobian below which another method may do better
 _ALONG = 1e-5  # sine of the angle that a face may be off the direction, or off being at right angles to it
 _FAR_TOO_MANY = (
     1_500_000  # unknowns, ten times those above which tetrahedra are taken: not worth meshing to see it
@@ -200,7 +200,7 @@ def _way_in_words(direction: Float[np.ndarray, "3"], flat: PlanMesh, plan: Plan,
 
 
 def not_too_bad(solid: Solid, mesh: SolidMesh) -> SolidMesh:
-    """The mesh itself, unless another way may do better."""
+    """The mesh itself, unless another method may do better."""
     quality = mesh_quality(mesh)
     if quality.least < _LEAST:
         raise OtherMethodError(

@@ -13,7 +13,7 @@ from kedfem.mesh.session import gmsh_copy, gmsh_options, numbered_nodes
 
 _HEX27 = 12  # gmsh's number of the 27-node hexahedron
 _MOST = 2000  # cubes of the size in the volume: a finer default is not taken
-_LEAST = 0.1  # scaled Jacobian below which another way may do better
+_LEAST = 0.1  # scaled Jacobian below which another method may do better
 _TURN = np.radians(20)  # of a curved edge per element: parabolas lose 5e-5 of a circle's area
 #: As gmsh has them by itself; who meshed before may have left others.
 _OPTIONS: dict[str, float] = {
