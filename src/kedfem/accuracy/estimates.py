@@ -18,7 +18,7 @@ from typing import ClassVar
 import numpy as np
 
 from kedfem.accuracy.error_budget import Budget, Share, by_kind, joined
-from kedfem.accuracy.geometric import GeometricError, geometric_warning
+from kedfem.accuracy.geometric import GeometricError, bent, geometric_warning
 from kedfem.accuracy.histories import Histories, counted, extent, histories
 from kedfem.accuracy.mesh_estimate import FUNCTIONS, link_errors, mesh_share, plain_mesh_share
 from kedfem.accuracy.prepared import Prepared
@@ -180,7 +180,7 @@ def frames_share(geometric: GeometricError, kinds: Sequence[str]) -> Share | Non
         return None
     warned = geometric_warning(geometric)
     remedy = warned[0].rsplit("; ", 1)[-1] if warned else ""
-    how = f"the elastic rotation of links is up to {np.degrees(geometric.turn):.2g} deg"
+    how = bent(geometric)
     errors = {kind: geometric.estimate if kind == "stress" else geometric.worst for kind in kinds}
     return Share("frames", errors, how, f"{how}; {remedy}" if remedy else "")
 

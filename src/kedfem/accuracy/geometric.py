@@ -207,16 +207,19 @@ def geometric_warning(found: GeometricError) -> tuple[str, ...]:
     error = found.worst
     if error < LARGE:
         return ()
-    remedy = _remedy(found, error)
-    of = "of the peak stress"
-    if found.slid > found.estimate:
-        names = ", ".join(dict.fromkeys(f"joints.{name}" for name, _ in slides(found.model)))
-        of = f"of the largest displacements and joint forces, as {names} goes on along the undeformed link"
+    of = "displacements and joint forces" if found.slid > found.estimate else "the peak stress"
     return (
-        f"the elastic rotation of links is up to {np.degrees(found.turn):.2g} deg, which the linear equation takes as "
-        f"small: it is off by about {float(f'{100 * min(error, 1.0):.2g}'):g} % {of}"
-        f"{' or more' if error > 1 else ''}; {remedy}",
+        f"{bent(found)}, which the linear equation takes as small: it is off by about "
+        f"{float(f'{100 * min(error, 1.0):.2g}'):g} % of {of}{' or more' if error > 1 else ''}; {_remedy(found, error)}",
     )
+
+
+def bent(found: GeometricError) -> str:
+    """How far links bend, and what slides along them as if they did not, in words."""
+    names = dict.fromkeys(f"joints.{name}" for name, _ in slides(found.model))
+    verb = "slides" if len(names) == 1 else "slide"
+    sliding = f" ({', '.join(names)} {verb} along the undeformed link)" if found.slid > found.estimate else ""
+    return f"the elastic rotation of links is up to {np.degrees(found.turn):.2g} deg{sliding}"
 
 
 def _remedy(found: GeometricError, error: float) -> str:
