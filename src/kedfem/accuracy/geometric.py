@@ -1,6 +1,6 @@
 """How far the linear equation is off because links bend: its geometric error, estimated from a run's own deflections.
 
-Equation (20) turns K with the rigid-body motion, which leaves two things out:
+Equation (20) turns K with the rigid-body motion, which leaves three things out:
 
 * **Axial forces.** On a link that has turned by ψ against its direction there an axial force N acts across it. This
   changes the stiffness that the deflection meets by the share
@@ -127,9 +127,11 @@ class GeometricError:
     turn: float = 0.0
     slid: float = 0.0
     _of: list[Slices | None] = field(default_factory=list, repr=False)
+    _slides: list[tuple[str, int]] = field(default_factory=list, repr=False)
     REMEMBERED: ClassVar = ("axial", "strain", "turn", "slid")
 
     def __post_init__(self) -> None:
+        self._slides = slides(self.model)
         self._of = [
             slices(link, joint) if link.fit is None else None
             for link, joint in zip(self.model.links, self.model.joints, strict=True)
@@ -144,7 +146,7 @@ class GeometricError:
             return
         self.strain = max(self.strain, float(np.sum(looked_at, axis=0).max()))
         some, axial = block.every(max(1, len(block) // INSTANTS)), np.zeros(1)
-        guides = {body for _, body in slides(self.model)}
+        guides = {body for _, body in self._slides}
         joined = zip(
             self.model.links, self.model.joints, self.model.bodies, some.links, self._of, strict=True
         )
@@ -163,12 +165,18 @@ class GeometricError:
         """Of the peak stress."""
         share = self.axial / (2 * self.strain) if self.strain else 0.0
         error = AXIAL * share + TURN * self.turn**2
-        return STIFFENED * error if self.stiffened and not slides(self.model) else error
+        return STIFFENED * error if self.stiffened and not self._slides else error
 
     @property
     def worst(self) -> float:
         """Of the peak of anything: of displacements and joint forces where slides keep their directions."""
         return self.estimate + self.slid
+
+    @property
+    def sliding(self) -> tuple[str, ...]:
+        """Joints that slide along bent links, if most of the error is theirs."""
+        most = self.slid > self.estimate
+        return tuple(dict.fromkeys(f"joints.{name}" for name, _ in self._slides)) if most else ()
 
 
 def slides(model: Model) -> list[tuple[str, int]]:
@@ -207,7 +215,7 @@ def geometric_warning(found: GeometricError) -> tuple[str, ...]:
     error = found.worst
     if error < LARGE:
         return ()
-    of = "displacements and joint forces" if found.slid > found.estimate else "the peak stress"
+    of = "displacements and joint forces" if found.sliding else "the peak stress"
     return (
         f"{bent(found)}, which the linear equation takes as small: it is off by about "
         f"{float(f'{100 * min(error, 1.0):.2g}'):g} % of {of}{' or more' if error > 1 else ''}; {_remedy(found, error)}",
@@ -216,9 +224,9 @@ def geometric_warning(found: GeometricError) -> tuple[str, ...]:
 
 def bent(found: GeometricError) -> str:
     """How far links bend, and what slides along them as if they did not, in words."""
-    names = dict.fromkeys(f"joints.{name}" for name, _ in slides(found.model))
+    names = found.sliding
     verb = "slides" if len(names) == 1 else "slide"
-    sliding = f" ({', '.join(names)} {verb} along the undeformed link)" if found.slid > found.estimate else ""
+    sliding = f" ({', '.join(names)} {verb} along the undeformed link)" if names else ""
     return f"the elastic rotation of links is up to {np.degrees(found.turn):.2g} deg{sliding}"
 
 
@@ -232,7 +240,7 @@ def _remedy(found: GeometricError, error: float) -> str:
     corotational = 'analysis.frames = "co-rotational"'
     if error >= MODERATE:
         return f"take {corotational}, which is right at any deflection"
-    known = found.stiffened or found.slid > found.estimate  # neither once more, nor against what slides leave
+    known = found.stiffened or found.sliding  # neither once more, nor against what slides leave
     stiffening = "" if known else "analysis.stiffening = true leaves about a third of it, "
     return f"{stiffening}{corotational} is right at any deflection"
 
