@@ -86,12 +86,11 @@ def forcing_of(
 
 def instants(model: Model, motion: RigidMotion, stresses: Stiffening | None = None) -> list[Instant]:
     """Orientation, load, spin and, if given, stress stiffness of all links at each time point."""
-    forcing = forcings(model, motion)
+    forcing, rows = forcings(model, motion), joint_rows(model.rows, motion)
     if stresses is not None:
-        forcing = stresses.over(forcing, motion)
+        forcing = stresses.stressed(forcing, rows)
     W = cross_matrix(motion.omega)
     spin = cross_matrix(motion.alpha) + W @ W
-    rows = joint_rows(model.rows, motion)
     return [
         Instant(
             [each.at(k) for each in forcing],

@@ -76,12 +76,12 @@ def constants(link: Link, joint: Attachment, body: int, damping: Rayleigh) -> Co
 class RigidRates:
     """Rigid motion of S bodies at T time points, x = p + R X, in k dimensions, time last.
 
-    place : (k, 1 + k, S, T) [p R]
+    R : (k, k, S, T)
     rates : (2, 1 + k, k, S, T) of x' and x'': [p', R'ᵀ] and [p'', R''ᵀ]
     omega, alpha : (3, S, T) turning rate and its own; in a plane (1, S, T)
     """
 
-    place: Float[np.ndarray, "k k1 S T"]
+    R: Float[np.ndarray, "k k S T"]
     rates: Float[np.ndarray, "2 k1 k S T"]
     omega: Float[np.ndarray, "c S T"]
     alpha: Float[np.ndarray, "c S T"]
@@ -89,26 +89,25 @@ class RigidRates:
     def of(self, bodies: Int[np.ndarray, " S"], k: int = 3) -> "RigidRates":
         """Of some of the bodies, in k dimensions."""
         turns = (x[2 * (3 - k) :, bodies] for x in (self.omega, self.alpha))
-        return RigidRates(self.place[:k, : 1 + k, bodies], self.rates[:, : 1 + k, :k, bodies], *turns)
+        return RigidRates(self.R[:k, :k, bodies], self.rates[:, : 1 + k, :k, bodies], *turns)
 
     def every(self, which: slice) -> "RigidRates":
         """At some of the time points."""
         return RigidRates(
-            self.place[..., which], self.rates[..., which], self.omega[..., which], self.alpha[..., which]
+            self.R[..., which], self.rates[..., which], self.omega[..., which], self.alpha[..., which]
         )
 
 
 def rates_of_bodies(motion: RigidMotion) -> RigidRates:
     """Of all bodies of a motion."""
     T, B = motion.p.shape[:2]
-    place, rates = np.empty((3, 4, B, T)), np.empty((2, 4, 3, B, T))
-    place[:, 0], place[:, 1:] = motion.p.T, motion.R.transpose(2, 3, 1, 0)
+    R, rates = np.ascontiguousarray(motion.R.transpose(2, 3, 1, 0)), np.empty((2, 4, 3, B, T))
     rates[0, 0], rates[1, 0] = motion.v.T, motion.p2.T
     rates[1, 1:] = motion.R2.transpose(3, 2, 1, 0)
     omega, alpha = (np.ascontiguousarray(x.T) for x in (motion.omega, motion.alpha))
     for k in range(3):
-        rates[0, 1 + k] = cross(omega.T, place[:, 1 + k].T).T
-    return RigidRates(place, rates, omega, alpha)
+        rates[0, 1 + k] = cross(omega.T, R[:, k].T).T
+    return RigidRates(R, rates, omega, alpha)
 
 
 def mass_times(of: Constants, u: Field) -> Field:
@@ -142,7 +141,7 @@ def turned(N: Float[np.ndarray, "*z k k S T"]) -> Float[np.ndarray, "*z c S T"]:
 
 def rotated(at: RigidRates, x: Float[np.ndarray, "c S T"]) -> Float[np.ndarray, "c S T"]:
     """R x; what is across a plane stays there."""
-    return x if len(x) == 1 else np.einsum("ijst,jst->ist", at.place[:, 1:], x)
+    return x if len(x) == 1 else np.einsum("ijst,jst->ist", at.R, x)
 
 
 def dot(x: Float[np.ndarray, "T ..."], y: Float[np.ndarray, "T ..."]) -> Float[np.ndarray, " T"]:

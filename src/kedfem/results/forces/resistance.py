@@ -85,7 +85,7 @@ def _turning(rows: Float[np.ndarray, "m S T"], arms: Float[np.ndarray, "k k S T"
     y = rows[:-1].reshape(at.rates.shape[1:])
     moment = turned(y[1:] + arms)
     moment[-1] += rows[-1]
-    impulse, turn = np.einsum("ijst,jst->ist", at.place[:, 1:], y[0]), rotated(at, moment)
+    impulse, turn = np.einsum("ijst,jst->ist", at.R, y[0]), rotated(at, moment)
     return np.asarray(
         np.einsum("ist,ist->t", impulse, at.rates[0, 0]) + np.einsum("ist,ist->t", turn, at.omega)
     )
@@ -96,7 +96,7 @@ def held(of: Constants, history: LinkHistory, at: RigidRates) -> Field | None:
     if of.link.fit is None or not of.damping.alpha:
         return None
     d = of.link.d
-    return np.asarray(history.u @ at.place[:d, 1 : 1 + d, of.body].transpose(2, 0, 1))
+    return np.asarray(history.u @ at.R[:d, :d, of.body].transpose(2, 0, 1))
 
 
 def last_of(
@@ -153,5 +153,5 @@ def _change(
 
 def _mean(now: RigidRates, before: RigidRates) -> RigidRates:
     """Of the two ends of each step."""
-    pairs = ((getattr(now, x), getattr(before, x)) for x in ("place", "rates", "omega", "alpha"))
+    pairs = ((getattr(now, x), getattr(before, x)) for x in ("R", "rates", "omega", "alpha"))
     return RigidRates(*(0.5 * (x + np.concatenate([y, x[..., :-1]], axis=-1)) for x, y in pairs))
