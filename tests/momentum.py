@@ -33,7 +33,8 @@ def momentum(model: Model, blocks: Sequence[Block]) -> Momentum:
     """Of a run from its first block to its last."""
     t = np.concatenate([block.motion.t for block in blocks])
     h = np.diff(t, prepend=t[0])[:, None]
-    kept, forces, turning, taken, sizes = (np.zeros((len(t), 6)) for _ in range(5))
+    kept, forces, turning, taken = (np.zeros((len(t), 6)) for _ in range(4))
+    sizes = np.zeros((len(t), 3))
     for k, body in enumerate(model.bodies):
         last, parts = None, []
         for block in blocks:
@@ -44,7 +45,7 @@ def momentum(model: Model, blocks: Sequence[Block]) -> Momentum:
         kept, forces, turning, taken = (
             a + b for a, b in zip((kept, forces, turning, taken), found[:4], strict=True)
         )
-        sizes[:, :3] += np.stack([_size(found[0][:, :3]), _size(found[0][:, 3:]), found[4]], axis=1)
+        sizes += np.stack([_size(found[0][:, :3]), _size(found[0][:, 3:]), found[4]], axis=1)
     work, turned = (np.cumsum(0.5 * h * (x + np.vstack([x[:1], x[:-1]])), axis=0) for x in (forces, turning))
     left = kept - kept[0] - work + turned + np.cumsum(taken, axis=0)
     which = [0, 1, 5] if any(link.planar for link in model.links) else list(range(6))

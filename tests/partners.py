@@ -104,6 +104,13 @@ def direction(
     return np.cross(one, two) if kind == "revolute" else any_
 
 
+def axis_of(kind: str, partners: tuple[str, str], driven: bool = False, plane: bool = False) -> np.ndarray:
+    """The axis of a chain's joint J as it is without a rotation."""
+    axes: list[np.ndarray] = []
+    chain(kind, partners, driven, plane, lambda axis: axes.append(axis) or np.eye(3))  # type: ignore[func-returns-value]
+    return axes[0]
+
+
 def chain(
     kind: str,
     partners: tuple[str, str],

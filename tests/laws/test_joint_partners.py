@@ -13,7 +13,7 @@ from kedfem.scene import scene_from, spatial_beams
 from kedfem.scene.questions.moving_joints import SHARED
 from tests.laws.test_joint_rows import ROUNDING, assert_the_same, moved
 from tests.moving import channels, ran
-from tests.partners import IN_PLANE, IN_SPACE, PLANAR, SPATIAL, Z, chain
+from tests.partners import IN_PLANE, IN_SPACE, PLANAR, SPATIAL, Z, axis_of, chain
 
 Cell = tuple[str, tuple[str, str], bool]
 #: a coupling surface at the very end of a bar; a slider with two slides
@@ -122,9 +122,8 @@ def check(cell: Cell, plane: bool, turns: tuple[str, ...]) -> None:
             with pytest.raises(KedfemError, match=wanted):
                 ran(scene())
         return
-    axes: list[np.ndarray] = []
-    chain(kind, partners, driven, plane, lambda axis: axes.append(axis) or np.eye(3))  # type: ignore[func-returns-value]
-    R = {name: TURNS[plane][name](axes[0]) for name in turns}
+    axis = axis_of(kind, partners, driven, plane)
+    R = {name: TURNS[plane][name](axis) for name in turns}
     digits = limit(cell, plane)
     runs = {name: ran(scene()) for name, scene in made.items()}
     for name in turns[1:]:

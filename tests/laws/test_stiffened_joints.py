@@ -13,7 +13,7 @@ from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import path_parameter, scene_from
 from tests.laws.test_joint_partners import TURNS, named
 from tests.moving import channels, inverted, ran
-from tests.partners import chain
+from tests.partners import axis_of, chain
 
 Raw = dict[str, Any]
 SPEED = 60.0  # rad/s of the crank: stresses then change displacements by percent
@@ -54,9 +54,8 @@ def displaced(raw: Raw) -> np.ndarray:
 def test_stresses_of_constrained_joints_turn_with_the_scene(cell: tuple[str, tuple[str, str], bool]) -> None:
     """Along x, y, z and askew; and they matter."""
     kind, partners, driven = cell
-    axes: list[np.ndarray] = []
-    chain(kind, partners, driven, False, lambda axis: axes.append(axis) or np.eye(3))  # type: ignore[func-returns-value]
-    R = {name: turn(axes[0]) for name, turn in TURNS[False].items()}
+    axis = axis_of(kind, partners, driven)
+    R = {name: turn(axis) for name, turn in TURNS[False].items()}
     found = {
         name: displaced(fast(chain(kind, partners, driven, False, turn)))
         for name, turn in TURNS[False].items()
