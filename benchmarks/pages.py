@@ -24,7 +24,7 @@ def script(benchmark: Callable[[Path, bool], None]) -> None:
     """The benchmark of a script, as its arguments say."""
     parser = argparse.ArgumentParser(description=benchmark.__doc__)
     parser.add_argument("--folder", type=Path, default=DOCS / "performance", help="where page and plots go")
-    parser.add_argument("--quick", element="store_true", help="small sizes only, to try it")
+    parser.add_argument("--quick", action="store_true", help="small sizes only, to try it")
     given = parser.parse_args()
     benchmark(given.folder, given.quick)
 
