@@ -263,6 +263,9 @@ def run_of(of: Begun, monolithic: bool = False) -> np.ndarray:
     if monolithic:
         links = model.links, model.joints
         solver: Any = MonolithicSteps(*links, of.ready.scheme, model.damping, stiffening(model))
+        if made.scene.springs or made.scene.motors:
+            still = made.scene.analysis.model_copy(update={"solver": "monolithic"})
+            solver = steps_of(made.scene.model_copy(update={"analysis": still}), model)
     else:
         solver = steps_of(made.scene, model)
     blocks = list(transient(made.scene, made.linkage, made.path, model, solver))

@@ -69,7 +69,7 @@ def test_stress_modes_hold_every_stress_of_the_rigid_body_motion(
     motion = rigid_motion(ready.linkage, ready.path, t, path_parameter(ready.scene, t))
     found = stiffening.stiffening(model)
     forcing = forcings(model, motion)
-    stressed = found.stressed(forcing, None)
+    stressed = found.over(forcing, motion)
     for k in range(len(t)):
         R = [each.R[k] for each in forcing]
         load = [each.F[k] @ each.R[k] for each in forcing]

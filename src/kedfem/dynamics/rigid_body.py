@@ -88,7 +88,7 @@ def instants(model: Model, motion: RigidMotion, stresses: Stiffening | None = No
     """Orientation, load, spin and, if given, stress stiffness of all links at each time point."""
     forcing, rows = forcings(model, motion), joint_rows(model.rows, motion)
     if stresses is not None:
-        forcing = stresses.stressed(forcing, rows)
+        forcing = stresses.stressed(forcing, motion, rows)
     W = cross_matrix(motion.omega)
     spin = cross_matrix(motion.alpha) + W @ W
     return [

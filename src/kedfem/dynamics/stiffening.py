@@ -2,8 +2,9 @@
 
 The stresses are quasi-static: those of P − M R0'' and the joint forces that go with it, in balance on each link. In the
 link frame such loads are combinations of a few constant ones: six of turning, three in a plane (what deforms of −M R0''
-= −(m·1) ⊗ p'' − (m·X) R''ᵀ), the link's loads and its port forces. Their static states g_i are made orthonormal in strain
-energy; then K0 g = F has g = Σ s_i g_i with s_i = g_i · F, and K_σ = T (k ⊗ P) Tᵀ, k(t) = Σ s_i(t) k_i, k_i constant.
+= −(m·1) ⊗ p'' − (m·X) R''ᵀ), the link's loads, those of motors and springs, and its port forces. Their static states g_i
+are made orthonormal in strain energy; then K0 g = F has g = Σ s_i g_i with s_i = g_i · F, and K_σ = T (k ⊗ P) Tᵀ, k(t) =
+Σ s_i(t) k_i, k_i constant.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,6 +23,7 @@ from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.matrices.interface import solved, static_tie
 from kedfem.dynamics.matrices.substructure import Substructure, factored, mass_matrix
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.rigid_elements import RigidElements, unit_loads_on, with_elements
 from kedfem.dynamics.stepping.state import ForcingAt, LinkState, Nodal
 from kedfem.links.record import Link, Matrix
 from kedfem.links.reduced import rigid_modes
@@ -69,20 +71,29 @@ class Stiffening:
     """Stress modes of all links, and the static linkage that shares the loads out among the joints (A = K0).
 
     joints : those that are enforced by constraint equations
+    elements : motors and springs, whose forces are those that the rigid-body motion has
     """
 
     parts: Sequence[Substructure]
     modes: Sequence[StressModes]
     joints: Sequence[ConstraintJoint]
+    elements: RigidElements | None
 
     def over(self, forcing: Sequence[Forcing], motion: RigidMotion) -> list[Forcing]:
         """The same over the times of a motion with the factors s_i of the stress modes."""
-        return self.stressed(forcing, joint_rows(self.joints, motion))
+        return self.stressed(forcing, motion, joint_rows(self.joints, motion))
 
-    def stressed(self, forcing: Sequence[Forcing], rows: JointRows | None) -> list[Forcing]:
-        """The same with the constraint equations known."""
+    def stressed(
+        self, forcing: Sequence[Forcing], motion: RigidMotion | None, rows: JointRows | None
+    ) -> list[Forcing]:
+        """The same with the constraint equations known.
+
+        Parameters
+        ----------
+        motion : what motors and springs need, if there are any
+        """
         R = [each.R for each in forcing]
-        loads = [each.F @ each.R for each in forcing]
+        loads = [F @ each.R for F, each in zip(self._loads(forcing, motion), forcing, strict=True)]
         forces = port_forces(self.parts, R, loads, rows)
         return [
             replace(each, stress=_factors(modes, part, load, force))
@@ -90,6 +101,17 @@ class Stiffening:
                 forcing, self.modes, self.parts, loads, forces, strict=True
             )
         ]
+
+    def _loads(
+        self, forcing: Sequence[Forcing], motion: RigidMotion | None
+    ) -> list[Float[np.ndarray, "T n d"]]:
+        """Loads of all links with those of motors and springs, world components."""
+        if self.elements is None:
+            return [each.F for each in forcing]
+        if motion is None:
+            raise ValueError("the motion must be given with motors and springs, got none")
+        forces = self.elements.forces(motion)[0]
+        return [with_elements(k, each.F, self.elements, forces) for k, each in enumerate(forcing)]
 
     def turnings(self, at: Sequence[ForcingAt]) -> list[Turning]:
         """g → k g P of all links at one time."""
@@ -103,8 +125,12 @@ class Stiffening:
         ]
 
 
-def stiffening(model: Model) -> Stiffening:
+def stiffening(model: Model, elements: RigidElements | None = None) -> Stiffening:
     """Stress modes of a model's links.
+
+    Parameters
+    ----------
+    elements : motors and springs on them, if there are any
 
     Raises
     ------
@@ -113,20 +139,23 @@ def stiffening(model: Model) -> Stiffening:
     """
     parts = [factored(link, joint, 0.0, 1.0) for link, joint in zip(model.links, model.joints, strict=True)]
     modes = [
-        stress_modes(link, part, loads)
-        for link, part, loads in zip(model.links, parts, model.loads, strict=True)
+        stress_modes(link, part, loads, [] if elements is None else unit_loads_on(k, link, elements))
+        for k, (link, part, loads) in enumerate(zip(model.links, parts, model.loads, strict=True))
     ]
-    return Stiffening(parts, modes, model.rows)
+    return Stiffening(parts, modes, model.rows, elements)
 
 
-def stress_modes(link: Link, part: Substructure, loads: Sequence[Pattern]) -> StressModes:
+def stress_modes(
+    link: Link, part: Substructure, loads: Sequence[Pattern], elements: Sequence[Nodal] = ()
+) -> StressModes:
     """Static states of a link under all loads in balance that the rigid-body motion can put on it, and their k.
 
     Parameters
     ----------
     part : the link with A = K0
+    elements : unit forces of motors and springs, link frame
     """
-    F = unit_loads(link, part.attachment, loads)
+    F = unit_loads(link, part.attachment, loads, elements)
     B = rigid_modes(link)
     MB = mass_matrix(link) @ B
     lever = np.linalg.solve(B.T @ MB, MB.T)
@@ -144,10 +173,12 @@ def stress_modes(link: Link, part: Substructure, loads: Sequence[Pattern]) -> St
     return StressModes(states, *_stacked([of(each) for each in states], link.n), turned_directions(link))
 
 
-def unit_loads(link: Link, joint: Attachment, loads: Sequence[Pattern]) -> Float[np.ndarray, "k u"]:
+def unit_loads(
+    link: Link, joint: Attachment, loads: Sequence[Pattern], elements: Sequence[Nodal] = ()
+) -> Float[np.ndarray, "k u"]:
     """Loads, link frame, that those of the rigid-body motion are combinations of, but for accelerations of the link."""
     space = 2 if link.planar else 3
-    columns: list[Nodal] = []
+    columns: list[Nodal] = [*elements]
 
     def along(weights: Float[np.ndarray, " n"], j: int) -> Nodal:
         out = np.zeros((link.n, link.d))

@@ -5,7 +5,8 @@
 K = T K0 Tᵀ of links, κ the tangents of force laws there. All links are factored once, with
 K0 + s M; at each position joints and laws add an interface of some dozen unknowns (`system.starts.balance`), and a block
 Lanczos run on (K + s M)⁻¹ M finds the lowest ω². s > 0, so that motions without strain, ω = 0, are found like the others.
-Forces that stretch a link or a spring do not change its stiffness here; `stiffened` has those of links.
+Forces that stretch a link or a spring do not change its stiffness here, unless `preloads` are asked for; `stiffened` has
+those of links.
 """
 
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.modes.lanczos import Block, lanczos
+from kedfem.dynamics.modes.preloads import with_preloads
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.dynamics.system.arrays import Coefficients
@@ -79,12 +81,16 @@ class Frozen:
     count : vibrations that are wanted
     free : motions without strain that there may be, which are found beside them
     least : s at the least [1/s²], where links alone are not held by less
+    preloaded : whether forces of springs and motors, which change their directions, count
 
     factorisations : of links, so far
     """
 
-    def __init__(self, system: System, count: int, free: int = 0, least: float = 0.0) -> None:
+    def __init__(
+        self, system: System, count: int, free: int = 0, least: float = 0.0, preloaded: bool = False
+    ) -> None:
         self.system, self.count, self.free, self.least = system, count, free, least
+        self.preloaded = preloaded
         elastic = [link for link in system.model.links if not link.rigid] or list(system.model.links)
         self.shift = max(FIRST * min(map(wave_frequency, elastic)) ** 2, least)
         self.factorisations = 0
@@ -146,7 +152,8 @@ class Frozen:
         """K + s M with all joints and laws at a position."""
         now = Instant(self.of, lambda t: motion, float(motion.t[0]), self._like)
         self._like = now
-        return now, Balance(self.of, self.held, now.R, asked(now))
+        found = asked(now)
+        return now, Balance(self.of, self.held, now.R, with_preloads(now, found) if self.preloaded else found)
 
     def _lowest(self, motion: RigidMotion) -> tuple[Float[np.ndarray, " f"], Float[np.ndarray, "N f"]]:
         """ω² in rising order, and shapes on the coordinates of all bodies."""

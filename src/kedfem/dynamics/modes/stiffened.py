@@ -17,6 +17,7 @@ from kedfem.dynamics.matrices.substructure import mass_matrix
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.frozen import Frozen, Modes, UnstableError
 from kedfem.dynamics.rigid_body import forcings
+from kedfem.dynamics.rigid_elements import RigidElements, rigid_elements_of
 from kedfem.dynamics.stiffening import stiffening
 from kedfem.dynamics.system.record import System
 from kedfem.errors import SceneError, SolveError
@@ -40,6 +41,7 @@ class Stiffened:
     Parameters
     ----------
     driven : the model of the same links that the drive moves, from which their stresses come
+    elements : motors and springs on these links, if there are any
 
     Raises
     ------
@@ -47,9 +49,11 @@ class Stiffened:
         If nothing holds a link.
     """
 
-    def __init__(self, system: System, driven: Model, count: int, free: int = 0) -> None:
+    def __init__(
+        self, system: System, driven: Model, count: int, free: int = 0, elements: RigidElements | None = None
+    ) -> None:
         self.system, self.driven, self.count, self.free = system, driven, count, free
-        self.stresses = stiffening(driven)
+        self.stresses = stiffening(driven, elements)
         self.rigid = [_rigid(link) for link in system.model.links]
         self.factorisations = 0
 
@@ -72,7 +76,7 @@ class Stiffened:
         """
         system, shift = self.system_at(motion)
         try:
-            return Frozen(system, self.count, self.free, shift)
+            return Frozen(system, self.count, self.free, shift, preloaded=True)
         except SolveError as fault:
             raise UnstableError(BUCKLES, motion) from fault
 
@@ -136,7 +140,7 @@ def frozen_linkage(
         return Frozen(system, count, released)
     driven = elastic_model(scene, linkage, along=along)
     _refuse_prescribed(driven, free)
-    return Stiffened(system, driven, count, released)
+    return Stiffened(system, driven, count, released, rigid_elements_of(scene, driven, along))
 
 
 def _refuse_prescribed(driven: Model, free: bool) -> None:

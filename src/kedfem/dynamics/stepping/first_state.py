@@ -91,7 +91,7 @@ def _begun(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: St
         return first_states(scene, linkage, along, model, solver.stiffening)
     at_rest = scene.analysis.initial == "rest"
     pulled = scene.springs or scene.motors or scene.limits
-    plain = (solver.ready.c.single and not pulled) or solver.stiffening is not None
+    plain = (solver.ready.c.single or solver.stiffening is not None) and not pulled
     damped = dampers_count(model)
     # nodal rows lose digits of links a million times as stiff as others
     stiff = bool(model.rows) and any(link.rigid for link in model.links) and solver.stiffening is None

@@ -145,7 +145,7 @@ class MonolithicSteps:
     ) -> tuple[list[LinkHistory], Begun]:
         """All time points of a block, one step after the other."""
         if self.stiffening is not None:
-            forcing = self.stiffening.stressed(forcing, rows)
+            forcing = self.stiffening.stressed(forcing, None, rows)
         links, held, taken = state.links, state.rows, []
         for k in range(len(forcing[0].R)):
             at = [each.at(k) for each in forcing]

@@ -3,13 +3,16 @@
 from collections.abc import Sequence
 
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.rigid_body import POINTS
+from kedfem.dynamics.rigid_body import POINTS, drive_range
+from kedfem.dynamics.rigid_elements import rigid_elements_of
 from kedfem.dynamics.segment import CONVERGED, FREE
 from kedfem.dynamics.stepping.monolithic import MonolithicSteps
 from kedfem.dynamics.stepping.scheme import generalised_alpha
-from kedfem.dynamics.stiffening import stiffening
+from kedfem.dynamics.stiffening import Stiffening, stiffening
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.steps import SystemSteps, rigid_frame_system
+from kedfem.motion.linkage import linkage
+from kedfem.motion.path import path
 from kedfem.scene import Scene, corotational, time_grid
 
 BLOCK_BYTES = 64_000_000
@@ -32,11 +35,17 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     if corotational(scene):
         return CorotationalSteps(scene, model, scheme, FREE if scene.driven is None else CONVERGED)
     monolithic = scene.analysis.solver == "monolithic"
-    stresses = stiffening(model) if scene.analysis.stiffening else None
+    stresses = _stresses(scene, model) if scene.analysis.stiffening else None
     elements = scene.springs or scene.motors or scene.limits
     if elements or scene.analysis.initial_deflection or dampers_count(model) or not monolithic:
         return SystemSteps(scene, rigid_frame_system(scene, model, stresses), model, scheme, monolithic)
     return MonolithicSteps(model.links, model.joints, scheme, model.damping, stresses)
+
+
+def _stresses(scene: Scene, model: Model) -> Stiffening:
+    if not (scene.springs or scene.motors):
+        return stiffening(model)
+    return stiffening(model, rigid_elements_of(scene, model, path(linkage(scene), *drive_range(scene))))
 
 
 def dampers_count(model: Model) -> bool:

@@ -8,9 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.force_element import (
-    ANGLE,
     DISTANCE,
-    POINT,
     TURN,
     End,
     ForceElement,
@@ -22,6 +20,7 @@ from kedfem.dynamics.force_element import (
 from kedfem.dynamics.force_elements import force_elements, hinges
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.rigid_elements import wrench
 from kedfem.motion.constraints import cross
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import Channel
@@ -52,12 +51,7 @@ class Measured:
                 if block.exerted is not None and i < known:
                     yield end, block.exerted.ends[:, i, e, 0], block.exerted.ends[:, i, e, 1]
                     continue
-                x, f = self.places[:, i, e], self.forces[:, i, e]
-                if end.form == POINT:
-                    yield end, f[:, 0], cross(x[:, 0], f[:, 0])
-                else:
-                    moment = f[:, 0] if end.form == ANGLE else cross(x, f).sum(axis=1)
-                    yield end, np.zeros_like(moment), np.asarray(moment)
+                yield end, *wrench(end, self.places[:, i, e], self.forces[:, i, e])
 
     def on(self, link: str, block: Block, about: Rows) -> tuple[Rows, Rows]:
         """Force and moment of all force elements on a link without unknowns of its own: a slider, a prescribed one.

@@ -6,18 +6,17 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.force_element import kernel_table
 from kedfem.dynamics.force_elements import rigid_elements
-from kedfem.dynamics.history import Block
 from kedfem.dynamics.inertias import Inertias, acting
 from kedfem.dynamics.joints.places import slider_axis
+from kedfem.dynamics.rigid_body import drive_range
+from kedfem.dynamics.rigid_elements import RigidElements, on_rigid_motion
 from kedfem.motion.constraints import cross
 from kedfem.motion.joint_equations import moving_pair
 from kedfem.motion.linkage import Linkage
-from kedfem.motion.path import Path
+from kedfem.motion.path import Path, path
 from kedfem.motion.reactions import BlockReactions, Reactions, reactions
 from kedfem.motion.rigid import RigidMotion
-from kedfem.results.forces.force_elements import Measured
 from kedfem.results.recorded import drive_prefix
 from kedfem.results.records import Channel
 from kedfem.scene import GROUND, ConstantSpeed, Joint, Scene, turn_steps
@@ -52,7 +51,7 @@ class Borne:
 class RigidForces:
     """Rigid inverse dynamics of a scene; worked out once for each motion.
 
-    force_elements : motors and springs, which are loads of given motion
+    force_elements : motors and springs, if any, which are loads of given motion
     turn : time steps after which all poses return; 0 if they do not
     """
 
@@ -60,7 +59,7 @@ class RigidForces:
     linkage: Linkage
     inertias: Inertias
     every: tuple[Borne, ...]
-    force_elements: Measured
+    force_elements: RigidElements | None
     turn: int = 0
     _motion: RigidMotion | None = None
     _rows: dict[str, Rows] = field(default_factory=dict)
@@ -76,7 +75,7 @@ class RigidForces:
         if motion is not self._motion:
             force, moment = acting(self.inertias, motion)
             centre = motion.p + motion.R @ self.inertias.centre
-            for end, f, m in self.force_elements.wrenches(Block(step or 0, motion, [])):
+            for end, f, m in self.force_elements.wrenches(motion) if self.force_elements else ():
                 force[:, end.body] += f
                 moment[:, end.body] += m - cross(centre[:, end.body], f)
             wrench = np.concatenate([force, moment], axis=2)[:, 1:]
@@ -149,8 +148,8 @@ def rigid_forces(
             every += [x for name in scene.joints for x in _joint(scene, linkage, found, name)]
         every += [_drive(scene, linkage, name) for name in scene.driven_joints]
     acted = rigid_elements(scene, linkage.bodies)
-    measured = Measured(acted, kernel_table(acted))
-    return RigidForces(scene, linkage, inertias, tuple(every), measured, returning(scene, along))
+    elements = on_rigid_motion(acted, along or path(linkage, *drive_range(scene))) if acted else None
+    return RigidForces(scene, linkage, inertias, tuple(every), elements, returning(scene, along))
 
 
 def returning(scene: Scene, along: Path | None) -> int:

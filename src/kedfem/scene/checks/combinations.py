@@ -157,10 +157,10 @@ def analysis(parts: Parts) -> Iterator[Told]:
     """The analysis with its start and times, and damping."""
     entry, damping = parts.analysis, parts.damping
     at = entry.where
-    if given := [*parts.motors, *parts.springs, *parts.limits]:
-        yield "analysis", {"element": "force element", "frames": ""}, at, {"elements": shown(given)}
     if parts.limits:
-        yield "analysis", limited(parts), at, {"elements": shown(list(parts.limits))}
+        limits = {"elements": shown(list(parts.limits))}
+        yield "analysis", {"element": "limit", "frames": "", "solver": ""}, at, limits
+        yield "analysis", limited(parts), at, limits
     yield "analysis", {"drive": ""}, at, {}
     yield from kinds(parts)
     if entry.word("frames"):

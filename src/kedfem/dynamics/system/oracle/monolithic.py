@@ -10,7 +10,7 @@ Nothing of `step_kernel` or what it calls is used here: internal forces are thos
 coordinates those of `motion.values`.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -21,6 +21,7 @@ from kedfem.dynamics.frames import Deformed, deformation, frame_force, frames_of
 from kedfem.dynamics.joints.ports import port_columns
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.matrices.substructure import mass_matrix
+from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.dynamics.system.oracle.monolithic_places import force, placed, turned_load, valued
 from kedfem.dynamics.system.oracle.monolithic_tangent import Inverse, inverse, tangent
@@ -30,6 +31,7 @@ from kedfem.dynamics.system.record import (
     System,
 )
 from kedfem.errors import SolveError
+from kedfem.links.record import Matrix
 from kedfem.motion.rigid import RigidMotion
 
 ITERATIONS = 40
@@ -68,12 +70,15 @@ class Monolithic:
 
     keeps : whether steps go on with the tangent of the step before while changes fall with it, which is dear to assemble
     kept : the tangent's inverse
+    stressed : of all links the stiffness that stresses of the rigid-body motion give at the end of the step, world
+        components; none without stiffening
     """
 
     system: System
     scheme: Scheme
     keeps: bool = False
     kept: Inverse | None = None
+    stressed: Sequence[Matrix] = ()
 
     def __post_init__(self) -> None:
         model = self.system.model
@@ -108,6 +113,7 @@ class Monolithic:
         SolveError
             If the iterations do not converge.
         """
+        self.stressed = self._stresses(at)
         if self.keeps:
             try:
                 return self._stepped(old, at, patience=1)
@@ -115,6 +121,14 @@ class Monolithic:
                 pass
         self.kept = None
         return self._stepped(old, at, patience=0)
+
+    def _stresses(self, at: RigidMotion) -> Sequence[Matrix]:
+        stiffening = self.system.stiffening
+        if stiffening is None:
+            return ()
+        found = stiffening.over(forcings(self.system.model, at), at)
+        every: list[Matrix] = stiffening.stiffness([each.at(0) for each in found])
+        return every
 
     def _stepped(self, old: Now, at: RigidMotion, patience: int) -> Now:
         """The same; `patience` is how many changes in a row may fall slowly before tangents are assembled anew."""
@@ -196,7 +210,8 @@ class Monolithic:
             Kx = (link.K0 @ x.ravel()).reshape(x.shape)
             C = damping.alpha * Mx + damping.beta * Kx
             C = np.stack([C, *self.rates(C, *old.damped[k])])
-            return ((Kx + C[1]) @ R.T).ravel(), [], C
+            f = ((Kx + C[1]) @ R.T).ravel()
+            return (f + self.stressed[k] @ u if self.stressed else f), [], C
         y = x + link.X[:, : link.d] * ([1, 1, 0] if link.kind == "beam" else 1)
         C = damping.alpha * Mx
         C = np.stack([C, *self.rates(C, *old.damped[k])])

@@ -52,7 +52,8 @@ def _of_body(of: Monolithic, n: int, now: Now, old: Now, at: RigidMotion) -> Mat
     if link.fit is None:
         R = np.kron(np.eye(link.n), at.R[0, model.bodies[n], : link.d, : link.d])
         K = R @ (link.K0 @ R.T)
-        return np.asarray(K + a1 * (model.damping.alpha * of.M[own, own] + model.damping.beta * K))
+        out = K + a1 * (model.damping.alpha * of.M[own, own] + model.damping.beta * K)
+        return np.asarray(out + of.stressed[n] if of.stressed else out)
     pushed = np.eye(own.stop - own.start) * DIFFERENCE
     change = [of.force_of(n, now.u[own] + x, old, at)[0] - now.f[own] for x in pushed]
     return np.array(change).T / DIFFERENCE

@@ -205,7 +205,7 @@ def _independent(C: Float[np.ndarray, "r k"], compliance: Float[np.ndarray, " r"
     """Numbers of laws, and of constraints that do not repeat others."""
     size = np.linalg.norm(C, axis=1)
     hard = np.flatnonzero((compliance == 0.0) & (size > DEPENDENT))
-    soft = np.flatnonzero(compliance > 0.0)
+    soft = np.flatnonzero(compliance != 0.0)
     if len(hard):
         _, upper, order = scipy.linalg.qr((C[hard] / size[hard, None]).T, mode="economic", pivoting=True)
         hard = hard[order[: int((np.abs(np.diag(upper)) > DEPENDENT).sum())]]

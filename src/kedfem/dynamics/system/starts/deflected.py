@@ -222,7 +222,7 @@ def _balanced(
     for n in range(ITERATIONS):
         exact = exact or (linear and n >= DIRECT)
         f, R = bodies.still.forces(now.motion.R[0], u, now.amounts)
-        r = now.F - f + more(u, f) - bodies.inertia(u)
+        r = now.F - f + more(u, f) - bodies.inertia(u) - now.stress(u)
         try:
             balance = Balance(of, bodies.held(R), R, _asked(now, u, z1))
             change = bodies.change(balance, r, exact)

@@ -86,7 +86,17 @@ class Instant:
         self.R, self.omega = motion.R[0][of.bodies.motion], motion.omega[0][of.bodies.motion]
         self.travels = travels(of.system, self.at)
         self.always: Always = always(of) if like is None else like.always
+        self._turnings = None if of.stressed is None else of.stressed.turnings(of.system.model, motion)
         self._gradients: Float[np.ndarray, "r k"] | None = None  # as they were found last
+
+    def stress(self, u: Flat) -> Flat:
+        """Forces by the stresses of the rigid-body motion, R (k g P), at a displacement; none without stiffening."""
+        out = np.zeros_like(u)
+        for k, stressed in enumerate(self._turnings or ()):
+            R = self.R[k][: (d := self.of.system.model.links[k].d), :d]
+            force = stressed(rows(self.of, k, u[own(self.of, k)]) @ R) @ R.T
+            out[own(self.of, k)] = work_on(self.of.parts[k], force).ravel()
+        return out
 
     def inside(self, u: Flat, v: Flat) -> list[Inside]:
         """All bodies at a displacement and rate; loads that turn with them are taken from their internal forces."""
@@ -95,7 +105,7 @@ class Instant:
         out = [
             inside(still, k, self.R[k], spins[k], u[own(of, k)], v[own(of, k)]) for k in range(len(self.R))
         ]
-        pushed = self.pushed(u)
+        pushed = self.pushed(u) - self.stress(u)
         return [replace(each, f=each.f - pushed[own(of, k)]) for k, each in enumerate(out)]
 
     def pushed(self, u: Flat) -> Flat:

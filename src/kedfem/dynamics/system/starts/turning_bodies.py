@@ -40,12 +40,14 @@ class TurningBodies:
     def change(self, balance: Balance, r: Flat, exact: bool = False) -> Flat:
         """What a residual asks for: GMRES puts in the inertia of turning of sparse bodies, and takes out their mass.
 
+        It puts in the stiffness that stresses of the rigid-body motion give, too.
+
         Parameters
         ----------
         exact : whether it takes out the mass of dense bodies too
         """
         direct = balance.solved(r).x
-        if not any(self.sparse) and not exact:
+        if not any(self.sparse) and not exact and self.now.of.stressed is None:
             return direct
         none = balance.solved(0 * r).x
 
@@ -63,17 +65,17 @@ class TurningBodies:
         return out
 
     def left_out(self, u: Flat, dense: bool) -> Flat:
-        """What matrices of sparse bodies leave out of that, less what they have of mass.
+        """What matrices of sparse bodies leave out of that, less what they have of mass, and stress stiffness of all.
 
         Parameters
         ----------
         dense : whether what matrices of dense bodies have of mass is taken off too
         """
-        out, none = np.zeros_like(u), np.zeros((3, 3))
+        out, none = self.now.stress(u), np.zeros((3, 3))
         for k, sparse in enumerate(self.sparse):
             if sparse or dense:
                 S = self.spins[k] if sparse and self.spins is not None else none
-                out[own(self.now.of, k)] = self._momentum(k, S - self.now.always.least(k) * np.eye(3), u)
+                out[own(self.now.of, k)] += self._momentum(k, S - self.now.always.least(k) * np.eye(3), u)
         return out
 
     def _momentum(self, k: int, S: Float[np.ndarray, "3 3"], u: Flat) -> Flat:

@@ -1,0 +1,65 @@
+"""What forces of springs and motors add to the stiffness as their directions change: −Q ∂²q/∂z² of a coordinate q.
+
+Second derivatives are exact: where z moves along x at a steady rate and all else rests, q'' = xᵀ (∂²q/∂z²) x.
+"""
+
+from itertools import combinations
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.system.record import Constraint
+from kedfem.dynamics.system.starts.balance import Asked
+from kedfem.dynamics.system.starts.instant import Instant
+from kedfem.dynamics.system.starts.rates import Places, pose, value
+
+ROUNDING = 1e-12  # of the largest eigenvalue of a law's second derivatives
+
+
+def with_preloads(now: Instant, asked: Asked) -> Asked:
+    """Springs along the directions in which each law's force changes, beside what is asked of a small motion."""
+    none = np.zeros((3, now.of.system.unknowns))
+    forces = now.forces(now.coordinates(none))[:, 0]
+    rows, stiffness = [asked.C], [np.zeros(0)]
+    for n, each in enumerate(now.of.system.constraints):
+        if forces[n] and not each.linear:
+            columns, second = _second_derivatives(now, each)
+            values, vectors = np.linalg.eigh(-forces[n] * second)
+            some = np.abs(values) > ROUNDING * np.abs(values).max(initial=0.0)
+            row = np.zeros((int(some.sum()), none.shape[1]))
+            row[:, columns] = vectors[:, some].T
+            rows.append(row)
+            stiffness.append(values[some])
+    more = 1 / np.concatenate(stiffness)
+    return Asked(
+        np.concatenate(rows),
+        np.append(asked.target, 0 * more),
+        np.append(asked.compliance, more),
+        asked.known,
+    )
+
+
+def _second_derivatives(now: Instant, each: Constraint) -> tuple[list[int], Float[np.ndarray, "m m"]]:
+    """Interface unknowns that a coordinate depends on, and its second derivatives by these at z = 0."""
+    ends = now.of.system.ends
+    which = {n for term in each.terms for n in (term.i, term.j)}
+    columns = sorted({int(c) for n in which for c in np.flatnonzero(ends[n].onto.any(axis=(0, 1)))})
+    out = np.zeros((len(columns),) * 2)
+    for a in range(len(columns)):
+        out[a, a] = _along(now, each, [columns[a]])
+    for a, b in combinations(range(len(columns)), 2):
+        both = _along(now, each, [columns[a], columns[b]])
+        out[a, b] = out[b, a] = (both - out[a, a] - out[b, b]) / 2
+    return columns, out
+
+
+def _along(now: Instant, each: Constraint, moving: list[int]) -> float:
+    """q'' where some interface unknowns have a rate of one, and all else rests."""
+    at, system = now.at, now.of.system
+    still = Places(at.R * [[[[1.0]]], [[[0.0]]], [[[0.0]]]], at.p * [[[1.0]], [[0.0]], [[0.0]]])
+    z = np.zeros((3, system.unknowns))
+    z[1, moving] = 1.0
+    found = {n: pose(system.ends[n], still, z) for term in each.terms for n in (term.i, term.j)}
+    return float(
+        sum(term.factor * value(system, term, found[term.i], found[term.j])[2] for term in each.terms).real
+    )

@@ -1,0 +1,170 @@
+"""Forces of motors, springs and limits were all links rigid, at any times of the motion.
+
+Their coordinates depend on the times before in one thing only: rotations of hinges are counted on beyond ±π. How often a
+hinge has turned is known along the path of the linkage, so that any part of the motion can be asked for by itself.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.dynamics.force_element import (
+    ANGLE,
+    POINT,
+    TURN,
+    End,
+    ForceElement,
+    Table,
+    kernel_table,
+    rigid_vectors,
+    stiffness_factors,
+)
+from kedfem.dynamics.force_elements import force_elements
+from kedfem.dynamics.model import Model
+from kedfem.links.record import Link
+from kedfem.motion.constraints import cross
+from kedfem.motion.path import Path, place_on
+from kedfem.motion.rigid import RigidMotion, resting
+from kedfem.scene import Pieces, Scene
+
+ONE = Pieces(np.zeros(1), np.array([[1.0, 0.0, 0.0, 0.0]]))
+Vectors = Float[np.ndarray, "T A 2 2 3"]
+"""Two vectors of both ends of all force elements over time, or forces on them, world components."""
+
+
+@dataclass(frozen=True, slots=True)
+class RigidElements:
+    """Force elements whose ends move as the rigid-body motion has them.
+
+    along : path of that motion
+    turned : (G, A) rotations of hinges at its grid points, counted on from the reference position [rad]; zero of others
+    """
+
+    every: Sequence[ForceElement]
+    table: Table
+    along: Path
+    turned: Float[np.ndarray, "G A"]
+
+    def forces(self, motion: RigidMotion) -> tuple[Vectors, Vectors]:
+        """Forces on all ends, and the vectors that they act on.
+
+        Parameters
+        ----------
+        motion : between successive times no hinge turns by π
+        """
+        return _evaluated(self.every, self.table, motion, self._turned(motion))[1:]
+
+    def wrenches(
+        self, motion: RigidMotion
+    ) -> Iterator[tuple[End, Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]]:
+        """Force and moment about the world's origin (T, 3) of every end."""
+        forces, x = self.forces(motion)
+        for i, element in enumerate(self.every):
+            for e, end in enumerate(element.ends):
+                yield end, *wrench(end, x[:, i, e], forces[:, i, e])
+
+    def _turned(self, motion: RigidMotion) -> Float[np.ndarray, " A"]:
+        """Rotations near the first of these times."""
+        tau = (motion.t if motion.drives.shape[1] > 1 else motion.phi)[:1]
+        k, s, periods = place_on(self.along, tau)
+        near = np.minimum(k + (s > 0.5), len(self.turned) - 1)
+        return np.asarray((self.turned[near] + periods * (self.turned[-1] - self.turned[0]))[0])
+
+
+def wrench(
+    end: End, x: Float[np.ndarray, "T 2 3"], f: Float[np.ndarray, "T 2 3"]
+) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]:
+    """Force and moment about the world's origin of the forces on an end's vectors."""
+    if end.form == POINT:
+        return f[:, 0], cross(x[:, 0], f[:, 0])
+    moment = f[:, 0] if end.form == ANGLE else cross(x, f).sum(axis=1)
+    return np.zeros_like(moment), np.asarray(moment)
+
+
+def on_rigid_motion(every: Sequence[ForceElement], along: Path) -> RigidElements:
+    """Force elements on the rigid-body motion along a path."""
+    table, start = kernel_table(every), int(np.abs(along.phi).argmin())
+    turned = np.zeros((len(along.phi), len(every)))
+    for way in (np.arange(start, len(along.phi)), np.arange(start, -1, -1)):
+        here = replace(resting(along.R.shape[1], np.zeros(len(way))), R=along.R[way])
+        turned[way] = _evaluated(every, table, here, np.zeros(len(every)))[0]
+    turned[:, [each.kind != TURN for each in every]] = 0.0
+    return RigidElements(every, table, along, turned)
+
+
+def rigid_elements_of(scene: Scene, model: Model, along: Path) -> RigidElements | None:
+    """The motors and springs of a scene on a model's links, without their deflection; None if there are none.
+
+    Raises
+    ------
+    MeshError, SceneError
+        If a point or joint is not on its link.
+    """
+    every = force_elements(scene, model)
+    return on_rigid_motion(every, along) if every else None
+
+
+def _evaluated(
+    every: Sequence[ForceElement], table: Table, motion: RigidMotion, before: Float[np.ndarray, " A"]
+) -> tuple[Float[np.ndarray, "T A"], Vectors, Vectors]:
+    """Coordinates, forces and the vectors that these act on; of hinges, nearest to the rotations before."""
+    from kedfem.dynamics.force_elements_kernel import evaluate_all
+
+    x, v, forces = np.zeros((3, len(motion.t), len(every), 2, 2, 3))
+    for i, element in enumerate(every):
+        for e, end in enumerate(element.ends):
+            x[:, i, e], v[:, i, e] = rigid_vectors(end, motion)
+    factors = stiffness_factors([each.factor for each in every], motion.t, motion.phi)
+    values = np.zeros((len(motion.t), len(every), 4))
+    evaluate_all(motion.t, factors, x, v, before.copy(), table, forces, values)
+    return values[..., 0], forces, x
+
+
+def with_elements(
+    k: int, F: Float[np.ndarray, "T n d"], elements: RigidElements, forces: Vectors
+) -> Float[np.ndarray, "T n d"]:
+    """Loads on a link of a model with those of force elements, world components.
+
+    Parameters
+    ----------
+    k : its number
+    """
+    for i, element in enumerate(elements.every):
+        for e, end in enumerate(element.ends):
+            if end.k == k:
+                F = F + _nodal(end, F.shape[2], forces[:, i, e])
+    return F
+
+
+def unit_loads_on(k: int, link: Link, elements: RigidElements) -> list[Float[np.ndarray, "n d"]]:
+    """Nodal forces, link frame, that the forces of elements on a link are combinations of at all times.
+
+    Torques have the same directions on a link at all times, forces at points may have any.
+    """
+    out, space = [], 2 if link.planar else 3
+    for element in elements.every:
+        for e, end in enumerate(element.ends):
+            if end.k != k:
+                continue
+            if end.form == POINT:
+                units = np.zeros((space, 2, 3))
+                units[np.arange(space), 0, np.arange(space)] = 1.0
+            else:
+                units = _torque(element, e)[None]
+            out += list(_nodal(end, link.d, units))
+    return out
+
+
+def _nodal(end: End, d: int, f: Float[np.ndarray, "T 2 3"]) -> Float[np.ndarray, "T n d"]:
+    """What forces on an end's vectors are at the nodes of its link."""
+    on_rows = (f * end.mask)[:, : len(end.weights), :d]
+    return np.asarray(end.weights.T @ on_rows)
+
+
+def _torque(element: ForceElement, e: int) -> Float[np.ndarray, "2 3"]:
+    """Forces on the directions of one end under a unit torque, in the reference position."""
+    unit = replace(element, stiffness=0.0, damping=0.0, factor=None, over=0, curve=ONE)
+    still = resting(1 + max(end.body for end in element.ends), np.zeros(1))
+    return np.asarray(_evaluated([unit], kernel_table([unit]), still, np.zeros(1))[1][0, 0, e])
