@@ -68,6 +68,23 @@ def test_stresses_of_constrained_joints_turn_with_the_scene(cell: tuple[str, tup
     assert np.abs(first - plain).max() > 1e-4 * peak
 
 
+@pytest.mark.parametrize(
+    "cell", [*EVERY, ("revolute", ("planar beam", "planar beam"), False), ("slot", ("plane", "plane"), False)], ids=named
+)  # fmt: skip
+def test_quasi_static_positions_are_those_that_a_march_begins_with(
+    cell: tuple[str, tuple[str, str], bool],
+) -> None:
+    """The start is found in nodal rows, positions by the system: neither knows the other."""
+    kind, partners, driven = cell
+    plane, found = partners[0].startswith("plan"), []
+    for more in ({"initial": "quasi-static"}, {"kind": "quasi-static"}):
+        raw = fast(chain(kind, partners, driven, plane), speed=10.0 if plane else SPEED)
+        del raw["analysis"]["initial"]
+        raw["analysis"] |= {"step": 1e-4, "end_time": 4e-4, **more}
+        found.append(np.concatenate([link.u[0].ravel() for link in ran(raw)[1][0].links]))
+    assert_allclose(found[1], found[0], rtol=0, atol=1e-6 * np.abs(found[0]).max())  # stiff hubs: 2e-7
+
+
 def stress_factors(raw: Raw) -> list[np.ndarray]:
     """s of all links at some times."""
     ready = meshed(scene_from(raw))

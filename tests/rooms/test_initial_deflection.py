@@ -69,7 +69,6 @@ def test_a_plucked_cantilever_swings_with_its_first_frequency(
 REFUSED = [
     ({"initial": "rest"}, "drive", "initial: must be 'quasi-static' with an initial deflection and a drive"),
     ({"initial_speeds": {"A": 1.0}}, "drive", "initial_deflection: must not be combined with initial speeds and motions"),
-    ({"stiffening": True}, "drive", "initial_deflection: must not be combined with analysis.stiffening"),
     ({"initial_deflection": {"tip": {"link": "rod", "at": [0, 0], "force": [0, 1]}}}, "weld",
      "initial_deflection.tip.link: must name a link, got 'rod', known: arm"),
     ({"initial_deflection": {"tip": {"link": "arm", "at": [0.6, 0], "force": [0, 1]}}}, "weld", "tip.at: must"),

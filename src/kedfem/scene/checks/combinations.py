@@ -196,10 +196,8 @@ def kinds(parts: Parts) -> Iterator[Told]:
         return
     facts, words = only(kind=kind), {"kind": kind}
     yield "analysis", facts | {"solver": entry.word("solver") or "condensed"}, entry.where, words
-    stiffening = "on" if entry.raw.get("stiffening") is True else "off"
     levels = "one" if entry.record is None or (entry.record.extrapolation_levels or 1) == 1 else "several"
-    for more in ({"stiffening": stiffening}, {"levels": levels}):
-        yield "analysis", {**facts, "drive": "", "rho_inf": "", **more}, entry.where, words
+    yield "analysis", {**facts, "drive": "", "rho_inf": "", "levels": levels}, entry.where, words
     for key in ("initial_speeds", "initial_motions", "initial_deflection"):
         given = entry.raw.get(key)
         if isinstance(given, Mapping) and given:

@@ -10,6 +10,9 @@ from kedfem.dynamics.system.starts.instant import Flat, Instant
 from kedfem.dynamics.system.starts.internal import own
 
 KRYLOV = 60
+LEFT = (
+    1e-4  # of a residual by GMRES: iterations of the deflection go on, and what rounding leaves may be 1e-8
+)
 CONVERGED = 1e-10  # change of an iteration, of the deflection
 
 Spins = Float[np.ndarray, "L 3 3"]
@@ -55,7 +58,7 @@ class TurningBodies:
             return np.asarray(x + balance.solved(self.left_out(x, exact)).x - none)
 
         whole = LinearOperator((len(r),) * 2, applied, dtype=float)
-        return np.asarray(gmres(whole, direct, rtol=CONVERGED, restart=KRYLOV, maxiter=4)[0])
+        return np.asarray(gmres(whole, direct, rtol=LEFT, restart=KRYLOV, maxiter=4)[0])
 
     def inertia(self, u: Flat) -> Flat:
         """M ([α]× + [ω]×²) u of all bodies."""
