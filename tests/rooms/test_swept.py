@@ -24,6 +24,7 @@ from kedfem.mesh.session import gmsh_model
 from kedfem.mesh.swept.core import disc
 from kedfem.mesh.swept.path_sweep import path_mesh
 from kedfem.mesh.swept.revolved import revolved_mesh
+from kedfem.mesh.unknowns import nearest
 from kedfem.scene import Material, link_from
 from kedfem.scene.records.shapes import Cad
 from tests.verification.linear import frequencies
@@ -258,3 +259,26 @@ def test_ends_are_those_of_the_part_not_of_what_is_missing(tmp_path: Path) -> No
         centre = 1e3 * (x * basis.dx).sum(axis=(1, 2)) / basis.dx.sum()
         far = R * (1 + r**2 / (4 * R**2)) * sin(angle / 2) / (angle / 2)
         assert_allclose(centre, [far * cos(angle / 2), far * sin(angle / 2), 0], atol=2e-3)
+
+
+@pytest.mark.parametrize("power", [1.0, 1.5])
+def test_the_search_for_a_number_of_unknowns_passes_over_sizes_that_change_nothing(power: float) -> None:
+    """As where layers are whole numbers: unknowns jump, and some sizes give the same."""
+    tried: list[float] = []
+
+    def mesh_of(size: float) -> tuple[float, int]:
+        tried.append(size)
+        return size, 1000 * max(round(8 / size), 2) // 2 * 2
+
+    for wanted in (2_500, 4_100, 15_000, 40_000):
+        for start in (0.05, 0.5, 1.9, 5.0):
+            tried.clear()
+            size, note = nearest(wanted, start, 4.0, power, mesh_of)
+            assert not note
+            assert 1 / 1.3 < mesh_of(size)[1] / wanted < 1.3
+            assert len(tried) <= 7
+    tried.clear()
+    size, note = nearest(500, 1.0, 4.0, power, mesh_of)
+    assert size == 4.0  # the largest, and no more are made of it
+    assert tried.count(4.0) == 1
+    assert "nearest found to the 500" in note

@@ -6,6 +6,7 @@ from typing import TypeVar
 import numpy as np
 
 NEAR = 1.3  # ratio of unknowns got and asked for that is near enough
+APART = 1.02  # ratio of sizes between which no other number of unknowns is sought
 TRIES = 6  # meshes made in search of a number of unknowns
 
 T = TypeVar("T")
@@ -24,14 +25,20 @@ def nearest(
     mesh_of : the mesh with elements of a size, and its unknowns
     """
     found: list[tuple[float, T]] = []
+    low, high = 0.0, np.inf  # sizes known as too small and too large
     for _ in range(TRIES):
-        mesh, unknowns = mesh_of(min(size, most))
+        tried = min(size, most)
+        mesh, unknowns = mesh_of(tried)
         ratio = unknowns / wanted
-        known = any(ratio == before for before, _ in found)
         found.append((ratio, mesh))
-        if known or 1 / NEAR < ratio < NEAR:
+        if 1 / NEAR < ratio < NEAR:
             break
-        size *= ratio ** (1 / power)
+        low, high = (max(low, tried), high) if ratio > 1 else (low, min(high, tried))
+        if low >= most or high < APART * low:
+            break
+        size = tried * ratio ** (1 / power)
+        if not low < size < high:
+            size = float(np.sqrt(low * high))
     ratio, mesh = min(found, key=lambda each: abs(np.log(each[0])))
     note = f"the nearest found to the {wanted:,} unknowns asked for"
     return mesh, "" if 1 / NEAR < ratio < NEAR else note
