@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path as FilePath
 
-from kedfem.accuracy.error_budget import Budget, attributes, budget_warning, kind_of, meaningless
+from kedfem.accuracy.error_budget import Budget, attributes, budget_warning, kind_of_name, meaningless
 from kedfem.accuracy.estimates import Strained, budget
 from kedfem.accuracy.histories import Histories, steady_state
 from kedfem.accuracy.plan import Plan, plan_for
@@ -55,6 +55,7 @@ from kedfem.results.fatigue.damage import fatigue_of, kept_since, stress_period
 from kedfem.results.fatigue.strength import require_fatigue
 from kedfem.results.forces.force_elements import measured_elements
 from kedfem.results.forces.indeterminate import undetermined, undetermined_warning
+from kedfem.results.on_demand import Chosen
 from kedfem.results.recording import recording
 from kedfem.results.stresses.envelope import Envelope
 from kedfem.results.stresses.hot_spots import hot_spots
@@ -293,5 +294,5 @@ def _mesh_field(strained: Strained, file: FilePath) -> None:
 
 def _in_memory(results: Results, solvers: Sequence[Steps]) -> Histories:
     """The channels of a run as its errors are judged."""
-    channels = {name: each for name, each in results.channels.items() if kind_of(each[0]) is not None}
-    return Histories(results.time, channels, begun=steady_state(solvers))
+    names = tuple(name for name in results.channels if kind_of_name(name) is not None)
+    return Histories(results.time, Chosen(results.channels, names), begun=steady_state(solvers))

@@ -11,7 +11,16 @@ from numpy.testing import assert_array_equal
 
 from kedfem.analysis import analyse
 from kedfem.errors import OutputError
-from kedfem.results import Channel, ResultsWriter, read_results, write_csv, write_parquet
+from kedfem.results import (
+    Channel,
+    Results,
+    ResultsWriter,
+    on_demand,
+    read_results,
+    table,
+    write_csv,
+    write_parquet,
+)
 from kedfem.results.additions import add_account
 from kedfem.results.dimensions import cf_units, columns_dimension
 from kedfem.results.records import ANGLE, TRAVEL
@@ -39,6 +48,60 @@ def written(path: Path, drive: Channel = ANGLE, count: int = 700) -> dict[str, n
             file.append(step[part] * 1e-3, step[part] * 0.1, {name: x[part] for name, x in rows.items()})
     add_account(path, ["the step is long"], {"steps": 1.5})
     return rows
+
+
+@pytest.mark.parametrize("kept", [0, 10**9])
+def test_channels_of_large_files_are_read_when_they_are_asked_for(
+    tmp_path: Path, kept: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = written(tmp_path / "results.h5")
+    whole = read_results(tmp_path / "results.h5")
+    assert isinstance(whole.channels, dict)
+    write_csv(whole, tmp_path / "whole.csv")
+    monkeypatch.setattr(on_demand, "AT_ONCE", 0)
+    monkeypatch.setattr(on_demand, "KEPT", kept)
+    monkeypatch.setattr(table, "ROWS", 300)
+    results = read_results(tmp_path / "results.h5")
+    assert not isinstance(results.channels, dict)
+    assert list(results.channels) == list(rows)
+    for name, values in rows.items():
+        for _ in range(2):
+            channel, found = results.channels[name]
+            assert channel == whole.channels[name][0]
+            assert_array_equal(found, values)
+            assert not found.flags.writeable
+    write_csv(results, tmp_path / "later.csv")
+    assert (tmp_path / "later.csv").read_bytes() == (tmp_path / "whole.csv").read_bytes()
+    some = on_demand.Chosen(results.channels, ("drive/torque",))
+    assert list(some) == ["drive/torque"]
+    assert "gears/g/ratio" not in some
+    add_account(
+        tmp_path / "results.h5", ["one more"], {"steps": 1.5}
+    )  # adds to the file, whose rows are the same
+    assert_array_equal(read_again(results, "gears/g/ratio"), rows["gears/g/ratio"])
+
+
+def read_again(results: Results, name: str) -> np.ndarray:
+    results.channels._kept.clear()  # type: ignore[attr-defined]
+    return results.channels[name][1]
+
+
+def test_a_file_that_became_another_is_not_read_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "results.h5"
+    written(path)
+    monkeypatch.setattr(on_demand, "AT_ONCE", 0)
+    results = read_results(path)
+    written(path, count=300)
+    with pytest.raises(
+        OutputError, match="must be the results file that was opened, got that of another run"
+    ):
+        read_again(results, "drive/torque")
+    path.write_bytes(b"nothing")
+    with pytest.raises(OutputError, match=r"results.h5: .* got a corrupt file"):
+        read_again(results, "drive/torque")
+    path.unlink()
+    with pytest.raises(OutputError, match=r"got a corrupt file|no such file"):
+        read_again(results, "drive/torque")
 
 
 @pytest.mark.parametrize("drive", [ANGLE, TRAVEL], ids=lambda x: x.name)

@@ -138,12 +138,13 @@ def budget(
     known = dict(step or {})
     try:
         base = histories(small) if ran is None or not own else replace(ran, size=extent(ready.model))
-        counts = by_kind(counted(base))
+        sizes = counted(base)
+        counts = by_kind(sizes)
         here = [kind for kind in kinds if kind in counts]
         shares[1:] = [frames_share(seen.geometric, here), seen.rounding.share(here)]
         if seen.steps:
             known = known or step_errors(small, base)
-            shares.append(_step_share({n: error for n, error in known.items() if n in counted(base)}))
+            shares.append(_step_share({n: error for n, error in known.items() if n in sizes}))
         shares.append(mesh_share(small, base, eta))
     except KedfemError as fault:
         limits.append(f"step and mesh: a run beside this one failed ({str(fault).splitlines()[0]})")

@@ -118,16 +118,14 @@ def relative_errors(found: Histories, reference: Histories) -> dict[str, float]:
 def counted(reference: Histories) -> dict[str, float]:
     """Channel that counts → its largest value; those that hold next to nothing are left out."""
     units: dict[str, float] = {}
-    for channel, values in reference.channels.values():
+    sizes: dict[str, tuple[str, float]] = {}
+    for name, (channel, values) in reference.channels.items():
         units[channel.unit] = max(units.get(channel.unit, 0.0), float(np.abs(values).max()))
-    sizes = {
-        name: float(np.linalg.norm(values, axis=1).max())
-        for name, (_, values) in reference.channels.items()
-        if asked_for(name)
-    }
+        if asked_for(name):
+            sizes[name] = channel.unit, float(np.linalg.norm(values, axis=1).max())
     least = {unit: NOTHING * value for unit, value in units.items()}
     least["N m"] = max(least.get("N m", 0.0), FAINT * reference.size * units.get("N", 0.0))
-    return {name: size for name, size in sizes.items() if size > least[reference.channels[name][0].unit]}
+    return {name: size for name, (unit, size) in sizes.items() if size > least[unit]}
 
 
 def worst(errors: Mapping[str, float]) -> float:

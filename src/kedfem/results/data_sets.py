@@ -8,6 +8,8 @@ from kedfem.results.dimensions import cf_units, columns_dimension
 from kedfem.results.extras import of_extra
 from kedfem.results.records import Channel, Results
 
+EVERY = slice(None)
+
 
 def as_data_tree(results: Results) -> Any:
     """An xarray.DataTree with the groups and names of the results file.
@@ -65,7 +67,7 @@ def header(results: Results) -> list[str]:
     return out
 
 
-def columns_of(results: Results) -> np.ndarray:
-    """All columns (n, c), time and drive first."""
-    blocks = [results.time[:, None], results.angle[:, None]]
-    return np.hstack([*blocks, *(values for _, values in results.channels.values())])
+def columns_of(results: Results, rows: slice = EVERY) -> np.ndarray:
+    """All columns (n, c) of some rows, time and drive first."""
+    blocks = [results.time[rows, None], results.angle[rows, None]]
+    return np.hstack([*blocks, *(values[rows] for _, values in results.channels.values())])

@@ -40,6 +40,14 @@ def opened(path: Path, mode: str, locking: bool | str = "best-effort") -> Any:
     return h5py.File(path, mode, locking=locking, libver=("v108", "v110"), rdcc_nbytes=CACHED)
 
 
+def opened_to_read(path: Path) -> Any:
+    """The file, whether or not a run is writing it."""
+    try:
+        return opened(path, "r", False)  # the run holds the lock
+    except OSError:
+        return opened(path, "r")  # HDF5 wants equal locking flags where the run is this same process
+
+
 def new_rows(file: Any, name: str, width: tuple[int, ...]) -> Any:
     """An empty dataset of rows that can grow, with checksums."""
     return file.create_dataset(

@@ -4,10 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast, get_args
 
-import numpy as np
-from jaxtyping import Float
-
 from kedfem.errors import OutputError
+from kedfem.results import on_demand
 from kedfem.results.files import reason
 from kedfem.results.layout import (
     FATIGUE,
@@ -17,11 +15,13 @@ from kedfem.results.layout import (
     WARNINGS,
     all_rows,
     opened,
+    opened_to_read,
     read_facts,
     read_text,
     sealed,
     series,
 )
+from kedfem.results.on_demand import rows_of
 from kedfem.results.records import (
     ANGLE,
     TIME,
@@ -59,9 +59,9 @@ def read_results(path: Path) -> Results:
         got = "a folder" if path.is_dir() else "no such file"
         raise OutputError(f"{path}: must be {WANTED}, got {got}")
     try:
-        with _opened(path) as file:
+        with opened_to_read(path) as file:
             _refuse_foreign(file, path)
-            found = _results(file)
+            found = _results(file, path)
             if not sealed(file):
                 raise ValueError("a text that is not what was written")
         abandoned = found.status == "running" and not _alive(path)
@@ -75,7 +75,7 @@ def read_results(path: Path) -> Results:
 def abandoned_rows(path: Path) -> int | None:
     """How many rows a run left whose process was killed; None if there is no such run."""
     try:
-        with _opened(path) as file:
+        with opened_to_read(path) as file:
             if read_facts(file).get("status") != "running":
                 return None
             rows = len(file[TIME.name])
@@ -87,7 +87,7 @@ def abandoned_rows(path: Path) -> int | None:
 def run_status(path: Path) -> str:
     """What a results file says of its run, without its rows; "" of a file that cannot be read."""
     try:
-        with _opened(path) as file:
+        with opened_to_read(path) as file:
             return str(read_facts(file)["status"])
     except (OSError, RuntimeError, KeyError):
         return ""
@@ -96,18 +96,10 @@ def run_status(path: Path) -> str:
 def foreign(path: Path) -> bool:
     """Whether there is an HDF5 file that is not of kedfem."""
     try:
-        with _opened(path) as file:
+        with opened_to_read(path) as file:
             return "kedfem_version" not in file.attrs
     except (OSError, RuntimeError):
         return False
-
-
-def _opened(path: Path) -> Any:
-    """The file, whether or not a run is writing it."""
-    try:
-        return opened(path, "r", False)  # the run holds the lock
-    except OSError:
-        return opened(path, "r")  # HDF5 wants equal locking flags where the run is this same process
 
 
 def _alive(path: Path) -> bool:
@@ -129,7 +121,7 @@ def _refuse_foreign(file: Any, path: Path) -> None:
         raise OutputError(f"{path}: must be {WANTED} with layout {FORMAT}, got {got}: run the scene again")
 
 
-def _results(file: Any) -> Results:
+def _results(file: Any, path: Path) -> Results:
     """The record; every series is cut to the rows that all of them have."""
     every = sorted(series(file), key=lambda rows: int(rows.attrs["index"]))
     n = min(len(rows) for rows in every)
@@ -137,12 +129,17 @@ def _results(file: Any) -> Results:
     toml = file["scene"].get("toml")
     position = TRAVEL if TRAVEL.name in named else ANGLE
     drive, facts = named.pop(position.name), read_facts(file)
+    time, scene = named.pop(TIME.name), read_text(file["scene/json"])
+    known = {name: _channel(name, rows) for name, rows in named.items()}
+    large = 8 * n * sum(len(channel.columns) for channel in known.values()) > on_demand.AT_ONCE
+    later = on_demand.OnDemand(path, scene, known, n) if large and facts["status"] != "running" else None
     return Results(
-        time=all_rows(named.pop(TIME.name), n),
+        time=all_rows(time, n),
         angle=all_rows(drive, n),
-        channels={name: _recorded(name, rows, n) for name, rows in named.items()},
+        channels=later
+        or {name: (known[name], rows_of(rows, known[name], n)) for name, rows in named.items()},
         status=_status(facts["status"]),
-        scene_json=read_text(file["scene/json"]),
+        scene_json=scene,
         scene_toml=None if toml is None else read_text(toml),
         notes=read_facts(file["notes"]),
         reason=facts["reason"],
@@ -207,7 +204,6 @@ def _spots(name: str, link: Any) -> tuple[FatigueSpot, ...]:
     return tuple(found)
 
 
-def _recorded(name: str, rows: Any, n: int) -> tuple[Channel, Float[np.ndarray, "n c"]]:
+def _channel(name: str, rows: Any) -> Channel:
     facts = read_facts(rows)
-    channel = Channel(name, tuple(facts["columns"]), facts["unit"], facts["frame"], facts["description"])
-    return channel, all_rows(rows, n).reshape(n, len(channel.columns))
+    return Channel(name, tuple(facts["columns"]), facts["unit"], facts["frame"], facts["description"])

@@ -14,6 +14,7 @@ from kedfem.results.extras import of_extra
 from kedfem.results.files import replacing
 from kedfem.results.records import Results
 
+ROWS = 100_000  # of a table, put together at a time
 DIGITS = "%.9g"
 """Of numbers in tables: more than any result is exact to, half as long as what gives back the same float."""
 
@@ -39,7 +40,9 @@ def write_csv(results: Results, path: Path) -> None:
     with text_file(Path(path)) as file:
         if results.status != "complete":
             file.write(f"# not a whole run: {results.status} after {len(results.time)} steps\n")
-        write_numbers(file, header(results), columns_of(results))
+        csv.writer(file, lineterminator="\n").writerow(header(results))
+        for first in range(0, len(results.time), ROWS):
+            _write_rows(file, columns_of(results, slice(first, first + ROWS)))
 
 
 @contextmanager
@@ -58,6 +61,10 @@ def text_file(path: Path) -> Iterator[TextIO]:
 def write_numbers(file: TextIO, names: Iterable[str], values: Float[np.ndarray, "n c"]) -> None:
     """A line of names, and a line of numbers for each row."""
     csv.writer(file, lineterminator="\n").writerow(names)
+    _write_rows(file, values)
+
+
+def _write_rows(file: TextIO, values: Float[np.ndarray, "n c"]) -> None:
     np.savetxt(file, values, fmt=DIGITS, delimiter=",")
 
 

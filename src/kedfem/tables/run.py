@@ -28,11 +28,12 @@ def run_tables(scene: Scene, done: Run) -> list[Table]:
         table.add_column(column, justify="left" if left else "right", overflow="fold", no_wrap=not left)
     channels = done.results.channels.values()
     highest: dict[str, float] = {}
-    for channel, values in channels:
-        highest[channel.unit] = max(highest.get(channel.unit, 0.0), float(np.abs(values).max()))
+    peaks = []
     for channel, values in channels:
         k, c = np.unravel_index(np.abs(values).argmax(), values.shape)
-        value = float(values[k, c])
+        peaks.append((channel, k, c, float(values[k, c])))
+        highest[channel.unit] = max(highest.get(channel.unit, 0.0), abs(peaks[-1][-1]))
+    for channel, k, c, value in peaks:
         if abs(value) <= NOTHING * highest[channel.unit]:
             table.add_row(channel.name, "", "≈ 0", "")
             continue

@@ -1,0 +1,94 @@
+"""Channels of a large results file, each read when it is asked for: a long run ends with the memory that it had."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.errors import OutputError
+from kedfem.results.files import reason
+from kedfem.results.layout import all_rows, opened_to_read, read_text
+from kedfem.results.records import Channel
+
+AT_ONCE = 64_000_000  # bytes: rows of files that have no more are all read with the file
+KEPT = 32_000_000  # bytes of rows that were asked for last, at hand if they are again
+
+Series = tuple[Channel, Float[np.ndarray, "n c"]]
+
+
+def rows_of(rows: Any, channel: Channel, n: int) -> Float[np.ndarray, "n c"]:
+    """The first rows of a channel's dataset; errors as of `all_rows`."""
+    return all_rows(rows, n).reshape(n, len(channel.columns))
+
+
+@dataclass(slots=True, eq=False)
+class OnDemand(Mapping[str, Series]):
+    """Name → (channel, values (n, columns), read-only).
+
+    file : the results file
+    scene : scene of its run in JSON
+    known : the channels, in the order recorded
+    count : n
+    """
+
+    file: Path
+    scene: str
+    known: Mapping[str, Channel]
+    count: int
+    _kept: dict[str, Float[np.ndarray, "n c"]] = field(default_factory=dict, repr=False)
+
+    def __getitem__(self, name: str) -> Series:
+        """A channel with its rows.
+
+        Raises
+        ------
+        OutputError
+            The file is not there any more, corrupt, or that of another run.
+        """
+        channel = self.known[name]
+        values = self._kept.pop(name, None)
+        self._kept[name] = self._read(channel) if values is None else values
+        size = sum(x.nbytes for x in self._kept.values())
+        while size > KEPT and len(self._kept) > 1:
+            size -= self._kept.pop(next(iter(self._kept))).nbytes
+        return channel, self._kept[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.known)
+
+    def __len__(self) -> int:
+        return len(self.known)
+
+    def _read(self, channel: Channel) -> Float[np.ndarray, "n c"]:
+        wanted = f"{self.file}: must be the results file that was opened"
+        try:
+            with opened_to_read(self.file) as file:
+                if read_text(file["scene/json"]) != self.scene or len(file[channel.name]) < self.count:
+                    raise OutputError(f"{wanted}, got that of another run: open it again")
+                return rows_of(file[channel.name], channel, self.count)
+        except (OSError, RuntimeError) as error:
+            raise OutputError(f"{wanted}, got a corrupt file ({reason(error)})") from error
+        except (KeyError, ValueError) as error:
+            raise OutputError(f"{wanted}, got one with a gap ({error})") from error
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chosen(Mapping[str, Series]):
+    """Some of the channels, by their names."""
+
+    every: Mapping[str, Series]
+    names: tuple[str, ...]
+
+    def __getitem__(self, name: str) -> Series:
+        if name not in self.names:
+            raise KeyError(name)
+        return self.every[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
