@@ -87,9 +87,9 @@ def on_rigid_motion(every: Sequence[ForceElement], along: Path) -> RigidElements
     """Force elements on the rigid-body motion along a path."""
     table, start = kernel_table(every), int(np.abs(along.phi).argmin())
     turned = np.zeros((len(along.phi), len(every)))
-    for way in (np.arange(start, len(along.phi)), np.arange(start, -1, -1)):
-        here = replace(resting(along.R.shape[1], np.zeros(len(way))), R=along.R[way])
-        turned[way] = _evaluated(every, table, here, np.zeros(len(every)))[0]
+    for order in (np.arange(start, len(along.phi)), np.arange(start, -1, -1)):
+        here = replace(resting(along.R.shape[1], np.zeros(len(order))), R=along.R[order])
+        turned[order] = _evaluated(every, table, here, np.zeros(len(every)))[0]
     turned[:, [each.kind != TURN for each in every]] = 0.0
     return RigidElements(every, table, along, turned)
 
