@@ -37,6 +37,7 @@ from kedfem.scene.records import (
     shapes,
 )
 from kedfem.scene.records.units import Quantity
+from reference.meanings import meanings
 from reference.scene_examples import EXAMPLES
 
 INTRODUCTION = """\
@@ -202,7 +203,11 @@ def record_table(record: type[BaseModel], alone: bool) -> str:
     kind = kind_of(record)
     about = (record.__doc__ or "").strip().splitlines()[0].replace("``", "`")
     title = "" if alone else f"### {f'kind = {chr(34)}{kind}{chr(34)}' if kind else construction(record)}\n\n"
-    rows = [row(key, field) for key, field in keys(record).items() if key != "kind" or kind is None]
+    texts, names = meanings(record), {id(field): name for name, field in record.model_fields.items()}
+    rows = [
+        row(key, field, texts.get(names[id(field)], ""))
+        for key, field in keys(record).items() if key != "kind" or kind is None
+    ]  # fmt: skip
     header = "| key | value | unit | default | meaning |\n| --- | --- | --- | --- | --- |\n"
     return f"{title}{about}\n\n{header}" + "\n".join(rows) + "\n"
 
@@ -212,11 +217,10 @@ def construction(record: type[BaseModel]) -> str:
     return "`{ " + ", ".join(f"{key} =" for key, field in keys(record).items() if field.is_required()) + " }`"
 
 
-def row(key: str, field: FieldInfo) -> str:
+def row(key: str, field: FieldInfo, meaning: str) -> str:
     """One key as a line of a table."""
     value, unit = described(field_hint(field))
-    meaning = " ".join((field.description or "").split())
-    return f"| `{key}` | {value} | {unit} | {default(field)} | {meaning} |"
+    return f"| `{key}` | {value} | {unit} | {default(field)} | {' '.join(meaning.split())} |"
 
 
 def described(hint: Any) -> tuple[str, str]:
