@@ -40,7 +40,7 @@ SEEDS: dict[tuple[str, int], int] = {
     ("screw", 0): 10, ("screw", 1): 7, ("screw", 2): 1, ("cylindrical", 0): 3, ("cylindrical", 1): 2,
     ("universal", 0): 13,
     ("universal", 1): 10, ("spherical", 0): 2, ("spherical", 1): 1, ("spherical", 2): 10, ("planar", 0): 10,
-    ("planar", 1): 3, ("slot", 0): 10, ("slot", 1): 10, ("weld", 0): 2, ("weld", 1): 12, ("weld", 2): 8,
+    ("planar", 1): 3, ("slot", 0): 10, ("slot", 1): 10, ("weld", 0): 5, ("weld", 1): 12, ("weld", 2): 8,
 }  # fmt: skip
 SPATIAL = ("beam", "solid", "reduced", "rigid", "bare")
 PLANAR = ("planar beam", "plane", "solid", "rigid", "bare")

@@ -15,6 +15,7 @@ from jaxtyping import Float
 from kedfem.links.record import Link, read_only
 
 RIGID = 1e3
+LIGHT = 1e-10  # of a rigid link's mass: what its matrix gets where it could be singular
 STRAIGHT = 1e-9  # of a link's length: what it leaves its line by is rounding
 INDEPENDENT = 1e-14  # of the largest eigenvalue: below, a function repeats others
 
@@ -118,10 +119,21 @@ def rigid(link: Link, frequency: float | None = None) -> Link:
     frequency : what its own vibrations are put at [rad/s]; RIGID times its `wave_frequency` if not given
     """
     made = reduced(link, rigid_functions(link))
+    if link.kind == "beam":
+        made = replace(made, mass=(*made.mass[:2], _definite(made.mass[2], made.one)))
     stiffness = (RIGID * wave_frequency(link) if frequency is None else frequency) ** 2
     B = np.linalg.qr(_weighted(made, rigid_modes(made)))[0]
     K0 = _weighted(made, _weighted(made, stiffness * (np.eye(made.unknowns) - B @ B.T)).T)
     return replace(made, K0=K0, rigid=True)
+
+
+def _definite(m: Float[np.ndarray, "n n"], one: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n n"]:
+    """The mass of a planar beam's ψ, definite though all of it may be at one point, as a flywheel's on a light beam.
+
+    What it gets does not move as the link turns as a whole.
+    """
+    e = one / np.linalg.norm(one)
+    return np.asarray(m + LIGHT * np.trace(m) * (np.eye(len(m)) - np.outer(e, e)))
 
 
 def wave_frequency(link: Link) -> float:

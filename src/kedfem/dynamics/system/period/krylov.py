@@ -52,8 +52,8 @@ class Derivative:
 
 
 def scale_of(of: PeriodMap, y: Flat) -> float:
-    """√ of the largest energy in a period."""
-    return float(np.sqrt(of.largest)) + of.size(y)
+    """√ of the largest energy in a period; where nothing moves, of what is less than any motion that counts."""
+    return float(np.sqrt(of.largest)) + of.size(y) + of.of.c.floor * 2 * np.pi / of.period
 
 
 def combined(c: Flat, basis: Sequence[Flat]) -> Flat:
