@@ -218,6 +218,8 @@ def test_parts_are_meshed_side_by_side_as_one_by_one(monkeypatch: pytest.MonkeyP
     assert list(found) == ["crank", "slider"]
     for name, mesh in found.items():
         alone = solid_mesh(scene, name)
-        assert_allclose(mesh.points, alone.points, rtol=0, atol=1e-12)
+        assert_allclose(
+            mesh.points, alone.points, rtol=0, atol=1e-10
+        )  # m; 2e-12 seen, by sums in another order
         assert np.array_equal(mesh.cells, alone.cells)
         assert mesh.method == alone.method
