@@ -260,12 +260,12 @@ def as_a_run(of: Begun) -> Begun:
 def run_of(of: Begun, monolithic: bool = False) -> np.ndarray:
     """Displacements (T, N) of all links by the solver that a run takes, or by the monolithic one."""
     made, model = of.prepared, of.prepared.model
-    if monolithic:
+    if monolithic and (made.scene.springs or made.scene.motors):
+        analysis = made.scene.analysis.model_copy(update={"solver": "monolithic"})
+        solver: Any = steps_of(made.scene.model_copy(update={"analysis": analysis}), model)
+    elif monolithic:
         links = model.links, model.joints
-        solver: Any = MonolithicSteps(*links, of.ready.scheme, model.damping, stiffening(model))
-        if made.scene.springs or made.scene.motors:
-            still = made.scene.analysis.model_copy(update={"solver": "monolithic"})
-            solver = steps_of(made.scene.model_copy(update={"analysis": still}), model)
+        solver = MonolithicSteps(*links, of.ready.scheme, model.damping, stiffening(model))
     else:
         solver = steps_of(made.scene, model)
     blocks = list(transient(made.scene, made.linkage, made.path, model, solver))

@@ -5,6 +5,7 @@ EI w'''' − N w'' = ρA ω² w and EI w''' − N w' = N w/ℓ at the tip; a for
 F/w = N k/(k L − tanh k L) + N/ℓ, k² = N/EI.
 """
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,15 +16,14 @@ from scipy.spatial.transform import Rotation
 
 from kedfem.accuracy.prepared import meshed
 from kedfem.dynamics.force_elements import rigid_elements
-from kedfem.dynamics.history import Block
 from kedfem.dynamics.modes.frozen import Frozen
 from kedfem.dynamics.modes.stiffened import Stiffened, frozen_linkage
 from kedfem.dynamics.rigid_elements import on_rigid_motion
 from kedfem.dynamics.system.build import system_of
 from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import path_parameter, scene_from
-from tests.laws.test_joint_partners import TURNS
 from tests.laws.test_stiffened import AXES, UNIT, Raw, arm
+from tests.laws.test_stiffened_joints import assert_stresses_turn, fast
 from tests.moving import bar, channels, ran
 from tests.partners import axis_of, chain
 from tests.verification.stiffening import HEIGHT, LENGTH, RUBBER
@@ -127,16 +127,7 @@ def test_a_pulled_cantilever_has_the_deflection_of_a_beam_column(
 
 def spring_chain(partners: tuple[str, str], law: str, turn: Any, on: bool = True) -> Raw:
     """A chain in space whose crank a preloaded spring pulls, or whose joint a torque drives."""
-    raw = chain("revolute", partners, False, False, turn)
-    raw["analysis"] |= {
-        "frames": "rigid-body",
-        "stiffening": on,
-        "initial": "rest",
-        "end_time": 3e-3,
-        "step": 2e-4,
-    }
-    raw["analysis"].pop("revolutions", None)
-    raw["drive"]["motion"] = {"kind": "constant_speed", "speed": 3.0}
+    raw = fast(chain("revolute", partners, False, False, turn), on, 3.0)
     crank = next(x for name, x in raw["joints"].items() if name != "A" and "crank" in x["links"])["at"]
     away = [x + y for x, y in zip(crank, turn(axis_of("revolute", partners)) @ [0.1, 0.3, 0.2], strict=True)]
     ends = [{"link": "crank", "at": crank}, {"link": "ground", "at": away}]
@@ -151,26 +142,7 @@ def spring_chain(partners: tuple[str, str], law: str, turn: Any, on: bool = True
 @pytest.mark.parametrize("partners", [("beam", "beam"), ("solid", "solid")])
 def test_stresses_of_springs_turn_with_the_scene(partners: tuple[str, str], law: str) -> None:
     """Along x, y, z and askew; and they matter."""
-    axis = axis_of("revolute", partners)
-    found = {}
-    for name, turn in TURNS[False].items():
-        ready, blocks = ran(spring_chain(partners, law, turn))
-        found[name] = _displaced(ready.model.links, blocks) @ turn(axis)
-    peak = np.abs(found["x"]).max()
-    for name in ("y", "z", "askew"):
-        assert_allclose(found[name], found["x"], rtol=0, atol=2e-6 * peak)
-    ready, blocks = ran(spring_chain(partners, law, TURNS[False]["x"], on=False))
-    plain = _displaced(ready.model.links, blocks) @ TURNS[False]["x"](axis)
-    assert np.abs(found["x"] - plain).max() > 1e-4 * peak
-
-
-def _displaced(links: Any, blocks: list[Block]) -> np.ndarray:
-    every = [
-        np.concatenate([block.links[k].u for block in blocks])
-        for k, link in enumerate(links)
-        if not link.rigid
-    ]
-    return np.concatenate(every, axis=1)[:, :, :3]
+    assert_stresses_turn(partial(spring_chain, partners, law), axis_of("revolute", partners))
 
 
 def swung(size: float, **analysis: Any) -> Raw:
@@ -227,10 +199,12 @@ def test_rotations_of_hinges_are_counted_at_any_time_as_in_order() -> None:
         ready, t = meshed(scene), np.linspace(0.0, 1.0, 501)
         elements = on_rigid_motion(rigid_elements(scene, ready.linkage.bodies), ready.path)
         motion = rigid_motion(ready.linkage, ready.path, t, path_parameter(scene, t))
-        in_order, _ = elements.forces(motion)
+        in_order = elements.over(motion).forces
         turns = np.array([elements._turned(motion.part(k, k + 1)) for k in range(len(t))])
         assert np.abs(turns[:, 0] - motion.phi).max() < 1.0  # of the grid point next to it
         for k in (0, 170, 333, 500):
-            assert_allclose(elements.forces(motion.part(k, k + 1))[0][0], in_order[k], rtol=1e-12, atol=1e-12)
+            assert_allclose(
+                elements.over(motion.part(k, k + 1)).forces[0], in_order[k], rtol=1e-12, atol=1e-12
+            )
         moment = np.array(next(m for end, _, m in elements.wrenches(motion) if end.link == "crank"))
         assert_allclose(moment[:, 2], -2.0 * motion.phi - 0.1 * speed, rtol=1e-9)

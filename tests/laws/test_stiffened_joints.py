@@ -1,5 +1,6 @@
 """Geometric stiffening with joints enforced by constraint equations: stresses that these bear, whatever the direction."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from tests.moving import channels, inverted, ran
 from tests.partners import axis_of, chain
 
 Raw = dict[str, Any]
+Turn = Callable[[np.ndarray], np.ndarray]
 SPEED = 60.0  # rad/s of the crank: stresses then change displacements by percent
 #: joint, its links, whether the drive is on it
 EVERY = [
@@ -50,22 +52,29 @@ def displaced(raw: Raw) -> np.ndarray:
     ], axis=1)  # fmt: skip
 
 
+def assert_stresses_turn(made: Callable[[Turn, bool], Raw], axis: np.ndarray) -> None:
+    """Displacements along x, y, z and askew are the same; and stiffening matters.
+
+    Parameters
+    ----------
+    made : a scene by its rotation and whether stiffening is on
+    axis : of the joint that is turned, as it is drawn without a rotation
+    """
+    R = {name: turn(axis) for name, turn in TURNS[False].items()}
+    found = {name: displaced(made(turn, True)) @ R[name] for name, turn in TURNS[False].items()}
+    peak = np.abs(found["x"]).max()
+    for name in ("y", "z", "askew"):
+        assert_allclose(found[name], found["x"], rtol=0, atol=2e-6 * peak)
+    plain = displaced(made(TURNS[False]["x"], False)) @ R["x"]
+    assert np.abs(found["x"] - plain).max() > 1e-4 * peak
+
+
 @pytest.mark.parametrize("cell", EVERY, ids=named)
 def test_stresses_of_constrained_joints_turn_with_the_scene(cell: tuple[str, tuple[str, str], bool]) -> None:
-    """Along x, y, z and askew; and they matter."""
     kind, partners, driven = cell
-    axis = axis_of(kind, partners, driven)
-    R = {name: turn(axis) for name, turn in TURNS[False].items()}
-    found = {
-        name: displaced(fast(chain(kind, partners, driven, False, turn)))
-        for name, turn in TURNS[False].items()
-    }
-    first = found["x"] @ R["x"]  # of the chain where it is drawn without a turn
-    peak = np.abs(first).max()
-    for name in ("y", "z", "askew"):
-        assert_allclose(found[name] @ R[name], first, rtol=0, atol=2e-6 * peak)
-    plain = displaced(fast(chain(kind, partners, driven, False, TURNS[False]["x"]), on=False)) @ R["x"]
-    assert np.abs(first - plain).max() > 1e-4 * peak
+    assert_stresses_turn(
+        lambda turn, on: fast(chain(kind, partners, driven, False, turn), on), axis_of(kind, partners, driven)
+    )
 
 
 @pytest.mark.parametrize(

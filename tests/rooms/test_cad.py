@@ -218,8 +218,7 @@ def test_parts_are_meshed_side_by_side_as_one_by_one(monkeypatch: pytest.MonkeyP
     assert list(found) == ["crank", "slider"]
     for name, mesh in found.items():
         alone = solid_mesh(scene, name)
-        assert_allclose(
-            mesh.points, alone.points, rtol=0, atol=1e-10
-        )  # m; 2e-12 seen, by sums in another order
+        # 2e-12 m seen, by sums in another order
+        assert_allclose(mesh.points, alone.points, rtol=0, atol=1e-10)
         assert np.array_equal(mesh.cells, alone.cells)
         assert mesh.method == alone.method

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from kedfem.results import Channel
 from kedfem.results.balance import Balance
 
 KINDS = ("displacement", "stress", "joint forces", "drive")
@@ -76,13 +75,8 @@ class Budget:
         return next((share for share in self.shares if share.source == source), None)
 
 
-def kind_of(channel: Channel) -> str | None:
-    """The kind of a channel whose accuracy counts; None of others."""
-    return kind_of_name(channel.name)
-
-
 def kind_of_name(name: str) -> str | None:
-    """The same by its name.
+    """The kind of a channel whose accuracy counts, by its name; None of others.
 
     >>> kind_of_name("probes/tip/velocity"), kind_of_name("joints/A/force"), kind_of_name("drive/rigid_torque")
     ('displacement', 'joint forces', None)

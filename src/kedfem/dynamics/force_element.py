@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.dynamics.history import Block
+from kedfem.dynamics.history import LinkHistory
 from kedfem.motion.constraints import cross, perpendiculars
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import Pieces
@@ -147,17 +147,50 @@ def rigid_vectors(end: End, motion: RigidMotion) -> Vectors:
     return x, v
 
 
-def vectors(every: Sequence[ForceElement], block: Block) -> tuple[Float[np.ndarray, "T A 2 2 3"], ...]:
-    """Positions and velocities of all ends over a block of time points, as the kernel takes them."""
-    x, v = np.zeros((2, len(block), len(every), 2, 2, 3))
+@dataclass(frozen=True, slots=True)
+class Evaluated:
+    """Force elements over time: vectors of both ends, forces on them, values as of the kernel, stiffness factors."""
+
+    x: Float[np.ndarray, "T A 2 2 3"]
+    forces: Float[np.ndarray, "T A 2 2 3"]
+    values: Float[np.ndarray, "T A 4"]
+    factors: Float[np.ndarray, "T A"]
+
+
+def evaluated(
+    every: Sequence[ForceElement], table: Table, turned: Float[np.ndarray, " A"], motion: RigidMotion,
+    links: Sequence[LinkHistory] = (),
+) -> Evaluated:  # fmt: skip
+    """All force elements at successive times.
+
+    Parameters
+    ----------
+    turned : coordinates before, near which rotations are; moved on to the last
+    links : histories of a model's links; without them none deforms or leaves the rigid-body motion
+    """
+    from kedfem.dynamics.force_elements_kernel import evaluate_all
+
+    x, v, forces = np.zeros((3, len(motion.t), len(every), 2, 2, 3))
     for i, element in enumerate(every):
         for e, end in enumerate(element.ends):
-            x[:, i, e], v[:, i, e] = rigid_vectors(end, block.motion)
-            if end.k >= 0:
-                history = block.links[end.k]
-                x[:, i, e] += elastic_vectors(end, history.u)
-                v[:, i, e] += elastic_vectors(end, history.v)
-    return x, v
+            x[:, i, e], v[:, i, e] = rigid_vectors(end, motion)
+            if end.k >= 0 and links:
+                x[:, i, e] += elastic_vectors(end, links[end.k].u)
+                v[:, i, e] += elastic_vectors(end, links[end.k].v)
+    factors = stiffness_factors([each.factor for each in every], motion.t, motion.phi)
+    values = np.zeros((len(motion.t), len(every), 4))
+    evaluate_all(motion.t, factors, x, v, turned, table, forces, values)
+    return Evaluated(x, forces, values, factors)
+
+
+def wrench(
+    end: End, x: Float[np.ndarray, "T 2 3"], f: Float[np.ndarray, "T 2 3"]
+) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]:
+    """Force and moment about the world's origin of the forces on an end's vectors."""
+    if end.form == POINT:
+        return f[:, 0], cross(x[:, 0], f[:, 0])
+    moment = f[:, 0] if end.form == ANGLE else cross(x, f).sum(axis=1)
+    return np.zeros_like(moment), np.asarray(moment)
 
 
 def elastic_vectors(end: End, u: Float[np.ndarray, "T n d"]) -> Float[np.ndarray, "T 2 3"]:

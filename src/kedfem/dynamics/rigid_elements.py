@@ -11,27 +11,25 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.force_element import (
-    ANGLE,
     POINT,
+    TIME,
     TURN,
     End,
+    Evaluated,
     ForceElement,
     Table,
+    evaluated,
     kernel_table,
-    rigid_vectors,
-    stiffness_factors,
+    wrench,
 )
 from kedfem.dynamics.force_elements import force_elements
 from kedfem.dynamics.model import Model
 from kedfem.links.record import Link
-from kedfem.motion.constraints import cross
 from kedfem.motion.path import Path, place_on
 from kedfem.motion.rigid import RigidMotion, resting
 from kedfem.scene import Pieces, Scene
 
 ONE = Pieces(np.zeros(1), np.array([[1.0, 0.0, 0.0, 0.0]]))
-Vectors = Float[np.ndarray, "T A 2 2 3"]
-"""Two vectors of both ends of all force elements over time, or forces on them, world components."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,23 +45,29 @@ class RigidElements:
     along: Path
     turned: Float[np.ndarray, "G A"]
 
-    def forces(self, motion: RigidMotion) -> tuple[Vectors, Vectors]:
-        """Forces on all ends, and the vectors that they act on.
+    def over(self, motion: RigidMotion) -> Evaluated:
+        """All of them at the times of a motion, with the vectors that forces act on.
 
         Parameters
         ----------
         motion : between successive times no hinge turns by π
         """
-        return _evaluated(self.every, self.table, motion, self._turned(motion))[1:]
+        return evaluated(self.every, self.table, self._turned(motion), motion)
 
     def wrenches(
         self, motion: RigidMotion
     ) -> Iterator[tuple[End, Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]]:
         """Force and moment about the world's origin (T, 3) of every end."""
-        forces, x = self.forces(motion)
+        found = self.over(motion)
+        for i, e, end in self.ends():
+            yield end, *wrench(end, found.x[:, i, e], found.forces[:, i, e])
+
+    def ends(self, k: int | None = None) -> Iterator[tuple[int, int, End]]:
+        """Numbers of element and end, and the end: all, or those on a link of the model."""
         for i, element in enumerate(self.every):
             for e, end in enumerate(element.ends):
-                yield end, *wrench(end, x[:, i, e], forces[:, i, e])
+                if k is None or end.k == k:
+                    yield i, e, end
 
     def _turned(self, motion: RigidMotion) -> Float[np.ndarray, " A"]:
         """Rotations near the first of these times."""
@@ -73,23 +77,13 @@ class RigidElements:
         return np.asarray((self.turned[near] + periods * (self.turned[-1] - self.turned[0]))[0])
 
 
-def wrench(
-    end: End, x: Float[np.ndarray, "T 2 3"], f: Float[np.ndarray, "T 2 3"]
-) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]:
-    """Force and moment about the world's origin of the forces on an end's vectors."""
-    if end.form == POINT:
-        return f[:, 0], cross(x[:, 0], f[:, 0])
-    moment = f[:, 0] if end.form == ANGLE else cross(x, f).sum(axis=1)
-    return np.zeros_like(moment), np.asarray(moment)
-
-
 def on_rigid_motion(every: Sequence[ForceElement], along: Path) -> RigidElements:
     """Force elements on the rigid-body motion along a path."""
     table, start = kernel_table(every), int(np.abs(along.phi).argmin())
     turned = np.zeros((len(along.phi), len(every)))
     for order in (np.arange(start, len(along.phi)), np.arange(start, -1, -1)):
         here = replace(resting(along.R.shape[1], np.zeros(len(order))), R=along.R[order])
-        turned[order] = _evaluated(every, table, here, np.zeros(len(every)))[0]
+        turned[order] = evaluated(every, table, np.zeros(len(every)), here).values[..., 0]
     turned[:, [each.kind != TURN for each in every]] = 0.0
     return RigidElements(every, table, along, turned)
 
@@ -106,35 +100,18 @@ def rigid_elements_of(scene: Scene, model: Model, along: Path) -> RigidElements 
     return on_rigid_motion(every, along) if every else None
 
 
-def _evaluated(
-    every: Sequence[ForceElement], table: Table, motion: RigidMotion, before: Float[np.ndarray, " A"]
-) -> tuple[Float[np.ndarray, "T A"], Vectors, Vectors]:
-    """Coordinates, forces and the vectors that these act on; of hinges, nearest to the rotations before."""
-    from kedfem.dynamics.force_elements_kernel import evaluate_all
-
-    x, v, forces = np.zeros((3, len(motion.t), len(every), 2, 2, 3))
-    for i, element in enumerate(every):
-        for e, end in enumerate(element.ends):
-            x[:, i, e], v[:, i, e] = rigid_vectors(end, motion)
-    factors = stiffness_factors([each.factor for each in every], motion.t, motion.phi)
-    values = np.zeros((len(motion.t), len(every), 4))
-    evaluate_all(motion.t, factors, x, v, before.copy(), table, forces, values)
-    return values[..., 0], forces, x
-
-
 def with_elements(
-    k: int, F: Float[np.ndarray, "T n d"], elements: RigidElements, forces: Vectors
+    k: int, F: Float[np.ndarray, "T n d"], elements: RigidElements, forces: Float[np.ndarray, "T A 2 2 3"]
 ) -> Float[np.ndarray, "T n d"]:
     """Loads on a link of a model with those of force elements, world components.
 
     Parameters
     ----------
     k : its number
+    forces : on all ends
     """
-    for i, element in enumerate(elements.every):
-        for e, end in enumerate(element.ends):
-            if end.k == k:
-                F = F + _nodal(end, F.shape[2], forces[:, i, e])
+    for i, e, end in elements.ends(k):
+        F = F + _nodal(end, F.shape[2], forces[:, i, e])
     return F
 
 
@@ -144,16 +121,13 @@ def unit_loads_on(k: int, link: Link, elements: RigidElements) -> list[Float[np.
     Torques have the same directions on a link at all times, forces at points may have any.
     """
     out, space = [], 2 if link.planar else 3
-    for element in elements.every:
-        for e, end in enumerate(element.ends):
-            if end.k != k:
-                continue
-            if end.form == POINT:
-                units = np.zeros((space, 2, 3))
-                units[np.arange(space), 0, np.arange(space)] = 1.0
-            else:
-                units = _torque(element, e)[None]
-            out += list(_nodal(end, link.d, units))
+    for i, e, end in elements.ends(k):
+        if end.form == POINT:
+            units = np.zeros((space, 2, 3))
+            units[np.arange(space), 0, np.arange(space)] = 1.0
+        else:
+            units = _torque(elements.every[i], e)[None]
+        out += list(_nodal(end, link.d, units))
     return out
 
 
@@ -165,6 +139,6 @@ def _nodal(end: End, d: int, f: Float[np.ndarray, "T 2 3"]) -> Float[np.ndarray,
 
 def _torque(element: ForceElement, e: int) -> Float[np.ndarray, "2 3"]:
     """Forces on the directions of one end under a unit torque, in the reference position."""
-    unit = replace(element, stiffness=0.0, damping=0.0, factor=None, over=0, curve=ONE)
+    unit = [replace(element, stiffness=0.0, damping=0.0, factor=None, over=TIME, curve=ONE)]
     still = resting(1 + max(end.body for end in element.ends), np.zeros(1))
-    return np.asarray(_evaluated([unit], kernel_table([unit]), still, np.zeros(1))[1][0, 0, e])
+    return np.asarray(evaluated(unit, kernel_table(unit), np.zeros(1), still).forces[0, 0, e])

@@ -110,7 +110,7 @@ class Stiffening:
             return [each.F for each in forcing]
         if motion is None:
             raise ValueError("the motion must be given with motors and springs, got none")
-        forces = self.elements.forces(motion)[0]
+        forces = self.elements.over(motion).forces
         return [with_elements(k, each.F, self.elements, forces) for k, each in enumerate(forcing)]
 
     def turnings(self, at: Sequence[ForcingAt]) -> list[Turning]:

@@ -56,7 +56,7 @@ def write_drive_load(path: Path, load: DriveLoad, results: Results, rows: Bool[n
 def _write(path: Path, columns: Columns, results: Results, rows: Bool[np.ndarray, " T"]) -> None:
     every = {"time [s]": results.time, drive_heading(results.drive): results.angle} | columns
     with text_file(path) as file:
-        write_numbers(file, every, np.column_stack([x[rows] for x in every.values()]))
+        write_numbers(file, every, [np.column_stack([x[rows] for x in every.values()])])
 
 
 def write_summary(path: Path, what: str, every: Mapping[str, Mapping[str, float]]) -> None:

@@ -72,7 +72,7 @@ def write_frequencies(
     header = ["time [s]", "drive travel [m]" if slides else "drive angle [rad]"]
     header += [f"frequency {k + 1} [Hz]" for k in range(values.shape[1])]
     with text_file(path) as file:
-        write_numbers(file, header, np.column_stack([t, place, values]))
+        write_numbers(file, header, [np.column_stack([t, place, values])])
 
 
 def write_part_frequencies(path: Path, values: Float[np.ndarray, " f"]) -> None:
@@ -84,4 +84,6 @@ def write_part_frequencies(path: Path, values: Float[np.ndarray, " f"]) -> None:
         The file cannot be written.
     """
     with text_file(path) as file:
-        write_numbers(file, ["mode", "frequency [Hz]"], np.column_stack([1 + np.arange(len(values)), values]))
+        write_numbers(
+            file, ["mode", "frequency [Hz]"], [np.column_stack([1 + np.arange(len(values)), values])]
+        )

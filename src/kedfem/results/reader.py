@@ -21,7 +21,6 @@ from kedfem.results.layout import (
     sealed,
     series,
 )
-from kedfem.results.on_demand import rows_of
 from kedfem.results.records import (
     ANGLE,
     TIME,
@@ -137,7 +136,7 @@ def _results(file: Any, path: Path) -> Results:
         time=all_rows(time, n),
         angle=all_rows(drive, n),
         channels=later
-        or {name: (known[name], rows_of(rows, known[name], n)) for name, rows in named.items()},
+        or {name: (known[name], on_demand.rows_of(rows, known[name], n)) for name, rows in named.items()},
         status=_status(facts["status"]),
         scene_json=scene,
         scene_toml=None if toml is None else read_text(toml),

@@ -40,9 +40,8 @@ def write_csv(results: Results, path: Path) -> None:
     with text_file(Path(path)) as file:
         if results.status != "complete":
             file.write(f"# not a whole run: {results.status} after {len(results.time)} steps\n")
-        csv.writer(file, lineterminator="\n").writerow(header(results))
-        for first in range(0, len(results.time), ROWS):
-            _write_rows(file, columns_of(results, slice(first, first + ROWS)))
+        parts = range(0, len(results.time), ROWS)
+        write_numbers(file, header(results), (columns_of(results, slice(k, k + ROWS)) for k in parts))
 
 
 @contextmanager
@@ -58,14 +57,11 @@ def text_file(path: Path) -> Iterator[TextIO]:
         yield file
 
 
-def write_numbers(file: TextIO, names: Iterable[str], values: Float[np.ndarray, "n c"]) -> None:
-    """A line of names, and a line of numbers for each row."""
+def write_numbers(file: TextIO, names: Iterable[str], parts: Iterable[Float[np.ndarray, "n c"]]) -> None:
+    """A line of names, and a line of numbers for each row of all parts."""
     csv.writer(file, lineterminator="\n").writerow(names)
-    _write_rows(file, values)
-
-
-def _write_rows(file: TextIO, values: Float[np.ndarray, "n c"]) -> None:
-    np.savetxt(file, values, fmt=DIGITS, delimiter=",")
+    for values in parts:
+        np.savetxt(file, values, fmt=DIGITS, delimiter=",")
 
 
 def cell(x: float) -> str:

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from kedfem.dynamics.system.record import Constraint
 from kedfem.dynamics.system.starts.balance import Asked
 from kedfem.dynamics.system.starts.instant import Instant
-from kedfem.dynamics.system.starts.rates import Places, pose, value
+from kedfem.dynamics.system.starts.rates import coordinate, moved_by
 
 ROUNDING = 1e-12  # of the largest eigenvalue of a law's second derivatives
 
@@ -41,25 +41,15 @@ def with_preloads(now: Instant, asked: Asked) -> Asked:
 
 def _second_derivatives(now: Instant, each: Constraint) -> tuple[list[int], Float[np.ndarray, "m m"]]:
     """Interface unknowns that a coordinate depends on, and its second derivatives by these at z = 0."""
-    ends = now.of.system.ends
-    which = {n for term in each.terms for n in (term.i, term.j)}
-    columns = sorted({int(c) for n in which for c in np.flatnonzero(ends[n].onto.any(axis=(0, 1)))})
-    out = np.zeros((len(columns),) * 2)
-    for a in range(len(columns)):
-        out[a, a] = _along(now, each, [columns[a]])
+    system, still = now.of.system, now.at.at_rest()
+    columns = sorted(moved_by(system, each.terms))
+
+    def along(*moving: int) -> float:
+        z = np.zeros((3, system.unknowns))
+        z[1, [columns[a] for a in moving]] = 1.0
+        return float(coordinate(system, each, still, z)[2])
+
+    out = np.diag([along(a) for a in range(len(columns))])
     for a, b in combinations(range(len(columns)), 2):
-        both = _along(now, each, [columns[a], columns[b]])
-        out[a, b] = out[b, a] = (both - out[a, a] - out[b, b]) / 2
+        out[a, b] = out[b, a] = (along(a, b) - out[a, a] - out[b, b]) / 2
     return columns, out
-
-
-def _along(now: Instant, each: Constraint, moving: list[int]) -> float:
-    """q'' where some interface unknowns have a rate of one, and all else rests."""
-    at, system = now.at, now.of.system
-    still = Places(at.R * [[[[1.0]]], [[[0.0]]], [[[0.0]]]], at.p * [[[1.0]], [[0.0]], [[0.0]]])
-    z = np.zeros((3, system.unknowns))
-    z[1, moving] = 1.0
-    found = {n: pose(system.ends[n], still, z) for term in each.terms for n in (term.i, term.j)}
-    return float(
-        sum(term.factor * value(system, term, found[term.i], found[term.j])[2] for term in each.terms).real
-    )

@@ -13,14 +13,13 @@ from kedfem.dynamics.force_element import (
     End,
     ForceElement,
     Table,
+    evaluated,
     kernel_table,
-    stiffness_factors,
-    vectors,
+    wrench,
 )
 from kedfem.dynamics.force_elements import force_elements, hinges
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.rigid_elements import wrench
 from kedfem.motion.constraints import cross
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import Channel
@@ -78,17 +77,12 @@ class Measured:
     def of(self, block: Block) -> Float[np.ndarray, "T A 4"]:
         """Coordinate, rate, force and stored energy of all force elements; blocks in the order of time."""
         if block is not self.block:
-            from kedfem.dynamics.force_elements_kernel import evaluate_all
-
             before = np.zeros(len(self.every)) if block.step == 0 or not self.turned.size else self.turned
-            self.turned, self.values = before.copy(), np.zeros((len(block), len(self.every), 4))
-            x, v = vectors(self.every, block)
-            self.places, self.forces, self.block = x, np.zeros_like(x), block
-            t, varied = block.motion.t, [each.factor for each in self.every]
-            factors = stiffness_factors(varied, t, block.motion.phi)
-            evaluate_all(t, factors, x, v, self.turned, self.table, self.forces, self.values)
+            self.turned, self.block = before.copy(), block
+            found = evaluated(self.every, self.table, self.turned, block.motion, block.links)
+            self.places, self.forces, self.values = found.x, found.forces, found.values
             if block.exerted is not None:
-                self._taken(block.exerted.element, factors)
+                self._taken(block.exerted.element, found.factors)
         return self.values
 
     def _taken(self, element: Float[np.ndarray, "T 3 k"], factors: Float[np.ndarray, "T A"]) -> None:

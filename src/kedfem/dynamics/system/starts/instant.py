@@ -81,7 +81,7 @@ class Instant:
         motion = motion_at(np.array([time]))
         self.near = near
         self.of, self.time, self.motion = of, time, motion
-        along = driving(of, motion)
+        along = driving(replace(of, stressed=None), motion)  # `stress` has these as forces
         self.F, self.amounts, self.at = along.F[0], along.amounts[0], places(motion)
         self.R, self.omega = motion.R[0][of.bodies.motion], motion.omega[0][of.bodies.motion]
         self.travels = travels(of.system, self.at)

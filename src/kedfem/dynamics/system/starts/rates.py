@@ -8,7 +8,7 @@ with B = Q₀ᵀ A and Q = Q₀ exp [w t + b t²/2]×, the skew parts of exp(−
 Constraints that are linear in z are derivatives by z: taken by a complex step, exact to rounding.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,6 +44,10 @@ class Places:
 
     R: Float[np.ndarray, "3 M 3 3"]
     p: Float[np.ndarray, "3 M 3"]
+
+    def at_rest(self) -> "Places":
+        """The same without rates."""
+        return Places(self.R * [[[[1.0]]], [[[0.0]]], [[[0.0]]]], self.p * [[[1.0]], [[0.0]], [[0.0]]])
 
 
 def places(motion: RigidMotion, k: int = 0) -> Places:
@@ -98,7 +102,7 @@ def gradients(
     known : the same at another z, where those that are linear are as here
     """
     C = np.zeros((len(system.constraints), system.unknowns))
-    still = Places(at.R * [[[[1.0]]], [[[0.0]]], [[[0.0]]]], at.p * [[[1.0]], [[0.0]], [[0.0]]])
+    still = at.at_rest()
     moving: dict[tuple[int, int, bool], tuple[Series, Series]] = {}
 
     def moved(n: int, column: int, linear: bool) -> tuple[Series, Series]:
@@ -115,16 +119,24 @@ def gradients(
             continue
         rest = _Poses(system, still, np.stack([0.0 * z if each.linear else z, 0.0 * z, 0.0 * z]))
         for term in each.terms:
-            columns = {
-                c for n in {term.i, term.j} for c in np.flatnonzero(system.ends[n].onto.any(axis=(0, 1)))
-            }
-            for c in columns:
+            for c in moved_by(system, [term]):
                 i, j = (
-                    moved(n, int(c), each.linear) if system.ends[n].onto[:, :, c].any() else rest(n)
+                    moved(n, c, each.linear) if system.ends[n].onto[:, :, c].any() else rest(n)
                     for n in (term.i, term.j)
                 )
                 C[a, c] += term.factor * value(system, term, i, j)[1]
     return C
+
+
+def moved_by(system: System, terms: Sequence[Term]) -> set[int]:
+    """Interface unknowns that move the ends of terms."""
+    ends = (system.ends[n] for n in {n for term in terms for n in (term.i, term.j)})
+    return {int(c) for end in ends for c in np.flatnonzero(end.onto.any(axis=(0, 1)))}
+
+
+def coordinate(system: System, each: Constraint, at: Places, z: Float[np.ndarray, "3 k"]) -> Series:
+    """A coordinate as a series (3,), though it be linear in z."""
+    return _summed(system, each, _Poses(system, at, z))
 
 
 @dataclass

@@ -10,9 +10,7 @@ from kedfem.dynamics.system.starts.instant import Flat, Instant
 from kedfem.dynamics.system.starts.internal import own
 
 KRYLOV = 60
-LEFT = (
-    1e-4  # of a residual by GMRES: iterations of the deflection go on, and what rounding leaves may be 1e-8
-)
+LEFT = 1e-4  # of a residual, by GMRES: iterations of the deflection go on, and rounding may leave 1e-8
 CONVERGED = 1e-10  # change of an iteration, of the deflection
 
 Spins = Float[np.ndarray, "L 3 3"]
