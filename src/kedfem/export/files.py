@@ -16,12 +16,7 @@ Record = TypeVar("Record")
 
 
 def require_ending(path: Path, endings: Sequence[str] = ENDINGS) -> None:
-    """A file of a kind that is known.
-
-    Raises
-    ------
-    OutputError
-    """
+    """OutputError unless a file is of a kind that is known."""
     if path.suffix not in endings:
         raise OutputError(f"{path}: must end in {' or '.join(endings)}, got '{path.suffix}'")
 

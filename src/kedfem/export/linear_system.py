@@ -96,11 +96,6 @@ def state_space(
     modes : vibrations that are kept, beside motions without strain
     at : time at which the drive is at the position [s]
     free : whether the drives let go of their joints, and their torques or forces are inputs; else they hold them
-
-    Raises
-    ------
-    KedfemError
-        With a message for the user.
     """
     _require(scene, modes, at, free)
     scene, assembly = assembled(scene)
@@ -125,12 +120,7 @@ def state_space(
 
 
 def _require(scene: Scene, modes: int, at: float, free: bool) -> None:
-    """What can be asked of a scene.
-
-    Raises
-    ------
-    SceneError
-    """
+    """SceneError where what is asked for cannot be had of a scene."""
     if modes < 1:
         raise SceneError(f"--modes: must be at least 1, got {modes}")
     require_drive(scene, free)

@@ -102,11 +102,6 @@ def frequencies(
     Parameters
     ----------
     folder : `frequencies_folder` if not given
-
-    Raises
-    ------
-    KedfemError
-        With a message for the user.
     """
     for name in ("modes", "positions", "harmonics"):
         if (value := getattr(wanted, name)) < 1:

@@ -121,11 +121,6 @@ def link_of_scene(scene: Scene, name: str, joints: Sequence[str] = ()) -> Part:
     Parameters
     ----------
     joints : each holds as if its other link were fixed; one with a drive does not let it turn
-
-    Raises
-    ------
-    KedfemError
-        With a message for the user.
     """
     require_elastic(scene.links, name)
     for joint in joints:
@@ -179,11 +174,6 @@ def part_frequencies(
     ----------
     count : of vibrations
     shapes : lowest mode shapes that are drawn
-
-    Raises
-    ------
-    KedfemError
-        With a message for the user.
     """
     if count < 1:
         raise SceneError(f"--modes: must be at least 1, got {count}")

@@ -83,10 +83,6 @@ def require_on_axis(
     ----------
     at, nearest : the point in the reference position, and the nearest of the link [m]
     noun, purpose : what a message calls the link, and says of what the point is for
-
-    Raises
-    ------
-    SceneError
     """
     beside = float(np.linalg.norm(nearest - at))
     if link.kind == "beam" and beside > ON_AXIS * link.size:

@@ -29,8 +29,7 @@ def reduced(link: Link, Q: Float[np.ndarray, "n s"]) -> Link:
 
     Returns
     -------
-    Link
-        With dense matrices; `full` and `Q` lead back to the link that it came from.
+    With dense matrices; `full` and `Q` lead back to the link that it came from
     """
     Q = mass_orthonormal(link, Q)
     mass = tuple(_gram(m, Q) for m in link.mass)

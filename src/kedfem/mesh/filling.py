@@ -56,20 +56,15 @@ def filled_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
 
     Parameters
     ----------
-    gmsh : module
-        With the solid in its model, which stays there.
-    solid : Solid
-        The solid.
-    sizing : Sizing
-        How fine. Without a size: `across` elements in twice the mean wall 2 V/A, which is the thickness of a plate, the
-        radius of a rod, the wall of a tube, but at least some thousand elements; 12 to a circle, as far as that is not
-        finer than a quarter of the size. A part of more than 45,000 unknowns is then meshed coarser, step by step. Hollow
-        faces are finer where `hollow` asks for it, in any case.
+    gmsh : with the solid in its model, which stays there
+    sizing : how fine. Without a size: `across` elements in twice the mean wall 2 V/A, which is the thickness of a
+        plate, the radius of a rod, the wall of a tube, but at least some thousand elements; 12 to a circle, as far as
+        that is not finer than a quarter of the size. A part of more than 45,000 unknowns is then meshed coarser, step
+        by step. Hollow faces are finer where `hollow` asks for it, in any case.
 
     Returns
     -------
-    SolidMesh
-        Proven to have det J > 0 everywhere.
+    Proven to have det J > 0 everywhere
 
     Raises
     ------

@@ -23,12 +23,9 @@ def finer_hollows(
 
     Parameters
     ----------
-    gmsh : module
-        With the solid, and with the options of a mesh.
-    turn : float
-        By which elements turn along all faces with these options [rad].
-    finest : float
-        Their least size [m].
+    gmsh : with the solid, and with the options of a mesh
+    turn : by which elements turn along all faces with these options [rad]
+    finest : their least size [m]
     """
     tags = free_hollows(solid, sizing)
     if sizing.hollow >= USUAL or not tags:

@@ -26,14 +26,9 @@ class AnimationWriter:
 
     The first frame removes the frames that an earlier run left under the same stem, and nothing else.
 
-    Parameters
-    ----------
-    folder
-        Where ``STEM.pvd`` goes, and the folder ``STEM`` with ``NAME_0000.vtu``, ``NAME_0001.vtu``, … of each link.
-    stem
-        Beginning of the names.
-    drive
-        What the drive's position is called, with its unit; empty without one.
+    folder : where ``STEM.pvd`` goes, and the folder ``STEM`` with ``NAME_0000.vtu``, ``NAME_0001.vtu``, … of each link
+    stem : beginning of the names
+    drive : what the drive's position is called, with its unit; empty without one
 
     Raises
     ------
@@ -60,8 +55,7 @@ class AnimationWriter:
         Parameters
         ----------
         time : [s]
-        fields
-            The links in this frame, and what joints exert.
+        fields : the links in this frame, and what joints exert
         angle : of the drive [rad], or travel [m]
 
         Returns
@@ -108,13 +102,7 @@ Entry = tuple[float, str, str]
 
 
 def write_collection(folder: Path, stem: str, entries: Sequence[Entry]) -> None:
-    """The PVD file ``STEM.pvd`` that lists VTU files at their times.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """The PVD file ``STEM.pvd`` that lists VTU files at their times."""
     with replacing(folder / f"{stem}.pvd") as part:
         part.write_bytes(HEAD + _rows(entries) + TAIL)
 

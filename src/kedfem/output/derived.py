@@ -90,12 +90,7 @@ def fields(
 
 
 def refuse_foreign(folder: Path) -> None:
-    """A folder with files of the names that a run replaces, but without results of kedfem, holds somebody's own files.
-
-    Raises
-    ------
-    OutputError
-    """
+    """OutputError where a folder has files of the names that a run replaces, but no results of kedfem."""
     file = folder / "results.h5"
     names = [*WHOLE, f"{STEM}.pvd"]
     found = [] if file.exists() else [name for name in names if (folder / name).exists()]

@@ -17,13 +17,7 @@ MOST = 300.0  # of powers of ten: life without damage
 
 
 def write_fatigue(folder: Path, found: Fatigue, fields: Sequence[LinkFatigue], table: bool) -> None:
-    """Damage at every point on the undeformed links for ParaView, hot spots as CSV, all points as CSV if asked.
-
-    Raises
-    ------
-    OutputError
-        A file cannot be written.
-    """
+    """Damage at every point on the undeformed links for ParaView, hot spots as CSV, all points as CSV if asked."""
     every = [(each, drawn_points(each.recovery)) for each in fields]
     columns = _columns(found, fields)
     parts = [(each.recovery.link.name, X, each.recovery.cells, each.recovery.cell_type) for each, X in every]

@@ -22,23 +22,15 @@ from kedfem.output.array_names import (
 class LinkField:
     """One link in one frame of the animation.
 
-    Parameters
-    ----------
-    name
-        The link's name.
-    cell_type
-        meshio's name: ``hexahedron27``, ``hexahedron20``, ``hexahedron``, ``line``, ``line3``.
-    cells : (e, k) [-]
-        Node numbers in VTK's order.
-    points : (n, 3) [m]
-        Where the nodes are drawn: rigid motion plus the exaggerated elastic displacement.
-    displacement : (n, 3) [m]
-        Elastic displacement δ, world components, not exaggerated.
-    stress : (n, 6) [Pa]
-        xx, yy, zz, xy, yz, zx in the world's axes; nan of beams, whose stress is known along their axis.
+    name : the link's name
+    cell_type : meshio's name: ``hexahedron27``, ``hexahedron20``, ``hexahedron``, ``line``, ``line3``
+    cells : (e, k) node numbers in VTK's order [-]
+    points : (n, 3) where the nodes are drawn: rigid motion plus the exaggerated elastic displacement [m]
+    displacement : (n, 3) elastic displacement δ, world components, not exaggerated [m]
+    stress : (n, 6) xx, yy, zz, xy, yz, zx in the world's axes [Pa]; nan of beams, whose stress is known along their
+        axis
     von_mises : (n,) [Pa]
-    principal : (n, 2) [Pa]
-        Smallest and largest principal stress.
+    principal : (n, 2) smallest and largest principal stress [Pa]
     section : height and thickness [m] of a beam that is drawn as a line, and whether they are diameters of an ellipse
     """
 
@@ -68,12 +60,8 @@ class LinkField:
 class RigidField:
     """One rigid link in one frame of the animation.
 
-    Parameters
-    ----------
-    name, cell_type, cells, points
-        As of :class:`LinkField`; cells are surfaces, lines or a vertex.
-    velocity, acceleration : (n, 3) [m/s, m/s²]
-        World components.
+    name, cell_type, cells, points : as of :class:`LinkField`; cells are surfaces, lines or a vertex
+    velocity, acceleration : (n, 3) world components [m/s, m/s²]
     """
 
     name: str
@@ -92,14 +80,9 @@ class RigidField:
 class JointField:
     """What joints and drives exert in one frame, at points for arrows.
 
-    Parameters
-    ----------
-    names
-        Of the joints.
-    points : (n, 3) [m]
-        Where they are in the rigid-body motion.
-    vectors
-        (n, 3) by names with units: world components.
+    names : of the joints
+    points : (n, 3) where they are in the rigid-body motion [m]
+    vectors : (n, 3) by names with units: world components
     """
 
     names: tuple[str, ...]

@@ -20,13 +20,7 @@ Columns = dict[str, Float[np.ndarray, " T"]]
 
 
 def write_joint_load(path: Path, load: JointLoad, results: Results, rows: Bool[np.ndarray, " T"]) -> None:
-    """A joint's load over time as CSV: in the world's axes, in each link's, magnitude, axial and bearing load, speed.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """A joint's load over time as CSV: in the world's axes, in each link's, magnitude, axial and bearing load, speed."""
     first, second = load.links
     columns: Columns = {f"on {first}, world {c} [N]": load.world[:, k] for k, c in enumerate(XYZ)}
     for link, inside in zip(load.links, load.inside, strict=False):
@@ -39,13 +33,7 @@ def write_joint_load(path: Path, load: JointLoad, results: Results, rows: Bool[n
 
 
 def write_drive_load(path: Path, load: DriveLoad, results: Results, rows: Bool[np.ndarray, " T"]) -> None:
-    """A drive's torque or force, rate and power over time as CSV.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """A drive's torque or force, rate and power over time as CSV."""
     torque = load.unit == "N m"
     columns: Columns = {f"{'torque' if torque else 'force'} [{load.unit}]": load.effort}
     if load.rate is not None and load.power is not None:
@@ -60,13 +48,7 @@ def _write(path: Path, columns: Columns, results: Results, rows: Bool[np.ndarray
 
 
 def write_summary(path: Path, what: str, every: Mapping[str, Mapping[str, float]]) -> None:
-    """One line a joint or drive, empty where a number is not known.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """One line a joint or drive, empty where a number is not known."""
     names = list(dict.fromkeys(name for found in every.values() for name in found))
     with text_file(path) as file:
         table = csv.writer(file, lineterminator="\n")
@@ -76,13 +58,7 @@ def write_summary(path: Path, what: str, every: Mapping[str, Mapping[str, float]
 
 
 def write_polar(path: Path, load: JointLoad, rows: Bool[np.ndarray, " T"]) -> bool:
-    """Polar diagram of a hinge's radial load, as each of its links bears it in its own axes; whether there is one.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """Polar diagram of a hinge's radial load, as each of its links bears it in its own axes; whether there is one."""
     if not has_polar(load):
         return False
     with figure_saved(path, polar_title(load, rows)) as figure:

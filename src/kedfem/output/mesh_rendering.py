@@ -30,10 +30,8 @@ def render(npz: str, png: str, count: str) -> None:
 
     Parameters
     ----------
-    npz, png
-        What to draw, and where to.
-    count
-        How many meshes there are.
+    npz, png : what to draw, and where to
+    count : how many meshes there are
     """
     given = np.load(npz)
     if int(count) == 1:

@@ -32,11 +32,6 @@ def write_motion(path: Path, scene: Scene, linkage: Linkage, blocks: Iterable[Ri
     Parameters
     ----------
     blocks : the motion, one part of the time after the other
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
     """
     names = ["time [s]", drive_heading(drive_channel(scene)), *_columns(list(scene.links))]
     last: dict[int, Float[np.ndarray, "4"]] = {}

@@ -89,11 +89,6 @@ def write_state(scene: Scene, results: Results, peak: Peak | None, folder: Path)
     Parameters
     ----------
     peak : highest stress, where the colours end
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
     """
     text = TEXT.substitute(
         state=STATE, folder=repr(str(folder.resolve())), stress=VON_MISES, highest=peak.stress if peak else 1.0,

@@ -26,18 +26,12 @@ def write_picture(
 
     Parameters
     ----------
-    vtu
-        A frame of :class:`~kedfem.output.animation.AnimationWriter`.
-    png
-        The picture.
-    title
-        Written above; long ones are wrapped.
-    deformation_scale
-        Exaggeration of the deformation in the frame, written below.
-    gravity : (3,) [m/s²]
-        Points down in the picture, unless it is looked along.
-    meanwhile
-        What is done here while VTK draws.
+    vtu : a frame of :class:`~kedfem.output.animation.AnimationWriter`
+    png : the picture
+    title : written above; long ones are wrapped
+    deformation_scale : exaggeration of the deformation in the frame, written below
+    gravity : (3,) points down in the picture, unless it is looked along [m/s²]
+    meanwhile : what is done here while VTK draws
 
     Raises
     ------
@@ -66,16 +60,11 @@ def draw_apart(
 
     Parameters
     ----------
-    script
-        A file beside this one.
-    files
-        What is drawn, and the PNG.
-    words
-        The script's further arguments.
-    wanted
-        What a message says of the subject of the picture.
-    meanwhile
-        What is done here at the same time.
+    script : a file beside this one
+    files : what is drawn, and the PNG
+    words : the script's further arguments
+    wanted : what a message says of the subject of the picture
+    meanwhile : what is done here at the same time
 
     Raises
     ------

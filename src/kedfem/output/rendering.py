@@ -42,8 +42,7 @@ def render(vtu: str, png: str, title: str, deformation_scale: str = "1", *gravit
 
     Parameters
     ----------
-    vtu, png, title, deformation_scale, gravity
-        As in :func:`kedfem.output.picture.write_picture`.
+    vtu, png, title, deformation_scale, gravity : as in :func:`kedfem.output.picture.write_picture`
     """
     import pyvista
 

@@ -56,11 +56,6 @@ def write_deck(
     Parameters
     ----------
     comments : lines of comment for its head
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
     """
     held = supports(link)
     with text_file(path) as file:
@@ -97,13 +92,7 @@ def _numbers(x: Float[np.ndarray, " k"]) -> str:
 
 
 def write_case(path: Path, link: Link, case: LoadCase) -> None:
-    """A load case for ParaView: the undeformed link; forces of each kind, displacement, acceleration and stress at nodes.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """A load case for ParaView: the undeformed link; forces by kind, displacement, acceleration and stress at nodes."""
     import meshio
     from meshio import vtu
 
@@ -140,11 +129,6 @@ def write_resultants(
     Parameters
     ----------
     drive : heading of the drive's position
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
     """
     columns = [
         f"{what} {c} [{unit}]"

@@ -51,13 +51,7 @@ class Extremes:
 
 
 def write_envelope(folder: Path, extremes: Extremes, table: bool) -> None:
-    """Highest stresses at every point and when they occur, on the undeformed links: for ParaView, and as CSV if asked.
-
-    Raises
-    ------
-    OutputError
-        A file cannot be written.
-    """
+    """Highest stresses at every point and when they occur, on the undeformed links: for ParaView, and as CSV if asked."""
     every = [(each, drawn_points(each.recovery)) for each in extremes.found]
     columns = extremes.columns()
     doubts = np.array([float(bool(x)) for each in extremes.near for x in each])
@@ -78,13 +72,7 @@ def write_envelope(folder: Path, extremes: Extremes, table: bool) -> None:
 
 
 def write_top(folder: Path, every: Mapping[str, Sequence[Peak]], drive: str) -> None:
-    """The highest stresses of each link at places apart as CSV; nothing where no link has stress.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """The highest stresses of each link at places apart as CSV; nothing where no link has stress."""
     if not every:
         return
     header = [

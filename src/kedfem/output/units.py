@@ -13,10 +13,8 @@ def prefixed(peak: float, unit: str) -> tuple[float, str]:
 
     Parameters
     ----------
-    peak
-        Largest absolute value, in `unit`.
-    unit
-        The prefix goes before its first letter.
+    peak : largest absolute value, in `unit`
+    unit : the prefix goes before its first letter
 
     Returns
     -------

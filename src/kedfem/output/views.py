@@ -21,14 +21,9 @@ FLAT = 0.35
 class View:
     """From where a linkage is drawn, and what it takes up there.
 
-    Parameters
-    ----------
-    direction, across, up : (3,) [-]
-        Unit vectors towards the eye, to the right and upwards in the picture.
-    cut : (3,) [m]
-        The highest stress, where it is hidden: what is before it is drawn translucent; else None.
-    middle, size : (2,) [m]
-        Centre, width and height of the linkage in the picture.
+    direction, across, up : (3,) unit vectors towards the eye, to the right and upwards in the picture [-]
+    cut : (3,) the highest stress, where it is hidden: what is before it is drawn translucent [m]; else None
+    middle, size : (2,) centre, width and height of the linkage in the picture [m]
     """
 
     direction: Float[np.ndarray, " 3"]
@@ -99,13 +94,11 @@ def sight(extents: Float[np.ndarray, " 3"]) -> tuple[Float[np.ndarray, " 3"], Fl
 
     Parameters
     ----------
-    extents : (3,) [m]
-        Along x, y and z.
+    extents : (3,) along x, y and z [m]
 
     Returns
     -------
-    direction, up
-        Unit vectors, the first towards the eye.
+    direction, up: unit vectors, the first towards the eye
     """
     x, y, z = np.eye(3)
     least, second, most = np.sort(extents)

@@ -30,12 +30,8 @@ SPARE = 1_000_000  # bytes for HDF5's own tables
 class AnimationFile:
     """Frames of a run in one file.
 
-    Parameters
-    ----------
-    path
-        The file; the first frame replaces an older one.
-    drive
-        What the drive's position is called, with its unit: a field of each frame.
+    path : the file; the first frame replaces an older one
+    drive : what the drive's position is called, with its unit: a field of each frame
 
     Raises
     ------
@@ -70,8 +66,7 @@ class AnimationFile:
         ----------
         time : [s]
         angle : of the drive [rad], or travel [m]
-        fields
-            The links in this frame, not exaggerated: points are those of the rigid motion; what joints exert.
+        fields : the links in this frame, not exaggerated: points are those of the rigid motion; what joints exert
         """
         import h5py
 

@@ -17,13 +17,7 @@ STRESS_COMPONENTS = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
 
 
 def write_mesh(mesh: SolidMesh, path: Path) -> None:
-    """A mesh as a VTU file, with the scaled Jacobian of its elements.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """A mesh as a VTU file, with the scaled Jacobian of its elements."""
     import meshio
     from meshio import vtu
 
@@ -43,11 +37,6 @@ def write_points(
     ----------
     parts : name, points (n, 3), elements (e, m) and their type
     values : of all points of all parts, one after the other
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
     """
     import meshio
     from meshio import vtu
@@ -66,13 +55,7 @@ def write_points(
 
 
 def write_frame(path: Path, time: float, fields: Sequence[Block]) -> None:
-    """One frame on its own, all links in one grid.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """One frame on its own, all links in one grid."""
     with replacing(path) as part:
         write_blocks(part, {"TimeValue": float(time)}, fields)
 
@@ -87,11 +70,6 @@ def write_cells(
     parts : points (n, 3), elements (e, m) and their type
     name : of the values
     values : (e,) of each part
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
     """
     import meshio
     from meshio import vtu

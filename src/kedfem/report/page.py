@@ -51,12 +51,7 @@ class Report:
 
 
 def require_report(where: str) -> None:
-    """What a report needs is installed.
-
-    Raises
-    ------
-    OutputError
-    """
+    """OutputError unless what a report needs is installed."""
     for package in ("jinja2", "k3d"):
         of_extra(package, where, EXTRA)
 

@@ -65,8 +65,6 @@ class Surface:
 class _Source:
     """Where a link's surface is in the frames: its points there, and how surface points follow from them.
 
-    Parameters
-    ----------
     part : its elements
     ids : (m,) which points of a frame are its own
     X : (m, 3) where these are in the reference position [m]

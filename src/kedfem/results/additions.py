@@ -1,4 +1,7 @@
-"""What is added to a results file after its rows: the verdict, peaks, notes, warnings and timing."""
+"""What is added to a results file after its rows: the verdict, peaks, notes, warnings and timing; all files are whole.
+
+An OutputError says that a file cannot be written.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -12,25 +15,13 @@ from kedfem.results.records import Fatigue, FatigueSpot, Peak
 
 
 def mark_doubtful(path: Path, why: str) -> None:
-    """Say of a file that is whole that it means nothing, and why.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """Say that results mean nothing, and why."""
     with _changed(path) as file:
         write_facts(file, {"status": "doubtful", "reason": why})
 
 
 def add_peaks(path: Path, peaks: Mapping[str, Peak]) -> None:
-    """Store the highest stress of each link, ``peaks/LINK``, in a file that is whole.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """Store the highest stress of each link, ``peaks/LINK``."""
     with _changed(path) as file:
         for name, peak in peaks.items():
             _lay_peak(file.create_group(f"{PEAKS}/{name}"), peak)
@@ -49,13 +40,7 @@ def _lay_peak(group: Any, peak: Peak) -> None:
 
 
 def add_fatigue(path: Path, found: Fatigue) -> None:
-    """Store damage, ``fatigue/LINK/RANK``, in a file that is whole.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """Store damage, ``fatigue/LINK/RANK``."""
     with _changed(path) as file:
         group = file.create_group(FATIGUE)
         write_facts(
@@ -85,25 +70,13 @@ def _lay_spot(group: Any, spot: FatigueSpot) -> None:
 
 
 def add_notes(path: Path, notes: Mapping[str, str | float]) -> None:
-    """Store more facts about a run whose file is whole.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """Store more facts about a run."""
     with _changed(path) as file:
         write_facts(file["notes"], notes)
 
 
 def add_account(path: Path, warnings: Sequence[str], seconds: Mapping[str, float]) -> None:
-    """Store what is reported of a run, and the seconds of each of its stages, in a file that is whole.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """Store what is reported of a run, and the seconds of each of its stages."""
     with _changed(path) as file:
         numbered = {f"warning {k}": text for k, text in enumerate(warnings, start=1)}
         for name, facts in ((WARNINGS, numbered), (TIMING, seconds)):

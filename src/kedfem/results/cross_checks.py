@@ -103,11 +103,9 @@ class _Drive:
 class CrossChecks:
     """Efforts over a run, block after block.
 
-    Parameters
-    ----------
     account : of the same run's energy; the drives' work is compared with that of all port forces on the rigid-body
-    motion.
-        On the elastic motion constraint equations whose directions vary do work too, −μᵀ C' z, and springs in joints do
+        motion. On the elastic motion constraint equations whose directions vary do work too, −μᵀ C' z, and springs in
+        joints do.
     """
 
     REMEMBERED = ("pairs", "_last", "_work", "_left", "exchanged")

@@ -34,8 +34,7 @@ def ready_folder(folder: Path) -> Path:
 
     Parameters
     ----------
-    folder
-        Where results are to go.
+    folder : where results are to go
 
     Returns
     -------

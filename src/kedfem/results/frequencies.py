@@ -37,13 +37,7 @@ class Summary:
 
 
 def write_summary(folder: Path, summary: Summary) -> None:
-    """Write what a report shows of them.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """Write what a report shows of them."""
     with replacing(folder / SUMMARY) as part:
         part.write_text(json.dumps(asdict(summary)), encoding="utf-8")
 
@@ -62,13 +56,7 @@ def write_frequencies(
     path: Path, t: Float[np.ndarray, " P"], place: Float[np.ndarray, " P"], values: Float[np.ndarray, "P f"],
     slides: bool,
 ) -> None:  # fmt: skip
-    """One row a position: time [s], drive angle [rad] or travel [m], natural frequencies [Hz].
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """One row a position: time [s], drive angle [rad] or travel [m], natural frequencies [Hz]."""
     header = ["time [s]", "drive travel [m]" if slides else "drive angle [rad]"]
     header += [f"frequency {k + 1} [Hz]" for k in range(values.shape[1])]
     with text_file(path) as file:
@@ -76,13 +64,7 @@ def write_frequencies(
 
 
 def write_part_frequencies(path: Path, values: Float[np.ndarray, " f"]) -> None:
-    """One row a mode: its number, natural frequency [Hz].
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """One row a mode: its number, natural frequency [Hz]."""
     with text_file(path) as file:
         write_numbers(
             file, ["mode", "frequency [Hz]"], [np.column_stack([1 + np.arange(len(values)), values])]

@@ -41,8 +41,7 @@ def read_results(path: Path) -> Results:
 
     Parameters
     ----------
-    path
-        A file that a run wrote.
+    path : a file that a run wrote
 
     Returns
     -------

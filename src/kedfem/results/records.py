@@ -15,18 +15,11 @@ Status = Literal["running", "complete", "doubtful", "interrupted", "abandoned"]
 class Channel:
     """One group of columns that are recorded together.
 
-    Parameters
-    ----------
-    name
-        Path in the file, e.g. ``probes/rocker_mid/stress``, ``joints/B/force``, ``drive/torque``.
-    columns
-        Names of the columns, e.g. ``("x", "y", "z")``.
-    unit
-        Unit of all columns, e.g. ``Pa``.
-    frame
-        ``link``, ``world``, or empty where there is none.
-    description
-        A line for titles and readers.
+    name : path in the file, e.g. ``probes/rocker_mid/stress``, ``joints/B/force``, ``drive/torque``
+    columns : names of the columns, e.g. ``("x", "y", "z")``
+    unit : unit of all columns, e.g. ``Pa``
+    frame : ``link``, ``world``, or empty where there is none
+    description : a line for titles and readers
     """
 
     name: str
@@ -45,21 +38,14 @@ TRAVEL = Channel("drive_travel", (), "m", "", "drive travel from the reference p
 class Peak:
     """The highest von Mises stress of a link over all steps.
 
-    Parameters
-    ----------
     stress : [Pa]
-    link
-        Its name.
-    place : (3,) [m]
-        As drawn, in the reference position.
-    node
-        Number of the point in the link, in the order of ``envelope.vtu``.
-    step, time, angle
-        Number of the step, of the finest of several levels in time, [s], and the drive's angle [rad] or travel [m].
-    near
-        What is near, in words, where stress is not what it seems: a sharp corner, a point force, a joint; else empty.
-    away
-        The highest stress away from such places, where `near` is not empty and there is one.
+    link : its name
+    place : (3,) as drawn, in the reference position [m]
+    node : number of the point in the link, in the order of ``envelope.vtu``
+    step, time, angle : number of the step, of the finest of several levels in time, [s], and the drive's angle [rad] or
+        travel [m]
+    near : what is near, in words, where stress is not what it seems: a sharp corner, a point force, a joint; else empty
+    away : the highest stress away from such places, where `near` is not empty and there is one
     """
 
     stress: float
@@ -77,24 +63,14 @@ class Peak:
 class FatigueSpot:
     """A place of a link where damage is highest.
 
-    Parameters
-    ----------
-    link, place, node, near
-        As of :class:`Peak`.
-    criterion
-        ``signed von Mises``, ``normal stress`` or ``Findley``.
-    damage
-        Miner's sum in a period; 1 is failure.
-    utilisation
-        Of the amplitude that is borne for the required life, with the safety factor.
-    amplitude, mean
-        Of the cycle that does most damage [Pa].
-    disproportion
-        What the best proportional history leaves of the stresses, of the highest [-].
-    support
-        The factor by which a stress gradient raises what is borne.
-    cycles
-        In a period.
+    link, place, node, near : as of :class:`Peak`
+    criterion : ``signed von Mises``, ``normal stress`` or ``Findley``
+    damage : Miner's sum in a period; 1 is failure
+    utilisation : of the amplitude that is borne for the required life, with the safety factor
+    amplitude, mean : of the cycle that does most damage [Pa]
+    disproportion : what the best proportional history leaves of the stresses, of the highest [-]
+    support : the factor by which a stress gradient raises what is borne
+    cycles : in a period
     """
 
     link: str
@@ -115,22 +91,14 @@ class FatigueSpot:
 class Fatigue:
     """Damage by the stresses of a motion that repeats itself.
 
-    Parameters
-    ----------
-    period, revolutions
-        [s], and turns of the drive in it; 0 of a drive that does not go on turning.
-    repeats
-        By how much stresses differ between the last period and the one before, or its beginning, of each link's highest.
-    doubt
-        Why the numbers are doubtful, else empty.
-    spots
-        Link → places of the highest damage, apart from each other, the highest first.
-    strengths
-        Link → what its material withstands, in words.
-    left_out
-        Link → points of its surface that were not examined, as they are near corners, point forces or joints.
-    without
-        Elastic links without data.
+    period, revolutions : [s], and turns of the drive in it; 0 of a drive that does not go on turning
+    repeats : by how much stresses differ between the last period and the one before, or its beginning, of each link's
+        highest
+    doubt : why the numbers are doubtful, else empty
+    spots : link → places of the highest damage, apart from each other, the highest first
+    strengths : link → what its material withstands, in words
+    left_out : link → points of its surface that were not examined, as they are near corners, point forces or joints
+    without : elastic links without data
     """
 
     period: float
@@ -161,39 +129,23 @@ class Fatigue:
 class Results:
     """A results file as it was read.
 
-    Parameters
-    ----------
-    time : (n,) [s]
-        Moments of the rows, read-only.
-    angle : (n,) [rad], or [m] where the drive slides
-        Drive angle or travel from the reference position, as `drive` says, read-only.
-    channels
-        Name → (channel, values (n, columns) in the channel's unit, read-only), in the order recorded.
-    status
-        ``complete``; ``doubtful``: whole, but meaningless by its own estimates; ``interrupted``; ``running``: still being
-        written; ``abandoned``: its process was killed.
-    scene_json, scene_toml
-        The scene that was analysed; the TOML text is None for a scene made in Python.
-    notes
-        What the run reported about itself.
-    reason
-        Why the run was interrupted or is doubtful, else empty.
-    version
-        The kedfem that wrote the file.
-    warnings
-        What was reported to the user; of a run that came to its end.
-    seconds
-        Stage → what it took [s]; of a run that came to its end.
-    peaks
-        Link → its highest stress over all steps; of a whole elastic run, of links that have stress.
-    drive
-        Name and unit of `angle`; of several drives it is the first one's.
-    links
-        Link → what it was modelled as: `model` in words, `elements`, `unknowns`, and with what is attached `mass [kg]`,
-        `centre of mass [m]` in the reference position, `inertia [kg m^2]` about it: xx, yy, zz, xy, yz, zx; of an
-        elastic run.
-    fatigue
-        Damage, of a whole run of a scene that asks for it.
+    time : (n,) moments of the rows, read-only [s]
+    angle : (n,) drive angle [rad] or travel [m] from the reference position, as `drive` says, read-only
+    channels : name → (channel, values (n, columns) in the channel's unit, read-only), in the order recorded
+    status : ``complete``; ``doubtful``: whole, but meaningless by its own estimates; ``interrupted``; ``running``:
+        still being written; ``abandoned``: its process was killed
+    scene_json, scene_toml : the scene that was analysed; the TOML text is None for a scene made in Python
+    notes : what the run reported about itself
+    reason : why the run was interrupted or is doubtful, else empty
+    version : the kedfem that wrote the file
+    warnings : what was reported to the user; of a run that came to its end
+    seconds : stage → what it took [s]; of a run that came to its end
+    peaks : link → its highest stress over all steps; of a whole elastic run, of links that have stress
+    drive : name and unit of `angle`; of several drives it is the first one's
+    links : link → what it was modelled as: `model` in words, `elements`, `unknowns`, and with what is attached `mass
+        [kg]`, `centre of mass [m]` in the reference position, `inertia [kg m^2]` about it: xx, yy, zz, xy, yz, zx; of
+        an elastic run
+    fatigue : damage, of a whole run of a scene that asks for it
     """
 
     time: Float[np.ndarray, " n"]

@@ -1,4 +1,4 @@
-"""Results as a table for spreadsheets and data frames."""
+"""Results as a table for spreadsheets and data frames; an OutputError says that a file cannot be written."""
 
 import csv
 from collections.abc import Iterable, Iterator
@@ -27,15 +27,8 @@ def write_csv(results: Results, path: Path) -> None:
 
     Parameters
     ----------
-    results
-        What was read.
-    path
-        The file; an older one is replaced when the new one is whole.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
+    results : what was read
+    path : the file; an older one is replaced when the new one is whole
     """
     with text_file(Path(path)) as file:
         if results.status != "complete":
@@ -46,13 +39,7 @@ def write_csv(results: Results, path: Path) -> None:
 
 @contextmanager
 def text_file(path: Path) -> Iterator[TextIO]:
-    """A table's file, which takes its place when it is whole.
-
-    Raises
-    ------
-    OutputError
-        It cannot be written.
-    """
+    """A table's file, which takes its place when it is whole."""
     with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as file:
         yield file
 
@@ -85,11 +72,6 @@ def write_parquet(results: Results, path: Path) -> None:
 
 
 def require_parquet(where: str) -> None:
-    """What Parquet needs is installed.
-
-    Raises
-    ------
-    OutputError
-    """
+    """OutputError unless what Parquet needs is installed."""
     for package in ("pandas", "pyarrow"):
         of_extra(package, where)

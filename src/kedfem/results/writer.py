@@ -48,18 +48,11 @@ class ResultsWriter:
     See :mod:`kedfem.results` for what happens to an older file of the same name. Until its first rows it writes to a
     file with a name of its own; if another writer has put rows in place meanwhile, it is refused and leaves them alone.
 
-    Parameters
-    ----------
-    path
-        The HDF5 file; its folder is made where missing.
-    channels
-        All channels, with distinct names.
-    scene_json, scene_toml
-        The scene, stored in the file.
-    notes
-        Facts about the run, stored as attributes; those about a link, by their names, as attributes of a group.
-    drive
-        Name and unit of the drive's position.
+    path : the HDF5 file; its folder is made where missing
+    channels : all channels, with distinct names
+    scene_json, scene_toml : the scene, stored in the file
+    notes : facts about the run, stored as attributes; those about a link, by their names, as attributes of a group
+    drive : name and unit of the drive's position
 
     Raises
     ------
@@ -106,8 +99,7 @@ class ResultsWriter:
 
         Parameters
         ----------
-        rows
-            How many rows of a file of that run to keep, and to go on after; 0 begins a new file.
+        rows : how many rows of a file of that run to keep, and to go on after; 0 begins a new file
         """
         self.run, self._before = run, rows
         return self
@@ -142,8 +134,7 @@ class ResultsWriter:
         ----------
         time : (b,) [s]
         angle : (b,) [rad], or [m] where the drive slides
-        values
-            Channel name → (b, columns), for every channel, in its unit.
+        values : channel name → (b, columns), for every channel, in its unit
 
         Raises
         ------

@@ -23,18 +23,14 @@ def with_faces(gmsh: ModuleType, solid: Solid, mesh: SolidMesh) -> SolidMesh:
 
     Parameters
     ----------
-    gmsh : module
-        With the solid in its model.
-    solid : Solid
-        Its faces, in metres.
-    mesh : SolidMesh
-        In the solid's own frame; nodes on the outside may be off the faces by what curvature makes of a size.
+    gmsh : with the solid in its model
+    solid : its faces, in metres
+    mesh : in the solid's own frame; nodes on the outside may be off the faces by what curvature makes of a size
 
     Returns
     -------
-    SolidMesh
-        With `faces`; parts of one cylinder or sphere that meet in a seam are one face. A face that no side is on,
-        since it is narrower than an element, is left out.
+    With `faces`; parts of one cylinder or sphere that meet in a seam are one face. A face that no side is on, since it
+        is narrower than an element, is left out.
     """
     if mesh.faces:
         return mesh

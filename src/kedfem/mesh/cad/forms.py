@@ -45,17 +45,13 @@ def fitted_form(sample: Sample, accuracy: float, skew: float) -> Form:
 
     Parameters
     ----------
-    sample : Sample
-        At least three points.
-    accuracy : float [-]
-        How far points may be off, in sizes of the sample.
-    skew : float [-]
-        How far normals may be off: a sine.
+    sample : at least three points
+    accuracy : how far points may be off, in sizes of the sample [-]
+    skew : how far normals may be off: a sine [-]
 
     Returns
     -------
-    Form
-        The centre of a plane and of "other" is the mean of the points: whoever knows the centroid replaces it.
+    The centre of a plane and of "other" is the mean of the points: whoever knows the centroid replaces it
     """
     other = Form("other", sample.points.mean(axis=0), _NAN)
     for fit in (_plane, _cylinder, _sphere):

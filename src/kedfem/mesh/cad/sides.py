@@ -34,15 +34,13 @@ def owned_sides(cells: Int[np.ndarray, "e k"]) -> tuple[Int[np.ndarray, "f m"], 
 
     Parameters
     ----------
-    cells : (e, 8), (e, 20), (e, 27), (e, 4) or (e, 10)
-        Node numbers in VTK order.
+    cells : (e, 8), (e, 20), (e, 27), (e, 4) or (e, 10) node numbers in VTK order
 
     Returns
     -------
-    (f, 4), (f, 8) or (f, 9); of tetrahedra (f, 3) or (f, 6)
-        Corners counter-clockwise seen from outside, middles of edges, centre.
-    (f,)
-        The element of each.
+    (f, 4), (f, 8) or (f, 9); of tetrahedra (f, 3) or (f, 6): corners counter-clockwise seen from outside, middles of
+        edges, centre
+    (f,): the element of each
     """
     nodes = cells.shape[1]
     of_element = TET_SIDES if nodes in {4, 10} else SIDE_NODES

@@ -47,14 +47,10 @@ def cad_faces(
 
     Parameters
     ----------
-    gmsh : module
-        With the solid in its model, in metres.
-    where : str
-        For messages.
-    solid, extent
-        The solid's tag; the length of its box's diagonal [m].
-    names : dict of int to str
-        Names of faces that have one; others are called "face" and their tag.
+    gmsh : with the solid in its model, in metres
+    where : for messages
+    solid, extent : the solid's tag; the length of its box's diagonal [m]
+    names : names of faces that have one; others are called "face" and their tag
 
     Raises
     ------

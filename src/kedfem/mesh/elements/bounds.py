@@ -31,17 +31,13 @@ def determinant_bounds(
 
     Parameters
     ----------
-    points : (n, d) [m]
-        Nodes, in the plane (d = 2) or in space.
-    cells : (e, 9), (e, 8), (e, 20), (e, 27) or (e, 10)
-        quad9, hex8, hex20, hex27 or tet10 in VTK order.
-    depth : int
-        Most halvings.
+    points : (n, d) nodes, in the plane (d = 2) or in space [m]
+    cells : (e, 9), (e, 8), (e, 20), (e, 27) or (e, 10) quad9, hex8, hex20, hex27 or tet10 in VTK order
+    depth : most halvings
 
     Returns
     -------
-    (e,) and (e,) [-]
-        1 and 1 for a parallelepiped.
+    (e,) and (e,) [-]: 1 and 1 for a parallelepiped
     """
     chunks = np.array_split(cells, max(1, len(cells) // _CHUNK))
     lower, upper = zip(*(_chunk_bounds(points[chunk], depth) for chunk in chunks), strict=True)

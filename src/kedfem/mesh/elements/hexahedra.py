@@ -21,26 +21,18 @@ CELL_TYPES = {
 class Face:
     """A face of a part that has a name: what its geometry is, and the sides of elements on it.
 
-    Attributes
-    ----------
-    name : str
-        From the CAD file, the physical group of a mesh file, or "face 7".
-    kind : str
-        What its geometry is; "other" for a cone, a free form or several faces in one group.
-    centre : (3,) [m]
-        Centroid of its area; of a cylinder a point on the axis, half way along; of a sphere the sphere's centre.
-    direction : (3,) [-]
-        Unit vector: of a plane its outward normal, of a cylinder its axis; else nan.
-    radius : float [m]
-        Of a cylinder or sphere; else nan.
-    inward : bool
-        Whether the material is outside of a cylinder or sphere: a bore or a coupling surface, not a journal or a ball.
+    name : from the CAD file, the physical group of a mesh file, or "face 7"
+    kind : what its geometry is; "other" for a cone, a free form or several faces in one group
+    centre : (3,) centroid of its area [m]; of a cylinder a point on the axis, half way along; of a sphere the sphere's
+        centre
+    direction : (3,) unit vector: of a plane its outward normal, of a cylinder its axis [-]; else nan
+    radius : of a cylinder or sphere [m]; else nan
+    inward : whether the material is outside of a cylinder or sphere: a bore or a coupling surface, not a journal or a
+        ball
     sides : (f, 4), of tetrahedra (f, 3)
         Corner nodes of the sides of elements on the face, in any order.
-    chosen : bool
-        Whether a joint chose it by what it is: then its name is what was said of it.
-    words : str
-        What a designer calls it, of a face from CAD: ``fillet of radius 2 mm``.
+    chosen : whether a joint chose it by what it is: then its name is what was said of it
+    words : what a designer calls it, of a face from CAD: ``fillet of radius 2 mm``
     """
 
     name: str
@@ -58,16 +50,11 @@ class Face:
 class SolidMesh:
     """A mesh of hexahedra alone or of tetrahedra alone, every node used; the arrays are read-only copies.
 
-    Attributes
-    ----------
-    points : (n, 3) [m]
-        Nodes in the global reference position.
-    cells : (e, 8), (e, 20), (e, 27), (e, 10) or (e, 4)
-        Node numbers in VTK order (meshio: hexahedron, hexahedron20, hexahedron27, tetra10, tetra).
-    faces : tuple of Face
-        Faces that have a name, as far as they are known.
-    method : str
-        How the mesh was made and why so, in words; empty where there is no choice.
+    points : (n, 3) nodes in the global reference position [m]
+    cells : (e, 8), (e, 20), (e, 27), (e, 10) or (e, 4) node numbers in VTK order (meshio: hexahedron, hexahedron20,
+        hexahedron27, tetra10, tetra)
+    faces : faces that have a name, as far as they are known
+    method : how the mesh was made and why so, in words; empty where there is no choice
     """
 
     points: Float[np.ndarray, "n 3"]
@@ -99,15 +86,12 @@ def rectangle_quads(
 
     Parameters
     ----------
-    length, width : float [m]
-        Sides along x and y.
-    along, across : int
-        Numbers of elements along x and y.
+    length, width : sides along x and y [m]
+    along, across : numbers of elements along x and y
 
     Returns
     -------
-    (n, 2) [m] and (e, 9)
-        Plane nodes; cells in VTK order.
+    (n, 2) [m] and (e, 9): plane nodes; cells in VTK order
     """
     x, y = np.linspace(0, length, 2 * along + 1), np.linspace(-width / 2, width / 2, 2 * across + 1)
     points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -123,19 +107,14 @@ def extruded(
 
     Parameters
     ----------
-    points : (n, 2) [m]
-        Plane nodes, all used.
-    quads : (e, 9)
-        Cells in VTK order, counter-clockwise.
-    thickness : float [m]
-        Extent along z.
-    layers : int
-        Elements through the thickness.
+    points : (n, 2) plane nodes, all used [m]
+    quads : (e, 9) cells in VTK order, counter-clockwise
+    thickness : extent along z [m]
+    layers : elements through the thickness
 
     Returns
     -------
-    SolidMesh
-        e · layers elements; nodes level by level from below.
+    e · layers elements; nodes level by level from below
     """
     heights = np.linspace(-thickness / 2, thickness / 2, 2 * layers + 1)
     return stacked(points, heights, np.tile(quads, (layers, 1)), np.repeat(np.arange(layers), len(quads)))
@@ -151,14 +130,10 @@ def stacked(
 
     Parameters
     ----------
-    points : (n, 2) [m]
-        Plane nodes.
-    heights : (v,) [m]
-        Of all nodes, two to a layer and one more.
-    quads : (e, 9)
-        The cell that each element stands on, in VTK order, counter-clockwise.
-    layer : (e,)
-        The layer that each is in.
+    points : (n, 2) plane nodes [m]
+    heights : (v,) of all nodes, two to a layer and one more [m]
+    quads : (e, 9) the cell that each element stands on, in VTK order, counter-clockwise
+    layer : (e,) the layer that each is in
     """
     nodes = np.column_stack([np.tile(points, (len(heights), 1)), np.repeat(heights, len(points))])
     levels = 2 * layer[:, None] + 1 + HEX27[:, 2]

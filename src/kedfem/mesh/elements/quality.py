@@ -23,12 +23,8 @@ _CHUNK = 2048  # elements at a time: the Jacobians of one chunk fit in a process
 class Quality:
     """Scaled Jacobians of a mesh: 1 for a cuboid or a regular tetrahedron, at most 0 where folded or inverted.
 
-    Attributes
-    ----------
-    scaled_jacobian : (e,) [-]
-        Least of each element.
-    centres : (e, 3) [m]
-        Mean of each element's nodes.
+    scaled_jacobian : (e,) least of each element [-]
+    centres : (e, 3) mean of each element's nodes [m]
     """
 
     scaled_jacobian: Float[np.ndarray, " e"]
@@ -69,15 +65,12 @@ def scaled_jacobian(
 
     Parameters
     ----------
-    points : (n, d) [m]
-        Nodes, in the plane (d = 2) or in space.
-    cells : (e, 9), (e, 8), (e, 20), (e, 27) or (e, 10)
-        quad9, hex8, hex20, hex27 or tet10 in VTK order.
+    points : (n, d) nodes, in the plane (d = 2) or in space [m]
+    cells : (e, 9), (e, 8), (e, 20), (e, 27) or (e, 10) quad9, hex8, hex20, hex27 or tet10 in VTK order
 
     Returns
     -------
-    (e,) [-]
-        Between -1 and 1; 0 where an element has no extent.
+    (e,) [-]: between -1 and 1; 0 where an element has no extent
     """
     nodes = NODES[cells.shape[1]]
     if len(nodes) == len(TET10):

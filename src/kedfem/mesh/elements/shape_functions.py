@@ -39,15 +39,12 @@ def shape_functions(nodes: Places, at: Float[np.ndarray, "q d"]) -> Float[np.nda
 
     Parameters
     ----------
-    nodes : (k, d)
-        Reference coordinates of the element's nodes (HEX27, HEX20, HEX8, QUAD9, TET10, TRI6).
-    at : (q, d) [-]
-        Where the values are wanted, reference coordinates.
+    nodes : (k, d) reference coordinates of the element's nodes (HEX27, HEX20, HEX8, QUAD9, TET10, TRI6)
+    at : (q, d) where the values are wanted, reference coordinates [-]
 
     Returns
     -------
-    (q, k) [-]
-        One value per place and function.
+    (q, k) [-]: one value per place and function
     """
     x = np.asarray(at, dtype=float)
     if len(nodes) in {len(TET10), len(TRI6)}:
@@ -61,8 +58,7 @@ def shape_gradients(nodes: Places, at: Float[np.ndarray, "q d"]) -> Float[np.nda
 
     Returns
     -------
-    (q, k, d) [-]
-        One gradient per place and shape function.
+    (q, k, d) [-]: one gradient per place and shape function
     """
     x = np.asarray(at, dtype=float)
     if len(nodes) in {len(TET10), len(TRI6)}:

@@ -24,17 +24,13 @@ def named_faces(
 
     Parameters
     ----------
-    raw : RawMesh
-        As it was read.
-    points : (n, 3) [m]
-        All nodes, the file's first.
-    cells : (e, 8), (e, 20), (e, 27), (e, 4) or (e, 10)
-        The elements; their corners have the file's numbers.
+    raw : as it was read
+    points : (n, 3) all nodes, the file's first [m]
+    cells : (e, 8), (e, 20), (e, 27), (e, 4) or (e, 10) the elements; their corners have the file's numbers
 
     Returns
     -------
-    tuple of Face
-        Sets without a side on the outside are left out; of a set of nodes the sides all of whose corners are in it.
+    Sets without a side on the outside are left out; of a set of nodes the sides all of whose corners are in it
     """
     sides = boundary_sides(cells)
     corners = np.sort(sides[:, : side_corners(sides.shape[1])], axis=1)
@@ -52,12 +48,10 @@ def group_face(name: str, points: Float[np.ndarray, "n 3"], sides: Int[np.ndarra
 
     Parameters
     ----------
-    name : str
-        Of the group.
-    points : (n, 3) [m]
-        Nodes.
-    sides : (f, 4), (f, 8), (f, 9), (f, 3) or (f, 6)
-        Nodes of the sides, in the order of quad9 or tri6, seen from outside.
+    name : of the group
+    points : (n, 3) nodes [m]
+    sides : (f, 4), (f, 8), (f, 9), (f, 3) or (f, 6) nodes of the sides, in the order of quad9 or tri6, seen from
+        outside
     """
     places, normals, areas = side_normals(points, sides)
     form = fitted_form(Sample(points[np.unique(sides)], places, normals), _ACCURACY, _SKEW)

@@ -47,8 +47,8 @@ def one_kind(
 
     Returns
     -------
-    (m, 3) and (e, 20) or (e, 10)
-        The same nodes and new ones after them; an edge's middle is that of its quadratic elements where there are any.
+    (m, 3) and (e, 20) or (e, 10): the same nodes and new ones after them; an edge's middle is that of its quadratic
+        elements where there are any
 
     Raises
     ------

@@ -28,14 +28,11 @@ def mesh_from_file(where: str, path: Path, scale: float) -> SolidMesh:
 
     Parameters
     ----------
-    where : str
-        What the file is for, for messages.
-    path : Path
-        Of one of MESH_ENDINGS. Points and lines in it are passed over; sets of sides on the outside (physical groups,
-        sets of elements and surfaces) and sets of nodes become the mesh's `faces`. Cells of several kinds become
-        tetrahedra of 10 nodes, hexahedra of several orders those of 20.
-    scale : float [m]
-        Length of the file's unit.
+    where : what the file is for, for messages
+    path : of one of MESH_ENDINGS. Points and lines in it are passed over; sets of sides on the outside (physical
+        groups, sets of elements and surfaces) and sets of nodes become the mesh's `faces`. Cells of several kinds
+        become tetrahedra of 10 nodes, hexahedra of several orders those of 20.
+    scale : length of the file's unit [m]
 
     Raises
     ------

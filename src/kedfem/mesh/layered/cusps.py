@@ -51,17 +51,13 @@ def without_cusps(plan: Plan, size: float) -> tuple[Plan, float]:
 
     Parameters
     ----------
-    plan : Plan
-        Within its context.
-    size : float [-]
-        Length of the elements, by the solid's extent.
+    plan : within its context
+    size : length of the elements, by the solid's extent [-]
 
     Returns
     -------
-    Plan
-        Some cusps may be left: those with tips too large for the volume.
-    float
-        Volume of all tips by that of the solid.
+    Some cusps may be left: those with tips too large for the volume
+    Volume of all tips by that of the solid
     """
     lost, left = 0.0, len(cusps(plan))
     share = _LOST / max(left, 1)

@@ -23,14 +23,9 @@ _LOST_AT_45 = 2.44e-3  # of R²: area of a circle less that inside eight parabol
 class Division:
     """Nodes on the curves of a plan.
 
-    Attributes
-    ----------
-    points : (n, 2) [-]
-        The nodes, those at vertices once.
-    nodes : tuple of (c + 1,)
-        Of each curve the numbers of its nodes from start to end; a closed one ends where it starts.
-    middles : tuple of (c, 2) [-]
-        The points of the curve half way along between them.
+    points : (n, 2) the nodes, those at vertices once [-]
+    nodes : of each curve the numbers of its nodes from start to end; a closed one ends where it starts
+    middles : tuple of (c, 2) [-]; the points of the curve half way along between them
     """
 
     points: Float[np.ndarray, "n 2"]
@@ -62,12 +57,9 @@ def divided(plan: Plan, size: float, sizing: Sizing) -> tuple[Division, tuple[Ma
 
     Parameters
     ----------
-    plan : Plan
-        Within its context.
-    size : float [-]
-        By the solid's extent.
-    sizing : Sizing
-        Its `turn`, `hollow` and `kept` places.
+    plan : within its context
+    size : by the solid's extent [-]
+    sizing : its `turn`, `hollow` and `kept` places
     """
     sizes = _sizes(plan, size, _turns(plan, sizing))
     measures = [_measure(curve, local) for curve, local in zip(plan.curves, sizes, strict=True)]

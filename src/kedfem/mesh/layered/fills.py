@@ -14,14 +14,10 @@ from kedfem.mesh.planar.areas import PlaneQuads
 class Rim:
     """The divided boundary of a region.
 
-    Attributes
-    ----------
-    points : (n, 2)
-        Its nodes.
-    loops : tuple of tuple of (c + 1,)
-        Numbers of the nodes along each curve of each loop, the region on the left, the outer loop first.
-    middles : (n, 2)
-        The boundary's point half way between each node and the next one of its loop, in the order of `sides`.
+    points : (n, 2) its nodes
+    loops : numbers of the nodes along each curve of each loop, the region on the left, the outer loop first
+    middles : (n, 2) the boundary's point half way between each node and the next one of its loop, in the order of
+        `sides`
     """
 
     points: Float[np.ndarray, "n 2"]

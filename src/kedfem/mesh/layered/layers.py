@@ -42,17 +42,13 @@ def layered_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
 
     Parameters
     ----------
-    gmsh : module
-        With the solid in its current model, which is left as it is.
-    solid : Solid
-        The only solid in that model.
-    sizing : Sizing
-        How fine; the rule is that of :func:`~kedfem.mesh.layered.division.plan_size`.
+    gmsh : with the solid in its current model, which is left as it is
+    solid : the only solid in that model
+    sizing : how fine; the rule is that of :func:`~kedfem.mesh.layered.division.plan_size`
 
     Returns
     -------
-    SolidMesh
-        27-node elements, corners and middles of sides on the solid's own faces; without faces that have names.
+    27-node elements, corners and middles of sides on the solid's own faces; without faces that have names
 
     Raises
     ------

@@ -17,12 +17,8 @@ _UNEVEN = 4.0  # longest by shortest way across a ring
 class Mapping:
     """How a region is mapped.
 
-    Attributes
-    ----------
-    kind : str
-        block: four sides; ring: between two loops; disc: inside a smooth loop.
-    corners : tuple of int
-        Of a block where its sides begin: places in the outer loop.
+    kind : block: four sides; ring: between two loops; disc: inside a smooth loop
+    corners : of a block where its sides begin: places in the outer loop
     """
 
     kind: Literal["block", "ring", "disc"]

@@ -34,10 +34,8 @@ def outline_quads(where: str, outline: Outline, sizing: Sizing) -> tuple[Quads, 
 
     Returns
     -------
-    (n, 2) [m] and (e, 9)
-        Plane nodes; cells in VTK order, anticlockwise.
-    str
-        What is to be reported of them: which share of the area cusps are that were cut off.
+    (n, 2) [m] and (e, 9): plane nodes; cells in VTK order, anticlockwise
+    What is to be reported of them: which share of the area cusps are that were cut off
 
     Raises
     ------

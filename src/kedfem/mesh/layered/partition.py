@@ -11,20 +11,12 @@ from jaxtyping import Bool, Float
 class Curve:
     """A curve between two regions, or between one and the outside.
 
-    Attributes
-    ----------
-    ends : (int, int)
-        Numbers of the vertices where it starts and ends; the same one if it is closed.
-    free : bool
-        Whether it is closed and its vertex may be anywhere on it: no other curve meets it.
-    lengths : (m,) [-]
-        Length of arc from the start to each sample.
-    samples : (m, 2) [-]
-        Points along the curve, from end to end.
-    bends : (m,) [-]
-        Curvature there, positive or 0.
-    places : function
-        The points at lengths of arc, exactly on the curve.
+    ends : numbers of the vertices where it starts and ends; the same one if it is closed
+    free : whether it is closed and its vertex may be anywhere on it: no other curve meets it
+    lengths : (m,) length of arc from the start to each sample [-]
+    samples : (m, 2) points along the curve, from end to end [-]
+    bends : (m,) curvature there, positive or 0 [-]
+    places : the points at lengths of arc, exactly on the curve
     """
 
     ends: tuple[int, int]
@@ -56,14 +48,9 @@ Loop = tuple[tuple[int, bool], ...]
 class Region:
     """A part of the plane inside which no section has an edge.
 
-    Attributes
-    ----------
-    loops : tuple of Loop
-        Its boundary with the region on the left: the outer loop first, then those around holes.
-    material : (slabs,)
-        In which slabs there is material.
-    area : float [-]
-        Area.
+    loops : its boundary with the region on the left: the outer loop first, then those around holes
+    material : (slabs,) in which slabs there is material
+    area : [-]
     """
 
     loops: tuple[Loop, ...]
@@ -75,18 +62,12 @@ class Region:
 class Plan:
     """The sections of all slabs in one plane; lengths are divided by the solid's extent.
 
-    Attributes
-    ----------
-    axes : (3, 3) [-]
-        Rows: the plan's x and y and the direction of the layers, in the solid's components.
-    extent : float [m]
-        The unit of all lengths here.
-    heights : (slabs + 1,) [-]
-        Where the slabs begin and end along the direction.
+    axes : (3, 3) rows: the plan's x and y and the direction of the layers, in the solid's components [-]
+    extent : the unit of all lengths here [m]
+    heights : (slabs + 1,) where the slabs begin and end along the direction [-]
     curves : tuple of Curve
     regions : tuple of Region
-    origin : (3,) [m]
-        Where the plan's lengths begin, in the solid's components.
+    origin : (3,) where the plan's lengths begin, in the solid's components [m]
     """
 
     axes: Float[np.ndarray, "3 3"]

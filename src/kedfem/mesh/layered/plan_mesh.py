@@ -23,16 +23,10 @@ _BETTER = 0.05  # by which gmsh's quadrilaterals must be better than mapped ones
 class PlanMesh:
     """quad9 cells of a plan.
 
-    Attributes
-    ----------
-    points : (n, 2) [-]
-        By the solid's extent.
-    cells : (e, 9)
-        VTK order, anticlockwise.
-    regions : (e,)
-        The region that each cell is in.
-    settings : tuple of int
-        gmsh's algorithms that made cells; empty: all regions are mapped.
+    points : (n, 2) by the solid's extent [-]
+    cells : (e, 9) VTK order, anticlockwise
+    regions : (e,) the region that each cell is in
+    settings : gmsh's algorithms that made cells; empty: all regions are mapped
     """
 
     points: Float[np.ndarray, "n 2"]

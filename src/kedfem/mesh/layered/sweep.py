@@ -17,12 +17,9 @@ def swept(flat: PlanMesh, plan: Plan, layers: Int[np.ndarray, " slabs"]) -> Soli
 
     Parameters
     ----------
-    flat : PlanMesh
-        Quadrilaterals that share their nodes across regions.
-    plan : Plan
-        Where the slabs are, and the way back into the solid's place.
-    layers : (slabs,)
-        Elements through each slab.
+    flat : quadrilaterals that share their nodes across regions
+    plan : where the slabs are, and the way back into the solid's place
+    layers : (slabs,) elements through each slab
     """
     points, quads = flat.points, flat.cells
     heights = _levels(plan.heights, layers)

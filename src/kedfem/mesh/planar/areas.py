@@ -13,16 +13,10 @@ Quads = tuple[Float[np.ndarray, "_ 2"], Int[np.ndarray, "_ 9"]]
 class PlaneQuads:
     """Quadrilaterals with straight sides inside, and the sides on the boundary with their true middles.
 
-    Attributes
-    ----------
-    points : (n, 2) [m]
-        Corners of the cells.
-    cells : (e, 4)
-        Quadrilaterals, anticlockwise.
-    rim : (b, 2)
-        Sides on the boundary, each once, from start to end as in its cell.
-    middles : (b, 2) [m]
-        The point of the boundary half way along each of these sides.
+    points : (n, 2) corners of the cells [m]
+    cells : (e, 4) quadrilaterals, anticlockwise
+    rim : (b, 2) sides on the boundary, each once, from start to end as in its cell
+    middles : (b, 2) the point of the boundary half way along each of these sides [m]
     """
 
     points: Float[np.ndarray, "n 2"]
@@ -35,16 +29,10 @@ class PlaneQuads:
 class QuadraticQuads:
     """quad9 nodes and cells, and how the nodes follow when the free ones move.
 
-    Attributes
-    ----------
-    points : (m, 2) [m]
-        Corners, then middles of sides (on the boundary where there), then centres of cells.
-    cells : (e, 9)
-        VTK order.
-    free : (f,)
-        Corners inside the boundary.
-    follow : (m, f) [-]
-        Movement of each node for a movement of each free one: sides and centres stay in the middle.
+    points : (m, 2) corners, then middles of sides (on the boundary where there), then centres of cells [m]
+    cells : (e, 9) VTK order
+    free : (f,) corners inside the boundary
+    follow : (m, f) movement of each node for a movement of each free one: sides and centres stay in the middle [-]
     """
 
     points: Float[np.ndarray, "m 2"]

@@ -50,13 +50,11 @@ def best_quads(meshes: Iterable[PlaneQuads | None]) -> Candidate | None:
 
     Parameters
     ----------
-    meshes : iterable of PlaneQuads or None
-        In the order of SETTINGS; no more are asked for than needed.
+    meshes : in the order of SETTINGS; no more are asked for than needed
 
     Returns
     -------
-    Candidate
-        The first that is good; if none is, of those within a tenth of the best the one with the fewest elements.
+    The first that is good; if none is, of those within a tenth of the best the one with the fewest elements
     """
     found: list[Candidate] = []
     for tried, mesh in enumerate(meshes):

@@ -13,16 +13,10 @@ from kedfem.mesh.planar.areas import Quads
 class QuadMesh:
     """A mesh of quadrilaterals alone in a plane z = constant, every node used; the arrays are read-only copies.
 
-    Attributes
-    ----------
-    points : (n, 3) [m]
-        Nodes in the global reference position.
-    cells : (e, 9)
-        Node numbers in VTK order, anticlockwise (meshio: quad9).
-    thickness : float [m]
-        Extent along z, half of it to either side.
-    method : str
-        What is to be reported of how it was made.
+    points : (n, 3) nodes in the global reference position [m]
+    cells : (e, 9) node numbers in VTK order, anticlockwise (meshio: quad9)
+    thickness : extent along z, half of it to either side [m]
+    method : what is to be reported of how it was made
     """
 
     points: Float[np.ndarray, "n 3"]
@@ -41,16 +35,10 @@ class QuadMesh:
 class Plate:
     """A plate in a frame of its own, its middle plane at z = 0.
 
-    Attributes
-    ----------
-    quads : (n, 2) [m] and (e, 9)
-        Nodes and cells of the middle plane, all nodes used.
-    thickness : float [m]
-        Extent along z.
-    origin, axes : (3,) [m], (3, 3)
-        Where the frame's origin goes, and its x, y, z as rows.
-    method : str
-        What is to be reported of how its mesh was made.
+    quads : (n, 2) [m] and (e, 9): nodes and cells of the middle plane, all nodes used
+    thickness : extent along z [m]
+    origin, axes : (3,), (3, 3) where the frame's origin goes, and its x, y, z as rows [m]
+    method : what is to be reported of how its mesh was made
     """
 
     quads: Quads

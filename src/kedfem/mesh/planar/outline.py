@@ -14,16 +14,11 @@ _STRAIGHT = (np.nan, np.nan)
 class Outline:
     """A closed plane outline and round holes inside it; checked by the scene, taken on trust here.
 
-    Attributes
-    ----------
-    corners : (k, 2) [m]
-        Ends of the edges in order; edge i runs from corner i to corner i+1, the last one back to the first.
-    via : (k, 2) [m]
-        A point between the ends of each circular edge; nan where the edge is straight.
-    centres : (h, 2) [m]
-        Centres of the holes.
-    radii : (h,) [m]
-        Radii of the holes.
+    corners : (k, 2) ends of the edges in order [m]; edge i runs from corner i to corner i+1, the last one back to the
+        first
+    via : (k, 2) a point between the ends of each circular edge [m]; nan where the edge is straight
+    centres : (h, 2) centres of the holes [m]
+    radii : (h,) radii of the holes [m]
     """
 
     corners: Float[np.ndarray, "k 2"]

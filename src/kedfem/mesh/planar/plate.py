@@ -59,15 +59,12 @@ def plate_quads(sizes: PlateSizes, size: float) -> Quads:
 
     Parameters
     ----------
-    sizes : PlateSizes
-        The eyes at least as wide as the waist; wider ones do not meet.
-    size : float [m]
-        Edge length of the elements; those of the waist may be half as long again.
+    sizes : the eyes at least as wide as the waist; wider ones do not meet
+    size : edge length of the elements [m]; those of the waist may be half as long again
 
     Returns
     -------
-    (n, 2) [m] and (e, 9)
-        Plane nodes, those of bores, eyes and fillets exactly on their circles; cells in VTK order.
+    (n, 2) [m] and (e, 9): plane nodes, those of bores, eyes and fillets exactly on their circles; cells in VTK order
     """
     across = max(1, round(sizes.width / size))
     slope = _section_slope(sizes)
@@ -159,15 +156,12 @@ def ring_quads(inside: Float[np.ndarray, "m 2"], outside: Float[np.ndarray, "m 2
 
     Parameters
     ----------
-    inside, outside : (m, 2) [m]
-        Nodes round the curves, anticlockwise, corners and middles of elements in turn.
-    layers : int
-        Elements along each ray.
+    inside, outside : (m, 2) nodes round the curves, anticlockwise, corners and middles of elements in turn [m]
+    layers : elements along each ray
 
     Returns
     -------
-    (n, 2) [m] and (e, 9)
-        Plane nodes, ring by ring from inside; cells in VTK order.
+    (n, 2) [m] and (e, 9): plane nodes, ring by ring from inside; cells in VTK order
     """
     rays = np.linspace(inside, outside, 2 * layers + 1)
     m = len(inside)

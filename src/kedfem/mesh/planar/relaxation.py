@@ -16,15 +16,12 @@ def relaxed(mesh: PlaneQuads, iterations: int) -> Quads:
 
     Parameters
     ----------
-    mesh : PlaneQuads
-        May hold inverted cells.
-    iterations : int
-        At most so many steps of the minimiser (L-BFGS).
+    mesh : may hold inverted cells
+    iterations : at most so many steps of the minimiser (L-BFGS)
 
     Returns
     -------
-    (m, 2) [m] and (e, 9)
-        Plane nodes; cells in VTK order.
+    (m, 2) [m] and (e, 9): plane nodes; cells in VTK order
     """
     start = quadratic_quads(mesh)
     if len(start.free) == 0:
@@ -53,12 +50,9 @@ def distortion(
 
     Parameters
     ----------
-    points : (m, 2) [m]
-        Nodes.
-    cells : (e, 9)
-        quad9 cells in VTK order.
-    floor : float [m²]
-        Scale of det J below which h departs from it.
+    points : (m, 2) nodes [m]
+    cells : (e, 9) quad9 cells in VTK order
+    floor : scale of det J below which h departs from it [m²]
 
     Returns
     -------

@@ -27,19 +27,14 @@ def swept_without_blends(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> Soli
 
     Parameters
     ----------
-    gmsh : module
-        With the solid in its model, which is left as it is: the blends go in a copy.
-    solid : Solid
-        The solid.
-    sizing : Sizing
-        With `defeature_size`: rounds of less radius, chamfers of shorter sides go, whether convex or concave. Without it
-        those that are convex and smaller than SHARE of the part: material is added at edges, no sharp inner corner made.
-        Blends near the points in `kept` stay.
+    gmsh : with the solid in its model, which is left as it is: the blends go in a copy
+    sizing : with `defeature_size`: rounds of less radius, chamfers of shorter sides go, whether convex or concave.
+        Without it those that are convex and smaller than SHARE of the part: material is added at edges, no sharp inner
+        corner made. Blends near the points in `kept` stay.
 
     Returns
     -------
-    SolidMesh
-        With faces; `method` lists what is left out and by what that changes the volume.
+    With faces; `method` lists what is left out and by what that changes the volume
 
     Raises
     ------

@@ -29,18 +29,14 @@ def block_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
 
     Parameters
     ----------
-    gmsh : module
-        With the solid in its current model, which is left as it is.
-    solid : Solid
-        The only solid in that model.
-    sizing : Sizing
-        How fine: its size, or so many elements across the mean length of the shortest of the three sets of
-        opposite edges, but not more than some thousands.
+    gmsh : with the solid in its current model, which is left as it is
+    solid : the only solid in that model
+    sizing : how fine: its size, or so many elements across the mean length of the shortest of the three sets of
+        opposite edges, but not more than some thousands
 
     Returns
     -------
-    SolidMesh
-        27-node elements, the nodes of the surface on the solid's own faces.
+    27-node elements, the nodes of the surface on the solid's own faces
 
     Raises
     ------

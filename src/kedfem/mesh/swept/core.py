@@ -25,8 +25,7 @@ def core_radius(plan: Plan) -> float:
 
     Parameters
     ----------
-    plan : Plan
-        The meridian section: x along the axis, y from it.
+    plan : the meridian section: x along the axis, y from it
     """
     least, touches = np.inf, False
     for radii in (curve.samples[:, 1] for curve in plan.curves):
@@ -46,8 +45,7 @@ def disc(around: int) -> tuple[Float[np.ndarray, "n 2"], Int[np.ndarray, "e 9"]]
 
     Parameters
     ----------
-    around : int
-        A multiple of 4: a square of cells inside rings of them.
+    around : a multiple of 4: a square of cells inside rings of them
     """
     angles = np.arange(2 * around) * np.pi / around
     circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
@@ -66,21 +64,15 @@ def core_mesh(
 
     Parameters
     ----------
-    plan : Plan
-        The meridian section, within its context.
-    region : Region
-        The part between the axis and the core's radius, from one end to the other.
-    radius : float [-]
-        The core's, by the solid's extent.
-    stations : (s,) [-]
-        Places along x of the nodes on the core's surface, two to an element and one more, rising.
-    around : int
-        Elements around it.
+    plan : the meridian section, within its context
+    region : the part between the axis and the core's radius, from one end to the other
+    radius : the core's, by the solid's extent [-]
+    stations : (s,) places along x of the nodes on the core's surface, two to an element and one more, rising [-]
+    around : elements around it
 
     Returns
     -------
-    SolidMesh
-        By the solid's extent. Each layer is a disc that changes from the form of one end to that of the other.
+    By the solid's extent. Each layer is a disc that changes from the form of one end to that of the other.
     """
     points, quads = disc(around)
     low, high = _ends(plan, region)

@@ -27,13 +27,9 @@ class Frame:
 class Leg:
     """A line, or an arc about an axis, of a path.
 
-    Attributes
-    ----------
-    start : Frame
-    arm : (3,) [m]
-        Of an arc from its axis to where it starts; of a line 0.
-    travel : float
-        Length of a line [m], angle of an arc [rad].
+    start
+    arm : (3,) of an arc from its axis to where it starts [m]; of a line 0
+    travel : length of a line [m], angle of an arc [rad]
     """
 
     start: Frame

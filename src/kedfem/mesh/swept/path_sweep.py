@@ -26,18 +26,14 @@ def path_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
 
     Parameters
     ----------
-    gmsh : module
-        With the solid in its current model, which is left as it is.
-    solid : Solid
-        The only solid in that model.
-    sizing : Sizing
-        How fine: the rule of layers, in the section; along the path that size, or two and a half times it where none is
-        asked for, and 20 elements to a turn.
+    gmsh : with the solid in its current model, which is left as it is
+    solid : the only solid in that model
+    sizing : how fine: the rule of layers, in the section; along the path that size, or two and a half times it where
+        none is asked for, and 20 elements to a turn
 
     Returns
     -------
-    SolidMesh
-        27-node elements, the nodes of the surface on the solid's own faces.
+    27-node elements, the nodes of the surface on the solid's own faces
 
     Raises
     ------

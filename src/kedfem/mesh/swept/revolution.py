@@ -15,12 +15,8 @@ from kedfem.mesh.cad.words import direction_in_words, face_in_words
 class Revolution:
     """The axis of a solid of revolution.
 
-    Attributes
-    ----------
-    origin : (3,) [m]
-        A point of the axis.
-    axes : (3, 3) [-]
-        Rows: the axis, and two directions square to it, right-handed.
+    origin : (3,) a point of the axis [m]
+    axes : (3, 3) rows: the axis, and two directions square to it, right-handed [-]
     """
 
     origin: Float[np.ndarray, "3"]

@@ -46,18 +46,14 @@ def revolved_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
 
     Parameters
     ----------
-    gmsh : module
-        With the solid in its current model, which is left as it is.
-    solid : Solid
-        The only solid in that model.
-    sizing : Sizing
-        How fine: the rule of layers, for the section; around the axis the same size at the mean radius, or 12 to 24
-        elements to a turn where none is asked for.
+    gmsh : with the solid in its current model, which is left as it is
+    solid : the only solid in that model
+    sizing : how fine: the rule of layers, for the section; around the axis the same size at the mean radius, or 12 to
+        24 elements to a turn where none is asked for
 
     Returns
     -------
-    SolidMesh
-        27-node elements, the nodes of the surface on the solid's own faces.
+    27-node elements, the nodes of the surface on the solid's own faces
 
     Raises
     ------

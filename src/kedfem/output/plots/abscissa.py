@@ -16,13 +16,9 @@ MOST_TICKS = 13
 class Abscissa:
     """Values of the horizontal axis.
 
-    Parameters
-    ----------
     values : (n,) [deg], or [s] over time
-    degrees : (n,) [deg]
-        The drive angle, when the curves are over time and there is one that moves.
-    over_time
-        Whether the curves are over time.
+    degrees : (n,) the drive angle, when the curves are over time and there is one that moves [deg]
+    over_time : whether the curves are over time
     """
 
     values: Float[np.ndarray, " n"]
@@ -56,8 +52,7 @@ def draw_abscissa(top: Any, bottom: Any, along: Abscissa) -> None:
 
     Parameters
     ----------
-    top, bottom
-        Axes of matplotlib that share the abscissa.
+    top, bottom : axes of matplotlib that share the abscissa
     """
     first, last = float(along.values[0]), float(along.values[-1])
     bottom.set_xlabel("time (s)" if along.over_time else "drive angle (°)")

@@ -28,11 +28,6 @@ def write_comparison(
     ----------
     names : of the runs
     along : (T,) [s], or [rad], [m] of the drive
-
-    Raises
-    ------
-    OutputError
-        A file cannot be written.
     """
     remove_plots(ready_folder(folder))
     factor, label = (1.0, "time (s)")

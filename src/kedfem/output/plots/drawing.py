@@ -71,8 +71,7 @@ def envelope(values: Float[np.ndarray, " n"], bins: int = BINS) -> Int[np.ndarra
     Parameters
     ----------
     values : (n,) [any unit]
-    bins
-        Groups; a curve of no more than two points a group is kept whole.
+    bins : groups; a curve of no more than two points a group is kept whole
 
     Returns
     -------

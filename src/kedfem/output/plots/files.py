@@ -19,13 +19,10 @@ def write_plots(results: Results, folder: Path, each: bool = False) -> list[Path
 
     Parameters
     ----------
-    results
-        What was read; without rows nothing is drawn.
-    folder
-        Made where missing.
-    each
-        Whether every channel is also plotted on its own: ``probes-rocker_mid-stress.png``, …, ``energies.png``, and
-        ``joint_forces.png`` for all joints.
+    results : what was read; without rows nothing is drawn
+    folder : made where missing
+    each : whether every channel is also plotted on its own: ``probes-rocker_mid-stress.png``, …, ``energies.png``, and
+        ``joint_forces.png`` for all joints
 
     Returns
     -------

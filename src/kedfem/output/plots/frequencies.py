@@ -13,13 +13,7 @@ def write_over_turn(
     path: Path, t: Float[np.ndarray, " P"], angle: Float[np.ndarray, " P"], values: Float[np.ndarray, "P f"],
     revolutions: bool,
 ) -> None:  # fmt: skip
-    """Natural frequencies [Hz] over the drive angle, of a drive that does not go on turning over time.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """Natural frequencies [Hz] over the drive angle, of a drive that does not go on turning over time."""
     x = np.degrees(angle) if revolutions else t
     with figure_saved(path, "Natural frequencies of the linkage frozen at positions") as figure:
         ax = figure.subplots()
@@ -41,11 +35,6 @@ def write_campbell(
     Parameters
     ----------
     speed : that of the scene
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
     """
     rpm = RPM * speeds
     with figure_saved(

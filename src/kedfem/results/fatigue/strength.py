@@ -67,12 +67,7 @@ class Strength:
 
 
 def require_fatigue(where: str) -> None:
-    """What fatigue needs is installed.
-
-    Raises
-    ------
-    OutputError
-    """
+    """OutputError unless what fatigue needs is installed."""
     of_extra("pylife", where, EXTRA)
 
 

@@ -70,8 +70,6 @@ class LoadCase:
 class Statics:
     """Linear statics of one link, factored once.
 
-    Parameters
-    ----------
     held : six (node, component) that hold it
     """
 
