@@ -21,8 +21,6 @@ from kedfem.cli.sweeping import sweep
 from kedfem.errors import KedfemError, OutputError, SceneError
 from kedfem.processes import end_as_interrupted, interruption_asked, one_blas_thread
 
-__all__ = ["DEFECT", "DOUBTFUL", "INTERRUPTED", "KINDS", "USER_ERROR", "app", "main"]
-
 app = typer.Typer(
     name="kedfem",
     help="How much the links of a moving mechanism bend, vibrate and are stressed.",

@@ -4,16 +4,3 @@ from kedfem.export.files import require_ending
 from kedfem.export.linear_system import StateSpace, read_state_space, state_space, write_state_space
 from kedfem.export.link import ExportedLink, exported_link, read_link, write_link
 from kedfem.export.motion import export_motion
-
-__all__ = [
-    "ExportedLink",
-    "StateSpace",
-    "export_motion",
-    "exported_link",
-    "read_link",
-    "read_state_space",
-    "require_ending",
-    "state_space",
-    "write_link",
-    "write_state_space",
-]

@@ -3,18 +3,3 @@
 from kedfem.frequencies.campbell import Campbell, Crossing, crossed
 from kedfem.frequencies.linkage import Frequencies, Wanted, frequencies, frequencies_folder
 from kedfem.frequencies.part import Part, PartFrequencies, link_of_scene, part_frequencies, part_from_file
-
-__all__ = [
-    "Campbell",
-    "Crossing",
-    "Frequencies",
-    "Part",
-    "PartFrequencies",
-    "Wanted",
-    "crossed",
-    "frequencies",
-    "frequencies_folder",
-    "link_of_scene",
-    "part_frequencies",
-    "part_from_file",
-]

@@ -6,17 +6,3 @@ from kedfem.mesh.elements.quality import Quality, checked_mesh, mesh_quality
 from kedfem.mesh.isolated import side_by_side
 from kedfem.mesh.link import link_mesh, part_mesh, plane_mesh
 from kedfem.mesh.planar.flat import QuadMesh
-
-__all__ = [
-    "CAD_ENDINGS",
-    "Face",
-    "QuadMesh",
-    "Quality",
-    "SolidMesh",
-    "checked_mesh",
-    "link_mesh",
-    "mesh_quality",
-    "part_mesh",
-    "plane_mesh",
-    "side_by_side",
-]

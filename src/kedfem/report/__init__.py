@@ -2,5 +2,3 @@
 
 from kedfem.report.gltf import Mechanism, write_gltf
 from kedfem.report.page import Report, require_report, write_report
-
-__all__ = ["Mechanism", "Report", "require_report", "write_gltf", "write_report"]

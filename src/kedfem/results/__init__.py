@@ -19,22 +19,3 @@ from kedfem.results.reader import abandoned_rows, read_results, run_status
 from kedfem.results.records import Channel, Fatigue, FatigueSpot, Peak, Results
 from kedfem.results.table import write_csv, write_parquet
 from kedfem.results.writer import ResultsWriter
-
-__all__ = [
-    "Channel",
-    "Fatigue",
-    "FatigueSpot",
-    "Peak",
-    "Results",
-    "ResultsWriter",
-    "abandoned_rows",
-    "add_notes",
-    "claimed",
-    "read_results",
-    "ready_folder",
-    "replacing",
-    "results_file",
-    "run_status",
-    "write_csv",
-    "write_parquet",
-]

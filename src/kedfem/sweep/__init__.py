@@ -3,5 +3,3 @@
 from kedfem.sweep.axes import Axis, axes_of
 from kedfem.sweep.points import Base, Row
 from kedfem.sweep.run import Asked, Swept, sweep, sweep_folder
-
-__all__ = ["Asked", "Axis", "Base", "Row", "Swept", "axes_of", "sweep", "sweep_folder"]

@@ -10,17 +10,3 @@ from kedfem.tables.run import run_tables
 from kedfem.tables.sizes import size_line
 from kedfem.tables.study import study_tables
 from kedfem.tables.sweep import sweep_tables
-
-__all__ = [
-    "assembly_tables",
-    "check_tables",
-    "frequencies_tables",
-    "kinematics_tables",
-    "mesh_tables",
-    "moment",
-    "part_tables",
-    "run_tables",
-    "size_line",
-    "study_tables",
-    "sweep_tables",
-]

@@ -2,5 +2,3 @@
 
 from kedfem.motion.path.following import MOST_TURNS, path
 from kedfem.motion.path.record import Path, aimed, place_on, predicted
-
-__all__ = ["MOST_TURNS", "Path", "aimed", "path", "place_on", "predicted"]
