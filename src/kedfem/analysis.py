@@ -41,8 +41,7 @@ from kedfem.output.derived import (
     write_derived,
     write_vibration,
 )
-from kedfem.output.fatigue_files import write_fatigue
-from kedfem.output.stress_files import Extremes, write_envelope, write_top
+from kedfem.output.stress_files import Extremes, write_envelope, write_fatigue, write_top
 from kedfem.output.vtu import write_cells, write_frame
 from kedfem.report import require_report, write_report
 from kedfem.results import Channel, Fatigue, Peak, Results, add_notes, claimed, read_results
@@ -288,7 +287,7 @@ def _mesh_field(strained: Strained, file: FilePath) -> None:
         for link, each in ((strained.model.links[k], each) for k, each in strained.indicators.items())
     ]
     if parts:
-        cells = [(link.X, link.cells, link.cell_type) for link, _ in parts]
+        cells = [(link.X, (link.cell_type, link.cells)) for link, _ in parts]
         write_cells(file, cells, "mesh_error", [values for _, values in parts])
 
 

@@ -11,15 +11,13 @@ from kedfem.dynamics.vibration import Vibration
 from kedfem.errors import OutputError, PictureError
 from kedfem.links.recovery import StressRecovery
 from kedfem.output.animation import remove_animation
-from kedfem.output.fatigue_files import FIELD, SPOTS
-from kedfem.output.fatigue_files import POINTS as DAMAGES
 from kedfem.output.fields import LinkField
 from kedfem.output.frames import link_fields
 from kedfem.output.paraview import STATE, write_state
 from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
 from kedfem.output.shapes import GROWING, write_growing
-from kedfem.output.stress_files import ENVELOPE, POINTS, TOP
+from kedfem.output.stress_files import DAMAGE, DAMAGE_POINTS, ENVELOPE, POINTS, SPOTS, TOP
 from kedfem.output.words import clock, moment, place_of, stress_at
 from kedfem.results import Fatigue, Peak, Results, write_csv, write_parquet
 from kedfem.results.reader import foreign
@@ -30,22 +28,9 @@ STEM, TABLE, PICTURE, PLOTS, MESH = "animation", "results.csv", "worst.png", "pl
 WORST, PARQUET, ONE_FILE = "worst.vtu", "results.parquet", "animation.vtkhdf"
 REPORT, GROWN = "report.html", f"{GROWING}.png"
 WHOLE = (
-    GROWN,
-    TABLE,
-    ONE_FILE,
-    PARQUET,
-    PICTURE,
-    MESH,
-    WORST,
-    ENVELOPE,
-    POINTS,
-    TOP,
-    REPORT,
-    FIELD,
-    SPOTS,
-    DAMAGES,
+    GROWN, TABLE, ONE_FILE, PARQUET, PICTURE, MESH, WORST, ENVELOPE, POINTS, TOP, REPORT, DAMAGE, SPOTS, DAMAGE_POINTS,
     STATE,
-)
+)  # fmt: skip
 """Files of a run that the next one replaces."""
 
 

@@ -1,6 +1,5 @@
 """Files of loads for suppliers: a table for each joint and drive, a summary, polar diagrams of bearing loads."""
 
-import csv
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ from kedfem.output.units import prefixed
 from kedfem.results import Results
 from kedfem.results.data_sets import drive_heading
 from kedfem.results.forces.loads import DriveLoad, JointLoad, facing
-from kedfem.results.table import cell, text_file, write_numbers
+from kedfem.results.table import text_file, write_numbers, write_rows
 
 XYZ = "xyz"
 Columns = dict[str, Float[np.ndarray, " T"]]
@@ -50,11 +49,8 @@ def _write(path: Path, columns: Columns, results: Results, rows: Bool[np.ndarray
 def write_summary(path: Path, what: str, every: Mapping[str, Mapping[str, float]]) -> None:
     """One line a joint or drive, empty where a number is not known."""
     names = list(dict.fromkeys(name for found in every.values() for name in found))
-    with text_file(path) as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow([what, *names])
-        for key, found in every.items():
-            table.writerow([key, *(cell(found.get(name, np.nan)) for name in names)])
+    rows = ([key, *(found.get(name, np.nan) for name in names)] for key, found in every.items())
+    write_rows(path, [what, *names], rows)
 
 
 def write_polar(path: Path, load: JointLoad, rows: Bool[np.ndarray, " T"]) -> bool:

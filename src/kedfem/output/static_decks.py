@@ -4,7 +4,6 @@ A deck has one step for each instant. Forces stand at nodes, all of them in bala
 and no more, keep it from drifting off: their reactions are what the balance leaves.
 """
 
-import csv
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TextIO
@@ -15,10 +14,10 @@ from jaxtyping import Float
 
 from kedfem.links.record import Link
 from kedfem.motion.constraints import cross
-from kedfem.output.vtu import STRESS_COMPONENTS
+from kedfem.output.vtu import complete, write_vtu
 from kedfem.results.files import replacing
 from kedfem.results.forces.load_cases import LoadCase
-from kedfem.results.table import cell, text_file
+from kedfem.results.table import text_file, write_rows
 from kedfem.scene import Material
 
 Forces = Float[np.ndarray, "n 3"]
@@ -93,21 +92,15 @@ def _numbers(x: Float[np.ndarray, " k"]) -> str:
 
 def write_case(path: Path, link: Link, case: LoadCase) -> None:
     """A load case for ParaView: the undeformed link; forces by kind, displacement, acceleration and stress at nodes."""
-    import meshio
-    from meshio import vtu
-
     fields = {f"{name} [N]": x for name, x in case.parts.items()} | {
         "all forces [N]": case.total, "displacement [m]": case.displacement,
         "acceleration [m/s^2]": case.acceleration, "von Mises [Pa]": case.von_mises,
         "von Mises by statics [Pa]": case.static_von_mises, "stress [Pa]": case.stress,
     }  # fmt: skip
-    fields = {name: np.ascontiguousarray(x) for name, x in fields.items()}
-    content = meshio.Mesh(link.X, [(link.cell_type, link.cells.astype(np.int32))], point_data=fields)
-    stress = f'Name="stress [Pa]" NumberOfComponents="{len(STRESS_COMPONENTS)}"'
-    named = "".join(f' ComponentName{i}="{name}"' for i, name in enumerate(STRESS_COMPONENTS))
     with replacing(path) as part:
-        vtu.write(str(part), content, binary=True, compression="zlib")
-        part.write_bytes(part.read_bytes().replace(stress.encode(), (stress + named).encode(), 1))
+        values = {name: np.ascontiguousarray(x) for name, x in fields.items()}
+        write_vtu(part, link.X, [(link.cell_type, link.cells)], point_data=values)
+        complete(part)
 
 
 def resultants(
@@ -135,10 +128,9 @@ def write_resultants(
         for what, unit in (("point", "m"), ("force", "N"), ("moment", "N m"))
         for c in "xyz"
     ]
-    with text_file(path) as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(["time [s]", drive, "what", *columns])
-        for case in cases:
-            for name, vectors in resultants(X, case, about).items():
-                numbers = map(cell, np.concatenate(vectors))
-                table.writerow([cell(case.time), cell(case.angle), name, *numbers])
+    rows = (
+        [case.time, case.angle, name, *np.concatenate(vectors)]
+        for case in cases
+        for name, vectors in resultants(X, case, about).items()
+    )
+    write_rows(path, ["time [s]", drive, "what", *columns], rows)

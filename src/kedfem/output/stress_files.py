@@ -1,6 +1,5 @@
-"""Files of the highest stresses over all steps: at every point, for ParaView and as a table; the top ten of each link."""
+"""Files of the highest stresses over all steps and of damage: at every point, and where they are highest."""
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,14 +7,20 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.links.recovery import StressRecovery
 from kedfem.output.vtu import write_points
-from kedfem.results import Peak
+from kedfem.results import Fatigue, Peak
+from kedfem.results.fatigue.surface import LinkFatigue
 from kedfem.results.stresses.envelope import LinkEnvelope
 from kedfem.results.stresses.hot_spots import drawn_points
-from kedfem.results.table import cell, text_file
+from kedfem.results.table import write_rows
 
 ENVELOPE, POINTS, TOP = "envelope.vtu", "envelope.csv", "peaks.csv"
+DAMAGE, DAMAGE_POINTS, SPOTS = "fatigue.vtu", "fatigue_points.csv", "fatigue.csv"
 KINDS = ("highest von Mises", "largest principal", "smallest principal")
+PLACE = tuple(f"reference {c} [m]" for c in "xyz")
+MOST = 300.0  # of powers of ten: life without damage
+Columns = dict[str, Float[np.ndarray, " p"]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,12 +38,12 @@ class Extremes:
     near: Sequence[Sequence[str]]
     drive: str
 
-    def columns(self) -> dict[str, Float[np.ndarray, " p"]]:
+    def columns(self) -> Columns:
         """Of all points of all links: stresses, time and drive of each; nan of rigid links."""
         stress = np.concatenate([each.stress for each in self.found], axis=1)
         step = np.concatenate([each.step for each in self.found], axis=1)
         what, _, unit = self.drive.partition(" [")
-        out: dict[str, Float[np.ndarray, " p"]] = {}
+        out: Columns = {}
         for k, name in enumerate(KINDS):
             none = np.isnan(stress[k])
             out[f"{name} stress [Pa]"] = stress[k]
@@ -52,43 +57,83 @@ class Extremes:
 
 def write_envelope(folder: Path, extremes: Extremes, table: bool) -> None:
     """Highest stresses at every point and when they occur, on the undeformed links: for ParaView, and as CSV if asked."""
-    every = [(each, drawn_points(each.recovery)) for each in extremes.found]
-    columns = extremes.columns()
-    doubts = np.array([float(bool(x)) for each in extremes.near for x in each])
-    parts = [(each.link, points, each.recovery.cells, each.recovery.cell_type) for each, points in every]
-    write_points(folder / ENVELOPE, parts, columns | {"depends on mesh or joint": doubts})
-    if not table:
-        return
-    X = np.concatenate([points for _, points in every])
-    header = ["link", "node", *(f"reference {c} [m]" for c in "xyz"), *columns, "near"]
-    names = [(each.link, k) for each, points in every for k in range(len(points))]
-    numbers = np.column_stack([X, *columns.values()])
-    words = [word for each in extremes.near for word in each]
-    with text_file(folder / POINTS) as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        for (link, node), row, word in zip(names, numbers, words, strict=True):
-            writer.writerow([link, node, *map(cell, row), word])
+    near = [word for each in extremes.near for word in each]
+    doubts = {"depends on mesh or joint": np.array([float(bool(word)) for word in near])}
+    recoveries, columns = [each.recovery for each in extremes.found], extremes.columns()
+    _write_field(folder / ENVELOPE, recoveries, columns | doubts)
+    if table:
+        _write_table(folder / POINTS, recoveries, columns, {"near": near})
 
 
 def write_top(folder: Path, every: Mapping[str, Sequence[Peak]], drive: str) -> None:
     """The highest stresses of each link at places apart as CSV; nothing where no link has stress."""
-    if not every:
-        return
-    header = [
-        "link",
-        "rank",
-        "von Mises stress [Pa]",
-        *(f"reference {c} [m]" for c in "xyz"),
-        "time [s]",
-        drive,
-        "node",
-        "near",
+    header = ["link", "rank", "von Mises stress [Pa]", *PLACE, "time [s]", drive, "node", "near"]
+    rows = [
+        [link, rank, peak.stress, *peak.place, peak.time, peak.angle, peak.node, peak.near]
+        for link, peaks in every.items()
+        for rank, peak in enumerate(peaks, start=1)
     ]
-    with text_file(folder / TOP) as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        for link, peaks in every.items():
-            for rank, peak in enumerate(peaks, start=1):
-                numbers = map(cell, (peak.stress, *peak.place, peak.time, peak.angle))
-                writer.writerow([link, rank, *numbers, peak.node, peak.near])
+    if every:
+        write_rows(folder / TOP, header, rows)
+
+
+def write_fatigue(folder: Path, found: Fatigue, fields: Sequence[LinkFatigue], table: bool) -> None:
+    """Damage at every point on the undeformed links for ParaView, hot spots as CSV, all points as CSV if asked."""
+    recoveries, columns = [each.recovery for each in fields], _damage_columns(found, fields)
+    _write_field(folder / DAMAGE, recoveries, columns)
+    _write_spots(folder / SPOTS, found)
+    if table:
+        _write_table(folder / DAMAGE_POINTS, recoveries, columns, {})
+
+
+def _damage_columns(found: Fatigue, fields: Sequence[LinkFatigue]) -> Columns:
+    """Of all points of all links; nan where there is nothing."""
+    damage = np.concatenate([each.damage for each in fields])
+    with np.errstate(divide="ignore"):
+        periods = np.minimum(-np.log10(damage), MOST)
+    return {
+        "damage in a period": damage,
+        "life, power of ten of hours": periods + np.log10(found.period / 3600),
+        "utilisation of endurance": np.concatenate([each.utilisation for each in fields]),
+        "amplitude of worst cycle [Pa]": np.concatenate([each.amplitude for each in fields]),
+        "mean of worst cycle [Pa]": np.concatenate([each.mean for each in fields]),
+        "disproportion": np.concatenate([each.disproportion for each in fields]),
+        "criterion (0 von Mises, 1 normal, 2 Findley)": np.concatenate([x.criterion for x in fields]),
+    }
+
+
+def _write_spots(path: Path, found: Fatigue) -> None:
+    """The places of the highest damage of each link."""
+    header = [
+        "link", "rank", *PLACE, "node", "criterion", "damage in a period", "life [periods]", "life [revolutions]",
+        "life [h]", "utilisation", "amplitude [Pa]", "mean stress [Pa]", "disproportion", "support factor",
+        "cycles in a period", "near", "doubt",
+    ]  # fmt: skip
+    rows = []
+    for link, spots in found.spots.items():
+        for rank, spot in enumerate(spots, start=1):
+            periods = 1 / spot.damage if spot.damage else np.inf
+            turns = periods * found.revolutions if found.revolutions else np.nan
+            rows.append(
+                [link, rank, *spot.place, spot.node, spot.criterion, spot.damage, periods, turns, found.hours(spot),
+                 spot.utilisation, spot.amplitude, spot.mean, spot.disproportion, spot.support, spot.cycles,
+                 spot.near, found.doubt]
+            )  # fmt: skip
+    write_rows(path, header, rows)
+
+
+def _write_field(path: Path, recoveries: Sequence[StressRecovery], columns: Columns) -> None:
+    """Values at all points of all links, undeformed, for ParaView."""
+    parts = [(x.link.name, drawn_points(x), (x.cell_type, x.cells)) for x in recoveries]
+    write_points(path, parts, columns)
+
+
+def _write_table(
+    path: Path, recoveries: Sequence[StressRecovery], columns: Columns, words: Mapping[str, Sequence[str]]
+) -> None:
+    """The same as CSV, with words for each point."""
+    names = [(x.link.name, node) for x in recoveries for node in range(x.points)]
+    numbers = np.column_stack([np.concatenate([drawn_points(x) for x in recoveries]), *columns.values()])
+    rows = zip(names, numbers.tolist(), *words.values(), strict=True)
+    header = ["link", "node", *PLACE, *columns, *words]
+    write_rows(path, header, ([*name, *row, *more] for name, row, *more in rows))

@@ -6,6 +6,7 @@ from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
+from jaxtyping import Float, Int
 
 from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.output.array_names import STRESS
@@ -14,44 +15,76 @@ from kedfem.output.fields import Block, JointField
 from kedfem.results.files import replacing
 
 STRESS_COMPONENTS = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
+GRID = b"<UnstructuredGrid>"
+Points = Float[np.ndarray, "n 3"]
+Cells = tuple[str, Int[np.ndarray, "e m"]]
+"""Elements of one type: its name in meshio, and their nodes."""
+
+
+def write_vtu(path: Path, points: Points, cells: Sequence[Cells], **values: Any) -> None:
+    """Points and elements with `point_data` and `cell_data` as meshio takes them: binary, compressed by zlib."""
+    import meshio
+    from meshio import vtu
+
+    whole = [(kind, of.astype(np.int32)) for kind, of in cells]
+    vtu.write(str(path), meshio.Mesh(points, whole, **values), binary=True, compression="zlib")
+
+
+def complete(path: Path, fields: str = "") -> None:
+    """Put in what meshio leaves out: field data, and the names of the components of stresses."""
+    stress = f'Name="{STRESS}" NumberOfComponents="{len(STRESS_COMPONENTS)}"'
+    named = "".join(f' ComponentName{i}="{name}"' for i, name in enumerate(STRESS_COMPONENTS))
+    head = GRID + f"<FieldData>{fields}</FieldData>".encode() if fields else GRID
+    text = path.read_bytes().replace(GRID, head, 1)
+    path.write_bytes(text.replace(stress.encode(), (stress + named).encode(), 1))
 
 
 def write_mesh(mesh: SolidMesh, path: Path) -> None:
     """A mesh as a VTU file, with the scaled Jacobian of its elements."""
-    import meshio
-    from meshio import vtu
-
     quality = mesh_quality(mesh).scaled_jacobian
-    cells = [(mesh.cell_type, mesh.cells.astype(np.int32))]
-    content = meshio.Mesh(mesh.points, cells, cell_data={"scaled_jacobian": [quality]})
     with replacing(path) as part:
-        vtu.write(str(part), content, binary=True, compression="zlib")
+        cells = [(mesh.cell_type, mesh.cells)]
+        write_vtu(part, mesh.points, cells, cell_data={"scaled_jacobian": [quality]})
 
 
 def write_points(
-    path: Path, parts: Sequence[tuple[str, np.ndarray, np.ndarray, str]], values: Mapping[str, np.ndarray]
+    path: Path, parts: Sequence[tuple[str, Points, Cells]], values: Mapping[str, np.ndarray]
 ) -> None:
     """Links in the reference position with values at their points.
 
     Parameters
     ----------
-    parts : name, points (n, 3), elements (e, m) and their type
+    parts : name, points and elements of each
     values : of all points of all parts, one after the other
     """
-    import meshio
-    from meshio import vtu
-
-    first = np.cumsum([0, *(len(points) for _, points, _, _ in parts)])
-    cells = [(kind, (of + n).astype(np.int32)) for (_, _, of, kind), n in zip(parts, first, strict=False)]
     names = list(dict.fromkeys(name for name, *_ in parts))
-    link = [np.full(len(of), names.index(name), np.int32) for name, _, of, _ in parts]
-    points = np.concatenate([points for _, points, _, _ in parts])
-    content = meshio.Mesh(points, cells, point_data=dict(values), cell_data={"link": link})
+    link = [np.full(len(of), names.index(name), np.int32) for name, _, (_, of) in parts]
+    whole = _together([(points, cells) for _, points, cells in parts])
     with replacing(path) as part:
-        vtu.write(str(part), content, binary=True, compression="zlib")
-        numbers = "".join(_number(f"link {name}", k) for k, name in enumerate(names))
-        head = f"<UnstructuredGrid><FieldData>{numbers}</FieldData>".encode()
-        part.write_bytes(part.read_bytes().replace(b"<UnstructuredGrid>", head, 1))
+        write_vtu(part, *whole, point_data=dict(values), cell_data={"link": link})
+        complete(part, "".join(_number(f"link {name}", k) for k, name in enumerate(names)))
+
+
+def write_cells(
+    path: Path, parts: Sequence[tuple[Points, Cells]], name: str, values: Sequence[np.ndarray]
+) -> None:
+    """Elements in the reference position with one value each.
+
+    Parameters
+    ----------
+    parts : points and elements of each
+    name : of the values
+    values : (e,) of each part
+    """
+    with replacing(path) as part:
+        write_vtu(part, *_together(parts), cell_data={name: list(values)})
+
+
+def _together(parts: Sequence[tuple[Points, Cells]]) -> tuple[Points, list[Cells]]:
+    """All points one after the other, and elements by their numbers there."""
+    first = np.cumsum([0, *(len(points) for points, _ in parts)])
+    cells = [(kind, of + n) for (_, (kind, of)), n in zip(parts, first, strict=False)]
+    return np.concatenate([points for points, _ in parts]), cells
 
 
 def write_frame(path: Path, time: float, fields: Sequence[Block]) -> None:
@@ -60,67 +93,29 @@ def write_frame(path: Path, time: float, fields: Sequence[Block]) -> None:
         write_blocks(part, {"TimeValue": float(time)}, fields)
 
 
-def write_cells(
-    path: Path, parts: Sequence[tuple[np.ndarray, np.ndarray, str]], name: str, values: Sequence[np.ndarray]
-) -> None:
-    """Elements in the reference position with one value each.
-
-    Parameters
-    ----------
-    parts : points (n, 3), elements (e, m) and their type
-    name : of the values
-    values : (e,) of each part
-    """
-    import meshio
-    from meshio import vtu
-
-    first = np.cumsum([0, *(len(points) for points, _, _ in parts)])
-    cells = [(kind, (of + n).astype(np.int32)) for (_, of, kind), n in zip(parts, first, strict=False)]
-    points = np.concatenate([points for points, _, _ in parts])
-    content = meshio.Mesh(points, cells, cell_data={name: list(values)})
-    with replacing(path) as part:
-        vtu.write(str(part), content, binary=True, compression="zlib")
-
-
 def write_blocks(path: Path, now: Mapping[str, float], fields: Sequence[Block], first: int = 0) -> None:
-    """A frame, or one block of it: zlib-compressed binary through meshio, with the field data that meshio leaves out.
+    """A frame, or one block of it.
 
     Parameters
     ----------
     now : the frame's time, and the drive's position if there is one
     first : number of the first block
     """
-    from meshio import vtu
-
-    vtu.write(str(path), _merged(fields, first), binary=True, compression="zlib")
-    stress = f'Name="{STRESS}" NumberOfComponents="{len(STRESS_COMPONENTS)}"'
-    named = "".join(f' ComponentName{i}="{name}"' for i, name in enumerate(STRESS_COMPONENTS))
-    text, head = path.read_bytes(), _field_data(now, fields, first).encode()
-    text = text.replace(b"<UnstructuredGrid>", b"<UnstructuredGrid>" + head, 1)
-    path.write_bytes(text.replace(stress.encode(), (stress + named).encode(), 1))
-
-
-def _merged(fields: Sequence[Block], number: int) -> Any:
-    """All blocks as one mesh of meshio."""
-    import meshio
-
-    first = np.cumsum([0, *(len(field.points) for field in fields)])
+    points, cells = _together([(field.points, (field.cell_type, field.cells)) for field in fields])
     every = [field.arrays() for field in fields]
-    return meshio.Mesh(
-        np.concatenate([field.points for field in fields]).astype(np.float32),
-        [
-            (field.cell_type, (field.cells + n0).astype(np.int32))
-            for field, n0 in zip(fields, first, strict=False)
-        ],
-        point_data={
-            name: np.concatenate([each[name] for each in every]).astype(np.float32, order="C")
-            for name in every[0]
-        },
-        cell_data={
-            "link": [np.full(len(field.cells), i, np.int32) for i, field in enumerate(fields, start=number)]
-        }
-        | _sections(fields),
+    values = {
+        name: np.concatenate([each[name] for each in every]).astype(np.float32, order="C")
+        for name in every[0]
+    }
+    link = [np.full(len(field.cells), i, np.int32) for i, field in enumerate(fields, start=first)]
+    write_vtu(
+        path,
+        points.astype(np.float32),
+        cells,
+        point_data=values,
+        cell_data={"link": link} | _sections(fields),
     )
+    complete(path, _field_data(now, fields, first))
 
 
 def _sections(fields: Sequence[Block]) -> dict[str, list[np.ndarray]]:
@@ -144,7 +139,7 @@ def _field_data(now: Mapping[str, float], fields: Sequence[Block], first: int) -
         f'<DataArray type="Float64" Name={quoteattr(name)} NumberOfTuples="1" format="ascii">{x!r}</DataArray>'
         for name, x in now.items()
     )
-    return f"<FieldData>{moments}{numbers}</FieldData>"
+    return moments + numbers
 
 
 def _number(name: str, number: int) -> str:

@@ -44,6 +44,14 @@ def text_file(path: Path) -> Iterator[TextIO]:
         yield file
 
 
+def write_rows(path: Path, names: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
+    """A table of words and numbers: a line of names, and a line for each row; of floats see `cell`."""
+    with text_file(path) as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(names)
+        writer.writerows([cell(x) if isinstance(x, float) else x for x in row] for row in rows)
+
+
 def write_numbers(file: TextIO, names: Iterable[str], parts: Iterable[Float[np.ndarray, "n c"]]) -> None:
     """A line of names, and a line of numbers for each row of all parts."""
     csv.writer(file, lineterminator="\n").writerow(names)

@@ -1,6 +1,5 @@
 """The same curves of several runs over each other, as PNG, and their differences as CSV."""
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from kedfem.output.units import prefixed
 from kedfem.results import ready_folder
 from kedfem.results.differences import Difference, Over, magnitude
 from kedfem.results.records import Channel
-from kedfem.results.table import cell, text_file
+from kedfem.results.table import write_rows
 
 LOOKS = ("-", "--", ":", "-.")
 
@@ -36,15 +35,13 @@ def write_comparison(
         factor, label = (180 / np.pi, "drive angle (°)") if angle else (1.0, "drive travel (m)")
     for each in found:
         _write_picture(each, names, factor * along, label, folder)
-    with text_file(folder / "differences.csv") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(
-            ["channel", "unit", "run", "peak", "largest difference [%]", "at", "rms difference [%]"]
-        )
-        for each in found:
-            for k, name in enumerate(names):
-                numbers = (each.peaks[k], 100 * each.largest[k], each.at[k], 100 * each.rms[k])
-                table.writerow([each.channel.name, each.channel.unit, name, *map(cell, numbers)])
+    header = ["channel", "unit", "run", "peak", "largest difference [%]", "at", "rms difference [%]"]
+    rows = [
+        [x.channel.name, x.channel.unit, name, x.peaks[k], 100 * x.largest[k], x.at[k], 100 * x.rms[k]]
+        for x in found
+        for k, name in enumerate(names)
+    ]
+    write_rows(folder / "differences.csv", header, rows)
 
 
 def _write_picture(
