@@ -204,10 +204,9 @@ def record_table(record: type[BaseModel], alone: bool) -> str:
     about = (record.__doc__ or "").strip().splitlines()[0].replace("``", "`")
     title = "" if alone else f"### {f'kind = {chr(34)}{kind}{chr(34)}' if kind else construction(record)}\n\n"
     texts, names = meanings(record), {id(field): name for name, field in record.model_fields.items()}
-    rows = [
-        row(key, field, texts.get(names[id(field)], ""))
-        for key, field in keys(record).items() if key != "kind" or kind is None
-    ]  # fmt: skip
+    shown = [each for each in keys(record).items() if each[0] != "kind" or kind is None]
+    shown.sort(key=lambda each: not each[1].is_required())  # what must be given first
+    rows = [row(key, field, texts.get(names[id(field)], "")) for key, field in shown]
     header = "| key | value | unit | default | meaning |\n| --- | --- | --- | --- | --- |\n"
     return f"{title}{about}\n\n{header}" + "\n".join(rows) + "\n"
 

@@ -5,9 +5,16 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Mapping
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, StringConstraints, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    StringConstraints,
+    ValidationError,
+    model_validator,
+)
 from pydantic_core import InitErrorDetails
 
 from kedfem.errors import Fault
@@ -19,14 +26,31 @@ NAME = re.compile(r"[^\W_](?:[\w \-]*\w)?")
 
 
 class Record(BaseModel):
-    """A frozen record of the scene that refuses unknown keys."""
+    """A frozen record of the scene that refuses unknown keys.
 
-    model_config = ConfigDict(
-        frozen=True,
-        extra="forbid",
-        validate_by_name=True,
-        validate_by_alias=True,
-    )
+    exactly_one, at_least_one : keys of which so many must be given, and what the message asks for beside the first
+    only_with : pairs of a key and another without which it has no meaning
+    """
+
+    exactly_one: ClassVar[tuple[tuple[str, ...], str]] = ((), "")
+    at_least_one: ClassVar[tuple[tuple[str, ...], str]] = ((), "")
+    only_with: ClassVar[tuple[tuple[str, str], ...]] = ()
+    model_config = ConfigDict(frozen=True, extra="forbid", validate_by_name=True, validate_by_alias=True)
+
+    @model_validator(mode="after")
+    def _goes_together(self) -> Self:
+        for keys, wanted in (self.exactly_one, self.at_least_one):
+            given = [key for key in keys if getattr(self, key) is not None]
+            if keys and not given:
+                got = "neither" if len(keys) == 2 else "none of them"
+                refuse([Fault(keys[:1], f"is required{wanted}, got {got}")])
+            if len(given) > 1 and keys == self.exactly_one[0]:
+                refuse([Fault((given[1],), f"cannot be combined with {given[0]}, got both")])
+        refuse([
+            Fault((key,), f"must be combined with {other}, got it alone") for key, other in self.only_with
+            if getattr(self, other) is None and getattr(self, key) != type(self).model_fields[key].default
+        ])  # fmt: skip
+        return self
 
     def fill(self, **values: Any) -> Self:
         """Put in defaults that depend on other keys; for the validators of a record under construction."""
@@ -44,26 +68,25 @@ def checked_name(name: str) -> str:
     return name
 
 
+def printable(text: str, what: str = "a line") -> str:
+    """A text without control characters."""
+    if control := [character for character in text if unicodedata.category(character) == "Cc"]:
+        raise fault(f"must be {what} without control characters, got {control[0]!r}")
+    return text
+
+
 def checked_file(name: str) -> str:
     """A path without control characters, none of its parts too long for a disk."""
-    if control := [character for character in name if unicodedata.category(character) == "Cc"]:
-        raise fault(f"must be a path without control characters, got {control[0]!r}")
+    printable(name, "a path")
     longest = max(len(part.encode()) for part in name.replace("\\", "/").split("/"))
     if longest > LONGEST_FILE:
         raise fault(f"must be a path of names of at most {LONGEST_FILE} bytes, got one of {longest}")
     return name
 
 
-def checked_line(text: str) -> str:
-    """One line without control characters."""
-    if control := [character for character in text if unicodedata.category(character) == "Cc"]:
-        raise fault(f"must be a line without control characters, got {control[0]!r}")
-    return text
-
-
 Name = Annotated[str, AfterValidator(checked_name)]
 FileName = Annotated[str, StringConstraints(min_length=1), AfterValidator(checked_file)]
-Line = Annotated[str, AfterValidator(checked_line)]
+Line = Annotated[str, AfterValidator(printable)]
 
 
 def plain(value: Any) -> Any:

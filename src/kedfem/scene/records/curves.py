@@ -118,8 +118,8 @@ def curve_faults(
 class Factor(Curve):
     """What a load or a stiffness is multiplied by: over time, or over the angle or travel of the only drive."""
 
-    units: ClassVar[dict[str, str]] = {"time": "s", "angle": "rad", "travel": "m"}
-    what: ClassVar[tuple[str, str]] = ("factor", "1")
+    units: ClassVar = {"time": "s", "angle": "rad", "travel": "m"}
+    what = ("factor", "1")
     over: Literal["time", "angle", "travel"] = "time"
     """what it depends on; angle and travel: those of the drive, from the reference position"""
     value: tuple[Number, ...] = ()
@@ -129,8 +129,8 @@ class Factor(Curve):
 class TorqueCurve(Curve):
     """A torque over time, speed or angle."""
 
-    units: ClassVar[dict[str, str]] = {"time": "s", "speed": "rad/s", "angle": "rad"}
-    what: ClassVar[tuple[str, str]] = ("torque", "N*m")
+    units: ClassVar = {"time": "s", "speed": "rad/s", "angle": "rad"}
+    what = ("torque", "N*m")
     over: Literal["time", "speed", "angle"] = "time"
     """what it depends on; speed and angle are those of the joint, the angle from the reference position"""
     value: tuple[Torque, ...] = ()
@@ -140,8 +140,8 @@ class TorqueCurve(Curve):
 class ForceCurve(Curve):
     """A force over time, speed or travel."""
 
-    units: ClassVar[dict[str, str]] = {"time": "s", "speed": "m/s", "travel": "m"}
-    what: ClassVar[tuple[str, str]] = ("force", "N")
+    units: ClassVar = {"time": "s", "speed": "m/s", "travel": "m"}
+    what = ("force", "N")
     over: Literal["time", "speed", "travel"] = "time"
     """what it depends on; speed and travel are those of the joint, the travel from the reference position"""
     value: tuple[Force, ...] = ()
@@ -151,8 +151,8 @@ class ForceCurve(Curve):
 class PullCurve(Curve):
     """A pull over time, or over the length, travel or speed of what pulls."""
 
-    units: ClassVar[dict[str, str]] = {"time": "s", "speed": "m/s", "length": "m", "travel": "m"}
-    what: ClassVar[tuple[str, str]] = ("force", "N")
+    units: ClassVar = {"time": "s", "speed": "m/s", "length": "m", "travel": "m"}
+    what = ("force", "N")
     over: Literal["time", "speed", "length", "travel"] = "time"
     """what it depends on; `"length"`: the distance of both ends; `"travel"`: along a slide, from the reference position;
     `"speed"`: at which either grows"""

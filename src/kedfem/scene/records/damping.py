@@ -46,11 +46,8 @@ class Damping(Record):
 def damping_faults(damping: Damping) -> list[Fault]:
     """What is contradictory in a damping: places and messages."""
     if damping.ratio is None:
-        return (
-            []
-            if damping.frequencies is None
-            else [Fault(("ratio",), "is required with frequencies, got nothing")]
-        )
+        lacking = [Fault(("ratio",), "is required with frequencies, got nothing")]
+        return [] if damping.frequencies is None else lacking
     if damping.alpha or damping.beta:
         return [Fault(("ratio",), "cannot be combined with alpha and beta, got both")]
     if damping.frequencies is None:

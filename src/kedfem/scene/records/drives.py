@@ -112,16 +112,12 @@ class Table(Record):
 class _Rise(Record):
     """What laws share that move by an angle or a travel: how far."""
 
-    angle: Angle | None
-    travel: Length | None
-
-    @model_validator(mode="after")
-    def _one_rise(self) -> _Rise:
-        if self.angle is None and self.travel is None:
-            refuse([Fault(("angle",), "is required [rad], or travel [m] of a prismatic joint, got neither")])
-        if self.angle is not None and self.travel is not None:
-            refuse([Fault(("travel",), "cannot be combined with angle, got both")])
-        return self
+    exactly_one = ("angle", "travel"), " [rad], or travel [m] of a prismatic joint"
+    kind: str
+    angle: Angle | None = None
+    """the rise; the amplitude φ0 of what swings"""
+    travel: Length | None = None
+    """the same of a prismatic joint, instead of an angle"""
 
     @property
     def height(self) -> float:
@@ -129,14 +125,9 @@ class _Rise(Record):
         return self.angle if self.angle is not None else self.travel or 0.0
 
 
-class Cycloidal(_Rise):
-    """Rise by an angle, dwell, return, dwell, and so on, by the cycloidal law: s = x − sin(2πx)/2π."""
+class _RiseAndDwell(_Rise):
+    """What laws share that rise, dwell and return."""
 
-    kind: Literal["cycloidal"] = "cycloidal"
-    angle: Angle | None = None
-    """the rise"""
-    travel: Length | None = None
-    """the rise of a prismatic joint, instead of an angle"""
     rise: PositiveTime
     """duration of the rise"""
     dwell: Duration = 0.0
@@ -147,34 +138,24 @@ class Cycloidal(_Rise):
     """duration of the dwell after the return, before it all repeats"""
 
 
-class Polynomial(_Rise):
+class Cycloidal(_RiseAndDwell):
+    """Rise by an angle, dwell, return, dwell, and so on, by the cycloidal law: s = x − sin(2πx)/2π."""
+
+    kind: Literal["cycloidal"] = "cycloidal"
+
+
+class Polynomial(_RiseAndDwell):
     """Rise by an angle, dwell, return, dwell, and so on, by a polynomial law."""
 
     kind: Literal["polynomial"] = "polynomial"
     order: Literal[5, 7] = 5
     """5: the 3-4-5 polynomial, zero acceleration at the ends; 7: 4-5-6-7, zero jerk there too"""
-    angle: Angle | None = None
-    """the rise"""
-    travel: Length | None = None
-    """the rise of a prismatic joint, instead of an angle"""
-    rise: PositiveTime
-    """duration of the rise"""
-    dwell: Duration = 0.0
-    """duration of the dwell at the top"""
-    return_time: PositiveTime | None = None
-    """duration of the return; without it the drive stays at the top"""
-    dwell_after: Duration = 0.0
-    """duration of the dwell after the return, before it all repeats"""
 
 
 class Harmonic(_Rise):
     """Swings, from the reference position on: φ = φ0 (sin(2π f t + α) − sin α)."""
 
     kind: Literal["harmonic"] = "harmonic"
-    angle: Angle | None = None
-    """the amplitude φ0"""
-    travel: Length | None = None
-    """the amplitude of a prismatic joint, instead of an angle"""
     frequency: Frequency
     """f"""
     phase: Angle = 0.0
@@ -189,6 +170,7 @@ MotionLaw = Annotated[
 class Drive(Record):
     """A joint that turns or slides in a given way: its first link that is not the ground against the other."""
 
+    only_with = (("shaft_damping", "shaft_stiffness"),)
     joint: str
     """name of the driven joint: revolute or prismatic"""
     motion: MotionLaw
@@ -199,12 +181,6 @@ class Drive(Record):
     shaft_damping: RotationalDamper = 0.0
     """of a hinge: torsional damping of that shaft"""
 
-    @model_validator(mode="after")
-    def _damped_shaft(self) -> Drive:
-        if self.shaft_damping and self.shaft_stiffness is None:
-            refuse([Fault(("shaft_damping",), "must be combined with shaft_stiffness, got it alone")])
-        return self
-
 
 class Gear(Record):
     """Gears, belts or a rack: two joints whose motions are in proportion.
@@ -212,6 +188,8 @@ class Gear(Record):
     A joint's motion is that of its first link that is not the ground against the other, about or along its axis.
     """
 
+    exactly_one = ("ratio", "teeth", "radius"), ", or teeth, or radius [m] of a rack"
+    only_with = (("internal", "teeth"),)
     joints: tuple[str, str]
     """the two joints: A and B revolute; of a rack A revolute and B prismatic"""
     ratio: Number | None = None
@@ -224,17 +202,9 @@ class Gear(Record):
     """of a rack: travel of B per radian of A; negative if it runs against B's axis"""
 
     @model_validator(mode="after")
-    def _one_of_three(self) -> Gear:
-        given = [key for key in ("ratio", "teeth", "radius") if getattr(self, key) is not None]
-        if not given:
-            refuse([Fault(("ratio",), "is required, or teeth, or radius [m] of a rack, got none of them")])
-        if len(given) > 1:
-            refuse([Fault((given[1],), f"cannot be combined with {given[0]}, got both")])
-        if self.internal and self.teeth is None:
-            refuse([Fault(("internal",), "must be given with teeth only, got it without")])
-        for key in given:
-            if getattr(self, key) == 0.0:
-                refuse([Fault((key,), "must not be zero, got 0")])
+    def _moves(self) -> Gear:
+        zero = [key for key in ("ratio", "radius") if getattr(self, key) == 0.0]
+        refuse([Fault((key,), "must not be zero, got 0") for key in zero])
         return self
 
     @property

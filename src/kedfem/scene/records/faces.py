@@ -68,18 +68,20 @@ def face_choice(value: object) -> Any:
         return ChosenFace.model_validate(value)
     if isinstance(value, ChosenFace) or (isinstance(value, str) and value):
         return value
-    raise fault(
-        f"must be a face's name, a table that says what it is, or a list of these, got {shown(value)}"
-    )
+    raise no_face(value)
+
+
+def no_face(value: object) -> Exception:
+    """The fault of what is no face."""
+    wanted = "must be a face's name, a table that says what it is, or a list of these"
+    return fault(f"{wanted}, got {shown(value)}")
 
 
 def several(value: object) -> object:
     """One or several names or choices of faces, as a list that is not empty."""
     listed = [value] if isinstance(value, (str, Mapping, ChosenFace)) else value
     if not isinstance(listed, (list, tuple)) or not listed:
-        raise fault(
-            f"must be a face's name, a table that says what it is, or a list of these, got {shown(value)}"
-        )
+        raise no_face(value)
     return tuple(listed)
 
 

@@ -149,7 +149,6 @@ class Fatigue(Record):
     @model_validator(mode="after")
     def _some_data(self) -> Self:
         if not self.materials and not self.links:
-            refuse(
-                [Fault(("materials",), "is required, or links: data of at least one of them, got nothing")]
-            )
+            wanted = "is required, or links: data of at least one of them"
+            refuse([Fault(("materials",), f"{wanted}, got nothing")])
         return self

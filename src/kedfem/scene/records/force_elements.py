@@ -39,20 +39,13 @@ class Motor(Record):
     A curve over speed or angle is one over those of that link against the other.
     """
 
+    exactly_one = ("torque", "force"), " [N*m], or force [N] of a slider"
     joint: str
     """the joint: revolute, cylindrical or screw for a torque, prismatic or cylindrical for a force"""
     torque: TorqueOver | None = None
     """of a hinge, positive about its axis: a number, or `{ over = "speed", at = [...], value = [...] }`"""
     force: ForceOver | None = None
     """of a slider, positive along its direction: a number, or such a table"""
-
-    @model_validator(mode="after")
-    def _one_of_both(self) -> Self:
-        if self.torque is None and self.force is None:
-            refuse([Fault(("torque",), "is required [N*m], or force [N] of a slider, got neither")])
-        if self.torque is not None and self.force is not None:
-            refuse([Fault(("torque",), "cannot be combined with force, got both")])
-        return self
 
     @property
     def curve(self) -> TorqueCurve | ForceCurve:
@@ -105,9 +98,8 @@ class _Elastic(Record):
     @model_validator(mode="after")
     def _does_something(self) -> Self:
         if not (getattr(self, "stiffness", 1.0) or getattr(self, "damping", 1.0) or self.curve):
-            refuse(
-                [Fault(("stiffness",), f"must be positive, or damping, or a {self.effort}, got none of them")]
-            )
+            wanted = f"must be positive, or damping, or a {self.effort}, got none of them"
+            refuse([Fault(("stiffness",), wanted)])
         return self
 
     @model_validator(mode="after")
@@ -129,7 +121,8 @@ class LineSpring(_Elastic):
     position, and what it pulls back is that link.
     """
 
-    effort: ClassVar[str] = "force"
+    effort = "force"
+    exactly_one = ("between", "joint"), ", or a joint"
     kind: Literal["spring"] = "spring"
     between: tuple[SpringEnd, SpringEnd] | None = None
     """its two ends, each `{ link = "...", at = point }`"""
@@ -153,34 +146,23 @@ class LineSpring(_Elastic):
     @model_validator(mode="after")
     def _has_a_direction(self) -> Self:
         if self.between is None:
-            if self.joint is None:
-                refuse([Fault(("between",), "is required, or a joint, got neither")])
             if self.free_length is not None:
                 refuse([Fault(("free_length",), "must be free_travel [m] along a joint, got a length")])
             self._curve_over("length", "travel", "along a joint")
             return self
-        if self.joint is not None:
-            refuse([Fault(("between",), "cannot be combined with joint, got both")])
         if self.free_travel is not None:
             refuse([Fault(("free_travel",), "must be free_length [m] between two points, got a travel")])
         self._curve_over("travel", "length", "between two points")
         a, b = self.between
         if a.at == b.at and (self.free_length != 0.0 or self.preload):
-            refuse(
-                [
-                    Fault(
-                        ("between",),
-                        "must be two different points unless free_length = 0, got the same twice",
-                    )
-                ]
-            )
+            wanted = "must be two different points unless free_length = 0, got the same twice"
+            refuse([Fault(("between",), wanted)])
         return self
 
     def _curve_over(self, wrong: str, right: str, where: str) -> None:
         if self.force is not None and self.force.over == wrong:
-            refuse(
-                [Fault(("force", "over"), f"must be {right!r} {where}, or 'speed' or 'time', got {wrong!r}")]
-            )
+            wanted = f"must be {right!r} {where}, or 'speed' or 'time', got {wrong!r}"
+            refuse([Fault(("force", "over"), wanted)])
 
     @property
     def free(self) -> float:
@@ -195,7 +177,7 @@ class LineSpring(_Elastic):
 class TorsionSpring(_Elastic):
     """A spring and a damper about a hinge: they turn back with k (φ − φ0) + c φ' + T."""
 
-    effort: ClassVar[str] = "torque"
+    effort = "torque"
     kind: Literal["torsion"] = "torsion"
     joint: str
     """the hinge, cylindrical joint or screw"""

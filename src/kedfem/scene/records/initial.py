@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from typing import Annotated
 
-from pydantic import BeforeValidator, PlainValidator, model_validator
+from pydantic import BeforeValidator, PlainValidator
 from pydantic_core import PydanticCustomError
 
-from kedfem.errors import Fault
-from kedfem.scene.records.base import Record, refuse
+from kedfem.scene.records.base import Record
 from kedfem.scene.records.drives import EitherSpeed
 from kedfem.scene.records.loads import ForceVector
 from kedfem.scene.records.points import Point, as_vector
@@ -46,15 +45,10 @@ JointSpeed = Annotated[float, PlainValidator(joint_speed)]
 class InitialMotion(Record):
     """How a link moves at the start."""
 
+    at_least_one = ("velocity", "angular_velocity"), " [m/s], or angular_velocity [rad/s]"
     at: Point
     """a point of the link, in the reference position"""
     velocity: VelocityVector | None = None
     """velocity of this point; left open if not given"""
     angular_velocity: AngularVelocity | None = None
     """rotational speed of the link, a vector; left open if not given"""
-
-    @model_validator(mode="after")
-    def _says_something(self) -> Self:
-        given = self.velocity is not None or self.angular_velocity is not None
-        refuse([] if given else [Fault(("velocity",), "is required [m/s], or spin [rad/s], got neither")])
-        return self

@@ -35,10 +35,7 @@ def three(value: object) -> Any:
 
 Rates = Annotated[tuple[Rate, Rate, Rate], BeforeValidator(three)]
 Dampers = Annotated[tuple[Damper, Damper, Damper], BeforeValidator(three)]
-TurningRates = Annotated[
-    tuple[TurningRate, TurningRate, TurningRate],
-    BeforeValidator(three),
-]
+TurningRates = Annotated[tuple[TurningRate, TurningRate, TurningRate], BeforeValidator(three)]
 TurningDampers = Annotated[
     tuple[RotationalDamper, RotationalDamper, RotationalDamper], BeforeValidator(three)
 ]
@@ -52,6 +49,8 @@ class Bushing(Record):
     to both. Without an `axis` they are the world's in the reference position. They are fixed in the joint's second link,
     or the ground if that is one."""
 
+    at_least_one = ("stiffness", "rotational_stiffness"), " [N/m], or rotational_stiffness [N m/rad]"
+    only_with = ("damping", "stiffness"), ("rotational_damping", "rotational_stiffness")
     stiffness: Rates | None = None
     """of displacements; held rigidly if not given"""
     damping: Dampers = (0.0, 0.0, 0.0)
@@ -61,17 +60,6 @@ class Bushing(Record):
     the third"""
     rotational_damping: TurningDampers = (0.0, 0.0, 0.0)
     """of turns"""
-
-    @model_validator(mode="after")
-    def _springs(self) -> Self:
-        if self.stiffness is None and self.rotational_stiffness is None:
-            refuse(
-                [Fault(("stiffness",), "is required [N/m], or rotational_stiffness [N m/rad], got neither")]
-            )
-        for stiffness, damping in (("stiffness", "damping"), ("rotational_stiffness", "rotational_damping")):
-            if getattr(self, stiffness) is None and any(getattr(self, damping)):
-                refuse([Fault((damping,), f"must be combined with {stiffness}, got it alone")])
-        return self
 
 
 def of_links(value: object, what: Callable[[object], Any]) -> dict[str, Any]:

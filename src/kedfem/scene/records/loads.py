@@ -6,7 +6,6 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from kedfem.errors import Fault
 from kedfem.scene.records.base import Record, refuse
 from kedfem.scene.records.curves import ONE, FactorOver, Force, Torque
 from kedfem.scene.records.inertia import Inertia, inertia_faults
@@ -21,72 +20,66 @@ BodyVector = Annotated[tuple[ForcePerVolume, ForcePerVolume, ForcePerVolume], Be
 SurfaceVector = Annotated[tuple[Pressure, Pressure, Pressure], BeforeValidator(as_vector)]
 
 
-class ForceLoad(Record):
+class _Load(Record):
+    """What all loads share."""
+
+    kind: str
+    link: str
+    """the link it acts on"""
+    factor: FactorOver = ONE
+    """a number, or a curve over time or the drive's angle or travel: `{ over = "angle", at = [...], value = [...] }`"""
+
+
+class _Directed(_Load):
+    """What loads share that have a direction."""
+
+    frame: Literal["world", "link"] = "world"
+    """world: keeps its direction; link: given in the reference position, turns with the link from there"""
+
+
+class ForceLoad(_Directed):
     """A force at a point of a link."""
 
     kind: Literal["force"] = "force"
-    link: str
-    """the link it acts on"""
     at: Point
     """where, in the reference position"""
     vector: ForceVector
     """the force"""
-    frame: Literal["world", "link"] = "world"
-    """world: keeps its direction; link: given in the reference position, turns with the link from there"""
-    factor: FactorOver = ONE
-    """a number, or a curve over time or the drive's angle or travel: `{ over = "angle", at = [...], value = [...] }`"""
 
 
-class BodyLoad(Record):
+class BodyLoad(_Directed):
     """A force per volume of a link."""
 
     kind: Literal["body"] = "body"
-    link: str
-    """the link it acts on"""
     vector: BodyVector
     """the force per volume"""
-    frame: Literal["world", "link"] = "world"
-    """world: keeps its direction; link: given in the reference position, turns with the link from there"""
-    factor: FactorOver = ONE
-    """a number, or a curve over time or the drive's angle or travel: `{ over = "angle", at = [...], value = [...] }`"""
 
 
-class SurfaceLoad(Record):
+class SurfaceLoad(_Directed):
     """A force per area on a face of a solid link."""
 
     kind: Literal["surface"] = "surface"
-    link: str
-    """the link it acts on"""
     at: Point
     """a point of the flat or cylindrical face, in the reference position"""
     vector: SurfaceVector
     """the force per area"""
-    frame: Literal["world", "link"] = "world"
-    """world: keeps its direction; link: given in the reference position, turns with the link from there"""
-    factor: FactorOver = ONE
-    """a number, or a curve over time or the drive's angle or travel: `{ over = "angle", at = [...], value = [...] }`"""
 
 
-class PressureLoad(Record):
+class PressureLoad(_Load):
     """A pressure on a face of a solid or plane link: across the face everywhere, as it turns with the link."""
 
     kind: Literal["pressure"] = "pressure"
-    link: str
-    """the link it acts on"""
     at: Point
     """a point of the flat or curved face, in the reference position"""
     pressure: Pressure
     """force per area, positive pushing on the face"""
-    factor: FactorOver = ONE
-    """a number, or a curve over time or the drive's angle or travel: `{ over = "angle", at = [...], value = [...] }`"""
 
 
-class TorqueLoad(Record):
+class TorqueLoad(_Directed):
     """A torque on a bore, face or section of a link: on the mean rotation of it."""
 
+    exactly_one = ("at", "joint"), " [m], or a joint of the link"
     kind: Literal["torque"] = "torque"
-    link: str
-    """the link it acts on"""
     at: Point | None = None
     """a point on the axis of a bore or journal, or of a face; of a beam a point of its axis, of one in space one where it
     has a node; in the reference position"""
@@ -94,18 +87,6 @@ class TorqueLoad(Record):
     """a joint of the link, on whose bore or face it acts, instead of `at`"""
     vector: TorqueVector
     """the torque"""
-    frame: Literal["world", "link"] = "world"
-    """world: keeps its direction; link: given in the reference position, turns with the link from there"""
-    factor: FactorOver = ONE
-    """a number, or a curve over time or the drive's angle or travel: `{ over = "angle", at = [...], value = [...] }`"""
-
-    @model_validator(mode="after")
-    def _one_place(self) -> Self:
-        if self.at is None and self.joint is None:
-            refuse([Fault(("at",), "is required [m], or a joint of the link, got neither")])
-        if self.at is not None and self.joint is not None:
-            refuse([Fault(("at",), "cannot be combined with joint, got both")])
-        return self
 
 
 Load = Annotated[ForceLoad | BodyLoad | SurfaceLoad | PressureLoad | TorqueLoad, Field(discriminator="kind")]

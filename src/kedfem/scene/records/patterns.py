@@ -61,21 +61,14 @@ class Pattern(Record):
     @model_validator(mode="before")
     @classmethod
     def _whole_vector(cls, raw: Any) -> Any:
-        return (
-            {**raw, "shift": as_vector(raw["shift"])} if isinstance(raw, Mapping) and "shift" in raw else raw
-        )
+        given = isinstance(raw, Mapping) and "shift" in raw
+        return {**raw, "shift": as_vector(raw["shift"])} if given else raw
 
     @model_validator(mode="after")
     def _goes_on(self) -> Pattern:
         if self.count > 1 and not self.turn and not any(self.shift):
-            refuse(
-                [
-                    Fault(
-                        ("turn",),
-                        "is required, or a shift [m], so that copies are not in one place, got neither",
-                    )
-                ]
-            )
+            wanted = "is required, or a shift [m], so that copies are not in one place"
+            refuse([Fault(("turn",), f"{wanted}, got neither")])
         return self
 
 

@@ -26,9 +26,7 @@ AXES: dict[str, XYZ] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0
 MARKS = {"from", "between", "along", "distances"}
 """Keys that distinguish one construction of a point from others."""
 FARTHEST = 1e100  # m: squares of distances can still be formed
-UNIT = (
-    1e-15  # a vector whose length is so near one is a unit vector, and stays as it is when it is read again
-)
+UNIT = 1e-15  # a vector of a length so near one is a unit vector, and stays as it is when it is read again
 UNPLACED: XYZ = (math.nan, math.nan, math.nan)  # a point that is named but could not be constructed
 
 _known_points: ContextVar[Mapping[str, XYZ] | None] = ContextVar("known_points", default=None)

@@ -49,20 +49,8 @@ def along_up(pairs: list[tuple[XYZ, XYZ]], up: XYZ | None) -> list[Fault]:
 
 
 MESH_ENDINGS = (
-    ".msh",
-    ".unv",
-    ".bdf",
-    ".nas",
-    ".med",
-    ".mesh",
-    ".inp",
-    ".vtu",
-    ".vtk",
-    ".xdmf",
-    ".xmf",
-    ".e",
-    ".exo",
-)
+    ".msh", ".unv", ".bdf", ".nas", ".med", ".mesh", ".inp", ".vtu", ".vtk", ".xdmf", ".xmf", ".e", ".exo",
+)  # fmt: skip
 
 
 class Bar(Record):
@@ -189,7 +177,20 @@ class Polyline(Record):
         return RectangleSection(width=self.width or math.nan, thickness=self.thickness or math.nan)
 
 
-class MeshFile(Record):
+class _FromFile(Record):
+    """What shapes share that are drawn in a file of another program."""
+
+    kind: str
+    file: FileName
+    origin: Point = (0.0, 0.0, 0.0)
+    """where the file's origin goes; if neither this nor `towards` nor `z` is given, the file is drawn in its place"""
+    towards: Point | None = None
+    """a point that the file's x axis goes to point at, from `origin`; along global x if not given"""
+    z: Axis | None = None
+    """`"x"`, `"y"`, `"z"` or a vector: where the file's z axis goes, as near as its x axis allows; z if not given"""
+
+
+class MeshFile(_FromFile):
     """A mesh of hexahedra or tetrahedra of order 1 or 2, or of several kinds, in a file of another program; solid."""
 
     kind: Literal["mesh"] = "mesh"
@@ -198,15 +199,9 @@ class MeshFile(Record):
     .e or .exo"""
     scale: Annotated[float, Quantity("1", above=0.0)] = 1.0
     """metres per unit of the file: 0.001 for a file in millimetres"""
-    origin: Point = (0.0, 0.0, 0.0)
-    """where the file's origin goes; if neither this nor `towards` nor `z` is given, the mesh is drawn in its place"""
-    towards: Point | None = None
-    """a point that the file's x axis goes to point at, from `origin`; along global x if not given"""
-    z: Axis | None = None
-    """`"x"`, `"y"`, `"z"` or a vector: where the file's z axis goes, as near as its x axis allows; z if not given"""
 
 
-class Cad(Record):
+class Cad(_FromFile):
     """A part from CAD (STEP, IGES or BREP), of hexahedra or tetrahedra. `file = "rod.step"` in a link is short for it."""
 
     kind: Literal["cad"] = "cad"
@@ -216,12 +211,6 @@ class Cad(Record):
     """which solid of an assembly; if not given the one with the link's name; of a file with one solid that one"""
     scale: Annotated[float, Quantity("1", above=0.0)] | None = None
     """metres per unit of the file; if not given the file's own unit, of BREP files, which have none, 0.001"""
-    origin: Point = (0.0, 0.0, 0.0)
-    """where the file's origin goes; if neither this nor `towards` nor `z` is given, the file is drawn in its place"""
-    towards: Point | None = None
-    """a point that the file's x axis goes to point at, from `origin`; along global x if not given"""
-    z: Axis | None = None
-    """`"x"`, `"y"`, `"z"` or a vector: where the file's z axis goes, as near as its x axis allows; z if not given"""
 
 
 Shape = Annotated[Bar | PlateLink | Extrusion | Part | Polyline | MeshFile | Cad, Field(discriminator="kind")]

@@ -77,14 +77,8 @@ HUGE = 1e30  # a number beyond, or a positive one below 1 / HUGE, is no machine'
 OVERFLOW = 10**308  # whole numbers in TOML have no end
 CYCLES = {"hertz"}
 TURNING = {
-    "radian",
-    "degree",
-    "arcminute",
-    "arcsecond",
-    "turn",
-    "revolutions_per_minute",
-    "revolutions_per_second",
-}
+    "radian", "degree", "arcminute", "arcsecond", "turn", "revolutions_per_minute", "revolutions_per_second",
+}  # fmt: skip
 
 
 def fault(message: str) -> PydanticCustomError:
