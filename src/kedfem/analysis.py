@@ -57,8 +57,7 @@ from kedfem.results.forces.indeterminate import undetermined, undetermined_warni
 from kedfem.results.on_demand import Chosen
 from kedfem.results.recording import recording
 from kedfem.results.stresses.envelope import Envelope
-from kedfem.results.stresses.hot_spots import hot_spots
-from kedfem.results.stresses.peaks import highest, peaks
+from kedfem.results.stresses.peaks import highest, hot_spots, peaks
 from kedfem.results.stresses.singular_stress import doubtful
 from kedfem.results.table import require_parquet
 from kedfem.resume import EVERY, Keeper, remove_state

@@ -9,8 +9,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.analysis import Run, analyse
-from kedfem.results.stresses import hot_spots
-from kedfem.results.stresses.hot_spots import APART, MOST
+from kedfem.results.stresses import peaks as hot_spots
+from kedfem.results.stresses.peaks import APART, MOST
 from kedfem.scene import scene_from
 from tests.reliability.fuzz import short
 from tests.scenes import example

@@ -42,6 +42,18 @@ class RigidMotion:
     omega_phi: Float[np.ndarray, "T B 3"]
     v_phi: Float[np.ndarray, "T B 3"]
 
+    def position(self, body: int, X: Float[np.ndarray, "3"]) -> Float[np.ndarray, "T 3"]:
+        """Of a body's point that is at X in the reference position [m]."""
+        return np.asarray(self.p[:, body] + self.R[:, body] @ X)
+
+    def velocity(self, body: int, X: Float[np.ndarray, "3"]) -> Float[np.ndarray, "T 3"]:
+        """Of the same point [m/s]."""
+        return np.asarray(self.v[:, body] + cross(self.omega[:, body], self.R[:, body] @ X))
+
+    def acceleration(self, body: int, X: Float[np.ndarray, "3"]) -> Float[np.ndarray, "T 3"]:
+        """Of the same point [m/s²]."""
+        return np.asarray(self.p2[:, body] + self.R2[:, body] @ X)
+
     def part(self, first: int, end: int) -> "RigidMotion":
         """The time points from one number up to another."""
         return self.at(slice(first, end))

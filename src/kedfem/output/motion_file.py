@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.data_sets import drive_heading
@@ -85,7 +84,6 @@ def _rows(
     motion: RigidMotion, body: int, at: Float[np.ndarray, "3"], q: Float[np.ndarray, "T 4"]
 ) -> list[Float[np.ndarray, "T c"]]:
     """All quantities of a body, in the order of QUANTITIES."""
-    omega, alpha, arm = motion.omega[:, body], motion.alpha[:, body], motion.R[:, body] @ at
-    velocity = motion.v[:, body] + cross(omega, arm)
-    acceleration = motion.p2[:, body] + motion.R2[:, body] @ at
-    return [motion.p[:, body] + arm, q, velocity, omega, acceleration, alpha]
+    moved = (of(body, at) for of in (motion.position, motion.velocity, motion.acceleration))
+    position, velocity, acceleration = moved
+    return [position, q, velocity, motion.omega[:, body], acceleration, motion.alpha[:, body]]

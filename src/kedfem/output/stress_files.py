@@ -12,7 +12,7 @@ from kedfem.output.vtu import write_points
 from kedfem.results import Fatigue, Peak
 from kedfem.results.fatigue.surface import LinkFatigue
 from kedfem.results.stresses.envelope import LinkEnvelope
-from kedfem.results.stresses.hot_spots import drawn_points
+from kedfem.results.stresses.peaks import drawn_points
 from kedfem.results.table import write_rows
 
 ENVELOPE, POINTS, TOP = "envelope.vtu", "envelope.csv", "peaks.csv"

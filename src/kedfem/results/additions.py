@@ -1,6 +1,6 @@
-"""What is added to a results file after its rows: the verdict, peaks, notes, warnings and timing; all files are whole.
+"""What is added to a results file after its rows, and read from it: verdict, peaks, damage, notes, warnings, timing.
 
-An OutputError says that a file cannot be written.
+All files are whole; an OutputError says that a file cannot be written.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -8,10 +8,24 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from kedfem.errors import OutputError
 from kedfem.results.files import reason
-from kedfem.results.layout import FATIGUE, PEAKS, TIMING, WARNINGS, opened, seal, write_facts
+from kedfem.results.layout import FATIGUE, PEAKS, TIMING, WARNINGS, opened, read_facts, seal, write_facts
 from kedfem.results.records import Fatigue, FatigueSpot, Peak
+
+OF_PEAK = {
+    "stress": "von_mises [Pa]", "link": "link", "place": "place [m]", "node": "node", "step": "step",
+    "time": "time [s]", "angle": "drive [rad or m]", "near": "near",
+}  # fmt: skip
+OF_FATIGUE = {"period": "period [s]", "revolutions": "revolutions", "repeats": "repeats to", "doubt": "doubt"}
+OF_SPOT = {
+    "place": "place [m]", "node": "node", "criterion": "criterion", "damage": "damage in a period",
+    "utilisation": "utilisation", "amplitude": "amplitude [Pa]", "mean": "mean stress [Pa]",
+    "disproportion": "disproportion", "support": "support factor", "cycles": "cycles in a period", "near": "near",
+}  # fmt: skip
+"""Fields of records by their names in the file."""
 
 
 def mark_doubtful(path: Path, why: str) -> None:
@@ -24,49 +38,60 @@ def add_peaks(path: Path, peaks: Mapping[str, Peak]) -> None:
     """Store the highest stress of each link, ``peaks/LINK``."""
     with _changed(path) as file:
         for name, peak in peaks.items():
-            _lay_peak(file.create_group(f"{PEAKS}/{name}"), peak)
+            _store(file.create_group(f"{PEAKS}/{name}"), peak, OF_PEAK)
+            if peak.away is not None:
+                _store(file.create_group(f"{PEAKS}/{name}/away"), peak.away, OF_PEAK)
 
 
-def _lay_peak(group: Any, peak: Peak) -> None:
-    write_facts(
-        group,
-        {
-            "von_mises [Pa]": peak.stress, "place [m]": peak.place, "node": peak.node, "step": peak.step,
-            "time [s]": peak.time, "drive [rad or m]": peak.angle, "near": peak.near, "link": peak.link,
-        }
-    )  # fmt: skip
-    if peak.away is not None:
-        _lay_peak(group.create_group("away"), peak.away)
+def read_peaks(file: Any) -> dict[str, Peak]:
+    """What `add_peaks` stored."""
+    return {name: _peak(group) for name, group in file.get(PEAKS, {}).items()}
+
+
+def _peak(group: Any) -> Peak:
+    return Peak(**_stored(group, OF_PEAK), away=_peak(group["away"]) if "away" in group else None)
 
 
 def add_fatigue(path: Path, found: Fatigue) -> None:
     """Store damage, ``fatigue/LINK/RANK``."""
     with _changed(path) as file:
         group = file.create_group(FATIGUE)
-        write_facts(
-            group,
-            {
-                "period [s]": found.period, "revolutions": found.revolutions, "repeats to": found.repeats,
-                "doubt": found.doubt, "links without data": "\n".join(found.without),
-            },
-        )  # fmt: skip
+        _store(group, found, OF_FATIGUE)
+        write_facts(group, {"links without data": "\n".join(found.without)})
         for name, spots in found.spots.items():
             link = group.create_group(name)
             write_facts(link, {"strength": found.strengths[name], "points left out": found.left_out[name]})
             for rank, spot in enumerate(spots, start=1):
-                _lay_spot(link.create_group(str(rank)), spot)
+                _store(link.create_group(str(rank)), spot, OF_SPOT)
 
 
-def _lay_spot(group: Any, spot: FatigueSpot) -> None:
-    write_facts(
-        group,
-        {
-            "damage in a period": spot.damage, "utilisation": spot.utilisation, "criterion": spot.criterion,
-            "amplitude [Pa]": spot.amplitude, "mean stress [Pa]": spot.mean, "disproportion": spot.disproportion,
-            "support factor": spot.support, "cycles in a period": spot.cycles, "place [m]": spot.place,
-            "node": spot.node, "near": spot.near,
-        },
-    )  # fmt: skip
+def read_fatigue(file: Any) -> Fatigue | None:
+    """What `add_fatigue` stored, if it did."""
+    if FATIGUE not in file:
+        return None
+    links, without = file[FATIGUE], read_facts(file[FATIGUE])["links without data"]
+    of = {name: read_facts(link) for name, link in links.items()}
+    spots = {
+        name: tuple(FatigueSpot(name, **_stored(link[rank], OF_SPOT)) for rank in sorted(link, key=int))
+        for name, link in links.items()
+    }
+    return Fatigue(
+        **_stored(links, OF_FATIGUE),
+        spots=spots,
+        strengths={name: facts["strength"] for name, facts in of.items()},
+        left_out={name: facts["points left out"] for name, facts in of.items()},
+        without=tuple(without.split("\n")) if without else (),
+    )
+
+
+def _store(group: Any, record: Peak | Fatigue | FatigueSpot, names: Mapping[str, str]) -> None:
+    write_facts(group, {fact: getattr(record, name) for name, fact in names.items()})
+
+
+def _stored(group: Any, names: Mapping[str, str]) -> dict[str, Any]:
+    facts = read_facts(group)
+    found = {name: facts[fact] for name, fact in names.items()}
+    return {name: tuple(x.tolist()) if isinstance(x, np.ndarray) else x for name, x in found.items()}
 
 
 def add_notes(path: Path, notes: Mapping[str, str | float]) -> None:
@@ -82,6 +107,13 @@ def add_account(path: Path, warnings: Sequence[str], seconds: Mapping[str, float
         for name, facts in ((WARNINGS, numbered), (TIMING, seconds)):
             file.pop(name, None)
             write_facts(file.create_group(name), facts)
+
+
+def read_account(file: Any) -> tuple[tuple[str, ...], dict[str, float]]:
+    """What `add_account` stored."""
+    facts = read_facts(file[WARNINGS]) if WARNINGS in file else {}
+    numbered = sorted(facts, key=lambda key: int(key.rpartition(" ")[2]))
+    return tuple(facts[key] for key in numbered), read_facts(file[TIMING]) if TIMING in file else {}
 
 
 @contextmanager

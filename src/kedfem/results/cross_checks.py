@@ -14,16 +14,12 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.history import Block
-from kedfem.motion.constraints import cross
-from kedfem.motion.joint_equations import joint_axis, moving_pair
 from kedfem.motion.linkage import Linkage
-from kedfem.motion.rigid import RigidMotion
 from kedfem.results.audit import Account
-from kedfem.results.recorded import drive_prefix
+from kedfem.results.forces.loads import joint_rate
+from kedfem.results.recorded import Rows, drive_prefix
 from kedfem.results.records import Channel
 from kedfem.scene import Scene, without_vibration
-
-Rows = Float[np.ndarray, "T c"]
 
 # c and the mean of e − r may be off by this part; runs of examples/ and tests stay below 0.2, a missing effort gives 1
 CONTRADICTION = 0.5
@@ -71,35 +67,6 @@ class _Pair:
         return c if less or more or shifted else None
 
 
-@dataclass(frozen=True, slots=True)
-class _Drive:
-    """A drive: its effort's channel ("" if there is none), its pair of bodies, reference point and axis."""
-
-    effort: str
-    bodies: tuple[int, int]
-    at: Float[np.ndarray, "3"]
-    axis: Float[np.ndarray, "3"]
-    slides: bool
-
-    @classmethod
-    def of(cls, scene: Scene, linkage: Linkage, known: Collection[str], name: str) -> "_Drive":
-        joint = scene.joints[name]
-        names = (f"{drive_prefix(scene, name)}{what}" for what in ("torque", "force"))
-        one, other = (linkage.bodies.index(link) for link in moving_pair(joint)[:2])
-        effort = next((each for each in names if each in known), "")
-        return cls(effort, (one, other), np.asarray(joint.at), joint_axis(joint), joint.kind == "prismatic")
-
-    def rate(self, motion: RigidMotion) -> Float[np.ndarray, " T"]:
-        """Speed of the drive's coordinate."""
-        i, j = self.bodies
-        axis = motion.R[:, j] @ self.axis
-        if not self.slides:
-            return np.asarray(((motion.omega[:, i] - motion.omega[:, j]) * axis).sum(axis=1))
-        x = motion.p[:, i] + motion.R[:, i] @ self.at
-        v = [motion.v[:, b] + cross(motion.omega[:, b], x - motion.p[:, b]) for b in (i, j)]
-        return np.asarray(((v[0] - v[1]) * axis).sum(axis=1))
-
-
 class CrossChecks:
     """Efforts over a run, block after block.
 
@@ -112,7 +79,7 @@ class CrossChecks:
 
     def __init__(self, scene: Scene, linkage: Linkage, channels: Sequence[Channel], account: Account) -> None:
         known = {each.name: each for each in channels}
-        self.size = linkage.size
+        self.linkage, self.size = linkage, linkage.size
         self.pairs = [
             _Pair(name, rigid, [list(each.columns).index(x) for x in known[rigid].columns], each.unit)
             for name, each in known.items()
@@ -121,9 +88,9 @@ class CrossChecks:
             and "without what is along" not in known[rigid].description
             and not linkage.mobility
         ]
-        self.drives = [_Drive.of(scene, linkage, known, name) for name in scene.driven_joints]
+        self.drives = {_effort(scene, known, name): scene.joints[name] for name in scene.driven_joints}
         self.account = account
-        all_known = bool(self.drives) and all(each.effort for each in self.drives)
+        all_known = bool(self.drives) and all(self.drives)
         self.worked = all_known and not without_vibration(scene)  # else there is no account of energy
         self._last: tuple[float, float] | None = None
         self._work, self._left = 0.0, 0.0
@@ -136,7 +103,10 @@ class CrossChecks:
             each.add(values[each.elastic][:, each.columns], values[each.rigid])
         if not self.worked:
             return
-        power = np.sum([values[each.effort][:, 0] * each.rate(motion) for each in self.drives], axis=0)
+        power = np.sum(
+            [values[effort][:, 0] * joint_rate(x, self.linkage, motion) for effort, x in self.drives.items()],
+            axis=0,
+        )
         t0, before = self._last or (float(motion.t[0]), float(power[0]))
         h = np.diff(motion.t, prepend=t0)
         work = self._work + np.cumsum(0.5 * h * (power + np.concatenate([[before], power[:-1]])))
@@ -163,7 +133,7 @@ class CrossChecks:
                     "elastic links do not explain that, unless links or springs are very soft: one of both is wrong"
                 )
         if self.unworked > UNWORKED:
-            names = ", ".join(each.effort for each in self.drives)
+            names = ", ".join(self.drives)
             out.append(
                 f"{names}: the work of the drive is off the change of energy and the other work by "
                 f"{100 * self.unworked:.2g} % of the energy exchanged: a part of its effort is missing"
@@ -173,6 +143,12 @@ class CrossChecks:
     def _arm(self, each: _Pair) -> float:
         """By which moments are compared with forces [m]."""
         return 1.0 if each.unit == "N" else self.size
+
+
+def _effort(scene: Scene, known: Collection[str], name: str) -> str:
+    """The channel of a drive's effort; "" if there is none."""
+    names = (f"{drive_prefix(scene, name)}{what}" for what in ("torque", "force"))
+    return next((each for each in names if each in known), "")
 
 
 def _rigid_name(name: str) -> str:

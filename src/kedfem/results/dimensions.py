@@ -13,14 +13,10 @@ from typing import Any
 import numpy as np
 
 from kedfem.results.layout import write_facts
-from kedfem.results.records import TIME, Channel
+from kedfem.results.records import STRESS, TIME, XYZ, Channel
 
 CONVENTIONS = "CF-1.11"
-NAMED = {
-    ("x", "y", "z"): "xyz",
-    ("x", "y"): "xy",
-    ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises"): "stress_component",
-}
+NAMED = {XYZ: "xyz", XYZ[:2]: "xy", STRESS: "stress_component"}
 
 
 def columns_dimension(columns: Sequence[str]) -> str:

@@ -7,7 +7,6 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.inertias import Inertias
-from kedfem.motion.constraints import cross
 from kedfem.motion.coordinates import Coordinate, coordinates, counted_on
 from kedfem.motion.joint_equations import GROUND
 from kedfem.motion.linkage import Linkage
@@ -15,13 +14,12 @@ from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion
 from kedfem.motion.transmission import Transmission, transmissions
 from kedfem.results.forces.rigid import stated_link
-from kedfem.results.records import Channel
+from kedfem.results.recorded import Rows
+from kedfem.results.records import XYZ, Channel
 from kedfem.scene import Scene
 
-Rows = Float[np.ndarray, "T c"]
-XYZ = ("x", "y", "z")
 FLAT = 1e-9  # of the fastest turn: what leaves the common plane is rounding
-RATES = (("position", "m"), ("velocity", "m/s"), ("acceleration", "m/s^2"))
+RATES = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 TRANSMISSION = "/transmission_angle"
 TURNS = (("angular_velocity", "rad/s"), ("angular_acceleration", "rad/s^2"))
 
@@ -103,18 +101,12 @@ def _point(
 ) -> list[tuple[Channel, Callable[[RigidMotion], Rows]]]:
     """Position, velocity and acceleration of a point of a body, in the reference position."""
 
-    def position(motion: RigidMotion) -> Rows:
-        return np.asarray(motion.p[:, body] + motion.R[:, body] @ at)
-
-    def velocity(motion: RigidMotion) -> Rows:
-        return np.asarray(motion.v[:, body] + cross(motion.omega[:, body], motion.R[:, body] @ at))
-
-    def acceleration(motion: RigidMotion) -> Rows:
-        return np.asarray(motion.p2[:, body] + motion.R2[:, body] @ at)
+    def rows(name: str) -> Callable[[RigidMotion], Rows]:
+        return lambda motion: getattr(motion, name)(body, at)
 
     return [
-        (Channel(f"{key}/{name}", XYZ, unit, "world", f"{name} {text}"), values)
-        for (name, unit), values in zip(RATES, (position, velocity, acceleration), strict=True)
+        (Channel(f"{key}/{name}", XYZ, unit, "world", f"{name} {text}"), rows(name))
+        for name, unit in RATES.items()
     ]
 
 

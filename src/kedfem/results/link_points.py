@@ -11,7 +11,6 @@ from kedfem.dynamics.model import Model, on_segment
 from kedfem.errors import SceneError
 from kedfem.links.point_rows import point_rows, require_on_axis
 from kedfem.links.record import Link, in_space
-from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import Linkage
 from kedfem.results.recorded import Rows
 
@@ -36,20 +35,15 @@ class LinkPoint:
 
     def position(self, block: Block) -> Rows:
         """R' = R + f, [KED, eqs. (2)(3)] [m]."""
-        motion = block.motion
-        return np.asarray(motion.p[:, self.body] + motion.R[:, self.body] @ self.X + self.elastic(block, "u"))
+        return np.asarray(block.motion.position(self.body, self.X) + self.elastic(block, "u"))
 
     def velocity(self, block: Block) -> Rows:
         """Of both motions together [m/s]."""
-        motion, b = block.motion, self.body
-        return np.asarray(
-            motion.v[:, b] + cross(motion.omega[:, b], motion.R[:, b] @ self.X) + self.elastic(block, "v")
-        )
+        return np.asarray(block.motion.velocity(self.body, self.X) + self.elastic(block, "v"))
 
     def acceleration(self, block: Block) -> Rows:
         """Of both motions together [m/s²]."""
-        motion, b = block.motion, self.body
-        return np.asarray(motion.p2[:, b] + motion.R2[:, b] @ self.X + self.elastic(block, "a"))
+        return np.asarray(block.motion.acceleration(self.body, self.X) + self.elastic(block, "a"))
 
 
 def link_point(model: Model, linked: Linkage, where: str, name: str, at: Drawn) -> LinkPoint:

@@ -14,11 +14,9 @@ from kedfem.motion.linkage import Linkage, linkage
 from kedfem.results.deflections import deflection
 from kedfem.results.link_points import Drawn, LinkPoint, link_point
 from kedfem.results.recorded import Recorded, Rows
-from kedfem.results.records import Channel
+from kedfem.results.records import STRESS, XYZ, Channel
 from kedfem.scene import ForceLoad, Probe, Scene, TorqueLoad
 
-XYZ = ("x", "y", "z")
-STRESS = ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises")
 ELASTIC = {"displacement": "u", "velocity": "v", "acceleration": "a"}
 UNITS = {"velocity": "m/s", "acceleration": "m/s^2", "total_velocity": "m/s", "total_acceleration": "m/s^2"}
 

@@ -6,13 +6,10 @@ from typing import Any, cast, get_args
 
 from kedfem.errors import OutputError
 from kedfem.results import on_demand
+from kedfem.results.additions import read_account, read_fatigue, read_peaks
 from kedfem.results.files import reason
 from kedfem.results.layout import (
-    FATIGUE,
     FORMAT,
-    PEAKS,
-    TIMING,
-    WARNINGS,
     all_rows,
     opened,
     opened_to_read,
@@ -21,17 +18,7 @@ from kedfem.results.layout import (
     sealed,
     series,
 )
-from kedfem.results.records import (
-    ANGLE,
-    TIME,
-    TRAVEL,
-    Channel,
-    Fatigue,
-    FatigueSpot,
-    Peak,
-    Results,
-    Status,
-)
+from kedfem.results.records import ANGLE, TIME, TRAVEL, Channel, Results, Status
 
 WANTED = "a results file of kedfem"
 
@@ -131,6 +118,7 @@ def _results(file: Any, path: Path) -> Results:
     known = {name: _channel(name, rows) for name, rows in named.items()}
     large = 8 * n * sum(len(channel.columns) for channel in known.values()) > on_demand.AT_ONCE
     later = on_demand.OnDemand(path, scene, known, n) if large and facts["status"] != "running" else None
+    warnings, seconds = read_account(file)
     return Results(
         time=all_rows(time, n),
         angle=all_rows(drive, n),
@@ -143,18 +131,12 @@ def _results(file: Any, path: Path) -> Results:
         reason=facts["reason"],
         version=facts["kedfem_version"],
         drive=replace(position, description=read_facts(drive)["description"]),
-        peaks={name: _peak(group) for name, group in file.get(PEAKS, {}).items()},
-        warnings=_warnings(file),
-        seconds=read_facts(file[TIMING]) if TIMING in file else {},
+        peaks=read_peaks(file),
+        warnings=warnings,
+        seconds=seconds,
         links={name: read_facts(group) for name, group in file["notes"].items()},
-        fatigue=_fatigue(file[FATIGUE]) if FATIGUE in file else None,
+        fatigue=read_fatigue(file),
     )
-
-
-def _warnings(file: Any) -> tuple[str, ...]:
-    """What was reported to the user, in its order."""
-    facts = read_facts(file[WARNINGS]) if WARNINGS in file else {}
-    return tuple(facts[key] for key in sorted(facts, key=lambda key: int(key.rpartition(" ")[2])))
 
 
 def _status(found: str) -> Status:
@@ -163,43 +145,6 @@ def _status(found: str) -> Status:
         if found == known:
             return cast(Status, known)
     raise ValueError(f"a status {found!r}")
-
-
-def _peak(group: Any) -> Peak:
-    facts = read_facts(group)
-    x, y, z = map(float, facts["place [m]"])
-    return Peak(
-        float(facts["von_mises [Pa]"]), facts["link"], (x, y, z), int(facts["node"]), int(facts["step"]),
-        float(facts["time [s]"]), float(facts["drive [rad or m]"]), facts["near"],
-        _peak(group["away"]) if "away" in group else None,
-    )  # fmt: skip
-
-
-def _fatigue(group: Any) -> Fatigue:
-    facts = read_facts(group)
-    every = {name: (link, read_facts(link)) for name, link in group.items()}
-    return Fatigue(
-        float(facts["period [s]"]), float(facts["revolutions"]), float(facts["repeats to"]), facts["doubt"],
-        {name: _spots(name, link) for name, (link, _) in every.items()},
-        {name: facts["strength"] for name, (_, facts) in every.items()},
-        {name: int(facts["points left out"]) for name, (_, facts) in every.items()},
-        tuple(facts["links without data"].split("\n")) if facts["links without data"] else (),
-    )  # fmt: skip
-
-
-def _spots(name: str, link: Any) -> tuple[FatigueSpot, ...]:
-    found = []
-    for rank in sorted(link, key=int):
-        facts = read_facts(link[rank])
-        x, y, z = map(float, facts["place [m]"])
-        spot = FatigueSpot(
-            name, (x, y, z), int(facts["node"]), facts["criterion"], float(facts["damage in a period"]),
-            float(facts["utilisation"]), float(facts["amplitude [Pa]"]), float(facts["mean stress [Pa]"]),
-            float(facts["disproportion"]), float(facts["support factor"]), int(facts["cycles in a period"]),
-            facts["near"],
-        )  # fmt: skip
-        found.append(spot)
-    return tuple(found)
 
 
 def _channel(name: str, rows: Any) -> Channel:

@@ -29,6 +29,10 @@ class Channel:
     description: str
 
 
+XYZ = ("x", "y", "z")
+STRESS = ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises")
+"""Columns of vectors and of stresses."""
+
 TIME = Channel("time", (), "s", "", "time")
 ANGLE = Channel("drive_angle", (), "rad", "", "drive angle from the reference position")
 TRAVEL = Channel("drive_travel", (), "m", "", "drive travel from the reference position")

@@ -7,13 +7,13 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.results import Channel, Results
+from kedfem.results.records import XYZ
 
 Curves = Mapping[str, Float[np.ndarray, " n"]]
 Panel = tuple[str, str, Curves]
 """Quantity, unit, curves."""
 
 ENERGY = "energy/"
-VECTOR = ("x", "y", "z")
 RIGID = "rigid_"
 """How the name of a channel begins that has the same of rigid links."""
 
@@ -101,7 +101,7 @@ def _single(channel: Channel, values: Float[np.ndarray, "n c"]) -> list[Panel]:
     """What is drawn of a channel on its own."""
     curves = dict(zip(channel.columns, values.T, strict=True))
     quantity = channel.name.rsplit("/", 1)[-1].replace("_", " ")
-    if channel.columns == VECTOR:
+    if channel.columns == XYZ:
         return [readable(quantity, channel.unit, curves | {"magnitude": np.linalg.norm(values, axis=1)})]
     if "von_mises" in curves:
         equivalent = {"von Mises": curves.pop("von_mises")}
@@ -116,7 +116,7 @@ def _paired(
     quantity = channel.name.rsplit("/", 1)[-1]
     both = dict(zip(channel.columns, values.T, strict=True))
     both |= {f"{name}{STIFF}": y for name, y in zip(rigid.columns, there.T, strict=True)}
-    if channel.columns != VECTOR:
+    if channel.columns != XYZ:
         return [(quantity, channel.unit, both)]
     sizes = {"size": np.linalg.norm(values, axis=1), "size" + STIFF: np.linalg.norm(there, axis=1)}
     return [(quantity, channel.unit, sizes), (quantity, channel.unit, both)]

@@ -17,7 +17,7 @@ from kedfem.results.fatigue.strength import Strength, strength_of, verdict
 from kedfem.results.fatigue.surface import CRITERIA, FINDLEY, LinkFatigue, Look, Period, Stressed
 from kedfem.results.records import Fatigue, FatigueSpot
 from kedfem.results.stresses.envelope import Envelope
-from kedfem.results.stresses.hot_spots import drawn_points, places_apart
+from kedfem.results.stresses.peaks import drawn_points, places_apart
 from kedfem.scene import Fatigue as Asked
 from kedfem.scene import Scene, time_grid, turn_steps, without_vibration
 

@@ -1,5 +1,6 @@
 """Channels of what joints exert on links, from their port forces; block by block."""
 
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -11,9 +12,7 @@ from kedfem.links.record import in_space
 from kedfem.results.forces.constraint_forces import known
 from kedfem.results.forces.hub_forces import constrained_joints, hub_wrench, partner
 from kedfem.results.forces.port_forces import (
-    XYZ,
     Forces,
-    Wrench,
     determinate,
     holder,
     loose,
@@ -21,7 +20,7 @@ from kedfem.results.forces.port_forces import (
     port_wrench,
 )
 from kedfem.results.recorded import Recorded, Rows
-from kedfem.results.records import Channel
+from kedfem.results.records import XYZ, Channel
 from kedfem.scene import GROUND, Scene
 
 
@@ -45,14 +44,9 @@ def joint_channels(scene: Scene, model: Model, name: str, forces: Forces) -> lis
     sign = -1.0 if opposite else 1.0
     label = f"of joint {name} on link {on} from {other}"
     at = np.asarray(scene.joints[name].at)
-    wrench = port_wrench(model, k, name, at, forces)
-    return [
-        Recorded(channel, partial(_part_of, wrench, which, sign))
-        for which, (channel, determined) in enumerate(
-            zip(_force_and_moment(name, label), determinate(model, k, name, at), strict=True)
-        )
-        if determined
-    ]
+    return _channels(
+        name, label, port_wrench(model, k, name, at, forces), determinate(model, k, name, at), sign
+    )
 
 
 def _row_joint(scene: Scene, model: Model, name: str, forces: Forces) -> list[Recorded]:
@@ -61,30 +55,27 @@ def _row_joint(scene: Scene, model: Model, name: str, forces: Forces) -> list[Re
     on, other = (second, first) if first == GROUND else (first, second)
     sign = 1.0 if ordered(scene.joints[name])[0] == on else -1.0
     label = f"of joint {name} on link {on} from {other}"
-    channels = zip(_force_and_moment(name, label), known(model, name), strict=True)
-    return [
-        Recorded(channel, partial(_row_part, forces, name, which, sign))
-        for which, (channel, determined) in enumerate(channels)
-        if determined
-    ]
+    return _channels(name, label, partial(forces.rows.wrench, name), known(model, name), sign)
 
 
-def _row_part(forces: Forces, name: str, which: int, sign: float, block: Block) -> Rows:
-    """Force (0) or moment (1)."""
-    return sign * forces.rows.wrench(name, block)[which]
-
-
-def _part_of(wrench: Wrench, which: int, sign: float, block: Block) -> Rows:
-    """Force (0) or moment (1)."""
-    return sign * wrench(block)[which]
-
-
-def _force_and_moment(joint: str, label: str) -> tuple[Channel, Channel]:
+def _channels(
+    joint: str,
+    label: str,
+    wrench: Callable[[Block], tuple[Rows, ...]],
+    determined: Sequence[bool],
+    sign: float = 1.0,
+) -> list[Recorded]:
+    """Force and moment of a joint, as far as statics determine them."""
     about = f"moment {label}, about the joint's point of the rigid-body motion"
-    return (
+    every = (
         Channel(f"joints/{joint}/force", XYZ, "N", "world", f"force {label}"),
         Channel(f"joints/{joint}/moment", XYZ, "N m", "world", about),
     )
+
+    def rows(which: int) -> Callable[[Block], Rows]:
+        return lambda block: sign * wrench(block)[which]
+
+    return [Recorded(channel, rows(k)) for k, channel in enumerate(every) if determined[k]]
 
 
 def _hub(scene: Scene, model: Model, prescribed: PrescribedBody, forces: Forces) -> list[Recorded]:
@@ -94,8 +85,7 @@ def _hub(scene: Scene, model: Model, prescribed: PrescribedBody, forces: Forces)
     rows = [known(model, name) for name in constrained_joints(scene, model, prescribed)]
     determined = [determined[which] and all(x[which] and x[0] for x in rows) for which in (0, 1)]
     label = f"of joint {prescribed.hub} on link {prescribed.link.name} from {partner(scene, prescribed)}"
-    channels = enumerate(_force_and_moment(prescribed.hub, label))
-    return [Recorded(channel, partial(_part_of, wrench, k, 1.0)) for k, channel in channels if determined[k]]
+    return _channels(prescribed.hub, label, wrench, determined)
 
 
 def _slider_force(scene: Scene, model: Model, slider: Slider, name: str, forces: Forces) -> list[Recorded]:

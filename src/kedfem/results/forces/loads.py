@@ -208,10 +208,9 @@ def joint_rate(joint: Joint, linked: Linkage, motion: RigidMotion) -> Scalars:
     axis = motion.R[:, other] @ joint_axis(joint)
     if joint.kind != "prismatic":
         return np.asarray(((motion.omega[:, one] - motion.omega[:, other]) * axis).sum(axis=1))
-    arm = motion.R[:, one] @ np.asarray(joint.at)
-    at = motion.p[:, one] + arm
-    v = motion.v[:, one] + cross(motion.omega[:, one], arm)
-    v = v - motion.v[:, other] - cross(motion.omega[:, other], at - motion.p[:, other])
+    at = np.asarray(joint.at)
+    there = motion.position(one, at) - motion.p[:, other]
+    v = motion.velocity(one, at) - motion.v[:, other] - cross(motion.omega[:, other], there)
     return np.asarray((v * axis).sum(axis=1))
 
 

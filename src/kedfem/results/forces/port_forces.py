@@ -16,7 +16,6 @@ from kedfem.results.forces.constraint_forces import ConstraintForces
 from kedfem.results.forces.force_elements import Measured
 from kedfem.results.recorded import Rows
 
-XYZ = ("x", "y", "z")
 INDETERMINATE = 1e-6  # [-, m] share of a loose port force of one that a joint would carry
 
 

@@ -17,13 +17,11 @@ from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path, path
 from kedfem.motion.reactions import BlockReactions, Reactions, reactions
 from kedfem.motion.rigid import RigidMotion
-from kedfem.results.recorded import drive_prefix
-from kedfem.results.records import Channel
+from kedfem.results.recorded import Rows, drive_prefix
+from kedfem.results.records import XYZ, Channel
 from kedfem.scene import GROUND, ConstantSpeed, Joint, Scene, turn_steps
 
-Rows = Float[np.ndarray, "T c"]
 Responses = Float[np.ndarray, "T c k"]
-XYZ = ("x", "y", "z")
 OPEN = 1e-9  # of squares: a share that small of what a joint bears is rounding
 ALONG = 1e-6  # sine of an angle between axes that are the same
 FEW = 4  # poses of a linkage of many bodies at which it is seen what statics determine of its joints

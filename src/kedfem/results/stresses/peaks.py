@@ -1,4 +1,4 @@
-"""The highest stresses of a run and of its links, from their envelopes."""
+"""The highest stresses of a run and of its links, from their envelopes: the very highest, and at places apart."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -6,14 +6,17 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.links.recovery import StressRecovery
 from kedfem.results.records import Peak
 from kedfem.results.stresses.envelope import VON_MISES, LinkEnvelope
 
+APART = 0.02  # of the link's size: nearer points belong to the same place, as neighbours in a fine mesh do
+MOST = 10
+
 
 def peaks(
-    found: Sequence[LinkEnvelope], when: Float[np.ndarray, "2 T"],
-    near: Sequence[Sequence[str]] | None = None,
-) -> dict[str, Peak]:  # fmt: skip
+    found: Sequence[LinkEnvelope], when: Float[np.ndarray, "2 T"], near: Sequence[Sequence[str]]
+) -> dict[str, Peak]:
     """The highest von Mises stress of each link that has stress, and away from places where it means little.
 
     Parameters
@@ -22,18 +25,15 @@ def peaks(
     when : time and drive at every step
     near : per link or segment what each point is near to, in words; empty where stress is what it seems
     """
-    out: dict[str, Peak] = {}
-    away: dict[str, Peak] = {}
-    for k, each in enumerate(found):
-        if not each.stress.shape[1] or np.isnan(each.stress).all():
+    out, away = dict[str, Peak](), dict[str, Peak]()
+    for each, words in zip(found, near, strict=True):
+        stress = each.stress[VON_MISES]
+        if np.isnan(each.stress).all():
             continue
-        words = None if near is None else near[k]
-        peak = _peak(each, when, np.ones(each.stress.shape[1], bool), words)
-        out[each.link] = max(out.get(each.link, peak), peak, key=lambda x: x.stress)
-        sound = np.array([not word for word in words]) if words is not None else np.ones(1, bool)
-        if words is not None and sound.any():
-            peak = _peak(each, when, sound, words)
-            away[each.link] = max(away.get(each.link, peak), peak, key=lambda x: x.stress)
+        for of, among in ((out, np.ones(len(stress), bool)), (away, np.array([not word for word in words]))):
+            if among.any():
+                peak = peak_at(each, when, int(np.where(among, stress, -1.0).argmax()), words)
+                of[each.link] = max(of.get(each.link, peak), peak, key=lambda x: x.stress)
     return {name: replace(peak, away=away.get(name)) if peak.near else peak for name, peak in out.items()}
 
 
@@ -46,21 +46,68 @@ def highest(every: Mapping[str, Peak]) -> Peak | None:
     return replace(peak, away=max(sound, key=lambda x: x.stress, default=None)) if peak.near else peak
 
 
-def _peak(
-    each: LinkEnvelope, when: Float[np.ndarray, "2 T"], among: np.ndarray, words: Sequence[str] | None
-) -> Peak:
-    return peak_at(each, when, int(np.where(among, each.stress[VON_MISES], -1.0).argmax()), words)
-
-
-def peak_at(
-    each: LinkEnvelope, when: Float[np.ndarray, "2 T"], node: int, words: Sequence[str] | None
-) -> Peak:
+def peak_at(each: LinkEnvelope, when: Float[np.ndarray, "2 T"], node: int, words: Sequence[str]) -> Peak:
     """The highest von Mises stress of one point of a link, and when it is."""
     step = int(each.step[VON_MISES, node])
-    link = each.recovery.link
-    place = each.recovery.at_points((link.full or link).X)[node]
+    place = drawn_points(each.recovery)[node]
     time, angle = when[:, step] if step < when.shape[1] else (0.0, 0.0)
     return Peak(
         float(each.stress[VON_MISES, node]), each.link, (float(place[0]), float(place[1]), float(place[2])),
-        node, step, float(time), float(angle), words[node] if words is not None else "",
+        node, step, float(time), float(angle), words[node],
     )  # fmt: skip
+
+
+def hot_spots(
+    found: Sequence[LinkEnvelope], when: Float[np.ndarray, "2 T"], near: Sequence[Sequence[str]],
+    most: int = MOST,
+) -> dict[str, list[Peak]]:  # fmt: skip
+    """The highest von Mises stresses of each link that has stress, falling, each at some distance from those before.
+
+    Parameters
+    ----------
+    found : per link or segment
+    when : time and drive at every step
+    near : per link or segment what each point is near to, in words; empty where stress is what it seems
+    most : how many of each link
+
+    Returns
+    -------
+    Link → its peaks; the first is the link's highest.
+    """
+    names = dict.fromkeys(each.link for each in found if not np.isnan(each.stress).all())
+    return {
+        name: _of([(e, w) for e, w in zip(found, near, strict=True) if e.link == name], when, most)
+        for name in names
+    }
+
+
+def _of(
+    parts: list[tuple[LinkEnvelope, Sequence[str]]], when: Float[np.ndarray, "2 T"], most: int
+) -> list[Peak]:
+    """Of one link, in segments or not."""
+    points = np.concatenate([drawn_points(each.recovery) for each, _ in parts])
+    stress = np.concatenate([each.stress[VON_MISES] for each, _ in parts])
+    ends = np.cumsum([each.stress.shape[1] for each, _ in parts])
+    out: list[Peak] = []
+    for k in places_apart(points, stress, most):
+        part = int(np.searchsorted(ends, k, side="right"))
+        each, words = parts[part]
+        node = k - int(ends[part]) + each.stress.shape[1]
+        out.append(peak_at(each, when, node, words))
+    return out
+
+
+def places_apart(points: Float[np.ndarray, "p 3"], values: Float[np.ndarray, " p"], most: int) -> list[int]:
+    """Numbers of the points with the highest values, falling, at some distance from those before; nan do not count."""
+    left, found = np.isfinite(values), list[int]()
+    apart = APART * float(np.linalg.norm(np.ptp(points, axis=0)))
+    while left.any() and len(found) < most:
+        k = int(np.where(left, values, -1.0).argmax())
+        found.append(k)
+        left &= np.linalg.norm(points - points[k], axis=1) > apart
+    return found
+
+
+def drawn_points(recovery: StressRecovery) -> Float[np.ndarray, "p 3"]:
+    """Where the points of a link are, in the reference position [m]."""
+    return np.asarray(recovery.at_points((recovery.link.full or recovery.link).X))
