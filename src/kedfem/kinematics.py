@@ -22,8 +22,8 @@ from kedfem.motion.path import Path
 from kedfem.motion.transmission import LEAST
 from kedfem.output.animation import AnimationWriter, remove_animation
 from kedfem.output.derived import PLOTS, STEM, TABLE
+from kedfem.output.frames import rigid_fields, sights
 from kedfem.output.plots import write_plots
-from kedfem.output.rigid_frames import rigid_fields, sights
 from kedfem.results import Results, ResultsWriter, claimed, read_results, write_csv
 from kedfem.results.additions import add_account
 from kedfem.results.data_sets import drive_heading

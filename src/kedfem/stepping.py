@@ -27,8 +27,7 @@ from kedfem.links.recovery import StressRecovery
 from kedfem.output.animation import AnimationWriter
 from kedfem.output.derived import ONE_FILE, STEM, fields, remove_derived
 from kedfem.output.fields import JointField
-from kedfem.output.frames import link_fields
-from kedfem.output.joint_frames import joint_field
+from kedfem.output.frames import joint_field, link_fields
 from kedfem.output.vtkhdf import AnimationFile
 from kedfem.results import Channel, ResultsWriter
 from kedfem.results.cross_checks import CrossChecks

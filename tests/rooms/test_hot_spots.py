@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.analysis import Run, analyse
-from kedfem.results.stresses import peaks as hot_spots
+from kedfem.results.stresses import peaks
 from kedfem.results.stresses.peaks import APART, MOST
 from kedfem.scene import scene_from
 from tests.reliability.fuzz import short
@@ -24,7 +24,7 @@ def run(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
     raw = short(example(request.param))
     raw["output"] |= {"csv": True}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(hot_spots, "APART", FAR)
+        patch.setattr(peaks, "APART", FAR)
         return analyse(scene_from(raw, tmp_path_factory.mktemp(request.param)))
 
 

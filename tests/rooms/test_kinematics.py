@@ -20,7 +20,7 @@ from kedfem.mesh.cad.sides import boundary_sides
 from kedfem.motion.coordinates import coordinates, counted_on
 from kedfem.motion.linkage import linkage
 from kedfem.motion.transmission import transmissions
-from kedfem.output.rigid_frames import rigid_fields, sights
+from kedfem.output.frames import rigid_fields, sights
 from kedfem.results import read_results
 from kedfem.results.kinematic import kinematics_of, plane_normal
 from kedfem.scene import Scene, drive_angle, scene_from

@@ -22,11 +22,11 @@ from kedfem.output.picture import write_picture
 from kedfem.output.plots import write_plots
 from kedfem.output.plots.abscissa import abscissa
 from kedfem.output.plots.drawing import drawn_over, envelope
+from kedfem.output.plots.files import shown
 from kedfem.output.plots.groups import pictures
-from kedfem.output.plots.overview import shown
-from kedfem.output.units import prefixed
 from kedfem.output.views import sight, view
 from kedfem.output.vtu import write_frame
+from kedfem.output.words import prefixed
 from kedfem.results import Channel, Results
 from tests.moving import ran
 from tests.spatial_joints import P, pushed

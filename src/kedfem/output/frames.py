@@ -1,12 +1,16 @@
-"""Animation frames from elastic states: where nodes are drawn, and the stresses there."""
+"""Animation frames: elastic links with their stresses, rigid links, and what joints and drives exert as vectors."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from kedfem.dynamics.history import LinkMoment, Snapshot
+from kedfem.dynamics.joints.constraint_joints import ordered
 from kedfem.dynamics.model import Model
+from kedfem.links.beams.spatial_recovery import drawn
 from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import (
     StressRecovery,
@@ -16,10 +20,19 @@ from kedfem.links.recovery import (
     turned_stress,
     von_mises,
 )
+from kedfem.mesh.cad.sides import boundary_sides, side_corners
 from kedfem.mesh.elements.shape_functions import HEX8
-from kedfem.output.fields import LinkField
+from kedfem.motion.constraints import cross
+from kedfem.motion.joint_equations import joint_axis
+from kedfem.motion.linkage import Linkage
+from kedfem.motion.rigid import RigidMotion
+from kedfem.output.array_names import DRIVE_FORCE, DRIVE_TORQUE, FORCE, MOMENT
+from kedfem.output.fields import JointField, LinkField, RigidField
+from kedfem.results.recorded import drive_prefix
+from kedfem.scene import Scene
 
 Place = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]
+Rows = Mapping[str, Float[np.ndarray, "T c"]]
 BLOCK = 0.08  # width of the block that stands for a slider without a shape, of the longest link
 
 
@@ -128,3 +141,97 @@ def _blocks(model: Model, snapshot: Snapshot, deformation_scale: float) -> list[
         cell = np.arange(8)[None]
         out.append(LinkField(slider.name, "hexahedron", cell, points, shift, none, none[:, 0], none[:, :2]))
     return out
+
+
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """What is seen of a link.
+
+    body : its number
+    points : (n, 3) in the reference position [m]
+    cells : (e, k) and meshio's name of them
+    """
+
+    name: str
+    body: int
+    points: Float[np.ndarray, "n 3"]
+    cells: Int[np.ndarray, "e k"]
+    cell_type: str
+
+
+def sights(scene: Scene, linkage: Linkage, links: Mapping[str, Link]) -> list[Sight]:
+    """Of all links; those without a record are sticks between their joints."""
+    out = []
+    for name in scene.links:
+        link = links.get(name)
+        points, cells, kind = _sticks(scene, name) if link is None else _seen(link)
+        used, numbers = np.unique(cells, return_inverse=True)
+        body = linkage.bodies.index(name)
+        out.append(Sight(name, body, points[used], numbers.reshape(cells.shape), kind))
+    return out
+
+
+def rigid_fields(every: Sequence[Sight], motion: RigidMotion, k: int) -> list[RigidField]:
+    """All links at one time point, with velocities and accelerations."""
+    out = []
+    for each in every:
+        b = each.body
+        arms = each.points @ motion.R[k, b].T
+        velocity = motion.v[k, b] + cross(np.broadcast_to(motion.omega[k, b], arms.shape), arms)
+        acceleration = motion.p2[k, b] + each.points @ motion.R2[k, b].T
+        points = motion.p[k, b] + arms
+        out.append(RigidField(each.name, each.cell_type, each.cells, points, velocity, acceleration))
+    return out
+
+
+def _seen(link: Link) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e k"], str]:
+    if link.kind == "spatial_beam":
+        values, _, cells = drawn(link)
+        return np.asarray(values @ link.X), boundary_sides(cells), "quad"
+    if link.kind == "beam":
+        return link.X, link.cells, link.cell_type
+    if link.kind == "plane":
+        return link.X, link.cells[:, :4], "quad"
+    sides = boundary_sides(link.cells)
+    corners = side_corners(sides.shape[1])
+    return link.X, sides[:, :corners], "quad" if corners == 4 else "triangle"
+
+
+def _sticks(scene: Scene, name: str) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e k"], str]:
+    """Lines between all joints of a link; a dot where all are at one place."""
+    at = [joint.at for joint in scene.joints.values() if name in joint.links]
+    points = np.array(list(dict.fromkeys(at)))
+    if len(points) == 1:
+        return points, np.zeros((1, 1), int), "vertex"
+    return points, np.array(list(combinations(range(len(points)), 2))), "line"
+
+
+def joint_field(scene: Scene, linked: Linkage, motion: RigidMotion, rows: Rows, k: int) -> JointField | None:
+    """Joints whose forces are recorded, at one time point; None without any.
+
+    Parameters
+    ----------
+    rows : of all channels over the times of the motion
+    k : number of the time point
+    """
+    names = [name for name in scene.joints if f"joints/{name}/force" in rows]
+    if not names:
+        return None
+    points = np.zeros((len(names), 3))
+    force, moment, push, torque = np.zeros((4, len(names), 3))
+    for n, name in enumerate(names):
+        joint = scene.joints[name]
+        i, j = (linked.bodies.index(link) for link in ordered(joint))
+        points[n] = motion.p[k, i] + motion.R[k, i] @ joint.at
+        force[n] = rows[f"joints/{name}/force"][k]
+        moment[n] = rows.get(f"joints/{name}/moment", np.zeros((k + 1, 3)))[k]
+        if name in scene.driven_joints:
+            axis, prefix = motion.R[k, j] @ joint_axis(joint), drive_prefix(scene, name)
+            for what, out in (("force", push), ("torque", torque)):
+                if (found := rows.get(f"{prefix}{what}")) is not None:
+                    out[n] = found[k] * axis
+    vectors = {FORCE: force, MOMENT: moment}
+    slides = {scene.joints[name].kind == "prismatic" for name in scene.driven_joints}
+    vectors |= {DRIVE_FORCE: push} if True in slides else {}
+    vectors |= {DRIVE_TORQUE: torque} if False in slides else {}
+    return JointField(tuple(names), points, vectors)

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from kedfem.output.plots.drawing import figure_saved
-from kedfem.output.units import prefixed
+from kedfem.output.words import prefixed
 from kedfem.results import Results
 from kedfem.results.data_sets import drive_heading
 from kedfem.results.forces.loads import DriveLoad, JointLoad, facing

@@ -33,18 +33,16 @@ def render(npz: str, png: str, count: str) -> None:
     npz, png : what to draw, and where to
     count : how many meshes there are
     """
-    given = np.load(npz)
-    if int(count) == 1:
-        draw_one(given, png)
-    else:
-        draw_several(given, png, int(count))
-
-
-def draw_one(given: Any, png: str) -> None:
-    """A mesh and the histogram of its quality."""
     import matplotlib as mpl
 
     mpl.use("Agg")
+    given = np.load(npz)
+    figure, dpi = (draw_one(given), 110) if int(count) == 1 else (draw_several(given, int(count)), 80)
+    figure.savefig(png, dpi=dpi, format="png")
+
+
+def draw_one(given: Any) -> Any:
+    """A mesh and the histogram of its quality."""
     import matplotlib.pyplot as plt
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(13, 6.6), width_ratios=[2, 1], layout="constrained")
@@ -58,14 +56,12 @@ def draw_one(given: Any, png: str) -> None:
     right.set_title(f"worst {quality.min():.2f}, median {np.median(quality):.2f}", fontsize=11)
     right.set(xlim=(0, 1), xlabel="scaled Jacobian", ylabel="elements")
     figure.suptitle("\n".join(textwrap.wrap(str(given["title"]), 120)), fontsize=12)
-    figure.savefig(png, dpi=110, format="png")
+    return figure
 
 
-def draw_several(given: Any, png: str, count: int) -> None:
+def draw_several(given: Any, count: int) -> Any:
     """Meshes in rows and columns."""
     import matplotlib as mpl
-
-    mpl.use("Agg")
     import matplotlib.pyplot as plt
 
     columns = min(3, count)
@@ -82,7 +78,7 @@ def draw_several(given: Any, png: str, count: int) -> None:
     bar = mpl.cm.ScalarMappable(mpl.colors.Normalize(0, 1), colours())
     figure.colorbar(bar, ax=axes, location="bottom", shrink=0.4, aspect=40, label="scaled Jacobian")
     figure.suptitle(str(given["title"]), fontsize=14)
-    figure.savefig(png, dpi=80, format="png")
+    return figure
 
 
 def image(given: Any, i: int) -> Any:

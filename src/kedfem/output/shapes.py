@@ -17,6 +17,8 @@ AMPLITUDE = 1e-3  # m: largest displacement of a shape, for which its stresses a
 DRAWN = 0.08  # of the size of what is drawn: largest displacement in pictures and animations
 MOSTLY = 0.9  # of the squares of all displacements: a shape along one axis
 STEM, GROWING = "shape", "growing"
+Fields = Callable[[float, float], Sequence[LinkField]]
+Gravity = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,12 +32,10 @@ class Shape:
 
     frequency: float
     title: str
-    fields: Callable[[float, float], Sequence[LinkField]]
+    fields: Fields
 
 
-def write_shapes(
-    folder: Path, shapes: Sequence[Shape], gravity: tuple[float, float, float] = (0, 0, 0)
-) -> None:
+def write_shapes(folder: Path, shapes: Sequence[Shape], gravity: Gravity = (0, 0, 0)) -> None:
     """``shape_1.pvd`` with its frames over a cycle, ``shape_1.png``, ...; those of an earlier command go.
 
     Shapes are written with a largest displacement of AMPLITUDE, stresses with it.
@@ -49,26 +49,17 @@ def write_shapes(
         remove_animation(folder, old.stem)
         old.with_suffix(".png").unlink(missing_ok=True)
     for k, shape in enumerate(shapes, 1):
-        name = f"{STEM}_{k}"
-        still = shape.fields(1.0, 0.0)
-        points = np.concatenate([each.points for each in still])
-        largest = max(float(np.linalg.norm(each.displacement, axis=1).max(initial=0.0)) for each in still)
-        factor = AMPLITUDE / largest if largest else 1.0
-        exaggeration = float(f"{DRAWN * float(np.linalg.norm(np.ptp(points, axis=0))) / AMPLITUDE:.2g}")
-        writer = AnimationWriter(folder, name)
-        for j in range(FRAMES):
-            swing = float(np.cos(2 * np.pi * j / FRAMES))
-            writer.add(j / FRAMES / shape.frequency, shape.fields(factor * swing, exaggeration))
-        title = f"{shape.title}{_along(still)}; stress for a displacement of {1e3 * AMPLITUDE:g} mm"
-        _write_picture(
-            shape.fields(factor, exaggeration), folder / f"{name}.png", title, exaggeration, gravity
-        )
+        cycle = np.arange(FRAMES) / FRAMES
+        frames = [
+            (t / shape.frequency, _times(shape.fields, swing))
+            for t, swing in zip(cycle.tolist(), np.cos(2 * np.pi * cycle).tolist(), strict=True)
+        ]
+        _write(folder, f"{STEM}_{k}", shape.title, frames, 0, gravity)
 
 
 def write_growing(
-    folder: Path, title: str, frames: Sequence[tuple[float, Callable[[float, float], Sequence[LinkField]]]],
-    gravity: tuple[float, float, float] = (0, 0, 0),
-) -> None:  # fmt: skip
+    folder: Path, title: str, frames: Sequence[tuple[float, Fields]], gravity: Gravity = (0, 0, 0)
+) -> None:
     """A vibration about a moving mechanism: ``growing.pvd``, and ``growing.png`` of the frame where it is largest.
 
     Parameters
@@ -80,33 +71,35 @@ def write_growing(
     OutputError
         A file cannot be written, or VTK cannot draw here.
     """
-    largest = [
-        max(float(np.linalg.norm(each.displacement, axis=1).max(initial=0.0)) for each in fields(1.0, 0.0))
-        for _, fields in frames
-    ]
-    k = int(np.argmax(largest))
+    k = int(np.argmax([_largest(fields(1.0, 0.0)) for _, fields in frames]))
+    _write(folder, GROWING, title, frames, k, gravity)
+
+
+def _times(fields: Fields, factor: float) -> Fields:
+    return lambda size, exaggeration: fields(factor * size, exaggeration)
+
+
+def _largest(fields: Sequence[LinkField]) -> float:
+    """Of all displacements [m]."""
+    return max(float(np.linalg.norm(each.displacement, axis=1).max(initial=0.0)) for each in fields)
+
+
+def _write(
+    folder: Path, name: str, title: str, frames: Sequence[tuple[float, Fields]], k: int, gravity: Gravity
+) -> None:
+    """An animation of frames of one amplitude, and a picture of the k-th, where displacements are largest."""
     still = frames[k][1](1.0, 0.0)
     size = float(np.linalg.norm(np.ptp(np.concatenate([each.points for each in still]), axis=0)))
     exaggeration = float(f"{DRAWN * size / AMPLITUDE:.2g}")
-    writer = AnimationWriter(folder, GROWING)
+    factor = AMPLITUDE / (_largest(still) or 1.0)
+    writer = AnimationWriter(folder, name)
     for t, fields in frames:
-        writer.add(t, fields(AMPLITUDE / (largest[k] or 1.0), exaggeration))
+        writer.add(t, fields(factor, exaggeration))
     whole = f"{title}{_along(still)}; stress for a displacement of {1e3 * AMPLITUDE:g} mm"
-    shown = frames[k][1](AMPLITUDE / (largest[k] or 1.0), exaggeration)
-    _write_picture(shown, folder / f"{GROWING}.png", whole, exaggeration, gravity)
-
-
-def _write_picture(
-    fields: Sequence[LinkField],
-    png: Path,
-    title: str,
-    exaggeration: float,
-    gravity: tuple[float, float, float],
-) -> None:
     with TemporaryDirectory() as apart:
         frame = Path(apart) / "frame.vtu"
-        write_frame(frame, 0.0, fields)
-        write_picture(frame, png, title, exaggeration, gravity)
+        write_frame(frame, 0.0, frames[k][1](factor, exaggeration))
+        write_picture(frame, folder / f"{name}.png", whole, exaggeration, gravity)
 
 
 def _along(fields: Sequence[LinkField]) -> str:

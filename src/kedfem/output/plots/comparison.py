@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from kedfem.output.plots.drawing import envelope, figure_saved
 from kedfem.output.plots.files import remove_plots
-from kedfem.output.units import prefixed
+from kedfem.output.words import prefixed
 from kedfem.results import ready_folder
 from kedfem.results.differences import Difference, Over, magnitude
 from kedfem.results.records import Channel

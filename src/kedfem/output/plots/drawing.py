@@ -14,7 +14,7 @@ from jaxtyping import Float, Int
 
 from kedfem.output.plots.abscissa import Abscissa, abscissa, draw_abscissa
 from kedfem.output.plots.groups import STIFF, Curves, Panel, Picture, pictures
-from kedfem.output.units import prefixed
+from kedfem.output.words import prefixed
 from kedfem.results import Channel, Results, replacing
 
 T = TypeVar("T")

@@ -1,10 +1,40 @@
-"""The plots of a run as PNG files."""
+"""The plots of a run as PNG files: all curves on one page, every picture on its own."""
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
-from kedfem.output.plots.drawing import MARK, draw_panels, drawn_over, figure_saved, heading, worth_drawing
-from kedfem.output.plots.overview import write_overview
+import numpy as np
+
+from kedfem.output.plots.abscissa import Abscissa, draw_abscissa
+from kedfem.output.plots.drawing import (
+    MARK,
+    draw_curves,
+    draw_panels,
+    drawn_over,
+    figure_saved,
+    heading,
+    worth_drawing,
+)
+from kedfem.output.plots.groups import Panel, Picture
 from kedfem.results import Results, ready_folder
+
+COLUMNS, MOST = 2, 14
+"""Of panels on a page, and how many it takes."""
+
+WIDTH, HEIGHT = 7.2, 2.0
+"""Inches of a panel with all that belongs to it."""
+
+LEFT, RIGHT, ABOVE, BETWEEN, BELOW = 0.85, 1.45, 0.85, 0.42, 0.5
+"""Inches beside the axes of a panel (labels, legend), above the first, between two, below the last."""
+
+CURVES = 9
+"""In one panel: so many its legend has room for."""
+
+FONT = 7.5
+"""Points of the small print."""
+
+FORCE = "/force"
 
 
 def write_plots(results: Results, folder: Path, each: bool = False) -> list[Path]:
@@ -37,7 +67,7 @@ def write_plots(results: Results, folder: Path, each: bool = False) -> list[Path
     if not len(results.time):
         return []
     along, drawn = drawn_over(results), list(worth_drawing(results))
-    written = write_overview(results, along, drawn, folder)
+    written = _overview(results, along, drawn, folder)
     for picture in drawn if each else []:
         path = Path(folder) / f"{picture.name}.png"
         with figure_saved(path, heading(picture.title, picture.channel, results)) as figure:
@@ -58,3 +88,80 @@ def remove_plots(folder: Path) -> None:
             continue
         if own:
             path.unlink()
+
+
+def _overview(results: Results, along: Abscissa, pictures: Sequence[Picture], folder: Path) -> list[Path]:
+    """Pages ``overview.png``, ``overview-2.png``, …: the first panels of these pictures, in two columns on one abscissa.
+
+    Forces of single joints are left out where one picture has all of them.
+    """
+    from matplotlib import rc_context
+
+    together = any(each.name == "joint_forces" for each in pictures)
+    chosen = [x for x in pictures if not (together and x.channel and _of_joint(x.channel.name))]
+    most = MOST - (along.degrees is not None)
+    pages = [chosen[k : k + most] for k in range(0, len(chosen), most)]
+    written = []
+    for number, page in enumerate(pages, 1):
+        path = Path(folder) / ("overview.png" if number == 1 else f"overview-{number}.png")
+        of = f", page {number} of {len(pages)}" if len(pages) > 1 else ""
+        rows = -(-(len(page) + (along.degrees is not None)) // COLUMNS)
+        size = (COLUMNS * WIDTH, ABOVE + rows * HEIGHT + BELOW)
+        with (
+            rc_context({"font.size": FONT}),
+            figure_saved(path, heading(f"All curves{of}", None, results), size, None) as figure,
+        ):
+            _draw_page(figure, along, page, rows)
+        written.append(path)
+    return written
+
+
+def _of_joint(name: str) -> bool:
+    return name.startswith("joints/") and name.endswith(FORCE)
+
+
+def _draw_page(figure: Any, along: Abscissa, page: Sequence[Picture], rows: int) -> None:
+    panels: list[tuple[str, Panel | None]] = [shown(each) for each in page]
+    if along.degrees is not None:
+        panels.append(("drive", None))
+    width, height = figure.get_size_inches()
+    first: Any = None
+    for column in range(COLUMNS):
+        axes = []
+        for row, (title, panel) in enumerate(panels[column * rows : (column + 1) * rows]):
+            top = height - ABOVE - row * HEIGHT
+            place = (column * WIDTH + LEFT, top - HEIGHT + BETWEEN, WIDTH - LEFT - RIGHT, HEIGHT - BETWEEN)
+            ax = figure.add_axes(
+                [place[0] / width, place[1] / height, place[2] / width, place[3] / height], sharex=first
+            )
+            first = first or ax
+            _draw_panel(ax, along, title, panel)
+            axes.append(ax)
+        if axes:
+            draw_abscissa(axes[0], axes[-1], along)
+        for ax in axes[:-1]:
+            ax.tick_params(labelbottom=False)
+
+
+def _draw_panel(ax: Any, along: Abscissa, title: str, panel: Panel | None) -> None:
+    if panel is None:
+        ax.plot(along.values, along.degrees, color="0.35", linewidth=1.2)
+        ax.set_ylabel("drive (°)")
+        ax.grid(alpha=0.3)
+    else:
+        quantity, unit, curves = panel
+        draw_curves(ax, along, curves, quantity, unit)
+    ax.set_title(title, loc="left", fontsize=FONT + 1, pad=3)
+
+
+def shown(picture: Picture) -> tuple[str, Panel]:
+    """What a panel is of, as short as results name it, and its curves: no more than have a place in its legend."""
+    title = picture.channel.name if picture.channel else picture.title
+    quantity, unit, curves = picture.panels[0]
+    if len(curves) <= CURVES:
+        return title, (quantity, unit, curves)
+    largest = sorted(
+        curves, key=lambda name: -np.abs(curves[name]).max(where=np.isfinite(curves[name]), initial=0.0)
+    )
+    kept = {name: y for name, y in curves.items() if name in largest[:CURVES]}
+    return f"{title}: the largest {CURVES} of {len(curves)}", (quantity, unit, kept)
