@@ -22,7 +22,7 @@ from kedfem.mesh.layered.layers import layer_directions
 from kedfem.mesh.layered.sections import plan_axes
 from kedfem.mesh.session import gmsh_copy
 from kedfem.mesh.swept.path import path
-from kedfem.mesh.swept.revolution import revolution
+from kedfem.mesh.swept.revolved import revolution
 from kedfem.scene import Cad
 
 LONGEST = 60  # [s] for a part

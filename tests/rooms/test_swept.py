@@ -22,7 +22,7 @@ from kedfem.mesh.elements.quality import scaled_jacobian
 from kedfem.mesh.filling import filled_mesh
 from kedfem.mesh.session import gmsh_model
 from kedfem.mesh.swept.core import disc
-from kedfem.mesh.swept.path_sweep import path_mesh
+from kedfem.mesh.swept.path import path_mesh
 from kedfem.mesh.swept.revolved import revolved_mesh
 from kedfem.mesh.unknowns import nearest
 from kedfem.scene import Material, link_from

@@ -23,13 +23,11 @@ INDEPENDENT = 1e-14  # of the largest eigenvalue: below, a function repeats othe
 def reduced(link: Link, Q: Float[np.ndarray, "n s"]) -> Link:
     """The changed copy of a link that moves in the span of modes Q only.
 
+    With dense matrices; `full` and `Q` lead back to the link that it came from.
+
     Parameters
     ----------
     Q : (n, s) independent modes whose span holds 1 and the position [-]; they are made mass-orthonormal
-
-    Returns
-    -------
-    With dense matrices; `full` and `Q` lead back to the link that it came from
     """
     Q = mass_orthonormal(link, Q)
     mass = tuple(_gram(m, Q) for m in link.mass)

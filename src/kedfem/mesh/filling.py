@@ -52,24 +52,12 @@ SETTINGS = (Setting(6, 1), Setting(6, 10), Setting(5, 1), Setting(1, 4))
 
 
 def filled_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
-    """tet10 mesh of a solid of any form, its faces known.
+    """A solid of any form, a `Method` of tet10: its faces known, proven to have det J > 0 everywhere.
 
-    Parameters
-    ----------
-    gmsh : with the solid in its model, which stays there
-    sizing : how fine. Without a size: `across` elements in twice the mean wall 2 V/A, which is the thickness of a
-        plate, the radius of a rod, the wall of a tube, but at least some thousand elements; 12 to a circle, as far as
-        that is not finer than a quarter of the size. A part of more than 45,000 unknowns is then meshed coarser, step
-        by step. Hollow faces are finer where `hollow` asks for it, in any case.
-
-    Returns
-    -------
-    Proven to have det J > 0 everywhere
-
-    Raises
-    ------
-    OtherMethodError
-        gmsh makes no tetrahedra of the solid; what it complaints.
+    Without a size there are `across` elements in twice the mean wall 2 V/A, which is the thickness of a plate, the
+    radius of a rod, the wall of a tube, but at least some thousand; 12 to a circle, as far as that is not finer than
+    a quarter of the size. A part of more than 45,000 unknowns is then meshed coarser, step by step. Hollow faces are
+    finer where `hollow` asks for it, in any case.
     """
     complaints: list[str] = []
     found: SolidMesh | None = None
@@ -119,13 +107,7 @@ def _with_hollows(
 
 
 def subdivided_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
-    """hex27 mesh of a solid of any form by gmsh's own subdivision, four in each tetrahedron; its quality is poor.
-
-    Raises
-    ------
-    OtherMethodError
-        gmsh makes none, with what it complaints.
-    """
+    """A solid of any form, a `Method`: gmsh's own subdivision, four hexahedra in each tetrahedron, of poor quality."""
     complaints: list[str] = []
     size = 2 * tetrahedron_size(solid, sizing)
     numbers = _options(size, min(2 * _TURN, np.pi / 3), size / _FINEST, SETTINGS[0])

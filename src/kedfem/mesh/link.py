@@ -43,6 +43,8 @@ _EYE_GAP = 1.1  # least distance of the bores, in diameters of eyes that are wid
 def link_mesh(name: str, link: LinkScene, folder: Path, kept_whole: KeptWhole = NOTHING) -> SolidMesh:
     """The hexahedral mesh of a solid link, in the scene's reference position.
 
+    Elements of the nodes that `link.element` says, of at least `link.min_quality`.
+
     Parameters
     ----------
     name : the link's name, for messages
@@ -50,10 +52,6 @@ def link_mesh(name: str, link: LinkScene, folder: Path, kept_whole: KeptWhole = 
     folder : the folder that the names of part and mesh files refer to
     kept_whole : where joints, loads and probes sit, and the faces that they name: a part from CAD keeps its blends
         there, and `mesh.fillet_angle` is not of bores around them
-
-    Returns
-    -------
-    Elements of the nodes that `link.element` says, of at least `link.min_quality`
 
     Raises
     ------

@@ -23,7 +23,7 @@ from kedfem.mesh.isolated import LONGEST, PART, apart
 from kedfem.mesh.layered.layers import layered_mesh
 from kedfem.mesh.swept.blends import points_in_file, swept_without_blends
 from kedfem.mesh.swept.blocks import block_mesh
-from kedfem.mesh.swept.path_sweep import path_mesh
+from kedfem.mesh.swept.path import path_mesh
 from kedfem.mesh.swept.revolved import revolved_mesh
 from kedfem.mesh.unknowns import nearest
 from kedfem.scene import Cad, LinkScene, MeshFile, Meshing
@@ -35,6 +35,8 @@ FLAT = 0.005  # of tetrahedra for which the CAD model is healed: edges of some m
 MOST = 150_000  # unknowns of hexahedra above which tetrahedra are taken, where nobody asked for a size
 _POWER = 2.5  # by which of the size unknowns fall, between that of plates and that of lumps
 
+#: A method of meshing: gmsh with a solid alone in its model, which is left as it is; how fine. Elements are of 27 nodes,
+#: those of the surface on the solid's own faces; an OtherMethodError says what is in the way, or that they are poor.
 Method = Callable[[ModuleType, Solid, Sizing], SolidMesh]
 #: Places of the scene [m] and names of faces at which a part keeps its blends.
 KeptWhole = tuple[tuple[tuple[float, float, float], ...], tuple[str, ...]]

@@ -17,16 +17,12 @@ UNITS = tuple((10.0**k, prefix) for k, prefix in reversed(PREFIXES.items()) if a
 
 
 def prefixed(peak: float, unit: str) -> tuple[float, str]:
-    """The prefix that brings a peak to 1 … 1000.
+    """Divisor, and the unit with the prefix, that bring a peak to 1 … 1000.
 
     Parameters
     ----------
     peak : largest absolute value, in `unit`
     unit : the prefix goes before its first letter
-
-    Returns
-    -------
-    divisor, unit with prefix
 
     Examples
     --------

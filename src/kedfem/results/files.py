@@ -32,14 +32,6 @@ def beside(folder: Path, what: str) -> Path:
 def ready_folder(folder: Path) -> Path:
     """A folder that exists and takes files; made where it is missing, with its parents.
 
-    Parameters
-    ----------
-    folder : where results are to go
-
-    Returns
-    -------
-    The same path.
-
     Raises
     ------
     OutputError

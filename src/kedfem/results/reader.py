@@ -26,13 +26,11 @@ WANTED = "a results file of kedfem"
 def read_results(path: Path) -> Results:
     """The time series of a run, finished or not.
 
+    All channels; `status` shows whether the run came to its end.
+
     Parameters
     ----------
     path : a file that a run wrote
-
-    Returns
-    -------
-    All channels; `status` shows whether the run came to its end.
 
     Raises
     ------

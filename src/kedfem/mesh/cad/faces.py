@@ -21,16 +21,14 @@ _NEARLY = (
 def with_faces(gmsh: ModuleType, solid: Solid, mesh: SolidMesh) -> SolidMesh:
     """The mesh with the faces of its solid, if it has none yet: each side on the outside belongs to exactly one.
 
+    With `faces`; parts of one cylinder or sphere that meet in a seam are one face. A face that no side is on, since it
+    is narrower than an element, is left out.
+
     Parameters
     ----------
     gmsh : with the solid in its model
     solid : its faces, in metres
     mesh : in the solid's own frame; nodes on the outside may be off the faces by what curvature makes of a size
-
-    Returns
-    -------
-    With `faces`; parts of one cylinder or sphere that meet in a seam are one face. A face that no side is on, since it
-        is narrower than an element, is left out.
     """
     if mesh.faces:
         return mesh

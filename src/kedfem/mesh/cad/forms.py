@@ -43,15 +43,13 @@ class Sample:
 def fitted_form(sample: Sample, accuracy: float, skew: float) -> Form:
     """The simplest form that a sample lies on.
 
+    The centre of a plane and of "other" is the mean of the points: whoever knows the centroid replaces it.
+
     Parameters
     ----------
     sample : at least three points
     accuracy : how far points may be off, in sizes of the sample [-]
     skew : how far normals may be off: a sine [-]
-
-    Returns
-    -------
-    The centre of a plane and of "other" is the mean of the points: whoever knows the centroid replaces it
     """
     other = Form("other", sample.points.mean(axis=0), _NAN)
     for fit in (_plane, _cylinder, _sphere):

@@ -105,16 +105,14 @@ def extruded(
 ) -> SolidMesh:
     """hex27 mesh of a plate: plane quad9 cells swept over -thickness/2 ≤ z ≤ thickness/2.
 
+    Nodes level by level from below.
+
     Parameters
     ----------
     points : (n, 2) plane nodes, all used [m]
     quads : (e, 9) cells in VTK order, counter-clockwise
     thickness : extent along z [m]
     layers : elements through the thickness
-
-    Returns
-    -------
-    e · layers elements; nodes level by level from below
     """
     heights = np.linspace(-thickness / 2, thickness / 2, 2 * layers + 1)
     return stacked(points, heights, np.tile(quads, (layers, 1)), np.repeat(np.arange(layers), len(quads)))

@@ -22,15 +22,13 @@ def named_faces(
 ) -> tuple[Face, ...]:
     """The sets of sides and nodes in a mesh file that lie on the outside of its elements, in the order of their names.
 
+    Sets without a side on the outside are left out; of a set of nodes the sides all of whose corners are in it.
+
     Parameters
     ----------
     raw : as it was read
     points : (n, 3) all nodes, the file's first [m]
     cells : (e, 8), (e, 20), (e, 27), (e, 4) or (e, 10) the elements; their corners have the file's numbers
-
-    Returns
-    -------
-    Sets without a side on the outside are left out; of a set of nodes the sides all of whose corners are in it
     """
     sides = boundary_sides(cells)
     corners = np.sort(sides[:, : side_corners(sides.shape[1])], axis=1)

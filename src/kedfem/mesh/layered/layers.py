@@ -1,5 +1,6 @@
 """Solids that consist of layers along one direction: the direction found, the section meshed, the mesh swept."""
 
+from dataclasses import replace
 from types import ModuleType
 
 import numpy as np
@@ -8,19 +9,16 @@ from jaxtyping import Float, Int
 from kedfem.errors import KedfemError
 from kedfem.mesh.cad.solids import CadFace, OtherMethodError, Sizing, Solid
 from kedfem.mesh.cad.words import direction_in_words, face_in_words
-from kedfem.mesh.elements.hexahedra import SolidMesh
+from kedfem.mesh.elements.hexahedra import SolidMesh, stacked, without_spare_nodes
 from kedfem.mesh.elements.quality import mesh_quality
 from kedfem.mesh.layered.cusps import without_cusps
 from kedfem.mesh.layered.division import plan_size
 from kedfem.mesh.layered.partition import Plan
 from kedfem.mesh.layered.plan_mesh import PlanMesh, plan_mesh
 from kedfem.mesh.layered.sections import plan_of_slabs
-from kedfem.mesh.layered.shares import GOOD, SHARES
-from kedfem.mesh.layered.sweep import swept
-from kedfem.mesh.places import in_mm
+from kedfem.mesh.layered.shares import GOOD, SHARES, not_too_bad
 
 _GAIN = 0.03  # of scaled Jacobian that more elements must bring
-_LEAST = 0.1  # scaled Jacobian below which another method may do better
 _ALONG = 1e-5  # sine of the angle that a face may be off the direction, or off being at right angles to it
 _FAR_TOO_MANY = (
     1_500_000  # unknowns, ten times those above which tetrahedra are taken: not worth meshing to see it
@@ -34,27 +32,12 @@ class TooManyError(OtherMethodError):
 
 
 def layered_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
-    """Hexahedra of a solid whose faces lie along one direction or across it: its section swept through its slabs.
+    """A solid whose faces lie along one direction or across it, a `Method`: its section swept through its slabs.
 
     The plane faces across the direction cut the solid into slabs of constant section. All sections together
     divide the plane into regions; these are meshed as mapped blocks where they can be, else with the best of
-    gmsh's quadrilaterals, and each is swept through the slabs in which it has material.
-
-    Parameters
-    ----------
-    gmsh : with the solid in its current model, which is left as it is
-    solid : the only solid in that model
-    sizing : how fine; the rule is that of :func:`~kedfem.mesh.layered.division.plan_size`
-
-    Returns
-    -------
-    27-node elements, corners and middles of sides on the solid's own faces; without faces that have names
-
-    Raises
-    ------
-    OtherMethodError
-        No such direction, with the face that is in the way; or the section gives no mesh of quality, with the
-        place.
+    gmsh's quadrilaterals, and each is swept through the slabs in which it has material. The elements are as large as
+    :func:`~kedfem.mesh.layered.division.plan_size` says.
     """
     best: tuple[float, SolidMesh] | None = None
     refusals: list[str] = []
@@ -189,18 +172,33 @@ def _way_in_words(direction: Float[np.ndarray, "3"], flat: PlanMesh, plan: Plan,
     through = f"{layers} layer{'s' * (layers > 1)}"
     if slabs > 1:
         through = f"{slabs} slabs, {through}"
-    kind = "quadrilaterals" if flat.settings else "mapped blocks"
-    comma = "," if not flat.settings else ""
-    by = f"; gmsh algorithm {', '.join(str(one) for one in flat.settings)}" if flat.settings else ""
-    return f"{kind}{comma} swept along {direction_in_words(direction)} through {through}{by}"
+    return f"{flat.kind} swept along {direction_in_words(direction)} through {through}{flat.made_by}"
 
 
-def not_too_bad(solid: Solid, mesh: SolidMesh) -> SolidMesh:
-    """The mesh itself, unless another method may do better."""
-    quality = mesh_quality(mesh)
-    if quality.least < _LEAST:
-        raise OtherMethodError(
-            f"{solid.name}: a sweep must give a scaled Jacobian of at least {_LEAST:g}, got {quality.least:.3g} "
-            f"at {in_mm(quality.centre)}"
-        )
-    return mesh
+def swept(flat: PlanMesh, plan: Plan, layers: Int[np.ndarray, " slabs"]) -> SolidMesh:
+    """hex27 mesh: each cell of the plan through the slabs in which its region has material.
+
+    A node's number is made of its place in the plan and of its level, so slabs share the nodes between them.
+
+    Parameters
+    ----------
+    flat : quadrilaterals that share their nodes across regions
+    plan : where the slabs are, and the way back into the solid's place
+    layers : (slabs,) elements through each slab
+    """
+    points, quads = flat.points, flat.cells
+    heights = _levels(plan.heights, layers)
+    slab = np.repeat(np.arange(len(layers)), layers)
+    material = np.stack([region.material for region in plan.regions])[flat.regions]
+    cell, layer = np.nonzero(material[:, slab])
+    mesh = stacked(points, heights, quads[cell], layer)
+    return without_spare_nodes(replace(mesh, points=plan.extent * (mesh.points @ plan.axes)))
+
+
+def _levels(bounds: Float[np.ndarray, " h"], layers: Int[np.ndarray, " s"]) -> Float[np.ndarray, " v"]:
+    """Heights of all nodes: two to a layer, those at the bounds once."""
+    parts = [
+        np.linspace(low, high, 2 * count + 1)[1:]
+        for low, high, count in zip(bounds[:-1], bounds[1:], layers, strict=True)
+    ]
+    return np.concatenate([bounds[:1], *parts])

@@ -34,6 +34,16 @@ class PlanMesh:
     regions: Int[np.ndarray, " e"]
     settings: tuple[int, ...]
 
+    @property
+    def kind(self) -> str:
+        """What is swept, in words."""
+        return "quadrilaterals" if self.settings else "mapped blocks,"
+
+    @property
+    def made_by(self) -> str:
+        """gmsh's algorithms in words, after a semicolon; empty without any."""
+        return f"; gmsh algorithm {', '.join(map(str, self.settings))}" if self.settings else ""
+
 
 def plan_mesh(where: str, plan: Plan, size: float, sizing: Sizing) -> PlanMesh:
     """The mesh of a plan, the nodes and middles of sides on its curves exactly there.

@@ -57,13 +57,8 @@ def plan_of_slabs(gmsh: ModuleType, solid: Solid, direction: Float[np.ndarray, "
     axes, extent = plan_axes(direction), solid.extent
     heights = _slab_heights(gmsh, solid, axes[2])
     with gmsh_copy(gmsh, 1 / extent) as other:
-        try:
+        with reporting(solid, f"its layers must have sections across {axes[2].round(6).tolist()}"):
             plan = _cut_plan(other, axes, extent, heights)
-        except Exception as error:  # gmsh raises nothing more special
-            raise OtherMethodError(
-                f"{solid.name}: its layers must have sections across {axes[2].round(6).tolist()}, "
-                f"got none from OpenCASCADE: {error}"
-            ) from error
         check_volume(solid, plan)
         yield plan
 

@@ -1,13 +1,19 @@
-"""Smaller sizes than asked for, where elements are poor."""
+"""The size of a swept mesh: what is asked for, smaller where elements are poor, larger where they are plenty."""
 
 from collections.abc import Callable
 from typing import TypeVar
 
 from kedfem.errors import KedfemError
-from kedfem.mesh.cad.solids import OtherMethodError
+from kedfem.mesh.cad.solids import OtherMethodError, Sizing, Solid
+from kedfem.mesh.elements.hexahedra import SolidMesh
+from kedfem.mesh.elements.quality import mesh_quality
+from kedfem.mesh.places import in_mm
 
 GOOD = 0.3  # scaled Jacobian from which no smaller size is tried
 SHARES = (1.0, 0.75, 0.5)  # of the size that is asked for
+_LEAST = 0.1  # scaled Jacobian below which another method may do better
+_PLENTY = 45_000  # unknowns above which a part whose size nobody gave is meshed coarser, as with tetrahedra
+_COARSER = (1.4, 2.0)  # times the size
 
 T = TypeVar("T")
 
@@ -39,3 +45,45 @@ def first_good(mesh_of: Callable[[float], T], quality: Callable[[T], float]) -> 
     if not found:
         raise OtherMethodError(refusals[0])
     return max(found, key=lambda each: each[0])
+
+
+def sized(solid: Solid, sizing: Sizing, mesh_of: Callable[[float], SolidMesh]) -> SolidMesh:
+    """The first good mesh of some shares of the size, or a cheaper one; else the best.
+
+    Parameters
+    ----------
+    solid, sizing : what is meshed, and how fine
+    mesh_of : the mesh with elements of a share of that size
+
+    Raises
+    ------
+    OtherMethodError
+        None is made, or all are poor.
+    """
+    least, mesh = first_good(mesh_of, lambda each: mesh_quality(each).least)
+    return _cheaper(sizing, mesh, mesh_of) if least >= GOOD else not_too_bad(solid, mesh)
+
+
+def _cheaper(sizing: Sizing, mesh: SolidMesh, mesh_of: Callable[[float], SolidMesh]) -> SolidMesh:
+    """The mesh, or a good one of larger elements where nobody asked for so many."""
+    for share in _COARSER if sizing.size is None and sizing.across <= 2 else ():
+        if 3 * len(mesh.points) <= _PLENTY:
+            break
+        try:
+            other = mesh_of(share)
+        except KedfemError:
+            continue
+        if len(other.points) < len(mesh.points) and mesh_quality(other).least >= GOOD:
+            mesh = other
+    return mesh
+
+
+def not_too_bad(solid: Solid, mesh: SolidMesh, what: str = "a sweep") -> SolidMesh:
+    """The mesh itself, unless another method may do better."""
+    quality = mesh_quality(mesh)
+    if quality.least < _LEAST:
+        raise OtherMethodError(
+            f"{solid.name}: {what} must give a scaled Jacobian of at least {_LEAST:g}, got {quality.least:.3g} "
+            f"at {in_mm(quality.centre)}"
+        )
+    return mesh

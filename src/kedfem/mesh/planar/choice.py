@@ -48,13 +48,11 @@ class Candidate:
 def best_quads(meshes: Iterable[PlaneQuads | None]) -> Candidate | None:
     """The mesh to take of those made under each of the settings, which may be None; None if all are.
 
+    The first that is good; if none is, of those within a tenth of the best the one with the fewest elements.
+
     Parameters
     ----------
     meshes : in the order of SETTINGS; no more are asked for than needed
-
-    Returns
-    -------
-    The first that is good; if none is, of those within a tenth of the best the one with the fewest elements
     """
     found: list[Candidate] = []
     for tried, mesh in enumerate(meshes):

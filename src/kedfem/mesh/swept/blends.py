@@ -23,23 +23,11 @@ _SAME = 1e-4  # of the part's size: how far apart the same face of two models ma
 
 
 def swept_without_blends(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
-    """Layers of a solid without the blends that are in their way.
+    """Layers of a solid without blends that are in their way, a `Method`; the mesh has faces, and says what is left out.
 
-    Parameters
-    ----------
-    gmsh : with the solid in its model, which is left as it is: the blends go in a copy
-    sizing : with `defeature_size`: rounds of less radius, chamfers of shorter sides go, whether convex or concave.
-        Without it those that are convex and smaller than SHARE of the part: material is added at edges, no sharp inner
-        corner made. Blends near the points in `kept` stay.
-
-    Returns
-    -------
-    With faces; `method` lists what is left out and by what that changes the volume
-
-    Raises
-    ------
-    OtherMethodError
-        Something else is in the way of layers too, or OpenCASCADE cannot leave the blends out.
+    With `defeature_size` rounds of less radius and chamfers of shorter sides go, whether convex or concave. Without it
+    those that are convex and smaller than SHARE of the part: material is added at edges, no sharp inner corner made.
+    Blends near the points in `kept` stay.
     """
     small = SHARE * solid.extent if sizing.ignore is None else sizing.ignore
     for faces in slanted_faces(gmsh, solid):

@@ -9,11 +9,11 @@ from kedfem.mesh.cad.solids import OtherMethodError, Sizing, Solid
 from kedfem.mesh.elements.hexahedra import SolidMesh, without_spare_nodes
 from kedfem.mesh.elements.quality import mesh_quality
 from kedfem.mesh.elements.shape_functions import HEX27, node_numbers
+from kedfem.mesh.layered.shares import not_too_bad
 from kedfem.mesh.session import gmsh_copy, gmsh_options, numbered_nodes
 
 _HEX27 = 12  # gmsh's number of the 27-node hexahedron
 _MOST = 2000  # cubes of the size in the volume: a finer default is not taken
-_LEAST = 0.1  # scaled Jacobian below which another method may do better
 _TURN = np.radians(20)  # of a curved edge per element: parabolas lose 5e-5 of a circle's area
 #: As gmsh has them by itself; who meshed before may have left others.
 _OPTIONS: dict[str, float] = {
@@ -25,23 +25,10 @@ _OPTIONS: dict[str, float] = {
 
 
 def block_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
-    """Hexahedra of a solid that is a block: six faces with four edges each, of any form.
+    """A solid that is a block, a `Method`: six faces with four edges each, of any form.
 
-    Parameters
-    ----------
-    gmsh : with the solid in its current model, which is left as it is
-    solid : the only solid in that model
-    sizing : how fine: its size, or so many elements across the mean length of the shortest of the three sets of
-        opposite edges, but not more than some thousands
-
-    Returns
-    -------
-    27-node elements, the nodes of the surface on the solid's own faces
-
-    Raises
-    ------
-    OtherMethodError
-        The solid is no block, or gives elements of poor quality.
+    Without a size there are so many elements across the mean length of the shortest of the three sets of opposite
+    edges, but not more than some thousands.
     """
     with gmsh_copy(gmsh, 1 / solid.extent) as copy:
         groups = _edge_groups(copy, solid)
@@ -57,13 +44,7 @@ def block_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
         mesh.cells,
         method="one mapped block of {} × {} × {} elements".format(*sorted(counts, reverse=True)),
     )
-    quality = mesh_quality(mesh)
-    if quality.least < _LEAST:
-        raise OtherMethodError(
-            f"{solid.name}: one block must give a scaled Jacobian of at least {_LEAST:g}, "
-            f"got {quality.least:.3g} at " + "({:.6g}, {:.6g}, {:.6g})".format(*quality.centre)
-        )
-    return mesh
+    return not_too_bad(solid, mesh, "one block")
 
 
 def _edge_groups(gmsh: ModuleType, solid: Solid) -> list[set[int]]:

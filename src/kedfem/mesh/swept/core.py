@@ -62,6 +62,8 @@ def core_mesh(
 ) -> SolidMesh:
     """hex27 mesh of what a region about the axis becomes when it turns: x along the axis, y and z across it.
 
+    By the solid's extent. Each layer is a disc that changes from the form of one end to that of the other.
+
     Parameters
     ----------
     plan : the meridian section, within its context
@@ -69,10 +71,6 @@ def core_mesh(
     radius : the core's, by the solid's extent [-]
     stations : (s,) places along x of the nodes on the core's surface, two to an element and one more, rising [-]
     around : elements around it
-
-    Returns
-    -------
-    By the solid's extent. Each layer is a disc that changes from the form of one end to that of the other.
     """
     points, quads = disc(around)
     low, high = _ends(plan, region)

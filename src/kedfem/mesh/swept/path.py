@@ -1,6 +1,7 @@
-"""The path of a bent bar, pipe or ring segment: lines and arcs from one plane end to the other, section carried."""
+"""Bent bars, pipes, ring segments: their path of lines and arcs from end to end, one section meshed and carried along."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from types import ModuleType
 
@@ -8,11 +9,19 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.mesh.cad.looks import OFF, Looks, common_axes, looks
-from kedfem.mesh.cad.solids import CadFace, OtherMethodError, Solid
-from kedfem.mesh.layered.sections import plan_axes
+from kedfem.mesh.cad.solids import CadFace, OtherMethodError, Sizing, Solid
+from kedfem.mesh.elements.hexahedra import SolidMesh, stacked, without_spare_nodes
+from kedfem.mesh.layered.division import plan_size
+from kedfem.mesh.layered.partition import Plan
+from kedfem.mesh.layered.plan_mesh import plan_mesh
+from kedfem.mesh.layered.sections import check_volume, laid_over, plan_axes, reporting, section
+from kedfem.mesh.layered.shares import sized
+from kedfem.mesh.session import gmsh_copy
 
 _SAMPLES = np.linspace(0, 1, 9)  # along each edge
 _ENDS = 12  # plane faces that are tried as the first end
+_TURN = np.radians(18)  # of an arc per element where no size is asked for, as about an axis
+_LONG = 2.5  # an element's length along the path by its size in the section, where no size is asked for
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +73,81 @@ class Leg:
             return np.asarray(off @ ahead)
         angle = np.arctan2((off + self.arm) @ ahead, (off + self.arm) @ self.arm / self.radius) % (2 * np.pi)
         return np.asarray(np.where(angle > 2 * np.pi - 10 * OFF, 0.0, angle))
+
+
+def path_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
+    """A solid that one section sweeps from end to end, a `Method`: bent bars and pipes, elbows, ring segments.
+
+    The section is meshed as the plan of a layer is; along the path elements are as long, or two and a half times as
+    long where no size is asked for, and 20 to a turn.
+    """
+    legs = path(gmsh, solid)
+    if not any(leg.radius for leg in legs):
+        raise OtherMethodError(f"{solid.name}: a path of lines alone is one of layers")
+
+    def mesh_of(share: float) -> SolidMesh:
+        with _section_plan(gmsh, solid, legs) as plan:
+            size = share * plan_size(plan, sizing)
+            flat = plan_mesh(solid.name, plan, size, sizing)
+        counts = [_count(leg, size * solid.extent, sizing) for leg in legs]
+        frames = [legs[0].start, *(leg.at(k / (2 * n)) for leg, n in zip(legs, counts, strict=True)
+                                   for k in range(1, 2 * n + 1))]  # fmt: skip
+        layers, each = sum(counts), len(flat.cells)
+        mesh = stacked(flat.points, np.arange(2 * layers + 1.0), np.tile(flat.cells, (layers, 1)),
+                       np.repeat(np.arange(layers), each))  # fmt: skip
+        points = np.concatenate(
+            [frame.origin + solid.extent * flat.points @ frame.axes[:2] for frame in frames]
+        )
+        words = f"{flat.kind} carried along {_in_words(legs)} in {layers} elements"
+        return without_spare_nodes(SolidMesh(points, mesh.cells, method=words))
+
+    return sized(solid, sizing, mesh_of)
+
+
+def _in_words(legs: tuple[Leg, ...]) -> str:
+    """How many lines and arcs there are."""
+    arcs = sum(leg.radius > 0 for leg in legs)
+    counts = {"arc": arcs, "line": len(legs) - arcs}
+    return " and ".join(f"{n} {kind}{'s' * (n > 1)}" for kind, n in counts.items() if n)
+
+
+def _count(leg: Leg, size: float, sizing: Sizing) -> int:
+    """Elements along a leg."""
+    longest, turn = (
+        (size, sizing.turn) if sizing.size is not None else (_LONG * size, min(_TURN, sizing.turn))
+    )
+    return max(
+        1, sizing.layers, round(leg.length / longest), int(np.ceil(leg.travel / turn * (leg.radius > 0)))
+    )
+
+
+@contextmanager
+def _section_plan(gmsh: ModuleType, solid: Solid, legs: tuple[Leg, ...]) -> Iterator[Plan]:
+    """The plan of the section half way along the first leg, about its centre, as thick as the path is long."""
+    frame = legs[0].at(0.5)
+    with gmsh_copy(gmsh, 1 / solid.extent) as copy:
+        with reporting(solid, "it must have a section across its path"):
+            faces = _section(copy, solid, frame)
+            length = sum(leg.length for leg in legs) / solid.extent
+            plan = laid_over(copy, [faces], frame.axes, solid.extent, np.array([0.0, length]))
+        check_volume(solid, plan)
+        yield replace(plan, origin=frame.origin)
+
+
+def _section(gmsh: ModuleType, solid: Solid, frame: Frame) -> list[tuple[int, int]]:
+    """The face around a frame in which its plane cuts the solid, moved to the origin."""
+    occ = gmsh.model.occ
+    [(_, tag)] = gmsh.model.getEntities(3)
+    origin = frame.origin / solid.extent
+    corners = np.array([(-1.5, -1.5, 0), (1.5, -1.5, 0), (1.5, 1.5, 0), (-1.5, 1.5, 0)]) @ frame.axes
+    faces = section(gmsh, int(tag), origin + corners)
+    occ.translate(faces, *(-origin))
+
+    def away(face: tuple[int, int]) -> float:
+        return float(np.linalg.norm(occ.getCenterOfMass(2, face[1])))
+
+    nearest = min(faces, key=away)
+    return [nearest]
 
 
 def path(gmsh: ModuleType, solid: Solid) -> tuple[Leg, ...]:

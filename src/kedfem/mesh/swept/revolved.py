@@ -1,4 +1,4 @@
-"""Solids of revolution: the meridian section meshed with quadrilaterals and swept about the axis."""
+"""Solids of revolution: the axis about which all faces turn, the meridian section meshed and swept about it."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,22 +8,34 @@ from types import ModuleType
 import numpy as np
 from jaxtyping import Bool, Float
 
+from kedfem.mesh.cad.looks import Axis, Looks, common_axes, looks
 from kedfem.mesh.cad.solids import OtherMethodError, Sizing, Solid
-from kedfem.mesh.cad.words import direction_in_words
+from kedfem.mesh.cad.words import direction_in_words, face_in_words
 from kedfem.mesh.elements.hexahedra import SolidMesh, stacked, without_spare_nodes
 from kedfem.mesh.layered.cusps import without_spare_curves
 from kedfem.mesh.layered.division import plan_size
 from kedfem.mesh.layered.partition import Plan, Region
 from kedfem.mesh.layered.plan_mesh import PlanMesh, plan_mesh
 from kedfem.mesh.layered.sections import check_volume, laid_over, reporting, section
+from kedfem.mesh.layered.shares import sized
 from kedfem.mesh.session import gmsh_copy
 from kedfem.mesh.swept.core import NEAR, core_mesh, core_radius
-from kedfem.mesh.swept.revolution import Revolution, revolution
-from kedfem.mesh.swept.shares import sized
 
 _ASIDE = 0.7  # [rad] from the start of a full turn to the section: seams of faces are at right angles, mostly
 _FEWEST, _MOST = 12, 20  # elements around a full turn where no size is asked for
 _RING = 20  # that a ring needs: with 16 its first frequency is 0.6 % too high, with 20 0.2 %
+
+
+@dataclass(frozen=True, slots=True)
+class Revolution:
+    """The axis of a solid of revolution.
+
+    origin : (3,) a point of the axis [m]
+    axes : (3, 3) rows: the axis, and two directions square to it, right-handed [-]
+    """
+
+    origin: Float[np.ndarray, "3"]
+    axes: Float[np.ndarray, "3 3"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,30 +50,47 @@ class _Meridian:
 
 
 def revolved_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
-    """Hexahedra of a solid of revolution: pulleys, bushings, shafts, balls.
+    """A solid of revolution, a `Method`: pulleys, bushings, shafts, balls.
 
-    Its meridian section is meshed as the plan of a layer is, and swept about the axis through all angles. What is
-    next to the axis is a core of its own, discs of quadrilaterals carried along it, as sections swept about a line in
-    them would have no angle there.
+    Its meridian section is meshed as the plan of a layer is, and swept about the axis through all angles: in elements of
+    the same size at the mean radius, or 12 to 24 to a turn where none is asked for. What is next to the axis is a core of
+    its own, discs of quadrilaterals carried along it, as sections swept about a line in them would have no angle there.
+    """
+    turn = revolution(gmsh, solid)
+    return sized(solid, sizing, lambda share: _mesh_about(gmsh, solid, turn, sizing, share))
 
-    Parameters
-    ----------
-    gmsh : with the solid in its current model, which is left as it is
-    solid : the only solid in that model
-    sizing : how fine: the rule of layers, for the section; around the axis the same size at the mean radius, or 12 to
-        24 elements to a turn where none is asked for
 
-    Returns
-    -------
-    27-node elements, the nodes of the surface on the solid's own faces
+def revolution(gmsh: ModuleType, solid: Solid) -> Revolution:
+    """The axis of a solid whose faces all turn about it.
 
     Raises
     ------
     OtherMethodError
-        The solid is not of revolution, with the face that is in the way, or gives elements of poor quality.
+        There is none; the largest face that is in the way.
     """
-    turn = revolution(gmsh, solid)
-    return sized(solid, sizing, lambda share: _mesh_about(gmsh, solid, turn, sizing, share))
+    every = list(looks(gmsh, solid).values())
+    obstacles: list[tuple[float, str]] = []
+    for axis in common_axes(solid, every):
+        others = [look.face for look in every if not look.turns_about(axis)]
+        if not others:
+            return _framed(gmsh, solid, every, axis)
+        words = face_in_words(max(others, key=lambda face: face.area))
+        reason = f"the {words} does not turn about {direction_in_words(axis[1])}"
+        obstacles.append((sum(face.area for face in others), reason))
+    reason = min(obstacles)[1] if obstacles else "no face turns about an axis"
+    raise OtherMethodError(f"{solid.name}: no solid of revolution, as {reason}")
+
+
+def _framed(gmsh: ModuleType, solid: Solid, every: list[Looks], axis: Axis) -> Revolution:
+    """The record: the axis runs to where more of the volume is, so that it turns with the part."""
+    point, along = axis
+    reach = np.concatenate([look.places for look in every]) @ along
+    centre = (np.asarray(gmsh.model.occ.getCenterOfMass(3, solid.tag)) - solid.middle) / solid.extent
+    along = along if centre @ along >= (reach.max() + reach.min()) / 2 - 1e-6 else -along
+    first = np.eye(3)[int(np.argmin(abs(along)))]
+    radial = first - (first @ along) * along
+    radial /= np.linalg.norm(radial)
+    return Revolution(solid.middle + solid.extent * point, np.stack([along, radial, np.cross(along, radial)]))
 
 
 def _mesh_about(gmsh: ModuleType, solid: Solid, turn: Revolution, sizing: Sizing, share: float) -> SolidMesh:
@@ -72,12 +101,11 @@ def _mesh_about(gmsh: ModuleType, solid: Solid, turn: Revolution, sizing: Sizing
         mesh = _turned(flat, around)
         for region in meridian.inside:
             mesh = _with_core(mesh, flat, meridian, region, around)
-    words = "mapped blocks," if not flat.settings else "quadrilaterals"
-    by = f"; gmsh algorithm {', '.join(str(one) for one in flat.settings)}" if flat.settings else ""
+    about = direction_in_words(turn.axes[0])
     return SolidMesh(
         turn.origin + solid.extent * mesh.points @ turn.axes,
         mesh.cells,
-        method=f"{words} swept about {direction_in_words(turn.axes[0])} in {around} elements{by}",
+        method=f"{flat.kind} swept about {about} in {around} elements{flat.made_by}",
     )
 
 

@@ -95,8 +95,6 @@ def envelope(values: Float[np.ndarray, " n"], bins: int = BINS) -> Int[np.ndarra
 def draw_panels(figure: Any, along: Abscissa, panels: list[Panel]) -> Any:
     """The panels one above the other on one abscissa; below, where needed, the drive angle over time.
 
-    Returns
-    -------
     The axes of matplotlib, from top to bottom.
     """
     strip = 0 if along.degrees is None else 1

@@ -40,6 +40,7 @@ FORCE = "/force"
 def write_plots(results: Results, folder: Path, each: bool = False) -> list[Path]:
     """Plot all channels on one page, ``overview.png``, several pages where there are many.
 
+    Returns the files written.
     What the table of a run calls ≈ 0 is left out.
     What there is of rigid links too is drawn with it, dashed. Angles are in degrees.
 
@@ -53,10 +54,6 @@ def write_plots(results: Results, folder: Path, each: bool = False) -> list[Path
     folder : made where missing
     each : whether every channel is also plotted on its own: ``probes-rocker_mid-stress.png``, …, ``energies.png``, and
         ``joint_forces.png`` for all joints
-
-    Returns
-    -------
-    The files written.
 
     Raises
     ------

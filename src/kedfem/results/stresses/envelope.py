@@ -250,9 +250,7 @@ def leading(
 ) -> tuple[Float[np.ndarray, "T r"], Float[np.ndarray, "p 6 r"], int]:
     """Modes turned to their principal directions over some steps, by what they make of stress, the largest first.
 
-    Returns
-    -------
-    coordinates and stresses of the same steps, and how many modes make all stress but `HEAD` of it
+    Coordinates and stresses of the same steps, and how many modes make all stress but `HEAD` of it.
     """
     seen = parts[:: 1 + len(parts) // SAMPLE]
     gain = np.sqrt((seen**2).sum(axis=(0, 1)))

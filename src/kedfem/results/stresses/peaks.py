@@ -63,16 +63,14 @@ def hot_spots(
 ) -> dict[str, list[Peak]]:  # fmt: skip
     """The highest von Mises stresses of each link that has stress, falling, each at some distance from those before.
 
+    Link → its peaks; the first is the link's highest.
+
     Parameters
     ----------
     found : per link or segment
     when : time and drive at every step
     near : per link or segment what each point is near to, in words; empty where stress is what it seems
     most : how many of each link
-
-    Returns
-    -------
-    Link → its peaks; the first is the link's highest.
     """
     names = dict.fromkeys(each.link for each in found if not np.isnan(each.stress).all())
     return {
