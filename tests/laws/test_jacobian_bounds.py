@@ -9,8 +9,7 @@ from numpy.testing import assert_allclose
 from kedfem.errors import MeshError
 from kedfem.mesh import SolidMesh, checked_mesh, mesh_quality
 from kedfem.mesh.elements.bounds import determinant_bounds, valid_everywhere
-from kedfem.mesh.elements.shape_functions import HEX8, HEX20, HEX27, NODES, QUAD9, shape_gradients
-from kedfem.mesh.elements.simplices import TET10
+from kedfem.mesh.elements.shape_functions import HEX8, HEX20, HEX27, NODES, QUAD9, TET10, shape_gradients
 from tests.laws.strategies import LAW, hexahedra, seeds
 
 KINDS = st.sampled_from([HEX8, TET10, HEX20, HEX27, QUAD9])

@@ -16,8 +16,8 @@ from kedfem.mesh.cad.solids import CadFace, OtherMethodError, Sizing, Solid
 from kedfem.mesh.cad.words import direction_in_words
 from kedfem.mesh.elements.shape_functions import HEX27, shape_functions, shape_gradients
 from kedfem.mesh.layered.cusps import Cusp, cusps
-from kedfem.mesh.layered.fills import Rim
 from kedfem.mesh.layered.layers import layer_directions, layered_mesh
+from kedfem.mesh.layered.mapping import Rim
 from kedfem.mesh.layered.partition import Plan
 from kedfem.mesh.layered.plan_mesh import plan_mesh
 from kedfem.mesh.layered.polygons import crosses_itself, polygon_quads

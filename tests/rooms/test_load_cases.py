@@ -18,8 +18,7 @@ from kedfem.analysis import analyse
 from kedfem.errors import OutputError, SceneError
 from kedfem.links.recovery import von_mises
 from kedfem.load_cases import LoadCases, load_cases
-from kedfem.mesh.elements.shape_functions import HEX8, HEX20, shape_gradients
-from kedfem.mesh.elements.simplices import TET10
+from kedfem.mesh.elements.shape_functions import HEX8, HEX20, TET10, shape_gradients
 from kedfem.results import read_results
 from kedfem.scene import scene_from
 from kedfem.tables.loads import case_tables

@@ -19,7 +19,7 @@ from kedfem.mesh.elements.hexahedra import linear, quadratic, serendipity
 from kedfem.mesh.elements.quality import scaled_jacobian
 from kedfem.mesh.elements.shape_functions import HEX8, HEX20, HEX27, QUAD9, shape_functions, shape_gradients
 from kedfem.mesh.planar.areas import PlaneQuads, pillowed, quadratic_quads
-from kedfem.mesh.planar.relaxation import distortion, relaxed
+from kedfem.mesh.planar.choice import distortion, relaxed
 from kedfem.mesh.session import gmsh_model
 from kedfem.scene import LinkScene, part_geometry
 from tests.laws.strategies import examples

@@ -14,8 +14,7 @@ from geometry.make import empty_model
 from geometry.step_files import write_step
 
 from kedfem.cli import USER_ERROR
-from kedfem.mesh.cad.assembly import AssemblySolid, RoundFace, assembly_solids
-from kedfem.mesh.cad.meetings import meetings
+from kedfem.mesh.cad.assembly import AssemblySolid, RoundFace, assembly_solids, meetings
 from kedfem.scene import GROUND, read_scene
 from kedfem.tables.draft import link_names, scene_text
 

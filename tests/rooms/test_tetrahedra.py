@@ -22,9 +22,8 @@ from kedfem.mesh.cad.sides import owned_sides
 from kedfem.mesh.cad.solids import OtherMethodError, Sizing
 from kedfem.mesh.elements.bounds import valid_everywhere
 from kedfem.mesh.elements.hexahedra import extruded, quadratic, rectangle_quads
-from kedfem.mesh.elements.simplices import TET10
-from kedfem.mesh.elements.tetrahedra import FORMS, straightened, tetrahedral
-from kedfem.mesh.elements.unfolding import unfolded
+from kedfem.mesh.elements.shape_functions import TET10
+from kedfem.mesh.elements.tetrahedra import FORMS, straightened, tetrahedral, unfolded
 from kedfem.mesh.files.read import mesh_from_file
 from kedfem.mesh.session import gmsh_model
 from kedfem.mesh.swept.blends import swept_without_blends

@@ -28,9 +28,8 @@ from kedfem.results.recorded import Recorded, drive_prefix
 from kedfem.scene import Motor, Scene, path_parameter, time_grid
 
 FORMAT = "kedfem state space 1"
-SMALL = (
-    1e-5  # of a link's size: displacements from whose differences outputs are; exact where these are linear
-)
+# of a link's size: displacements from whose differences outputs are; exact where these are linear
+SMALL = 1e-5
 NOTHING = 1e-12  # of the largest of its unit: an input so small does nothing
 
 Matrix = Float[np.ndarray, "_ _"]

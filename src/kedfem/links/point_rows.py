@@ -17,7 +17,7 @@ from kedfem.links.beams.spatial_recovery import (
 )
 from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_gradients, stress_of_gradient
-from kedfem.mesh.elements.simplices import barycentric
+from kedfem.mesh.elements.shape_functions import barycentric
 
 POINT_TOLERANCE = 1e-3  # how far outside its link a probe may lie, of the link's size
 ON_AXIS = 1e-6  # of a planar beam's size: farther beside its axis its state shows no displacement

@@ -16,7 +16,7 @@ from kedfem.links.beams.beam import line_pairs
 from kedfem.links.beams.beam_recovery import beam_fibre
 from kedfem.links.beams.spatial_recovery import drawn
 from kedfem.links.record import Link
-from kedfem.mesh.elements.simplices import barycentric
+from kedfem.mesh.elements.shape_functions import barycentric
 
 COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))  # xx, yy, zz, xy, yz, zx
 

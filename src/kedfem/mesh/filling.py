@@ -13,10 +13,8 @@ from kedfem.mesh.cad.solids import USUAL, CadFace, OtherMethodError, Sizing, Sol
 from kedfem.mesh.cad.words import with_faces_in_words
 from kedfem.mesh.elements.hexahedra import SolidMesh
 from kedfem.mesh.elements.quality import scaled_jacobian
-from kedfem.mesh.elements.shape_functions import node_numbers
-from kedfem.mesh.elements.simplices import TET10
-from kedfem.mesh.elements.tetrahedra import edge_middles
-from kedfem.mesh.elements.unfolding import unfolded
+from kedfem.mesh.elements.shape_functions import TET10, node_numbers
+from kedfem.mesh.elements.tetrahedra import edge_middles, unfolded
 from kedfem.mesh.hollows import finer_hollows, free_hollows
 from kedfem.mesh.session import gmsh_options, numbered_nodes
 from kedfem.mesh.swept.blocks import gmsh_hexahedra
@@ -24,9 +22,8 @@ from kedfem.mesh.swept.blocks import gmsh_hexahedra
 _HEX27 = 12  # gmsh's number of the 27-node hexahedron
 _TET10 = 11  # gmsh's number of the 10-node tetrahedron
 _REGULAR = 1 / (6 * np.sqrt(2))  # volume of a regular tetrahedron over the cube of its edge
-_COUNT = (
-    1200  # regular tetrahedra that fill a lump without small features, with two elements asked for across
-)
+# regular tetrahedra that fill a lump without small features, with two elements asked for across
+_COUNT = 1200
 _TURN = np.pi / 6  # that an element's edge turns along a curved face, where the least size lets it
 _FINEST = 4.0  # the size over the least size that curvature asks for
 _PLENTY = 45_000  # unknowns above which a part whose size nobody gave is meshed coarser

@@ -14,11 +14,10 @@ from kedfem.mesh.elements.hexahedra import SolidMesh, frame_along, placed, recta
 from kedfem.mesh.elements.quality import checked_mesh
 from kedfem.mesh.elements.tetrahedra import FORMS
 from kedfem.mesh.files.read import mesh_from_file
-from kedfem.mesh.layered.outlines import outline_quads
+from kedfem.mesh.layered.outlines import outline_quads, profile_outline, turned_outline
 from kedfem.mesh.memory_forecast import NODES_EACH, check_count, check_room, check_size, size_key
 from kedfem.mesh.methods import NOTHING, KeptWhole, cad_mesh, file_axes, sizing
 from kedfem.mesh.planar.flat import Plate, QuadMesh, middle_mesh, swept_mesh
-from kedfem.mesh.planar.outline import profile_outline, turned_outline
 from kedfem.mesh.planar.plate import PlateSizes, plate_quads
 from kedfem.mesh.swept.blends import points_in_file
 from kedfem.mesh.unknowns import nearest

@@ -1,7 +1,7 @@
 """The order of methods to mesh a part from CAD: hexahedra where it can be swept, else tetrahedra, and why."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
@@ -12,13 +12,13 @@ from jaxtyping import Float
 
 from kedfem.errors import MeshError
 from kedfem.mesh.cad.faces import with_faces
-from kedfem.mesh.cad.model import CadKeys, solid_model
+from kedfem.mesh.cad.model import CadKeys, leave_only, solid_model
+from kedfem.mesh.cad.solid_faces import cad_faces
 from kedfem.mesh.cad.solids import USUAL, OtherMethodError, Sizing, Solid
 from kedfem.mesh.elements.hexahedra import SolidMesh, frame_along, placed, quadratic
 from kedfem.mesh.elements.quality import mesh_quality
 from kedfem.mesh.elements.tetrahedra import FORMS
 from kedfem.mesh.filling import filled_mesh, subdivided_mesh, tetrahedron_size
-from kedfem.mesh.healing import healed
 from kedfem.mesh.isolated import LONGEST, PART, apart
 from kedfem.mesh.layered.layers import layered_mesh
 from kedfem.mesh.swept.blends import points_in_file, swept_without_blends
@@ -49,6 +49,8 @@ METHODS: dict[str | None, tuple[Method, ...]] = {
     "hexahedra": (*SWEPT, swept_without_blends, subdivided_mesh),
     "tet10": (filled_mesh,),
 }
+_HEALED = (0.03, 0.1, 0.3)  # sizes of edges that are healed away in turn, of the elements' size
+_SAME = 1e-3  # of the volume that this may change
 
 
 def cad_mesh(
@@ -215,3 +217,31 @@ def best_mesh(
 def _best_of(found: list[tuple[float, SolidMesh]]) -> float:
     """The best quality so far."""
     return max((least for least, _ in found), default=-1.0)
+
+
+def healed(gmsh: ModuleType, where: str, solid: Solid, size: float) -> Iterator[tuple[Solid, str]]:
+    """The solid of gmsh's model with edges and faces below growing sizes healed away, and what was done in words.
+
+    Parameters
+    ----------
+    size : of the elements [m]; what is healed is much smaller
+
+    Yields
+    ------
+    Solid and words, as long as the volume stays what it was.
+    """
+    tag = solid.tag
+    for share in _HEALED:
+        made = gmsh.model.occ.healShapes([(3, tag)], tolerance=share * size)
+        gmsh.model.occ.synchronize()
+        solids = {tag for dim, tag in made if dim == 3}
+        if len(solids) != 1:
+            return
+        (tag,) = solids
+        leave_only(gmsh, tag)
+        volume = float(gmsh.model.occ.getMass(3, tag))
+        if abs(volume / solid.volume - 1) > _SAME:
+            return
+        faces = cad_faces(gmsh, where, tag, solid.extent, {})
+        words = f"edges and faces below {1e3 * share * size:.2g} mm healed away"
+        yield replace(solid, tag=tag, volume=volume, faces=faces), words

@@ -11,8 +11,7 @@ from jaxtyping import Float, Int
 from kedfem.links.surfaces.part_candidates import Offer
 from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.mesh.cad.sides import owned_sides
-from kedfem.mesh.elements.shape_functions import QUAD9, shape_functions
-from kedfem.mesh.elements.simplices import TRI6
+from kedfem.mesh.elements.shape_functions import QUAD9, TRI6, shape_functions
 from kedfem.mesh.elements.tetrahedra import FORMS
 from kedfem.output.picture import draw_apart
 

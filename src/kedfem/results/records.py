@@ -44,7 +44,7 @@ class Peak:
 
     stress : [Pa]
     link : its name
-    place : (3,) as drawn, in the reference position [m]
+    place : (3,) in the reference position [m]
     node : number of the point in the link, in the order of ``envelope.vtu``
     step, time, angle : number of the step, of the finest of several levels in time, [s], and the drive's angle [rad] or
         travel [m]

@@ -13,8 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.errors import SceneError
-from kedfem.mesh.cad.assembly import AssemblySolid, assembly_solids
-from kedfem.mesh.cad.meetings import Meeting, meetings
+from kedfem.mesh.cad.assembly import AssemblySolid, Meeting, assembly_solids, meetings
 from kedfem.scene import GROUND, ChosenFace, link_from, scene_from
 
 FRAME = re.compile(r"ground|frame|base|housing|casing|chassis|bed|gestell|gehäuse|rahmen", re.IGNORECASE)

@@ -23,9 +23,8 @@ from kedfem.links.surfaces.surface import (
 
 FITS = 0.01  # of the radius: how far corners may be off the cylinder or ball that they are taken for
 FEWEST = 3  # facets that a cylinder or a ball is found from
-ROUNDED = (
-    0.02  # least mean square of normals along any direction, of a ball; less along the axis of a cylinder
-)
+# least mean square of normals along any direction, of a ball; less along the axis of a cylinder
+ROUNDED = 0.02
 TRIMMED = 5  # times that the worse half of facets is left out
 SEVERAL = 20  # cylinders and balls that hang together
 SOME = 0.15  # of a ball's facets: less is a rounded corner

@@ -15,9 +15,8 @@ from kedfem.links.surfaces.surface import PLANE_TOLERANCE
 from kedfem.mesh.elements.hexahedra import Face
 from kedfem.scene import ChosenFace, Scene
 
-SAME_DIAMETER = (
-    5e-3  # of the diameter: nodes of mesh files are rounded, and so are dimensions that people write
-)
+# of the diameter: nodes of mesh files are rounded, and so are dimensions that people write
+SAME_DIAMETER = 5e-3
 SAME_DIRECTION = np.cos(np.radians(0.1))  # a draft of half a degree is another face
 CLEARLY = 1.25  # times as far must the next face be
 

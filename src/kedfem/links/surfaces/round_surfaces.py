@@ -18,16 +18,14 @@ from kedfem.links.surfaces.surface import (
 
 FAR = 5.0  # lengths and radii of a bore: a joint further off along its axis does not sit in it
 AROUND = 0.1  # of a bore's radius: how near the middle of one of its facets may be to the axis
-CLOSED = (
-    0.3  # of the radius: how far from the axis the mean of a cylinder's corners is that goes all round it
-)
+# of the radius: how far from the axis the mean of a cylinder's corners is that goes all round it
+CLOSED = 0.3
 LEVEL = 1e-3  # of a cylinder's length and radius: places along the axis that are the same
 MANY = 12  # facets at one distance from a point are not so by chance
 SUNK = 0.1  # of a cylinder's radius: how far within it its facets may sink; those of a prism of six sides sink by 0.13
 ALL_WAYS = 0.01  # least variance of the normals of a ball in any direction; a zone of it of 30° has 0.02
-DOMED = (
-    0.1  # of a ball's radius: how far below it curved facets may sink; those of a cube about it sink by 0.4
-)
+# of a ball's radius: how far below it curved facets may sink; those of a cube about it sink by 0.4
+DOMED = 0.1
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,8 @@
-"""The solids of an assembly with their bores, journals and balls, for whoever looks where they meet."""
+"""The solids of an assembly, and where they meet as joints: a pin in a bore, two bores in a line, a ball in its seat."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from types import ModuleType
 from typing import Literal
@@ -18,6 +20,13 @@ from kedfem.mesh.session import gmsh_model
 # of a cylinder's full turn: a joint finds no less of it by itself (links/surfaces/round_surfaces.py); keyways are less
 CLOSED = 0.75
 BALL = 0.2  # of a ball's area: the rounded corner between three walls has an eighth
+PLAY = 0.1  # of the bore's radius: a pin so much thinner may be meant for it (an M10 screw's hole has 11 mm)
+PRESS = 0.01  # of the bore's radius: a pin so much thicker is pressed in
+ASIDE = 0.02  # of the bore's radius, beside the play: how far axes and centres may be apart, as drawn by hand
+SKEW = 1e-3  # sine between axes that are parallel: 0.06°
+LEAST = 0.05  # of the shorter length: a pin that ends at a bore's rim is not in it
+GAP = 1.0  # of the radius: so near along the axis are two bores of one pin that nobody drew
+SAME = 1e-3  # of the radius: such bores have the same
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,3 +104,126 @@ def _round_face(parts: list[CadFace]) -> RoundFace | None:
         return None
     centre = first.centre + (low + high) / 2 * first.direction
     return RoundFace("cylinder", centre, first.direction, first.radius, high - low, first.inward)
+
+
+@dataclass(frozen=True, slots=True)
+class Meeting:
+    """Round faces of two solids that meet, and the joint that they may be.
+
+    solids : indices, the one with the hole first; of two bores in the assembly's order
+    faces : of each solid the face that meets
+    at : (3,) where a joint would be [m]
+    share : how long they overlap along the axis [m]; nan of a ball, at most 0 for bores beside each other
+    hidden : for each solid whether a joint would find a bore about the same axis instead, as in a hollow pin
+    """
+
+    solids: tuple[int, int]
+    faces: tuple[RoundFace, RoundFace]
+    at: Float[np.ndarray, "3"]
+    share: float
+    hidden: tuple[bool, bool]
+
+    @property
+    def ball(self) -> bool:
+        """Whether it is a ball in its seat."""
+        return self.faces[0].kind == "sphere"
+
+    @property
+    def pinless(self) -> bool:
+        """Whether it is two bores in a line."""
+        return self.faces[0].inward and self.faces[1].inward
+
+
+def meetings(solids: Sequence[AssemblySolid]) -> list[Meeting]:
+    """All joints that an assembly suggests: of two solids one for each common axis or centre.
+
+    Two bores of one radius in a line suggest one where neither has a pin in it.
+    """
+    found = [each for pair in combinations(range(len(solids)), 2) for each in _of_two(solids, pair)]
+    filled = {id(face) for each in found if not each.pinless for face in each.faces}
+    return [each for each in found if not each.pinless or not any(id(face) in filled for face in each.faces)]
+
+
+def _of_two(solids: Sequence[AssemblySolid], pair: tuple[int, int]) -> list[Meeting]:
+    """The meetings of two solids, on each axis those of the longest overlap together."""
+    one, other = pair
+    several: list[list[Meeting]] = []
+    for a in solids[one].rounds:
+        for b in solids[other].rounds:
+            in_b = b.inward and not a.inward
+            order, faces = ((other, one), (b, a)) if in_b else ((one, other), (a, b))
+            if (met := _meeting(solids, order, faces)) is None:
+                continue
+            same = next((group for group in several if _same_axis(group[0].faces[0], met.faces[0])), None)
+            if same is None:
+                several.append([met])
+            else:
+                same.append(met)
+    return [_together(group) for group in several]
+
+
+def _meeting(
+    solids: Sequence[AssemblySolid], pair: tuple[int, int], faces: tuple[RoundFace, RoundFace]
+) -> Meeting | None:
+    """Two round faces, the first a hole, as a meeting; None if they do not meet."""
+    hole, pin = faces
+    if not hole.inward or not _fits(hole, pin):
+        return None
+    near = ASIDE * hole.radius + abs(hole.radius - pin.radius)
+    if hole.kind == "sphere":
+        met = not pin.inward and np.linalg.norm(pin.centre - hole.centre) <= near
+        return Meeting(pair, faces, hole.centre, np.nan, (False, False)) if met else None
+    share, middle = _overlap(hole, pin)
+    least = -GAP * hole.radius if pin.inward else LEAST * min(hole.length, pin.length)
+    if share < least or not _parallel(hole, pin) or _beside(hole, pin) > near:
+        return None
+    hidden = not pin.inward and any(each.inward and _same_axis(pin, each) for each in solids[pair[1]].rounds)
+    return Meeting(pair, faces, hole.centre + middle * hole.direction, share, (False, hidden))
+
+
+def _fits(hole: RoundFace, pin: RoundFace) -> bool:
+    """Whether a pin or ball is of a hole's size; two bores have to be of the same."""
+    least, most = (1 - SAME, 1 + SAME) if pin.inward else (1 - PLAY, 1 + PRESS)
+    return hole.kind == pin.kind and least * hole.radius <= pin.radius <= most * hole.radius
+
+
+def _together(group: list[Meeting]) -> Meeting:
+    """One of several meetings on an axis: the longest, in the middle of those of its radius, as of a fork's two eyes."""
+    longest = max(group, key=lambda each: 0.0 if each.ball else each.share)
+    hole = longest.faces[0]
+    alike = [each for each in group if abs(each.faces[0].radius - hole.radius) <= SAME * hole.radius]
+    if longest.ball or len(alike) == 1:
+        return longest
+    along = [(each.at - hole.centre) @ hole.direction for each in alike]
+    ends = [
+        (x - max(each.share, 0) / 2, x + max(each.share, 0) / 2) for x, each in zip(along, alike, strict=True)
+    ]
+    middle = (min(low for low, _ in ends) + max(high for _, high in ends)) / 2
+    at = hole.centre + middle * hole.direction
+    return Meeting(longest.solids, longest.faces, at, longest.share, longest.hidden)
+
+
+def _same_axis(a: RoundFace, b: RoundFace) -> bool:
+    """Whether two cylinders have one axis, or two balls one centre."""
+    if a.kind != b.kind:
+        return False
+    near = ASIDE * max(a.radius, b.radius)
+    if a.kind == "sphere":
+        return bool(np.linalg.norm(a.centre - b.centre) <= near)
+    return _parallel(a, b) and _beside(a, b) <= near
+
+
+def _parallel(a: RoundFace, b: RoundFace) -> bool:
+    return bool(np.linalg.norm(np.cross(a.direction, b.direction)) <= SKEW)
+
+
+def _beside(a: RoundFace, b: RoundFace) -> float:
+    """How far the middle of one cylinder is from the axis of another [m]."""
+    return float(np.linalg.norm(np.cross(b.centre - a.centre, a.direction)))
+
+
+def _overlap(a: RoundFace, b: RoundFace) -> tuple[float, float]:
+    """Length that two cylinders on one axis share, negative by their gap, and its middle from a's centre [m]."""
+    x = float((b.centre - a.centre) @ a.direction)
+    low, high = max(-a.length, 2 * x - b.length) / 2, min(a.length, 2 * x + b.length) / 2
+    return high - low, (low + high) / 2

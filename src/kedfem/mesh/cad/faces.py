@@ -13,9 +13,8 @@ from kedfem.mesh.elements.hexahedra import Face, SolidMesh
 
 _FLAT = 1e-7  # of the solid's size: sides as near as that to a plane are in it
 _ALIKE = 1e-5  # of the radius: cylinders and spheres that are one
-_NEARLY = (
-    0.1  # of a side's size: faces this much farther away than the nearest may be the one, if it ends before
-)
+# of a side's size: faces this much farther away than the nearest may be the one, if it ends before
+_NEARLY = 0.1
 
 
 def with_faces(gmsh: ModuleType, solid: Solid, mesh: SolidMesh) -> SolidMesh:

@@ -3,8 +3,15 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.mesh.elements.shape_functions import HEX27, QUAD9, node_numbers, shape_functions, shape_gradients
-from kedfem.mesh.elements.simplices import TET_SIDES, TRI6
+from kedfem.mesh.elements.shape_functions import (
+    HEX27,
+    QUAD9,
+    TET_SIDES,
+    TRI6,
+    node_numbers,
+    shape_functions,
+    shape_gradients,
+)
 
 
 def _side_nodes() -> Int[np.ndarray, "6 9"]:

@@ -12,13 +12,11 @@ from math import comb, factorial, prod
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from kedfem.mesh.elements.shape_functions import HEX8, HEX20, NODES, QUAD9, shape_gradients
-from kedfem.mesh.elements.simplices import EDGES, TET10
+from kedfem.mesh.elements.shape_functions import EDGES, HEX8, HEX20, NODES, QUAD9, TET10, shape_gradients
 
 _CHUNK = 512  # elements at a time: their coefficients fit in a processor's cache
-_DEPTH = (
-    6  # halvings after which an element is not proven valid: least det J within about 1e-3 of 0, or below
-)
+# halvings after which an element is not proven valid: least det J within about 1e-3 of 0, or below
+_DEPTH = 6
 
 
 def determinant_bounds(

@@ -9,8 +9,7 @@ from jaxtyping import Float, Int
 from kedfem.errors import MeshError
 from kedfem.mesh.elements.bounds import valid_everywhere
 from kedfem.mesh.elements.hexahedra import Face, SolidMesh
-from kedfem.mesh.elements.shape_functions import HEX8, HEX20, HEX27, NODES, shape_gradients
-from kedfem.mesh.elements.simplices import TET10
+from kedfem.mesh.elements.shape_functions import HEX8, HEX20, HEX27, NODES, TET10, shape_gradients
 from kedfem.mesh.places import in_mm
 from kedfem.mesh.planar.flat import QuadMesh
 

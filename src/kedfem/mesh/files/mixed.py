@@ -12,8 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.errors import MeshError
-from kedfem.mesh.elements.shape_functions import HEX20, HEX27, node_numbers, shape_functions
-from kedfem.mesh.elements.simplices import EDGES
+from kedfem.mesh.elements.shape_functions import EDGES, HEX20, HEX27, node_numbers, shape_functions
 
 #: Sides of each kind by the number of its corners, in VTK's order.
 _SIDES: dict[int, tuple[tuple[int, ...], ...]] = {

@@ -20,9 +20,8 @@ from kedfem.mesh.layered.shares import GOOD, SHARES, not_too_bad
 
 _GAIN = 0.03  # of scaled Jacobian that more elements must bring
 _ALONG = 1e-5  # sine of the angle that a face may be off the direction, or off being at right angles to it
-_FAR_TOO_MANY = (
-    1_500_000  # unknowns, ten times those above which tetrahedra are taken: not worth meshing to see it
-)
+# unknowns, ten times those above which tetrahedra are taken: not worth meshing to see it
+_FAR_TOO_MANY = 1_500_000
 _UNKNOWNS_EACH = 24  # of a 27-node hexahedron in a large mesh
 _SAMPLES = np.linspace(0.0, 1.0, 7)
 

@@ -8,8 +8,7 @@ from jaxtyping import Float, Int
 from kedfem.mesh.cad.solids import OtherMethodError, Sizing
 from kedfem.mesh.layered.cusps import CUSP, cusps
 from kedfem.mesh.layered.division import Division, divided
-from kedfem.mesh.layered.fills import Rim, mapped
-from kedfem.mesh.layered.mapping import Mapping
+from kedfem.mesh.layered.mapping import Mapping, Rim, mapped
 from kedfem.mesh.layered.partition import Plan, Region
 from kedfem.mesh.layered.polygons import polygon_quads
 from kedfem.mesh.places import in_mm

@@ -6,15 +6,14 @@ from types import ModuleType
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.mesh.layered.fills import Rim
+from kedfem.mesh.layered.mapping import Rim
 from kedfem.mesh.planar.areas import PlaneQuads, directed_sides
 from kedfem.mesh.planar.choice import SETTINGS, Setting
 from kedfem.mesh.session import gmsh_model, gmsh_options, quadrilaterals
 
 _LINE, _POINT = 1, 15  # gmsh's numbers of elements
-_MOST_SIDES = (
-    4000  # of a region's rim: a sliver of micrometres asks for more; all are compared with each other
-)
+# of a region's rim: a sliver of micrometres asks for more; all are compared with each other
+_MOST_SIDES = 4000
 _ROUNDING = 1e-24  # square of the area between sides that are on one line
 
 

@@ -6,8 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.mesh.elements.hexahedra import SolidMesh, stacked
-from kedfem.mesh.layered.fills import Rim, mapped
-from kedfem.mesh.layered.mapping import Mapping
+from kedfem.mesh.layered.mapping import Mapping, Rim, mapped
 from kedfem.mesh.layered.partition import Curve, Plan, Region
 from kedfem.mesh.planar.areas import quadratic_quads
 from kedfem.mesh.planar.choice import best_quads
