@@ -21,7 +21,7 @@ from kedfem.load_cases import LoadCases, load_cases
 from kedfem.mesh.elements.shape_functions import HEX8, HEX20, TET10, shape_gradients
 from kedfem.results import read_results
 from kedfem.scene import scene_from
-from kedfem.tables.loads import case_tables
+from kedfem.tables import case_tables
 from tests.scenes import arm, bar, constant_speed, cycloidal, four_bar
 
 OMEGA, LENGTH, SIDE = 100.0, 0.5, 0.02

@@ -17,7 +17,7 @@ from kedfem.loads import loads
 from kedfem.results import read_results
 from kedfem.results.forces.loads import BALL, ROLLER, equivalent_load, facing, in_axes
 from kedfem.scene import scene_from
-from kedfem.tables.loads import loads_tables
+from kedfem.tables import loads_tables
 from tests.reliability.fuzz import short
 from tests.scenes import example
 

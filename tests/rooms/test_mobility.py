@@ -14,7 +14,7 @@ from kedfem.motion.path import path
 from kedfem.motion.redundancy import redundancy, without_redundancy, wrenches
 from kedfem.motion.released_motions import free_motions, remedy
 from kedfem.scene import Scene, scene_from
-from kedfem.tables.mobility import mobility_table
+from kedfem.tables.model import mobility_table
 from tests.linkages import (
     RISE,
     UNIT_SPEED,

@@ -55,7 +55,7 @@ def check(scene: ScenePath, quick: Quick = False, within: Within = False) -> Non
     from kedfem.accuracy.sizes import size_warnings, sizes
     from kedfem.motion.assembly import assembled
     from kedfem.scene import read_scene
-    from kedfem.tables import assembly_tables, check_tables, size_line
+    from kedfem.tables import assembly_table, check_tables, size_line
 
     read = read_scene(scene, within=within)
     loaded, assembly = assembled(with_plain_defaults(read) if quick else read)
@@ -64,7 +64,7 @@ def check(scene: ScenePath, quick: Quick = False, within: Within = False) -> Non
         ready, reduction = prepared(plan.scene, stage, known=plan.links) if plan else prepared(loaded, stage)
     found = sizes(loaded, ready.model)
     out.print(size_line(found), markup=False, soft_wrap=True)
-    show([*assembly_tables(assembly), *check_tables(ready, reduction, plan)], size_warnings(loaded, found))
+    show([assembly_table(assembly), *check_tables(ready, reduction, plan)], size_warnings(loaded, found))
 
 
 @app.command()

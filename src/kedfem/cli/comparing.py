@@ -26,7 +26,7 @@ def compare(
 ) -> None:
     """Runs beside each other: what differs in their scenes, curves over each other, differences as a table."""
     from kedfem.compare import compare as compared
-    from kedfem.tables.compare import compare_tables
+    from kedfem.tables import compare_tables
 
     if over not in {None, "time", "drive"}:
         raise OutputError(f"--over: must be time or drive, got {over}")

@@ -46,7 +46,7 @@ def loads(
     if at:
         raise SceneError(f"--at: must be combined with --link NAME, got {at[0]:g} alone")
     from kedfem.loads import loads as written
-    from kedfem.tables.loads import loads_tables
+    from kedfem.tables import loads_tables
 
     found = written(results, last, folder)
     show(loads_tables(found), found.warnings)
@@ -55,7 +55,7 @@ def loads(
 
 def _cases(results: Path, link: str, at: list[float], folder: Path | None) -> None:
     from kedfem.load_cases import load_cases
-    from kedfem.tables.loads import case_tables
+    from kedfem.tables import case_tables
 
     with progress() as watch:
         found = load_cases(results, link, at, folder, watch)

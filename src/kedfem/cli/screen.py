@@ -10,9 +10,10 @@ out, err = terminal(), terminal(stderr=True)
 
 
 def show(tables: Iterable[Any], warnings: Iterable[str] = ()) -> None:
-    """Tables, and warnings after them."""
+    """Tables that have rows, and warnings after them."""
     for table in tables:
-        out.print(table)
+        if table.row_count:
+            out.print(table)
     for warning in warnings:
         err.print(f"warning: {warning}", style="yellow", markup=False)
 

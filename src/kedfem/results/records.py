@@ -1,7 +1,7 @@
 """What a results file holds: channels of columns over time and drive angle."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -32,6 +32,15 @@ class Channel:
 XYZ = ("x", "y", "z")
 STRESS = ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises")
 """Columns of vectors and of stresses."""
+
+
+def largest_by_unit(channels: Iterable[tuple[Channel, Float[np.ndarray, "T c"]]]) -> dict[str, float]:
+    """Unit → the largest magnitude of all channels that have it: what is nothing beside that is rounding."""
+    out: dict[str, float] = {}
+    for channel, values in channels:
+        out[channel.unit] = max(out.get(channel.unit, 0.0), float(np.abs(values).max()))
+    return out
+
 
 TIME = Channel("time", (), "s", "", "time")
 ANGLE = Channel("drive_angle", (), "rad", "", "drive angle from the reference position")

@@ -31,31 +31,26 @@ from kedfem.results.audit import Account
 from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.forces.force_elements import measured_elements
 from kedfem.results.recording import recording
-from kedfem.scene import Curve, Limit, LineSpring, Motor, Scene, Spring, is_constant, time_grid
+from kedfem.scene import Curve, Limit, LineSpring, Scene, Spring, is_constant, time_grid
 from kedfem.scene.questions.timing import turn_steps
 from kedfem.stepping import Watched, frame_steps, stepped
-from kedfem.tables.links import link_table, way_tables
-from kedfem.tables.mobility import mobility_table
-from kedfem.tables.plan import plan_tables, reduction_table
+from kedfem.tables.layout import facts
+from kedfem.tables.model import link_tables, mobility_table
+from kedfem.tables.run import plan_tables, reduction_table
 
 
 def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None) -> list[Table]:
     """What would be modelled: the plan for an accuracy, links, what reducing them costs, motion, frequency, cost."""
-    first = [] if plan is None else plan_tables(plan)
-    second = [] if reduction is None else [reduction_table(reduction)]
-    cost = _cost(ready, forecast(ready))
-    found = resolution(ready)
-    third = [] if found is None else [resolution_table(found, ready.scene)]
+    cost, found = forecast(ready), resolution(ready)
     return [
-        *first,
-        link_table(ready.model),
-        *way_tables(ready.model),
-        *second,
+        *(plan_tables(plan) if plan else []),
+        *link_tables(ready.model),
+        *([reduction_table(reduction)] if reduction else []),
         _motion(ready),
         mobility_table(ready.scene, ready.linkage, mobility(ready.scene, ready.linkage, ready.path)),
-        *_force_elements(ready),
-        *third,
-        cost,
+        _force_elements(ready),
+        *([resolution_table(found, ready.scene)] if found else []),
+        _cost(ready, cost),
     ]
 
 
@@ -76,8 +71,8 @@ def forecast(ready: Prepared) -> Cost:
         efforts = CrossChecks(still, ready.linkage, [each.channel for each in recorded], account)
         watched = Watched(recorded, {}, efforts, recoveries, SingularPasses(ready))
         with TemporaryDirectory() as folder:
-            arguments = replace(ready, scene=still), solvers, watched, FilePath(folder), _unwatched
-            worst = stepped(*arguments)[0].worst
+            arguments = replace(ready, scene=still), solvers, watched, FilePath(folder)
+            worst = stepped(*arguments, lambda stage, done, total: None)[0].worst
         seen.extend([worst] if worst else [])
 
     try:
@@ -88,48 +83,36 @@ def forecast(ready: Prepared) -> Cost:
     return replace(cost, steps=cost.steps + frames * _frame(ready, recoveries, seen[-1])) if seen else cost
 
 
-def _unwatched(stage: str, done: int, total: int) -> None:
-    """Nobody is arguments of the progress of a trial."""
-
-
 def _frame(ready: Prepared, recoveries: list[StressRecovery], now: Snapshot) -> float:
     """Seconds that a frame of the animation takes."""
     with TemporaryDirectory() as folder:
         for k in range(2):  # the first time prepares
             since = perf_counter()
-            write_frame(
-                FilePath(folder) / f"{k}.vtu", now.t, fields(ready.scene, ready.model, recoveries, now)
-            )
+            drawn = fields(ready.scene, ready.model, recoveries, now)
+            write_frame(FilePath(folder) / f"{k}.vtu", now.t, drawn)
     return perf_counter() - since
 
 
 def resolution_table(found: Resolution, scene: Scene) -> Table:
     """First frequency of the linkage against step and drive."""
     span = "over the last turn" if turn_steps(scene) else "over the analysis"
-    table = Table(title="First frequency (drive held, of what the loads excite)", show_header=False)
     low, high = found.first.min(), found.first.max()
-    table.add_row(span, f"{low:.4g} Hz" if high < 1.001 * low else f"{low:.4g} to {high:.4g} Hz")
-    table.add_row("steps in a period", f"{found.steps_per_period:.3g} at least")
-    for each in found.meetings:
-        angle = np.degrees(each.angle) % 360
-        table.add_row(f"met by harmonic {each.harmonic}", f"{each.frequency:.4g} Hz, near {angle:.0f}°")
-    return table
+    return facts("First frequency (drive held, of what the loads excite)", [
+        (span, f"{low:.4g} Hz" if high < 1.001 * low else f"{low:.4g} to {high:.4g} Hz"),
+        ("steps in a period", f"{found.steps_per_period:.3g} at least"),
+        *((f"met by harmonic {each.harmonic}", f"{each.frequency:.4g} Hz, near {np.degrees(each.angle) % 360:.0f}°")
+          for each in found.meetings),
+    ])  # fmt: skip
 
 
 def _motion(ready: Prepared) -> Table:
     along: Path = ready.path
-    table = Table(title="Rigid motion", show_header=False)
     names = tuple(ready.scene.driven_joints)
-    driven, joints = bool(names), of_joints(names)
-    table.add_row("drive", f"{joints}, {_over(ready)}" if driven else "none: the mechanism moves by itself")
-    for where, speed in _initial_speeds(ready):
-        table.add_row(where, speed)
-    if not driven:
-        return table
-    for k, name in enumerate(ready.linkage.bodies[1:], start=1):
-        turned = np.degrees(
-            np.arccos(np.clip((np.trace(along.R[:, k], axis1=1, axis2=2) - 1) / 2, -1, 1))
-        ).max()
+    drive = f"{of_joints(names)}, {_over(ready)}" if names else "none: the mechanism moves by itself"
+    table = facts("Rigid motion", [("drive", drive), *_initial_speeds(ready)])
+    for k, name in enumerate(ready.linkage.bodies[1:] if names else (), start=1):
+        cosine = (np.trace(along.R[:, k], axis1=1, axis2=2) - 1) / 2
+        turned = np.degrees(np.arccos(np.clip(cosine, -1, 1))).max()
         table.add_row(f"link {name}", f"turns up to {turned:.4g}° from the reference position")
     return table
 
@@ -145,19 +128,17 @@ def _over(ready: Prepared) -> str:
     return "repeats every revolution" if round(revolutions) == 1 else f"repeats every {revolutions:.4g} turns"
 
 
-def _force_elements(ready: Prepared) -> list[Table]:
+def _force_elements(ready: Prepared) -> Table:
     """Motors, springs and limits: where they act and by which law."""
-    force_elements(ready.scene, ready.model)  # refused where they do not fit
-    table = Table(
-        title="Motors, springs and limits" if ready.scene.limits else "Motors and springs", show_header=False
-    )
-    for name, motor in ready.scene.motors.items():
-        table.add_row(name, f"motor on joint {motor.joint}", _motor_law(motor))
-    for name, spring in ready.scene.springs.items():
-        table.add_row(name, *_spring_law(spring))
-    for name, limit in ready.scene.limits.items():
-        table.add_row(name, f"limit of the {limit.kind} of joint {limit.joint}", _limit_law(limit))
-    return [table] if table.row_count else []
+    scene = ready.scene
+    force_elements(scene, ready.model)  # refused where they do not fit
+    return facts("Motors, springs and limits" if scene.limits else "Motors and springs", [
+        *((name, f"motor on joint {each.joint}", _curve_words(each.curve, "N m" if each.torque else "N"))
+          for name, each in scene.motors.items()),
+        *((name, *_spring_law(each)) for name, each in scene.springs.items()),
+        *((name, f"limit of the {each.kind} of joint {each.joint}", _limit_law(each))
+          for name, each in scene.limits.items()),
+    ])  # fmt: skip
 
 
 def _limit_law(limit: Limit) -> str:
@@ -166,11 +147,6 @@ def _limit_law(limit: Limit) -> str:
     ends = " and ".join(with_prefix(x, unit) for x in (limit.lower, limit.upper) if x is not None)
     constants = zip((limit.stiffness, limit.damping), (force, rate), strict=True)
     return f"at {ends}: " + ", ".join(with_prefix(value, each) for value, each in constants if value)
-
-
-def _motor_law(motor: Motor) -> str:
-    """A motor's curve in words."""
-    return _curve_words(motor.curve, "N m" if motor.torque else "N")
 
 
 def _curve_words(curve: Curve, unit: str) -> str:
@@ -213,15 +189,12 @@ def _initial_speeds(ready: Prepared) -> list[tuple[str, str]]:
 
 
 def _cost(ready: Prepared, cost: Cost) -> Table:
-    grid = time_grid(ready.scene)
-    table = Table(title="Cost (estimated)", show_header=False)
-    table.add_row("steps", f"{grid.steps} of {grid.step:.4g} s")
-    table.add_row("solver", ready.scene.analysis.solver)
+    grid, frames = time_grid(ready.scene), len(frame_steps(ready.scene))
     how = f"{cost.tried} steps tried" if cost.tried else "from the sizes alone"
-    table.add_row("time", f"factor {cost.factor:.2g} s, steps {cost.steps:.2g} s; {how}")
-    table.add_row("memory", with_prefix(cost.memory, "B"))
-    table.add_row(
-        "animation frames",
-        f"{len(frame_steps(ready.scene))}, about {with_prefix(cost.frame_bytes, 'B')} each",
-    )
-    return table
+    return facts("Cost (estimated)", [
+        ("steps", f"{grid.steps} of {grid.step:.4g} s"),
+        ("solver", ready.scene.analysis.solver),
+        ("time", f"factor {cost.factor:.2g} s, steps {cost.steps:.2g} s; {how}"),
+        ("memory", with_prefix(cost.memory, "B")),
+        ("animation frames", f"{frames}, about {with_prefix(cost.frame_bytes, 'B')} each"),
+    ])  # fmt: skip

@@ -1,4 +1,4 @@
-"""What a run found: largest values, balance, seconds."""
+"""What was chosen for a run, and what it found: largest values, stresses, errors, balance, seconds."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -8,6 +8,8 @@ from rich.table import Table
 from rich.text import Text
 
 from kedfem.accuracy.error_budget import Budget, percent
+from kedfem.accuracy.plan import Plan
+from kedfem.accuracy.reduction import Reduction
 from kedfem.accuracy.steady import Steady
 from kedfem.analysis import Run
 from kedfem.output.words import NOTHING, clock, moment, place_of, with_prefix
@@ -15,54 +17,107 @@ from kedfem.report.facts import peak_rows
 from kedfem.report.fatigue_facts import ENDLESS, fatigue_notes
 from kedfem.results import Fatigue, Peak
 from kedfem.results.balance import Balance
-from kedfem.scene import Scene, without_vibration
-from kedfem.tables.plan import chosen_table
+from kedfem.results.records import largest_by_unit
+from kedfem.scene import LinkScene, Scene, time_grid, without_vibration
+from kedfem.tables.layout import facts, left, listed, right
+from kedfem.tables.mechanism import seconds_table
+
+
+def plan_tables(plan: Plan) -> list[Table]:
+    """Where the error of a run with `analysis.accuracy` comes from, what was chosen, and what was not."""
+    budget = listed(
+        f"Accuracy asked for: {100 * plan.asked:.3g} %",
+        [*left("part of the error"), *right("expected", "allowed")],
+        ((share.what, f"{100 * share.error:.2g} %", f"{100 * share.allowed:.2g} %") for share in plan.shares),
+    )
+    budget.add_row("together", f"{100 * plan.error:.2g} %", f"{100 * plan.asked:.2g} %")
+    return [budget, chosen_table(plan)]
+
+
+def chosen_table(plan: Plan) -> Table:
+    """What was chosen, and what was tried for it."""
+    scene = plan.scene
+    return facts(f"Chosen for {100 * plan.asked:.3g} %", [
+        ("frames", str(scene.analysis.frames)),
+        ("step", _step(scene)),
+        *((name, _chosen(link)) for name, link in scene.links.items()),
+        *(("note", Text(note)) for note in plan.notes),
+    ])  # fmt: skip
+
+
+def _step(scene: Scene) -> str:
+    """Step and levels in words."""
+    grid, levels = time_grid(scene), scene.analysis.extrapolation_levels or 1
+    halved = f", combined with {', '.join(f'1/{2**k}' for k in range(1, levels))} of it" if levels > 1 else ""
+    return f"{grid.step:.4g} s, {grid.steps} steps{halved}"
+
+
+def _chosen(link: LinkScene) -> str:
+    """Fidelity and mesh in words."""
+    sizes = ((key, value) for key, value in link.mesh if value is not None)
+    mesh = ", ".join(f"{key} {_size(key, value)}" for key, value in sizes) if link.shape else ""
+    segments = "" if link.segments is None else f", {link.segments} segments"
+    kind = f"{link.element} " if link.element and link.model != "rigid" else ""
+    return f"{'reduced ' * link.reduced}{kind}{link.model}" + (f" ({mesh})" if mesh else "") + segments
+
+
+def _size(key: str, value: object) -> object:
+    return f"{np.degrees(value):.3g}°" if key == "fillet_angle" and isinstance(value, float) else value
+
+
+def reduction_table(reduction: Reduction) -> Table:
+    """Estimated error of reduced links, channel by channel."""
+    return listed(
+        "Error of the reduction (estimated)",
+        [*left("channel"), *right("of its peak")],
+        ((name, f"{100 * error:.2g} %") for name, error in reduction.estimate.items()),
+        caption=f"asked for: {100 * reduction.tolerance:.2g} %; against the same links unreduced",
+    )
 
 
 def run_tables(scene: Scene, done: Run) -> list[Table]:
     """Largest values of every channel, the highest stress of every link, and the seconds spent."""
-    before = [] if done.plan is None else [chosen_table(done.plan)]
-    table = Table(title=Text(scene.title or "Largest values"))
-    for column in ("channel", "component", "largest", clock(scene)):
-        left = column in ("channel", "component")
-        table.add_column(column, justify="left" if left else "right", overflow="fold", no_wrap=not left)
-    channels = done.results.channels.values()
-    highest: dict[str, float] = {}
-    peaks = []
-    for channel, values in channels:
+    count = len(done.results.time)
+    taken = f"{count} positions" if without_vibration(scene) else f"{count - 1} steps"
+    return [
+        *([chosen_table(done.plan)] if done.plan else []),
+        channel_table(scene, done),
+        stress_table(scene, done.peaks),
+        *([fatigue_table(done.results.fatigue)] if done.results.fatigue else []),
+        *([steady_table(done.steady)] if done.steady else []),
+        *([budget_table(done.budget)] if done.budget and done.budget.kinds else []),
+        *([balance_table(done.balance)] if done.balance else []),
+        seconds_table(taken, done.seconds),
+    ]
+
+
+def channel_table(scene: Scene, done: Run) -> Table:
+    """The largest value of every channel, and when it is."""
+    columns = [*left("channel", "component"), *right("largest", clock(scene), no_wrap=True)]
+    table = listed(Text(scene.title or "Largest values"), columns)
+    highest = largest_by_unit(done.results.channels.values())
+    for channel, values in done.results.channels.values():
         k, c = np.unravel_index(np.abs(values).argmax(), values.shape)
-        peaks.append((channel, k, c, float(values[k, c])))
-        highest[channel.unit] = max(highest.get(channel.unit, 0.0), abs(peaks[-1][-1]))
-    for channel, k, c, value in peaks:
-        if abs(value) <= NOTHING * highest[channel.unit]:
+        if abs(value := float(values[k, c])) <= NOTHING * highest[channel.unit]:
             table.add_row(channel.name, "", "≈ 0", "")
             continue
         at = moment(scene, float(done.results.time[k]), float(done.results.angle[k]))
         table.add_row(channel.name, channel.columns[c], with_prefix(value, channel.unit), at)
-    balance = [] if done.balance is None else [balance_table(done.balance)]
-    count = len(done.results.time)
-    taken = f"{count} positions" if without_vibration(scene) else f"{count - 1} steps"
-    spent = Table(title=f"{taken}; seconds", show_header=False)
-    for stage, seconds in done.seconds.items():
-        spent.add_row(stage, f"{seconds:.2f}")
-    errors = [budget_table(done.budget)] if done.budget and done.budget.kinds else []
-    stress = [stress_table(scene, done.peaks)] if done.peaks else []
-    damaged = [fatigue_table(done.results.fatigue)] if done.results.fatigue else []
-    steady = [] if done.steady is None else [steady_table(done.steady)]
-    return [*before, table, *stress, *damaged, *steady, *errors, *balance, spent]
+    return table
 
 
 def steady_table(found: Steady) -> Table:
     """Period, and how vibrations about a steady motion die away."""
-    table = Table(title="Steady motion", show_header=False)
     n = f"{found.revolutions:.6g}"
     turns = f", {n} revolution{'s' * (n != '1')} of the drive" if found.revolutions else ""
-    table.add_row("period", f"{with_prefix(found.period, 's')}{turns}")
-    table.add_row("found in", f"{found.marches} marches over a period; the last leaves {found.residual:.1g}")
+    table = facts("Steady motion", [
+        ("period", f"{with_prefix(found.period, 's')}{turns}"),
+        ("found in", f"{found.marches} marches over a period; the last leaves {found.residual:.1g}"),
+    ])  # fmt: skip
     if found.growth is not None:
-        left = f"{100 * found.growth:.4g} % is left after a period"
+        share = f"{100 * found.growth:.4g} % is left after a period"
         settles = f", 1 % after {found.periods:,} of them" if found.periods and found.periods > 1 else ""
-        table.add_row("least damped vibration", f"{left}{settles}{': unstable' * found.unstable}")
+        table.add_row("least damped vibration", f"{share}{settles}{': unstable' * found.unstable}")
     if found.vibration:
         table.add_row("vibration that grows", found.vibration)
     return table
@@ -70,47 +125,33 @@ def steady_table(found: Steady) -> Table:
 
 def stress_table(scene: Scene, peaks: Mapping[str, Peak]) -> Table:
     """The highest stress of each link over all steps, and away from where it is not what it seems."""
-    table = Table(title="Highest von Mises stress, over all steps")
-    for column in ("link", "stress", "reference position", clock(scene), "near"):
-        table.add_column(column, justify="right" if column == "stress" else "left", overflow="fold")
-    for row in peak_rows(peaks, partial(moment, scene)):
-        table.add_row(*row)
-    return table
+    columns = [*left("link"), *right("stress"), *left("reference position", clock(scene), "near")]
+    return listed(
+        "Highest von Mises stress, over all steps", columns, peak_rows(peaks, partial(moment, scene))
+    )
 
 
 def fatigue_table(found: Fatigue) -> Table:
     """Life and utilisation at the place of the highest damage of each link."""
-    table = Table(title="Fatigue, by the last period")
     turns = "revolutions" if found.revolutions else "periods"
-    for column in (
-        "link",
-        "life, h",
-        turns,
-        "utilisation",
-        "mean ± amplitude",
-        "reference position",
-    ):
-        table.add_column(
-            column,
-            overflow="fold",
-            justify="left" if column in {"link", "reference position"} else "right",
-        )
+    numbers = right("life, h", turns, "utilisation", "mean ± amplitude")
+    columns = [*left("link"), *numbers, *left("reference position")]
+    caption = Text("\n".join(fatigue_notes(found)))
+    table = listed("Fatigue, by the last period", columns, caption=caption)
     for name, (worst, *_) in ((name, spots) for name, spots in found.spots.items() if spots):
         lives = [f"{x:.3g}" if x < ENDLESS else "endless" for x in (found.hours(worst), found.turns(worst))]
         cycle = f"{worst.mean / 1e6:.3g} ± {worst.amplitude / 1e6:.3g} MPa"
         table.add_row(name, *lives, percent(worst.utilisation), cycle, place_of(worst.place))
-    table.caption = Text("\n".join(fatigue_notes(found)))
     return table
 
 
 def budget_table(found: Budget) -> Table:
     """Estimated errors: a line for each source, a column for each kind of channel."""
-    table = Table(title="Estimated error, of each channel's largest value")
-    table.add_column("from")
-    for kind in found.kinds:
-        table.add_column(kind, justify="right")
-    for share in found.shares:
-        table.add_row(share.source, *(_cell(share.errors.get(kind)) for kind in found.kinds))
+    table = listed(
+        "Estimated error, of each channel's largest value",
+        [*left("from"), *right(*found.kinds)],
+        ((x.source, *(_cell(x.errors.get(kind)) for kind in found.kinds)) for x in found.shares),
+    )
     table.add_row("together", *(_cell(found.together[kind]) for kind in found.kinds), style="bold")
     lines = [f"mesh of {name}: {percent(eta)} in the energy norm" for name, eta in found.links.items()]
     lines += [f"no estimate of {text}" for text in found.limits]
@@ -124,10 +165,7 @@ def _cell(error: float | None) -> str:
 
 def balance_table(found: Balance) -> Table:
     """The residual of energy over the steps, and what energy rigid-body frames make."""
-    table = Table(title="Balance", show_header=False)
-    table.add_row("energy, residual of the steps", f"{100 * found.energy:.2g} % of the largest exchanged")
+    shares = {"energy, residual of the steps": f"{100 * found.energy:.2g} %"}
     if found.neglected:
-        table.add_row(
-            "energy made by rigid-body frames", f"{100 * found.neglected:.3g} % of the largest exchanged"
-        )
-    return table
+        shares["energy made by rigid-body frames"] = f"{100 * found.neglected:.3g} %"
+    return facts("Balance", ((what, f"{share} of the largest exchanged") for what, share in shares.items()))

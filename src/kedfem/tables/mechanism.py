@@ -1,0 +1,182 @@
+"""What kinematics found of a mechanism, loads of its joints and drives, load cases of links, natural frequencies."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+from rich.table import Table
+from rich.text import Text
+
+from kedfem.frequencies import Crossing, Frequencies, PartFrequencies
+from kedfem.kinematics import Moved, first_largest
+from kedfem.load_cases import LoadCases
+from kedfem.loads import Loads
+from kedfem.output.words import NOTHING, clock, moment, number_in, with_prefix
+from kedfem.results.kinematic import transmission_key
+from kedfem.results.records import largest_by_unit
+from kedfem.scene import Scene
+from kedfem.scene.records.units import RPM
+from kedfem.tables.layout import facts, left, listed, right
+
+WIDTH, BORDER = 72, 3  # of columns beside the first in a terminal of 80 characters; of each
+MODES = 8  # side by side
+SHORT = {
+    "drive at peak": "at", "largest bearing load": "radial", "largest axial": "axial", "equivalent, ball bearing": "ball",
+    "equivalent, roller bearing": "roller", "drive at largest": "at", "largest power": "peak power",
+}  # fmt: skip
+
+
+def kinematics_tables(scene: Scene, moved: Moved) -> list[Table]:
+    """Coordinates of joints, transmission angles, forces of joints and drive, and the seconds spent."""
+    angles = [*left("coupler", "drives"), *right("from", "to", "furthest from 90°", f"at {clock(scene)}")]
+    forces = [*left("of"), *right("largest", f"at {clock(scene)}")]
+    return [
+        listed(
+            Text(scene.title or "Joints"),
+            [*left("joint", "coordinate"), *right("from", "to", "range")],
+            _coordinates(scene, moved),
+        ),
+        listed("Transmission angles", angles, _transmissions(scene, moved)),
+        listed("Largest forces were all links rigid", forces, _forces(scene, moved)),
+        seconds_table(f"{len(moved.results.time) - 1} steps", moved.seconds),
+    ]
+
+
+def seconds_table(of: str, seconds: Mapping[str, float]) -> Table:
+    """How long each stage took."""
+    return facts(f"{of}; seconds", ((stage, f"{each:.2f}") for stage, each in seconds.items()))
+
+
+def _coordinates(scene: Scene, moved: Moved) -> Iterator[tuple[str, ...]]:
+    for each in moved.recorded.coordinates:
+        values = moved.results.channels[f"joints/{each.joint}/{each.name}"][1][:, 0]
+        low, high = float(values.min()), float(values.max())
+        words = [
+            _length(x) if each.kind == "length" else f"{np.degrees(x):.2f}°" for x in (low, high, high - low)
+        ]
+        driven = " (driven)" if each.joint in scene.driven_joints else ""
+        yield each.joint, each.name.replace("_", " ") + driven, *words
+
+
+def _transmissions(scene: Scene, moved: Moved) -> Iterator[tuple[str, ...]]:
+    for each in moved.recorded.transmissions:
+        values = moved.results.channels[transmission_key(each.coupler)][1][:, 0]
+        k = first_largest(np.abs(values - np.pi / 2))
+        words = (f"{np.degrees(x):.2f}°" for x in (values.min(), values.max(), values[k]))
+        yield each.coupler, each.driven, *words, _at(scene, moved, k)
+
+
+def _forces(scene: Scene, moved: Moved) -> Iterator[tuple[str, ...]]:
+    """Largest sizes; what statics do not determine is not there."""
+    found = {name: x for name, x in moved.results.channels.items() if "/rigid_" in name}
+    highest = largest_by_unit(found.values())
+    for name, (channel, values) in found.items():
+        size = np.linalg.norm(values, axis=1)
+        k = first_largest(size)
+        shown = float(values[k, 0]) if values.shape[1] == 1 else float(size[k])
+        of = name.replace("/rigid_", " ").replace("/", " ").removeprefix("joints ")
+        nothing = abs(shown) <= NOTHING * highest[channel.unit]
+        words = ("≈ 0", "") if nothing else (with_prefix(shown, channel.unit), _at(scene, moved, k))
+        yield of, *words
+
+
+def _at(scene: Scene, moved: Moved, k: int) -> str:
+    return moment(scene, float(moved.results.time[k]), float(moved.results.angle[k]))
+
+
+def _length(x: float) -> str:
+    return with_prefix(x, "m") if abs(x) > 1e-12 else "0 m"
+
+
+def loads_tables(found: Loads) -> list[Table]:
+    """Peak, mean and equivalent loads of joints; torque and power of drives."""
+    joints = _summary("Loads of joints", "joint", found.joints)
+    joints.caption = "radial, axial: largest; ball, roller: equivalent load for the life of such a bearing"
+    return [joints, _summary("Drives", "drive", found.drives)]
+
+
+def _summary(title: str, what: str, every: Mapping[str, Mapping[str, float]]) -> Table:
+    names = list(dict.fromkeys(name for row in every.values() for name in row))
+    if any(name.startswith("drive at") for name in names):
+        names = [name for name in names if not name.startswith("time of")]
+    labels = [SHORT.get(label := name.rpartition(" [")[0], label) for name in names]
+    rows = ((key, *(number_in(row, name) for name in names)) for key, row in every.items())
+    return listed(Text(title), [*left(what), *right(*labels)], rows)
+
+
+def case_tables(found: LoadCases) -> list[Table]:
+    """Of each instant the resultant of each kind of force, in the link's axes; the highest stress, the residual."""
+    title = Text(f"Load cases of {found.link}, in its axes in the reference position")
+    table = listed(title, [*right("time"), *left("what"), *right("x", "y", "z")])
+    short = listed("", right(
+        "time", "highest von Mises stress", "by statics", "off at most", "supports bear, of the largest force"
+    ))  # fmt: skip
+    for case, residual in zip(found.cases, found.left, strict=True):
+        every = {name: forces.sum(axis=0) for name, forces in case.parts.items()}
+        largest = max(float(np.abs(x).max()) for x in every.values())
+        time = with_prefix(case.time, "s")
+        stresses = (with_prefix(float(x.max()), "Pa") for x in (case.von_mises, case.static_von_mises))
+        for k, (name, force) in enumerate(every.items()):
+            words = ("≈ 0" if abs(x) < NOTHING * largest else with_prefix(float(x), "N") for x in force)
+            table.add_row(time if k == 0 else "", name, *words)
+        table.add_section()
+        short.add_row(time, *stresses, f"{100 * case.differs:.1g} %", f"{100 * residual:.1g} %")
+    return [table, short]
+
+
+def frequencies_tables(scene: Scene, found: Frequencies) -> list[Table]:
+    """Frequencies at each position; of a drive that goes on turning critical speeds of each harmonic."""
+    still = f"; {found.still} motions without strain, at 0 Hz" if found.still else ""
+    stiffened = ", stiffened by its motion" if scene.analysis.stiffening else ""
+    title = Text(f"Natural frequencies of the frozen linkage{stiffened} [Hz]{still}")
+    places = [
+        "in the reference position" if scene.driven is None else moment(scene, float(t), float(angle))
+        for t, angle in zip(found.time, found.angle, strict=True)
+    ]
+    out = []
+    for modes in _blocks(range(found.values.shape[1]), MODES):
+        columns = [*left("position"), *right(*(str(k + 1) for k in modes))]
+        out.append(listed(title, columns, (
+            (place, *("–" if np.isnan(row[k]) else f"{row[k]:.4g}" for k in modes))
+            for place, row in zip(places, found.values, strict=True)
+        )))  # fmt: skip
+    ranges = {(x.mode, x.harmonic): _range(x, found.speed) for x in found.crossings}
+    harmonics = sorted({k for _, k in ranges})
+    side_by_side = WIDTH // (BORDER + max(map(len, ranges.values()), default=1))
+    return out + [_speeds(found, ranges, some) for some in _blocks(harmonics, side_by_side)]
+
+
+def _speeds(found: Frequencies, ranges: Mapping[tuple[int, int], str], harmonics: Sequence[int]) -> Table:
+    message = (
+        f"Drive speeds at which its harmonics meet them [rpm]; the drive turns at {found.speed * RPM:.4g}"
+    )
+    beyond = any(np.isinf(x.fastest) for x in found.crossings)
+    caption = "* at the drive's speed" + ("; – alone: beyond the speeds examined" if beyond else "")
+    columns = [*left("mode"), *right(*(f"{k}×" for k in harmonics))]
+    rows = (
+        (str(mode), *(ranges.get((mode, k), "–") for k in harmonics))
+        for mode in sorted({mode for mode, _ in ranges})
+    )
+    return listed(Text(message), columns, rows, caption=Text(caption))
+
+
+def _blocks(numbers: Sequence[int], most: int) -> list[Sequence[int]]:
+    """Columns that fit beside one another."""
+    return [numbers[k : k + most] for k in range(0, len(numbers), most)]
+
+
+def _range(x: Crossing, speed: float) -> str:
+    """From the slowest speed to the fastest [rpm], with a mark where the drive's is among them."""
+    here = " *" * (x.slowest <= speed <= x.fastest)
+    fastest = f"{x.fastest * RPM:.0f}" if np.isfinite(x.fastest) else ""
+    return f"{x.slowest * RPM:.0f}–{fastest}{here}"
+
+
+def part_tables(found: PartFrequencies) -> list[Table]:
+    """Frequencies of a single link; what it is and what holds it."""
+    part, still = found.part, found.still
+    held = f"held at {', '.join(part.held)}" if part.held else "free"
+    caption = Text(f"{still} motions without strain, at 0 Hz, are left out") if still else None
+    rows = [("mass", with_prefix(found.mass, "kg")), ("unknowns", str(part.link.unknowns))]
+    rows += [(f"mode {number}", f"{f:.5g} Hz") for number, f in enumerate(found.values, 1)]
+    title = Text(f"Natural frequencies of {part.name}, {held}")
+    return [facts(title, rows, caption=caption, min_width=60)]
