@@ -17,7 +17,7 @@ from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from kedfem.analysis import analyse
-from kedfem.cli.reporting import _written
+from kedfem.cli.results import written_page
 from kedfem.errors import OutputError, SceneError
 from kedfem.frequencies import Wanted, frequencies
 from kedfem.kinematics import kinematics
@@ -243,9 +243,9 @@ def test_a_scene_from_elsewhere_is_refused_if_asked(tmp_path: Path) -> None:
     scene = tmp_path / "in" / "scene.toml"
     scene.write_text('include = "../other.toml"', encoding="utf-8")
     with pytest.raises(SceneError, match=r"include: must be within the scene's folder \(--within\)"):
-        _written(scene, None, within=True)
+        written_page(scene, None, within=True)
     with pytest.raises(SceneError, match="--within: must be combined with a scene"):
-        _written(tmp_path / "in", None, within=True)
+        written_page(tmp_path / "in", None, within=True)
 
 
 def told(folder: Path) -> str:

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from kedfem.cli.options import ScenePath, Within
-from kedfem.cli.screen import out, show, stages
+from kedfem.cli.screen import say, show, stages
 
 
 def export(
@@ -49,24 +49,30 @@ def export(
     """For other programs: matrices of a link, the mechanism as a linear system, motion of all, moving shapes."""
     from kedfem.errors import SceneError
 
-    given = {"--link": link, "--file": file, "--motion": motion, "--state-space": state_space, "--gltf": gltf}
-    got = [key for key, value in given.items() if value is not None]
-    if got == ["--motion"] and motion is not None:
-        _motion(scene, motion, within)
-    elif got == ["--state-space"] and state_space is not None:
-        _state_space(scene, state_space, (modes, at, free), within)
-    elif got == ["--gltf"] and gltf is not None:
-        _gltf(scene, gltf, within)
-    elif link is not None and set(got) <= {"--link", "--file"}:
-        _link(scene, link, file or scene.with_name(f"{link}.npz"), within)
-    else:
-        raise SceneError(
-            "export: must have --link NAME (with --file FILE, if wanted), --state-space FILE, --motion FILE "
-            f"or --gltf FILE, got {', '.join(got) or 'none of them'}: export one after the other"
-        )
+    options = {
+        "--link": link,
+        "--file": file,
+        "--motion": motion,
+        "--state-space": state_space,
+        "--gltf": gltf,
+    }
+    match [key for key, value in options.items() if value is not None]:
+        case ["--motion"] if motion:
+            say(*_motion(scene, motion, within))
+        case ["--state-space"] if state_space:
+            say(*_state_space(scene, state_space, (modes, at, free), within))
+        case ["--gltf"] if gltf:
+            say(*_gltf(scene, gltf, within))
+        case ["--link"] | ["--link", "--file"] if link:
+            say(*_link(scene, link, file or scene.with_name(f"{link}.npz"), within))
+        case got:
+            raise SceneError(
+                "export: must have --link NAME (with --file FILE, if wanted), --state-space FILE, --motion FILE "
+                f"or --gltf FILE, got {', '.join(got) or 'none of them'}: export one after the other"
+            )
 
 
-def _link(scene: Path, link: str, path: Path, within: bool) -> None:
+def _link(scene: Path, link: str, path: Path, within: bool) -> tuple[Path, str]:
     from kedfem.export import exported_link, require_ending, write_link
     from kedfem.scene import read_scene
 
@@ -75,25 +81,20 @@ def _link(scene: Path, link: str, path: Path, within: bool) -> None:
     with stages() as stage:
         found = exported_link(loaded, link, stage)
     write_link(found, path)
-    size, ports = len(found.mass), ", ".join(found.ports) or "none"
-    out.print(f"{path}  {found.model}: {size} unknowns, ports {ports}", markup=False, soft_wrap=True)
+    return path, f"{found.model}: {len(found.mass)} unknowns, ports {', '.join(found.ports) or 'none'}"
 
 
-def _motion(scene: Path, path: Path, within: bool) -> None:
+def _motion(scene: Path, path: Path, within: bool) -> tuple[Path, str]:
     from kedfem.export import export_motion
     from kedfem.scene import read_scene
 
     loaded = read_scene(scene, sketch=True, within=within)
     count, warnings = export_motion(loaded, path)
     show([], warnings)
-    out.print(
-        f"{path}  rigid motion of {', '.join(loaded.links)}: {count} time points",
-        markup=False,
-        soft_wrap=True,
-    )
+    return path, f"rigid motion of {', '.join(loaded.links)}: {count} time points"
 
 
-def _state_space(scene: Path, path: Path, how: tuple[int, float, bool], within: bool) -> None:
+def _state_space(scene: Path, path: Path, how: tuple[int, float, bool], within: bool) -> tuple[Path, str]:
     from kedfem.export import require_ending, state_space, write_state_space
     from kedfem.scene import read_scene
 
@@ -103,14 +104,11 @@ def _state_space(scene: Path, path: Path, how: tuple[int, float, bool], within: 
         found, warnings = state_space(loaded, *how, stage=stage)
     write_state_space(found, path)
     show([], warnings)
-    out.print(
-        f"{path}  linear system: {len(found.A)} states, inputs {', '.join(found.inputs)}, {len(found.outputs)} outputs",
-        markup=False,
-        soft_wrap=True,
-    )
+    sizes = f"{len(found.A)} states, inputs {', '.join(found.inputs)}, {len(found.outputs)} outputs"
+    return path, f"linear system: {sizes}"
 
 
-def _gltf(scene: Path, path: Path, within: bool) -> None:
+def _gltf(scene: Path, path: Path, within: bool) -> tuple[Path, str]:
     from kedfem.errors import OutputError
     from kedfem.report import write_gltf
     from kedfem.scene import read_scene
@@ -120,5 +118,4 @@ def _gltf(scene: Path, path: Path, within: bool) -> None:
         raise OutputError(f"--gltf: must have the results of a run, got none in {folder}: kedfem run {scene}")
     found = write_gltf(folder, path)
     show([], found.warnings)
-    links = ", ".join(found.links)
-    out.print(f"{path}  {links} over {found.frames} frames", markup=False, soft_wrap=True)
+    return path, f"{', '.join(found.links)} over {found.frames} frames"

@@ -5,23 +5,13 @@ from typing import Annotated
 
 import typer
 
-from kedfem.cli.screen import out, progress
+from kedfem.cli.screen import progress, say
 from kedfem.errors import OutputError, SceneError
 
 KINDS = (
-    "four-bar",
-    "slider-crank",
-    "cad-slider-crank",
-    "single-arm",
-    "press",
-    "scissor-lift",
-    "excavator",
-    "wishbone",
-    "stewart",
-    "robot-arm",
-    "valve-train",
-    "panel",
-)
+    "four-bar", "slider-crank", "cad-slider-crank", "single-arm", "press", "scissor-lift", "excavator", "wishbone",
+    "stewart", "robot-arm", "valve-train", "panel",
+)  # fmt: skip
 
 
 def new(
@@ -66,7 +56,7 @@ def new(
             raise _exists(each)
     for part in named:
         _write(target.parent / part.name, part.read_text(encoding="utf-8"))
-        out.print(f"{target.parent / part.name} written", markup=False, soft_wrap=True)
+        say(f"{target.parent / part.name} written")
     _write_new(target, text)
 
 
@@ -89,7 +79,7 @@ def _exists(target: Path) -> OutputError:
 
 def _write_new(target: Path, text: str) -> None:
     _write(target, text)
-    out.print(f"{target} written; try: kedfem check {target}", markup=False, soft_wrap=True)
+    say(f"{target} written; try: kedfem check {target}")
 
 
 def _write(target: Path, text: str) -> None:

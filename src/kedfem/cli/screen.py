@@ -1,9 +1,13 @@
 """What the commands print on: the two streams, tables, warnings, progress bars."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
+import typer
+
+from kedfem.cli.options import INTERRUPTED
 from kedfem.terminal import terminal
 
 out, err = terminal(), terminal(stderr=True)
@@ -15,7 +19,34 @@ def show(tables: Iterable[Any], warnings: Iterable[str] = ()) -> None:
         if table.row_count:
             out.print(table)
     for warning in warnings:
-        err.print(f"warning: {warning}", style="yellow", markup=False)
+        warn(f"warning: {warning}", soft_wrap=False)
+
+
+def say(*words: object) -> None:
+    """One line, however long: mostly a file and what it is."""
+    out.print("  ".join(map(str, words)), markup=False, soft_wrap=True)
+
+
+def say_written(folder: Path, files: Mapping[str, str]) -> None:
+    """Those files of a folder that are there, with what they are."""
+    for name, what in files.items():
+        if (folder / name).exists():
+            say(folder / name, *filter(None, [what]))
+
+
+def warn(text: str, style: str = "yellow", soft_wrap: bool = True) -> None:
+    """One line for the stream of errors."""
+    err.print(text, style=style, markup=False, soft_wrap=soft_wrap)
+
+
+@contextmanager
+def interruptible(kept: Callable[[], str]) -> Iterator[None]:
+    """Ctrl-C ends a command with its own status, and with what is kept of its work."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        warn(f"interrupted; {kept()}")
+        raise typer.Exit(INTERRUPTED) from None
 
 
 class progress:  # noqa: N801
