@@ -1,6 +1,7 @@
-"""What is swept: keys with their values, from texts as ``drive.speed=500rpm:4000rpm:50``; the points of all together."""
+"""What is swept: keys of a scene, dotted, with their values, as ``drive.speed=500rpm:4000rpm:50``; all points."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -9,13 +10,15 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.errors import SceneError, Where, place
+from kedfem.scene import Scene
+from kedfem.scene.checks.hints import below, known_keys
 from kedfem.scene.records.units import NUMBER, UNIT, UNREADABLE, unit_registry
-from kedfem.scene.records.wording import shown
-from kedfem.sweep.keys import located
+from kedfem.scene.records.wording import nearest, shown
 
 Value = bool | int | float | str
 MOST = 100_000  # points: a slip of the keyboard, not a sweep
 SEED = 0  # of Latin hypercubes: the same points each time, so that a sweep goes on where it was
+PARAMETERS = "parameters"
 HOW = "a list a,b,c or a range from:to:count"
 
 
@@ -48,16 +51,13 @@ class Axis:
 def axes_of(texts: Sequence[str], raw: Mapping[str, Any], samples: int | None = None) -> list[Axis]:
     """The swept keys, each with a value for every point: a grid of all, or a Latin hypercube.
 
+    A SceneError says what is wrong with the first of them that cannot be.
+
     Parameters
     ----------
     texts : ``KEY=a,b,c`` or ``KEY=from:to:count``; for a Latin hypercube ``KEY=from:to``
     raw : keys and values of the scene
     samples : points of a Latin hypercube (`scipy.stats.qmc`), with the same seed each time
-
-    Raises
-    ------
-    SceneError
-        With what is wrong with the first of them.
     """
     if samples is not None and not 1 <= samples <= MOST:
         raise SceneError(f"--samples: must be from 1 to {MOST:,}, got {samples}")
@@ -67,7 +67,7 @@ def axes_of(texts: Sequence[str], raw: Mapping[str, Any], samples: int | None = 
     if not named:
         raise SceneError("--over: must be given at least once, got nothing")
     if samples is not None:
-        return _hypercube([(where, *_ends(where, spec.split(":"), 2)) for where, spec in named], samples)
+        return _hypercube([(where, *_ends(where, spec.split(":"))) for where, spec in named], samples)
     single = [_axis(where, spec) for where, spec in named]
     count = int(np.prod([float(len(axis.values)) for axis in single]))
     if count > MOST:
@@ -97,15 +97,15 @@ def _axis(where: Where, spec: str) -> Axis:
     parts = spec.split(":")
     if len(parts) != 3 or not parts[2].strip().isdigit() or not 2 <= int(parts[2]) <= MOST:
         raise SceneError(f"--over {place(where)}: must be {HOW} (2 to {MOST:,}), got {shown(spec)}")
-    first, last, unit, whole = _ends(where, parts[:2], 2)
+    first, last, unit, whole = _ends(where, parts[:2])
     numbers = np.linspace(first, last, int(parts[2]))
     return Axis(where, tuple(stated(x, unit, whole) for x in numbers), numbers, unit)
 
 
-def _ends(where: Where, parts: Sequence[str], count: int) -> tuple[float, float, str, bool]:
+def _ends(where: Where, parts: Sequence[str]) -> tuple[float, float, str, bool]:
     """The ends of a range in one unit, the unit, and whether both are whole numbers."""
     pairs = [pair for part in parts if (pair := _number(part)) is not None]
-    if not len(pairs) == len(parts) == count:
+    if not len(pairs) == len(parts) == 2:
         wanted = "two ends with a : between them, numbers with or without a unit"
         raise SceneError(f"--over {place(where)}: must have {wanted}, got {shown(':'.join(parts))}")
     unit = next((unit for _, unit in pairs if unit), "")
@@ -131,9 +131,8 @@ def _in(where: Where, number: float, unit: str, common: str) -> float:
             raise ValueError("speeds and frequencies are not converted")
         return float(quantity.to(common).magnitude)
     except UNREADABLE as reason:
-        raise SceneError(
-            f"--over {place(where)}: must be in one unit, got {unit} and {common}: {reason}"
-        ) from None
+        wanted = f"must be in one unit, got {unit} and {common}"
+        raise SceneError(f"--over {place(where)}: {wanted}: {reason}") from None
 
 
 def _word(text: str) -> Value:
@@ -162,3 +161,69 @@ def _hypercube(ranges: Sequence[tuple[Where, float, float, str, bool]], samples:
         numbers = first + (last - first) * x
         out.append(Axis(where, tuple(stated(each, unit) for each in numbers), numbers, unit))
     return out
+
+
+def located(name: str, raw: Mapping[str, Any]) -> Where:
+    """The key of a scene that is meant: in full, a parameter's name, or without names in between if one key alone fits.
+
+    Parameters
+    ----------
+    name : ``drive.motion.speed``, ``drive.speed``, ``links.rod.shape.between[1][0]``, or ``r`` for ``parameters.r``
+    raw : keys and values of the scene
+    """
+    known = {place(where): where for where in _keys(raw, Scene, ())}
+    if found := known.get(name) or known.get(f"{PARAMETERS}.{name}"):
+        return found
+    short = [full for full in known if _fits(name.split("."), full.split("."))]
+    if len(short) == 1:
+        return known[short[0]]
+    if short:
+        raise SceneError(f"--over {name}: must name one key, got what fits {', '.join(sorted(short)[:6])}")
+    close = _nearest(name, list(known))
+    hint = f", did you mean {close!r}?" if close else "; keys are dotted, as in drive.motion.speed"
+    wanted = "must name a key of the scene or one of its parameters"
+    raise SceneError(f"--over {name}: {wanted}, got neither{hint}")
+
+
+def with_values(raw: Mapping[str, Any], values: Mapping[Where, Any]) -> dict[str, Any]:
+    """A changed copy of a scene's keys and values."""
+    out: dict[str, Any] = deepcopy(dict(raw))
+    for where, value in values.items():
+        holder: Any = out
+        for part in where[:-1]:
+            holder = holder[part]
+        holder[where[-1]] = value
+    return out
+
+
+def _keys(raw: Any, hint: Any, where: Where) -> Iterator[Where]:
+    """Places of single values: those that are written, and those that tables which are there may have."""
+    if isinstance(raw, Mapping):
+        for key in dict.fromkeys([*raw, *known_keys(hint, raw)]):
+            if key in raw:
+                yield from _keys(raw[key], below(hint, key, raw), (*where, key))
+            elif where:
+                yield (*where, key)
+    elif isinstance(raw, list):
+        for k, each in enumerate(raw):
+            yield from _keys(each, below(hint, k, raw), (*where, k))
+    else:
+        yield where
+
+
+def _fits(short: list[str], full: list[str]) -> bool:
+    """Whether a name is a full one without some of the names between its first and its last."""
+    rest = iter(full)
+    return len(short) > 1 and (short[0], short[-1]) == (full[0], full[-1]) and all(x in rest for x in short)
+
+
+def _nearest(name: str, known: list[str]) -> str | None:
+    """The known key that looks most like a name, with or without the table of parameters and names in between."""
+    forms = {short: full for full in reversed(known) for short in _shortened(full)}
+    close = nearest(name, forms)
+    return forms[close] if close else None
+
+
+def _shortened(full: str) -> list[str]:
+    parts = full.split(".")
+    return [full, f"{parts[0]}.{parts[-1]}", *([parts[-1]] if parts[0] == PARAMETERS else [])]

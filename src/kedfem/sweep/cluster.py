@@ -70,9 +70,8 @@ def cluster(address: str, folder: FilePath) -> OnCluster:
 def _refuse_unfit(client: Any, folder: FilePath) -> None:
     workers = client.scheduler_info(n_workers=-1)["workers"]
     if not workers:
-        raise OutputError(
-            "--cluster: must have workers, got a scheduler without any: start some with dask worker"
-        )
+        got = "got a scheduler without any: start some with dask worker"
+        raise OutputError(f"--cluster: must have workers, {got}")
     if busy := [name for name, worker in workers.items() if worker["nthreads"] != 1]:
         raise OutputError(
             f"--cluster: its workers must have one thread each, got {workers[busy[0]]['nthreads']} of {busy[0]}: "
@@ -81,9 +80,8 @@ def _refuse_unfit(client: Any, folder: FilePath) -> None:
     try:
         found = client.run(_found_there, str(folder))
     except Exception as error:  # noqa: BLE001 - as a worker without kedfem raises it
-        raise OutputError(
-            f"--cluster: its workers must have kedfem {installed_version()}, got {error}"
-        ) from None
+        wanted = f"its workers must have kedfem {installed_version()}"
+        raise OutputError(f"--cluster: {wanted}, got {error}") from None
     for name, (version, there) in found.items():
         if version != installed_version():
             wanted = f"its workers must have kedfem {installed_version()}"

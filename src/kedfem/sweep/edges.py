@@ -3,7 +3,6 @@
 Neighbours are points whose other keys have the same values, along the first key.
 """
 
-import csv
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -13,7 +12,7 @@ import numpy as np
 
 from kedfem.accuracy.steady import GROWS
 from kedfem.errors import SceneError
-from kedfem.results.table import text_file
+from kedfem.results.table import write_rows
 from kedfem.scene import Scene
 from kedfem.sweep.axes import Axis, Value, stated
 from kedfem.sweep.points import GROWTH, Row
@@ -51,16 +50,10 @@ class Edge:
 
 
 def refuse_without_growth(scene: Scene, axis: Axis, width: float) -> None:
-    """Refuse to look for edges where none can be found.
-
-    Raises
-    ------
-    SceneError
-    """
+    """Refuse to look for edges where none can be found."""
     if not FINEST <= width < 1.0:
-        raise SceneError(
-            f"--edges: must be a relative width from {FINEST:g} to below 1, such as 0.001, got {width:g}"
-        )
+        wanted = f"must be a relative width from {FINEST:g} to below 1, such as 0.001"
+        raise SceneError(f"--edges: {wanted}, got {width:g}")
     if scene.analysis.kind != "steady" or not scene.analysis.stability:
         given = f"kind = {scene.analysis.kind!r}" if scene.analysis.kind != "steady" else "stability = false"
         raise SceneError(
@@ -124,19 +117,11 @@ def with_middles(axes: Sequence[Axis], found: Sequence[Edge]) -> list[Axis]:
 
 
 def write_edges(path: FilePath, axes: Sequence[Axis], found: Sequence[Edge]) -> None:
-    """One line an edge: the other keys' values, the place, its half width, and on which side the motion is unstable.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """One line an edge: the other keys' values, the place, its half width, and on which side the motion is unstable."""
     first = axes[0]
     unit = f" [{first.unit}]" if first.unit else ""
-    with text_file(path) as file:
-        table = csv.writer(file, lineterminator="\n")
-        header = [*(axis.key for axis in axes[1:]), f"{first.key}{unit}", f"half width{unit}", "unstable"]
-        table.writerow(header)
-        for each in found:
-            place = f"{each.at:.9g}", f"{0.5 * (each.above - each.below):.3g}"
-            table.writerow([*each.others, *place, "above" if each.unstable_above else "below"])
+    header = [*(axis.key for axis in axes[1:]), f"{first.key}{unit}", f"half width{unit}", "unstable"]
+    write_rows(path, header, (
+        [*each.others, each.at, f"{0.5 * (each.above - each.below):.3g}", "above" if each.unstable_above else "below"]
+        for each in found
+    ))  # fmt: skip

@@ -1,6 +1,8 @@
-"""Files of a sweep: a row for each point as it is done, all rows as `sweep.h5` and `sweep.csv`."""
+"""Files of a sweep: a row for each point as it is done, all rows as `sweep.h5` and `sweep.csv`.
 
-import csv
+An OutputError says that one cannot be written.
+"""
+
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path as FilePath
@@ -12,11 +14,10 @@ import numpy as np
 from kedfem.dynamics.system.period.map import Carried
 from kedfem.results import replacing
 from kedfem.results.layout import opened
-from kedfem.results.table import DIGITS, text_file
+from kedfem.results.table import write_rows
 from kedfem.results.writer import installed_version
 from kedfem.sweep.axes import Axis
-from kedfem.sweep.extremes import MAGNITUDE
-from kedfem.sweep.points import Row
+from kedfem.sweep.points import MAGNITUDE, Row
 
 ROWS, STATES = "rows", "states"
 KINDS = ("max", "min", "rms", "when")
@@ -42,65 +43,39 @@ def kept_state(folder: FilePath, identity: str) -> Carried | None:
 
 
 def keep_state(folder: FilePath, identity: str, state: Carried) -> None:
-    """Put the state with which a steady motion begins on the disk, whole or not at all.
-
-    Raises
-    ------
-    OutputError
-        It cannot be written.
-    """
+    """Put the state with which a steady motion begins on the disk, whole or not at all."""
     with replacing(folder / STATES / f"{identity}.npz") as part, part.open("wb") as file:
         np.savez(file, **state)
 
 
 def keep_row(folder: FilePath, identity: str, row: Row) -> None:
-    """Put a row on the disk, whole or not at all.
-
-    Raises
-    ------
-    OutputError
-        It cannot be written.
-    """
+    """Put a row on the disk, whole or not at all."""
     with replacing(folder / ROWS / f"{identity}.json") as part:
         part.write_text(row.text(), encoding="utf-8")
 
 
 def write_table(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row]) -> None:
-    """One line a point: values of the keys, how it ended, extremes of every column.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """One line a point: values of the keys, how it ended, extremes of every column."""
     units = column_units(rows)
     header = [f"{axis.key} [{axis.unit}]" if axis.unit else axis.key for axis in axes]
     header += ["status", "settled", "change of the last turn"]
     header += [
         f"{name} {kind} [{'s' if kind == 'when' else unit}]" for name, unit in units.items() for kind in KINDS
     ]
-    with text_file(path) as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow([*header, "message"])
-        for k, row in enumerate(rows):
-            values = [axis.values[k] if axis.numbers is None else f"{axis.numbers[k]:.15g}" for axis in axes]
-            extremes = [DIGITS % x if math.isfinite(x) else "" for x in _numbers(row, units)]
-            change = "" if math.isnan(row.change) else f"{row.change:.3g}"
-            table.writerow([*values, row.status, row.settled, change, *extremes, row.message])
+
+    def line(k: int, row: Row) -> list[object]:
+        values = [axis.values[k] if axis.numbers is None else f"{axis.numbers[k]:.15g}" for axis in axes]
+        change = "" if math.isnan(row.change) else f"{row.change:.3g}"
+        return [*values, row.status, row.settled, change, *_numbers(row, units), row.message]
+
+    write_rows(path, [*header, "message"], (line(k, row) for k, row in enumerate(rows)))
 
 
 def write_sweep(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row], last: float) -> None:
-    """All rows in HDF5, in the layout of netCDF 4: dimensions `point` and `column`, which xarray reads as they are.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """All rows in HDF5, in the layout of netCDF 4: dimensions `point` and `column`, which xarray reads as they are."""
     units = column_units(rows)
-    numbers = np.array([list(_numbers(row, units)) for row in rows]).reshape(
-        len(rows), len(units), len(KINDS)
-    )
+    shape = len(rows), len(units), len(KINDS)
+    numbers = np.array([list(_numbers(row, units)) for row in rows]).reshape(shape)
     with replacing(path) as part, opened(part, "w") as file:
         file.attrs.update(kedfem_version=installed_version(), sweep_format=FORMAT, last_revolutions=last)
         file["point"] = np.arange(len(rows))
@@ -114,11 +89,10 @@ def write_sweep(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row], last:
                 file[axis.key] = axis.numbers
                 file[axis.key].attrs["units"] = axis.unit
             _along(file, axis.key, "point")
-        _texts(file, "status", [row.status for row in rows])
-        _texts(file, "settled", [row.settled for row in rows])
-        _texts(file, "message", [row.message for row in rows])
-        file["change"] = [row.change for row in rows]
-        file["seconds"] = [row.seconds for row in rows]
+        for name in ("status", "settled", "message"):
+            _texts(file, name, [getattr(row, name) for row in rows])
+        for name in ("change", "seconds"):
+            file[name] = [getattr(row, name) for row in rows]
         for name in ("status", "settled", "message", "change", "seconds"):
             _along(file, name, "point")
         _texts(file, "unit", list(units.values()))

@@ -26,11 +26,6 @@ def write_plot(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row], edges:
 
     A plot of an earlier sweep goes. Points that have not settled are open rings, unstable bands whose edges are known are
     shaded. Nothing is drawn of words, of more keys, of fewer than two points, nor of two keys without a known growth.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
     """
     path.unlink(missing_ok=True)
     if len(axes) == 2:
@@ -49,22 +44,15 @@ def write_plot(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row], edges:
     loose = np.array([rows[k].settled == "no" for k in order])
     bands = unstable_bands(numbers, rows, range(len(rows)), edges)
     title = f"Largest over the last turns of each run, over {axes[0].key}"
-    with figure_saved(
-        path, title + ("; rings: not settled" if loose.any() else "") + ("; red: unstable" if bands else "")
-    ) as figure:
+    title += ("; rings: not settled" if loose.any() else "") + ("; red: unstable" if bands else "")
+    with figure_saved(path, title) as figure:
         panes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         for ax, (label, scale, names) in zip(panes, panels, strict=True):
             for name in names:
                 values = np.array([scale * largest(rows[k], name) for k in order])
                 (line,) = ax.plot(numbers[order], values, marker=".", label=name.split("/")[1])
-                ax.plot(
-                    numbers[order][loose],
-                    values[loose],
-                    "o",
-                    markersize=7,
-                    fillstyle="none",
-                    color=line.get_color(),
-                )
+                ring = {"markersize": 7, "fillstyle": "none", "color": line.get_color()}
+                ax.plot(numbers[order][loose], values[loose], "o", **ring)
             for first, last in bands:
                 ax.axvspan(first, last, color="tab:red", alpha=0.12, linewidth=0)
             ax.set_ylabel(label)

@@ -1,8 +1,8 @@
-"""One point of a sweep: the scene with its values, its run, the row that it leaves."""
+"""One point of a sweep: the scene with its values, its run, the row that it leaves: extremes of the last turns."""
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, replace
 from hashlib import sha256
@@ -11,6 +11,9 @@ from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any
 
+import numpy as np
+from jaxtyping import Float
+
 from kedfem.accuracy.plan import plan_for
 from kedfem.accuracy.shared_modes import Neighbours
 from kedfem.accuracy.trials import Stage
@@ -18,15 +21,20 @@ from kedfem.analysis import analyse
 from kedfem.dynamics.system.period.map import Carried
 from kedfem.errors import KedfemError, SceneError, Where, place
 from kedfem.motion.assembly import assembled
+from kedfem.results import Results
 from kedfem.resume import origin
 from kedfem.scene import Scene, scene_from, time_grid, turn_steps
-from kedfem.sweep.axes import Value
-from kedfem.sweep.extremes import Extreme, change, extremes
-from kedfem.sweep.keys import with_values
+from kedfem.sweep.axes import Value, with_values
 
 SETTLED = 0.01  # what the last two turns may differ by
+NOTHING = 1e-6  # of the largest channel with the same unit: what is rounding in a channel that should be zero
+MAGNITUDE = "magnitude"
+SUMS = "energy/"  # channels that add up over the run: they have no extremes of a turn
 STRESS = "stress/{}/peak"
 GROWTH, MARCHES = "steady/growth", "steady/marches"
+
+Extreme = tuple[float, float, float, float]
+"""Maximum, minimum, root of the mean square, time [s] of the largest magnitude."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,24 +84,12 @@ class Job:
     near: Carried | None = None
 
     def scene(self) -> Scene:
-        """The scene of this point.
-
-        Raises
-        ------
-        SceneError
-            With all faults.
-        """
+        """The scene of this point; a SceneError has all its faults."""
         raw = with_values(self.base.raw, self.values)
         return self.chosen.applied(scene_from(raw, self.base.folder, stem=self.base.stem))
 
     def identity(self) -> str:
-        """What the row depends on, as a digest: values, scene, its files, kedfem's version, turns.
-
-        Raises
-        ------
-        SceneError
-            With all faults of the scene.
-        """
+        """What the row depends on, as a digest: values, scene, its files, kedfem's version, turns."""
         content = {k: v for k, v in origin(self.scene()).items() if not k.startswith("output.folder")}
         shared = [sorted((place(where), value) for where, value in each.items()) for each in self.ends]
         parts = [content, self.last, *([shared] if shared else [])]
@@ -132,13 +128,7 @@ class Row:
 
     @classmethod
     def read(cls, text: str) -> "Row":
-        """From JSON.
-
-        Raises
-        ------
-        ValueError, KeyError, TypeError
-            It is another text.
-        """
+        """From JSON; a ValueError, KeyError or TypeError of another text."""
         content = json.loads(text)
         found: dict[str, tuple[str, Extreme]] = {}
         for name, (unit, (most, least, rms, when)) in content.pop("extremes").items():
@@ -147,13 +137,7 @@ class Row:
 
 
 def chosen_by_plan(scene: Scene, stage: Stage) -> Chosen:
-    """What the plan of one point chooses, which all other points then take too.
-
-    Raises
-    ------
-    KedfemError
-        The point cannot be planned.
-    """
+    """What the plan of one point chooses, which all other points then take too."""
     before, _ = assembled(scene)
     plan = plan_for(before, stage)
     if plan is None:
@@ -196,12 +180,12 @@ def _ran(job: Job) -> Row:
     found = extremes(results, since)
     for name, peak in run.peaks.items():
         found[STRESS.format(name)] = ("Pa", (peak.stress, math.nan, math.nan, peak.time))
-    turn = turn_steps(scene)
+    turn, unknown = turn_steps(scene), (math.nan,) * 3
     if run.steady is not None:
         if run.steady.growth is not None:
-            found[GROWTH] = ("1", (run.steady.growth, math.nan, math.nan, math.nan))
+            found[GROWTH] = ("1", (run.steady.growth, *unknown))
         begun = run.begun if job.follows else None
-        found[MARCHES] = ("1", (float(run.steady.marches), math.nan, math.nan, math.nan))
+        found[MARCHES] = ("1", (float(run.steady.marches), *unknown))
         return Row(results.status, results.reason, run.steady.residual, extremes=found, begun=begun)
     settled = change(results, turn * time_grid(scene).step) if turn else math.nan
     return Row(results.status, results.reason, settled, extremes=found)
@@ -232,3 +216,56 @@ def _since(scene: Scene, last: float) -> float:
         message = f"must be at most the {grid.steps / turn:.3g} revolutions that are run, got {last:g}"
         raise SceneError(f"--last: {message}")
     return grid.end - (last * turn - 0.5) * grid.step
+
+
+def extremes(results: Results, since: float) -> dict[str, tuple[str, Extreme]]:
+    """Of every column after a time [s]: name → unit, extremes; of vectors also their magnitude."""
+    some = results.time > since
+    t = results.time[some]
+    return {name: (unit, _four(t, values)) for name, unit, values in columns(results, some)}
+
+
+def _four(t: Float[np.ndarray, " n"], values: Float[np.ndarray, " n"]) -> Extreme:
+    rms = np.sqrt((values**2).mean())
+    return float(values.max()), float(values.min()), float(rms), float(t[np.abs(values).argmax()])
+
+
+def columns(results: Results, some: np.ndarray) -> Iterator[tuple[str, str, Float[np.ndarray, " n"]]]:
+    """Name, unit and values of every column at some of the rows; energies and works are left out."""
+    for name, (channel, values) in results.channels.items():
+        if name.startswith(SUMS):
+            continue
+        rows = values[some]
+        if not channel.columns or rows.ndim == 1:
+            yield name, channel.unit, rows.reshape(len(rows))
+            continue
+        for k, column in enumerate(channel.columns):
+            yield f"{name}/{column}", channel.unit, rows[:, k]
+        if channel.columns == ("x", "y", "z"):
+            yield f"{name}/{MAGNITUDE}", channel.unit, np.sqrt((rows**2).sum(axis=1))
+
+
+def change(results: Results, turn: float) -> float:
+    """By how much the largest magnitudes of the last turn [s] differ from those of the turn before, relative, at worst.
+
+    Channels that are nothing beside others of the same unit are left out; nan where there are no two turns.
+    """
+    end = float(results.time[-1])
+    half = 0.5 * float(results.time[-1] - results.time[-2])
+    if end < 2 * turn - half:
+        return float("nan")
+    last = results.time > end - turn + half
+    before = (results.time > end - 2 * turn + half) & ~last
+    now, then = (
+        {name: (unit, np.abs(values).max()) for name, unit, values in columns(results, some)}
+        for some in (last, before)
+    )
+    largest: dict[str, float] = {}
+    for unit, size in (*now.values(), *then.values()):
+        largest[unit] = max(largest.get(unit, 0.0), size)
+    changes = [
+        abs(size - then[name][1]) / max(size, then[name][1])
+        for name, (unit, size) in now.items()
+        if max(size, then[name][1]) > NOTHING * largest[unit]
+    ]
+    return float(max(changes, default=0.0))

@@ -14,14 +14,12 @@ from kedfem.results import claimed
 from kedfem.scene import scene_from
 from kedfem.scene.questions.timing import scene_speed
 from kedfem.stepping import Watch
-from kedfem.sweep.axes import Axis
+from kedfem.sweep.axes import Axis, with_values
 from kedfem.sweep.edges import Edge, edges, refuse_without_growth, with_middles, write_edges
 from kedfem.sweep.files import ROWS, STATES, keep_row, kept_row, write_sweep, write_table
-from kedfem.sweep.following import Following, refuse_without_order
-from kedfem.sweep.keys import with_values
+from kedfem.sweep.neighbours import Ends, Following, refuse_without_order
 from kedfem.sweep.plot import write_plot
 from kedfem.sweep.points import Base, Chosen, Job, Row, chosen_by_plan, finished
-from kedfem.sweep.sharing import Ends
 
 AHEAD = 2  # points that wait for each worker, so that none is idle
 ONE_THREAD = dict.fromkeys((*BLAS_THREADS, "NUMBA_NUM_THREADS"), "1")
@@ -83,8 +81,7 @@ def sweep(
     Raises
     ------
     KedfemError
-        The scene is invalid, no point can be planned, the folder cannot be written, a worker was killed. What fails at
-        one point is reported in its row.
+        The scene is invalid, the folder cannot be written, a worker was killed; what fails at a point is in its row.
     """
     if not asked.last > 0:
         raise SceneError(f"--last: must be positive, got {asked.last:g}")
@@ -199,11 +196,7 @@ def _planned(base: Base, axes: Sequence[Axis], watch: Watch) -> tuple[Chosen, in
 
 
 def _run(
-    waiting: Mapping[int, tuple[str, Job]],
-    rows: dict[int, Row],
-    point: _Points,
-    watch: Watch,
-    pool: Executor,
+    waiting: Mapping[int, tuple[str, Job]], rows: dict[int, Row], point: _Points, watch: Watch, pool: Executor
 ) -> None:
     """Rows of points that wait, in whatever order they are finished; none before the one that it follows."""
     left, total, target = dict(waiting), len(rows) + len(waiting), point.target

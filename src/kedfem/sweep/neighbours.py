@@ -1,7 +1,11 @@
-"""Points that follow one another: a steady motion is looked for where that of the point before was found.
+"""What points of a sweep have of one another: the steady motion that was found before, and the modes of reduced links.
 
-Points follow along the first key in the order of its values, as long as the others are the same. Of motions that are not
-linear several may be steady at one speed; which is found then depends on from where the sweep comes.
+A steady motion is looked for where that of the point before was found. Points follow along the first key in the order of
+its values, as long as the others are the same. Of motions that are not linear several may be steady at one speed; which
+is found then depends on from where the sweep comes.
+
+Points that differ in the drive's speed and in damping alone share their reduced links: modes are found for the fastest
+and the slowest of them, and serve those in between.
 """
 
 from collections.abc import Mapping, Sequence
@@ -9,20 +13,21 @@ from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path as FilePath
 
-from kedfem.errors import SceneError
+from kedfem.accuracy.shared_modes import alike
+from kedfem.errors import SceneError, Where
 from kedfem.scene import Scene
+from kedfem.scene.questions.timing import scene_speed
 from kedfem.sweep.axes import Axis, Value
 from kedfem.sweep.files import keep_state, kept_state
 from kedfem.sweep.points import Job, Row
 
+FEWEST = 3  # points for which sharing modes saves something
+
+Values = Mapping[Where, Value]
+
 
 def refuse_without_order(scene: Scene, edges: bool) -> None:
-    """Refuse to follow where there is nothing to follow, or no order.
-
-    Raises
-    ------
-    SceneError
-    """
+    """Refuse to follow where there is nothing to follow, or no order."""
     if scene.analysis.kind != "steady":
         raise SceneError(
             "--follow: must be combined with analysis.kind = 'steady', whose motion is looked for near that of the point "
@@ -58,9 +63,8 @@ class Following:
         if k not in self.before:
             return own
         last = self.before[k]
-        self.names[k] = sha256(
-            f"{own} after {'' if last is None else self.names.get(last, '')}".encode()
-        ).hexdigest()
+        before = "" if last is None else self.names.get(last, "")
+        self.names[k] = sha256(f"{own} after {before}".encode()).hexdigest()
         return self.names[k]
 
     def due(self, k: int, rows: Mapping[int, Row]) -> bool:
@@ -77,13 +81,36 @@ class Following:
         return replace(job, follows=True, near=near)
 
     def kept(self, k: int, row: Row, target: FilePath) -> Row:
-        """A row without the state that it hands on, which goes to the disk.
-
-        Raises
-        ------
-        OutputError
-            It cannot be written.
-        """
+        """A row without the state that it hands on, which goes to the disk."""
         if row.begun is not None and k in self.names:
             keep_state(target, self.names[k], row.begun)
         return replace(row, begun=None)
+
+
+@dataclass(frozen=True, slots=True)
+class Ends:
+    """Of points that are alike the values of the fastest and of the slowest, by what they have in common."""
+
+    by: Mapping[str, tuple[Values, ...]] = field(default_factory=dict)
+
+    @classmethod
+    def among(cls, jobs: Sequence[Job]) -> "Ends":
+        """Of all points of a sweep; those whose scene is invalid are left out."""
+        groups: dict[str, list[tuple[float, Values]]] = {}
+        for job in jobs:
+            try:
+                scene = job.scene()
+            except SceneError:
+                continue
+            if (name := alike(scene)) is not None:
+                groups.setdefault(name, []).append((abs(scene_speed(scene)), job.values))
+        return cls({name: _fastest_and_slowest(each) for name, each in groups.items() if len(each) >= FEWEST})
+
+    def of(self, job: Job) -> tuple[Values, ...]:
+        """Those that a point shares its modes with; none if it has its own."""
+        return self.by.get(alike(job.scene()) or "", ()) if self.by else ()
+
+
+def _fastest_and_slowest(points: Sequence[tuple[float, Values]]) -> tuple[Values, ...]:
+    fastest, slowest = max(points, key=lambda each: each[0]), min(points, key=lambda each: each[0])
+    return (fastest[1],) if fastest[0] == slowest[0] else (fastest[1], slowest[1])
