@@ -17,9 +17,9 @@ import h5py
 import pytest
 
 import kedfem
-from kedfem import cli
 from kedfem.analysis import analyse
 from kedfem.cli import DEFECT, DOUBTFUL, INTERRUPTED, KINDS, USER_ERROR, main
+from kedfem.cli.running import with_plain_defaults
 from kedfem.errors import OutputError
 from kedfem.mesh.files.read import mesh_from_file
 from kedfem.output.animation import AnimationWriter, read_collection
@@ -559,7 +559,7 @@ def expect_whole_animation(folder: Path, results: Results) -> None:
 def test_a_scene_of_a_quick_run_can_be_read_again(kind: str, run_kedfem: Command, tmp_path: Path) -> None:
     """What takes results up, such as `kedfem loads`, reads their scene: with several drives its step was not in it."""
     assert run_kedfem("new", kind).code == 0
-    quick = cli.with_plain_defaults(read_scene(tmp_path / f"{kind}.toml"))
+    quick = with_plain_defaults(read_scene(tmp_path / f"{kind}.toml"))
     again = scene_from(json.loads(quick.model_dump_json()), tmp_path)
     assert time_grid(again) == time_grid(quick)
 
