@@ -107,8 +107,9 @@ def test_a_load_across_a_cantilever_is_judged_as_the_elastica_does() -> None:
         {"model": "plane", "mesh": {"elements": [16, 1]}},
         {"mesh": {"elements": [16, 1, 1]}},
         {"mesh": {"elements": [16, 1, 1]}, "reduction": 16},
+        {**BEAM, "beam": "spatial", "reduction": 16},
     ],
-    ids=["beam", "spatial", "plane", "solid", "reduced"],
+    ids=["beam", "spatial", "plane", "solid", "reduced", "reduced spatial"],
 )
 @pytest.mark.parametrize("N", [-0.2, 0.2])
 def test_a_beam_column_is_judged_by_the_axial_force_in_its_own_shape(link: dict[str, Any], N: float) -> None:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kedfem.accuracy.error_budget import percent
 from kedfem.accuracy.histories import Histories, counted, histories, relative_errors
 from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.step_estimate import LEAST_ORDER, SURE
@@ -96,7 +97,7 @@ def _unreached(found: _Halved, asked: float, until: float, error: float) -> str:
     errors = found.errors
     name = max(errors, key=errors.__getitem__)
     message = (
-        f"the step's error stays at {100 * error:.2g} % in {name} with {found.steps:,} steps, the most that are "
+        f"the step's error stays at {percent(error)} in {name} with {found.steps:,} steps, the most that are "
         "tried"
     )
     if until >= found.coarse.time[-1]:

@@ -248,9 +248,19 @@ def _remedy(found: GeometricError, error: float) -> str:
 def _projected(
     full: Link, Q: Float[np.ndarray, "n s"], chosen: Float[np.ndarray, "c n"]
 ) -> Float[np.ndarray, "c s"]:
-    """Coefficients of modes Q that come nearest to weights of nodes, by the nodes' share in the volume."""
-    share = np.sqrt(np.abs(full.volume))[:, None]
+    """Coefficients of modes Q that come nearest to weights of nodes, by the functions' share in the volume."""
+    share = np.sqrt(_volumes(full))[:, None]
     return np.asarray(np.linalg.lstsq(share * Q, share * chosen.T, rcond=None)[0].T)
+
+
+def _volumes(full: Link) -> Float[np.ndarray, " n"]:
+    """Volume of each node; times the section's radius of gyration squared of its slopes, whose ∫ N_a dV vanishes."""
+    own = full.one != 0
+    volume = np.asarray(np.abs(full.volume[own])[np.cumsum(own) - 1])
+    if full.section is None:
+        return volume
+    radius = (full.section.second_moment + full.section.second_moment_z) / (2 * full.section.area)
+    return np.asarray(np.where(own, volume, radius * volume))
 
 
 def _inertia(link: Link) -> Float[np.ndarray, "n 4"]:

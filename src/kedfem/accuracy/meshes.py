@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kedfem.accuracy.choices import elastic, open_step
-from kedfem.accuracy.error_budget import UNKNOWNS
+from kedfem.accuracy.error_budget import UNKNOWNS, percent
 from kedfem.accuracy.estimates import Strained
 from kedfem.accuracy.histories import histories, worst
 from kedfem.accuracy.mesh_estimate import link_errors, mesh_errors
@@ -74,7 +74,7 @@ def chosen_meshes(search: Trials, scene: Scene, allowed: float, auto: Sequence[s
         scene = with_links(scene, {name: refined(scene.links[name], factor) for name in worst_links})
     if error > allowed:
         search.notes.append(
-            f"meshes of {unknowns:,} unknowns leave an error of {error:.2g}; finer ones are not taken unasked"
+            f"meshes of {unknowns:,} unknowns leave an error of {percent(error)}; finer ones are not taken unasked"
         )
     return scene, error
 

@@ -14,16 +14,17 @@ from itertools import pairwise
 from typing import Any
 
 from kedfem.accuracy.choices import (
-    DEARER,
     beams_only,
     chosen_beams,
     chosen_frames,
     chosen_step,
+    frames_allowed,
     open_beams,
     open_frames,
     open_step,
     with_beams,
 )
+from kedfem.accuracy.error_budget import percent
 from kedfem.accuracy.meshes import chosen_meshes, distinct, open_meshes, open_modes, with_fillets, with_modes
 from kedfem.accuracy.prepared import key
 from kedfem.accuracy.segments import open_segments, with_segments
@@ -155,7 +156,7 @@ def _chosen(search: Trials, scene: Scene) -> Plan:
     stage("plan: frames")
     scene, frames = chosen_frames(search, scene)
     if frames:
-        shares.append(Share("frames", frames, DEARER * asked))
+        shares.append(Share("frames", frames, frames_allowed(search, scene)))
     if not (left_open or open_beams(scene) or open_meshes(scene)):
         search.notes.append("the scene states all meshes; the run reports their error")
         if not open_step(scene) and not open_segments(scene):
@@ -217,7 +218,7 @@ def _limits(plan: Plan) -> Iterator[str]:
         limit = max(plan.shares, key=lambda share: share.error)
         yield (
             f"the accuracy of {100 * plan.asked:.3g} % could not be reached: {limit.what} limits it, "
-            f"{100 * plan.error:.2g} % is expected"
+            f"{percent(plan.error)} is expected"
         )
 
 
@@ -268,7 +269,7 @@ def _with_mesh(
         if beyond <= allowed:
             return finer, beyond, next_factor
         error = beyond
-    search.notes.append(f"the finest mesh tried still leaves an error of {error:.2g}")
+    search.notes.append(f"the finest mesh tried still leaves an error of {percent(error)}")
     return meshes[-1][1], error, meshes[-1][0]
 
 

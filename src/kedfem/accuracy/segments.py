@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from kedfem.accuracy.error_budget import percent
 from kedfem.accuracy.trials import Trials
 from kedfem.accuracy.variants import with_links
 from kedfem.dynamics.model import Model, segments
@@ -43,7 +44,7 @@ def with_segments(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, 
         if beyond <= allowed:
             return finer, beyond
         error = beyond
-    search.notes.append(f"as many as {COUNTS[-1]} segments still leave an error of {error:.2g}")
+    search.notes.append(f"as many as {COUNTS[-1]} segments still leave an error of {percent(error)}")
     return _segmented(scene, most, COUNTS[-1]), error
 
 

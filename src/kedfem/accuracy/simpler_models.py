@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 
+from kedfem.accuracy.error_budget import percent
 from kedfem.accuracy.trials import Trials
 from kedfem.accuracy.variants import (
     families,
@@ -33,7 +34,9 @@ def with_simpler_links(
                 search.notes.append(f"{name}: not {simpler.model}, {str(fault).splitlines()[0]}")
                 continue
             verdict = "taken" if change <= allowed else "left out"
-            search.notes.append(f"{name}: as {_noun(simpler)} the results change by {change:.2g}, {verdict}")
+            search.notes.append(
+                f"{name}: as {_noun(simpler)} the results change by {percent(change)}, {verdict}"
+            )
             if change <= allowed:
                 scene, error = trial, change
                 break

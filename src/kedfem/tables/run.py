@@ -28,9 +28,9 @@ def plan_tables(plan: Plan) -> list[Table]:
     budget = listed(
         f"Accuracy asked for: {100 * plan.asked:.3g} %",
         [*left("part of the error"), *right("expected", "allowed")],
-        ((share.what, f"{100 * share.error:.2g} %", f"{100 * share.allowed:.2g} %") for share in plan.shares),
+        ((share.what, percent(share.error), percent(share.allowed)) for share in plan.shares),
     )
-    budget.add_row("together", f"{100 * plan.error:.2g} %", f"{100 * plan.asked:.2g} %")
+    budget.add_row("together", percent(plan.error), percent(plan.asked))
     return [budget, chosen_table(plan)]
 
 
@@ -70,8 +70,8 @@ def reduction_table(reduction: Reduction) -> Table:
     return listed(
         "Error of the reduction (estimated)",
         [*left("channel"), *right("of its peak")],
-        ((name, f"{100 * error:.2g} %") for name, error in reduction.estimate.items()),
-        caption=f"asked for: {100 * reduction.tolerance:.2g} %; against the same links unreduced",
+        ((name, percent(error)) for name, error in reduction.estimate.items()),
+        caption=f"asked for: {percent(reduction.tolerance)}; against the same links unreduced",
     )
 
 
