@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import sys
 import types
+from collections.abc import Sequence
 from typing import Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
@@ -89,7 +90,7 @@ The tables below are made from the program's own records (`python -m reference.s
 What a `—` in the column *default* stands for is said under *meaning*.
 """
 
-SECTIONS: list[tuple[str, str, list[type[BaseModel]]]] = [
+SECTIONS: list[tuple[str, str, Sequence[type[BaseModel]]]] = [
     ("The file", "", [scene.Scene]),
     (
         "[points]",

@@ -1,15 +1,22 @@
-"""Cross checks of drives and gears."""
+"""Cross checks of drives and gears, of the analysis with them, and of what starts without one."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 from pydantic_core import PydanticCustomError
 
 from kedfem.errors import Fault, place
 from kedfem.scene.checks.parts import Entry, Parts
-from kedfem.scene.records.drives import SLIDING, TURNING
-from kedfem.scene.records.wording import unknown_name
+from kedfem.scene.questions.laws import table_noise
+from kedfem.scene.questions.timing import cycle, turning_speed
+from kedfem.scene.records.analysis import WITHOUT_VIBRATION
+from kedfem.scene.records.drives import SLIDING, TURNING, ConstantSpeed, Cycloidal, Polynomial, Ramp, Table
+from kedfem.scene.records.units import Quantity, si_number
+
+ROUGH = 0.05  # share of a table's acceleration that may be noise
+AXES = {"revolute": TURNING, "prismatic": SLIDING}  # joints with one motion, and its speed
 
 
 def drive_faults(parts: Parts) -> Iterator[Fault]:
@@ -38,24 +45,158 @@ def law_faults(drive: Entry, kind: str) -> Iterator[Fault]:
     wanted, other = ("travel", "angle") if kind == "prismatic" else ("angle", "travel")
     if motion.get(other) is not None:
         article = "an" if other == "angle" else "a"
-        yield drive.fault(
-            "motion", f"must be given as {wanted} of a {kind} joint, got {article} {other}", other
-        )
+        message = f"must be given as {wanted} of a {kind} joint, got {article} {other}"
+        yield drive.fault("motion", message, other)
     if (speed := motion.get("speed")) is not None:
         try:
-            (SLIDING if kind == "prismatic" else TURNING).number(speed)
+            AXES[kind].number(speed)
         except PydanticCustomError as reason:
             yield drive.fault("motion", reason.message(), "speed")
 
 
 def gear_faults(parts: Parts) -> Iterator[Fault]:
-    """Gears on joints that do not exist."""
+    """Gears that couple a joint to itself."""
     for gear in parts.gears.values():
         names = gear.raw.get("joints")
-        if not isinstance(names, (list, tuple)) or len(names) != 2:
-            continue
-        if names[0] == names[1]:
+        if isinstance(names, (list, tuple)) and len(names) == 2 and names[0] == names[1]:
             yield gear.fault("joints", f"must be two different joints, got {names[0]!r} twice")
-        for i, name in enumerate(names):
-            if parts.joints and not (isinstance(name, str) and name in parts.joints):
-                yield gear.fault("joints", unknown_name("a joint", str(name), parts.joints), i)
+
+
+def analysis_faults(parts: Parts) -> Iterator[Fault]:
+    """An analysis whose end or step is missing, given twice or impossible with the drive."""
+    analysis = parts.analysis
+    if not analysis.raw and analysis.record is None:
+        return
+    if analysis.has("revolutions") and analysis.has("end_time"):
+        yield analysis.fault("revolutions", "cannot be combined with end_time, got both")
+    if not analysis.has("revolutions") and not analysis.has("end_time") and not _repeats(parts):
+        if parts.driven:
+            yield analysis.fault("revolutions", "is required, or end_time [s], got neither")
+        else:
+            yield analysis.fault("end_time", "is required [s], got nothing")
+    if analysis.has("step") and analysis.has("steps_per_revolution"):
+        yield analysis.fault("step", "cannot be combined with steps_per_revolution, got both")
+    if parts.driven:
+        yield from open_model_faults(parts)
+    drives = [drive for drive in parts.all_drives if drive.record is not None]
+    for drive in drives:
+        yield from drive_table_faults(parts, drive)
+    if len(parts.all_drives) == 1:
+        for drive in drives:
+            yield from drive_and_analysis_faults(parts, drive)
+    elif drives:
+        got = f"{len(parts.all_drives)} drives"
+        yield from steps_faults(parts, got, "one drive that goes on turning", "several drives")
+
+
+def _repeats(parts: Parts) -> bool:
+    """Whether the end need not be given: of a structure in static balance, or where the drive's law says after which time
+    it repeats itself, and the motion of one period is asked for.
+    """
+    if not parts.all_drives:
+        return parts.analysis.word("kind") == "static"
+    drives = [drive.record for drive in parts.all_drives]
+    known = len(drives) == 1 and drives[0] is not None and cycle(drives[0].motion) is not None
+    return parts.analysis.word("kind") in {"steady", *WITHOUT_VIBRATION} and known
+
+
+def open_model_faults(parts: Parts) -> Iterator[Fault]:
+    """Models left open without saying for which accuracy."""
+    for link in parts.links.values():
+        if link.word("model") == "auto" and parts.analysis.word("accuracy") == "quick":
+            yield link.fault("model", "needs an analysis.accuracy, e.g. 0.01, got 'quick' for 'auto'")
+
+
+def drive_and_analysis_faults(parts: Parts, drive: Entry) -> Iterator[Fault]:
+    """An analysis that does not suit the law of motion of the only drive."""
+    motion, joint = drive.record.motion, parts.joints.get(drive.record.joint)
+    if joint is not None and joint.word("kind") == "prismatic":
+        yield from steps_faults(parts, "one on a prismatic joint")
+    elif turning_speed(motion) == 0.0:
+        still = isinstance(motion, (ConstantSpeed, Ramp))
+        yield from steps_faults(parts, "speed 0" if still else f"{motion.kind!r}")
+
+
+def steps_faults(
+    parts: Parts, got: str, wanted: str = "a drive that goes on turning",
+    doing: str = "a drive that does not go on turning",
+) -> Iterator[Fault]:  # fmt: skip
+    """Turns that are asked for where there are none, and a step that is not given."""
+    analysis = parts.analysis
+    for key, instead in (("revolutions", "end_time"), ("steps_per_revolution", "step")):
+        if analysis.has(key):
+            yield analysis.fault(key, f"needs {wanted} (else {instead} [s]), got {got}")
+    stated = any(analysis.has(key) for key in ("step", "steps_per_revolution"))
+    if not stated and analysis.word("accuracy") == "quick":
+        yield analysis.fault("step", f"is required with {doing} [s], got {got}")
+
+
+def drive_table_faults(parts: Parts, drive: Entry) -> Iterator[Fault]:
+    """A motion table that does not cover the analysis or is too rough for it; a dwell without a return."""
+    motion = drive.record.motion
+    stays = isinstance(motion, (Cycloidal, Polynomial)) and motion.return_time is None
+    if stays and motion.dwell_after > 0.0:
+        yield drive.fault("motion", "must be combined with return_time, got no return", "dwell_after")
+    if not isinstance(motion, Table) or not motion.time:
+        return
+    if motion.time[0] > 0.0:
+        wanted = f"must begin at 0 or before [s], got {motion.time[0]:.6g}"
+        yield drive.fault("motion", wanted, "time")
+    end = parts.analysis.record.end_time if parts.analysis.record is not None else None
+    if end is not None and end > motion.time[-1] * (1.0 + 1e-9):
+        wanted = f"must reach the end of the analysis {end:.6g} [s]"
+        yield drive.fault("motion", f"{wanted}, got {motion.time[-1]:.6g}", "time")
+    noise, share = table_noise(motion)
+    if motion.smooth is None and share > ROUGH:
+        key, unit = ("travel", "m") if motion.travel else ("angle", "rad")
+        wanted = "must be smooth enough for its acceleration to shake nothing (more digits, or smooth"
+        got = f"got values that scatter by {noise:.2g} [{unit}], {100 * share:.0f} % of the acceleration"
+        yield drive.fault("motion", f"{wanted} = {2 * noise:.1g}), {got}", key)
+
+
+def initial_faults(parts: Parts) -> Iterator[Fault]:
+    """Speeds at the start of joints that have none of their own."""
+    given = parts.analysis.raw.get("initial_speeds")
+    for name, speed in given.items() if isinstance(given, Mapping) else ():
+        if name in parts.joints:
+            yield from speed_faults(parts, parts.joints[name], speed)
+
+
+def speed_faults(parts: Parts, joint: Entry, given: Any) -> Iterator[Fault]:
+    """A speed of a joint that has none, that the drive moves, or in a unit of another kind."""
+    kind = joint.word("kind")
+    if kind in {"spherical", "weld"}:
+        got = f"got {joint.name!r}, which is {kind}"
+        message = f"must be of a revolute or prismatic joint, {got}"
+        yield parts.analysis.fault("initial_speeds", message, joint.name)
+    elif joint.name in parts.driven_joints:
+        message = f"must be of a joint that the drive does not move, got {joint.name!r}"
+        yield parts.analysis.fault("initial_speeds", message, joint.name)
+    elif kind in AXES and isinstance(given, str) and not in_unit(given, AXES[kind]):
+        message = f"must be {AXES[kind].kind} for a {kind} joint, got {given!r}"
+        yield parts.analysis.fault("initial_speeds", message, joint.name)
+
+
+def in_unit(text: str, quantity: Quantity) -> bool:
+    """Whether a text is a number with a unit of one kind; one that is no number at all has its fault already."""
+    others = [other for other in AXES.values() if other != quantity]
+    return readable(text, quantity) or not any(readable(text, other) for other in others)
+
+
+def readable(text: str, quantity: Quantity) -> bool:
+    """Whether a text is a number with a unit."""
+    try:
+        si_number(text, quantity.unit)
+    except ValueError:
+        return False
+    return True
+
+
+def undriven_faults(parts: Parts) -> Iterator[Fault]:
+    """What only makes sense with a drive, in a scene without one."""
+    if parts.driven:
+        return
+    drawn = parts.animation.record
+    if drawn is not None and drawn.deformation_scale != 1.0:
+        message = "must be 1 in a scene without a drive, which has no motion that it deviates from"
+        yield parts.animation.fault("deformation_scale", f"{message}, got {drawn.deformation_scale:g}")

@@ -12,11 +12,12 @@ from kedfem.scene.checks.hints import (
     kind_of,
     known_keys,
     length_of,
+    marks,
     models,
     options,
-    quantities,
     walked,
 )
+from kedfem.scene.records.units import Quantity
 from kedfem.scene.records.wording import either, one_of, shown, unknown_key
 
 WANTED = {
@@ -102,5 +103,5 @@ def choice(hint: Any) -> str:
     """The words to choose from, or the unit, as it stands after 'is required'."""
     if options(hint):
         return f", {either(options(hint))}"
-    brackets = {quantity.bracket for quantity in quantities(hint)}
+    brackets = {quantity.bracket for quantity in marks(hint, Quantity)}
     return brackets.pop() if len(brackets) == 1 else ""

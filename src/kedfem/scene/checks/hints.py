@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import types
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
@@ -14,20 +15,20 @@ from kedfem.scene.records.points import AxisPoints, construction_of, is_construc
 from kedfem.scene.records.units import Quantity
 
 
-def members(hint: Any) -> Iterator[Any]:
+@cache
+def members(hint: Any) -> tuple[Any, ...]:
     """The alternatives of a type: unions taken apart, annotations taken off."""
     if get_origin(hint) is Annotated:
-        yield from members(get_args(hint)[0])
-    elif get_origin(hint) in {Union, types.UnionType}:
-        for part in get_args(hint):
-            yield from members(part)
-    else:
-        yield hint
+        return members(get_args(hint)[0])
+    if get_origin(hint) in {Union, types.UnionType}:
+        return tuple(each for part in get_args(hint) for each in members(part))
+    return (hint,)
 
 
-def models(hint: Any) -> list[type[BaseModel]]:
+@cache
+def models(hint: Any) -> tuple[type[BaseModel], ...]:
     """The records among the alternatives of a type."""
-    return [part for part in members(hint) if isinstance(part, type) and issubclass(part, BaseModel)]
+    return tuple(x for x in members(hint) if isinstance(x, type) and issubclass(x, BaseModel))
 
 
 def options(hint: Any) -> list[Any]:
@@ -35,6 +36,7 @@ def options(hint: Any) -> list[Any]:
     return [word for part in members(hint) if get_origin(part) is Literal for word in get_args(part)]
 
 
+@cache
 def kind_of(model: type[BaseModel]) -> str | None:
     """The word in the `kind` key of a record that is one of several."""
     field = model.model_fields.get("kind")
@@ -55,25 +57,32 @@ def field_hint(field: FieldInfo) -> Any:
     return hint
 
 
+@cache
 def keys(model: type[BaseModel]) -> dict[str, FieldInfo]:
     """The keys of a record as they are written in a scene, and their fields."""
     return {field.alias or name: field for name, field in model.model_fields.items()}
 
 
-def quantities(hint: Any) -> set[Quantity]:
-    """The quantities in a type."""
-    found: set[Quantity] = (
-        {extra for extra in get_args(hint)[1:] if isinstance(extra, Quantity)}
-        if get_origin(hint) is Annotated
-        else set()
-    )
-    return found.union(*(quantities(part) for part in get_args(hint) if not isinstance(part, (str, int))))
+@cache
+def key_hints(model: type[BaseModel]) -> dict[str, Any]:
+    """The types of its keys."""
+    return {key: field_hint(field) for key, field in keys(model).items()}
+
+
+@cache
+def marks(hint: Any, kind: Any) -> frozenset[Any]:
+    """What a type says of one kind beside what pydantic knows: quantities, or what it is the name of."""
+    own = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
+    found = frozenset(extra for extra in own if isinstance(extra, kind))
+    return found.union(*(marks(part, kind) for part in get_args(hint) if not isinstance(part, (str, int))))
 
 
 def construction(hint: Any, raw: Mapping[str, Any]) -> type[BaseModel] | None:
     """The record of a table that stands for a point or an axis; None if it stands for neither."""
     units = {
-        frozenset(x.unit for x in quantities(part)) for part in members(hint) if get_origin(part) is tuple
+        frozenset(x.unit for x in marks(part, Quantity))
+        for part in members(hint)
+        if get_origin(part) is tuple
     }
     if models(hint) and not is_construction(raw):
         return None
@@ -84,6 +93,8 @@ def construction(hint: Any, raw: Mapping[str, Any]) -> type[BaseModel] | None:
 
 def below(hint: Any, part: str | int, raw: Any) -> Any:
     """The type of one key or item of something of a given type; None if it has none."""
+    if hint is None:
+        return None
     for member in members(hint):
         inner = get_args(member)
         if get_origin(member) is dict and isinstance(part, str):
@@ -95,8 +106,26 @@ def below(hint: Any, part: str | int, raw: Any) -> Any:
     for model in models(hint):
         wanted = raw.get("kind") if isinstance(raw, dict) else None
         if part in keys(model) and (kind_of(model) in [None, wanted]):
-            return field_hint(keys(model)[str(part)])
+            return key_hints(model)[str(part)]
     return None
+
+
+def walk(raw: Any, hint: Any, where: Where = ()) -> Iterator[tuple[Where, Any, Any]]:
+    """Raw input, and all that is in it: place, value and type of each, tables and lists before what they hold."""
+    yield where, raw, hint
+    items = raw.items() if isinstance(raw, Mapping) else enumerate(raw) if isinstance(raw, list) else ()
+    for key, value in items:
+        yield from walk(value, below(hint, key, raw), (*where, key))
+
+
+def replaced(raw: Any, hint: Any, of: Callable[[Where, Any, Any], Any], where: Where = ()) -> Any:
+    """A copy of raw input with something in place of its values, by place, value and type; what stays is looked into."""
+    made = of(where, raw, hint)
+    if made is raw and isinstance(raw, Mapping):
+        return {key: replaced(x, below(hint, key, raw), of, (*where, key)) for key, x in raw.items()}
+    if made is raw and isinstance(raw, list):
+        return [replaced(x, below(hint, k, raw), of, (*where, k)) for k, x in enumerate(raw)]
+    return made
 
 
 def walked(loc: Where, hint: Any, raw: Any) -> tuple[Where, Any, Any]:

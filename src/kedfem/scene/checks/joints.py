@@ -1,4 +1,4 @@
-"""Cross checks of joints."""
+"""Cross checks of joints, and of what plane links and planar beams move in."""
 
 from __future__ import annotations
 
@@ -7,8 +7,22 @@ from collections.abc import Iterator, Mapping
 
 from kedfem.errors import Fault
 from kedfem.scene.checks.parts import Entry, Parts, category, link_names
+from kedfem.scene.questions.planes import (
+    FLAT,
+    Placed,
+    leaving,
+    obstacles,
+    off_plane,
+    on_links,
+    spatial_beams,
+    spring_ends,
+    vector,
+    welded,
+)
 from kedfem.scene.records.joints import DIRECTED, SQUARE
 from kedfem.scene.records.links import GROUND
+from kedfem.scene.records.scene import Scene
+from kedfem.scene.records.shapes import Bar
 from kedfem.scene.records.wording import NOUNS, unknown_name
 
 
@@ -22,9 +36,8 @@ def joint_faults(parts: Parts) -> Iterator[Fault]:
             yield joint.fault("links", f"must be two different links, got {names[0]!r} twice")
         yield from surface_faults(joint, parts)
         yield from direction_faults(joint)
-    pairs = (
-        [link_names(joint) for joint in parts.joints.values()] if parts.driven else []
-    )  # else links may fly
+    held = parts.joints.values() if parts.driven else ()  # else links may fly
+    pairs = [link_names(joint) for joint in held]
     reached = connected(GROUND, pairs)
     for link in parts.links.values() if pairs else ():
         if not any(link.name in pair for pair in pairs):
@@ -39,15 +52,11 @@ def direction_faults(joint: Entry) -> Iterator[Fault]:
     if kind in DIRECTED and not joint.has("axis"):
         yield joint.fault("axis", f"is required for a {kind} joint: 'x', 'y', 'z' or a vector, got nothing")
     for key, owner, wanted in (
-        (
-            "axes",
-            "universal",
-            "is required for a universal joint: two axes, of the first link and of the second",
-        ),
-        ("lead", "screw", "is required for a screw [m], travel in one revolution"),
+        ("axes", "universal", "a universal joint: two axes, of the first link and of the second"),
+        ("lead", "screw", "a screw [m], travel in one revolution"),
     ):
         if kind == owner and not joint.has(key):
-            yield joint.fault(key, f"{wanted}, got nothing")
+            yield joint.fault(key, f"is required for {wanted}, got nothing")
         if kind != owner and joint.has(key):
             yield joint.fault(key, f"must be given for a {owner} joint only, got one for a {kind} joint")
     if kind == "universal" and joint.has("axis"):
@@ -81,3 +90,54 @@ def connected(start: str, pairs: list[list[str]]) -> set[str]:
     while more := {name for pair in pairs if reached & set(pair) for name in pair} - reached:
         reached |= more
     return reached
+
+
+def planar_faults(parts: Parts) -> Iterator[Fault]:
+    """What leaves the plane of a scene with plane links."""
+    if any(category(link) == "plane" for link in parts.links.values()):
+        yield from _leaving_plane(parts.good, f"a scene of {NOUNS['plane']}s")
+
+
+def _leaving_plane(scene: Scene, here: str) -> Iterator[Fault]:
+    """Axes, gravity, loads and points that are not in the plane of plane links."""
+    for name, joint in scene.joints.items():
+        axis, where = joint.axis, ("joints", name, "axis")
+        if axis is None:
+            continue
+        if joint.kind == "revolute" and max(abs(axis[0]), abs(axis[1])) > FLAT:
+            yield Fault(where, f"must be along z in {here}, got {vector(axis)}")
+        if joint.kind in {"prismatic", "slot"} and abs(axis[2]) > FLAT:
+            yield Fault(where, f"must lie in the xy plane in {here}, got {vector(axis)}")
+    yield from leaving(scene, f"in {here}")
+    for name, link in scene.links.items():
+        shape = link.shape
+        if link.category == "plane" and isinstance(shape, Bar) and math.hypot(*shape.upward[:2]) > FLAT:
+            up = "links", name, "shape", "up"
+            yield Fault(up, f"must be along z in {here}, got {vector(shape.upward)}")
+    yield from off_plane(_beside_plane(scene), f"the other points of {here}")
+
+
+def _beside_plane(scene: Scene) -> Iterator[Placed]:
+    """Joints, plane and rigid links and what is on them; points of other links may be anywhere."""
+    others = {name for name, link in scene.links.items() if link.category in {"solid", "beam"}}
+    for name, joint in scene.joints.items():
+        yield ("joints", name), joint
+    for name, link in scene.links.items():
+        if name not in others:
+            yield ("links", name), link
+    ends = [end for name in scene.springs for end in spring_ends(scene, name)]
+    yield from ((where, record) for where, record in [*on_links(scene), *ends] if record.link not in others)
+
+
+def beam_faults(parts: Parts) -> Iterator[Fault]:
+    """What leaves the plane of beams that are said to be planar."""
+    spatial = spatial_beams(parts.good)
+    for link in parts.links.values():
+        if category(link) != "beam":
+            if link.has("beam"):
+                yield link.fault("beam", f"must be given for a beam only, got a {category(link)}")
+        elif link.word("beam") == "planar" and link.record is not None:
+            yield from obstacles(parts.good, link.name)
+            for other in sorted(welded(parts.good, link.name) & spatial):
+                wanted = "must not be 'planar' beside the spatial beam welded to it"
+                yield link.fault("beam", f"{wanted}, got {other!r}")

@@ -1,4 +1,4 @@
-"""Cross checks of links: keys that must suit each other.
+"""Cross checks of links, their meshes, frames and segments: keys that must suit each other.
 
 They look at what was given, not only at good records, so that a fault in one key hides no fault in another.
 """
@@ -6,8 +6,10 @@ They look at what was given, not only at good records, so that a fault in one ke
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import combinations as pairs
 
 from kedfem.errors import Fault
+from kedfem.scene.checks.combinations import frames_of, slider
 from kedfem.scene.checks.parts import Entry, Parts, category, link_names
 from kedfem.scene.questions.moving_joints import moving_grounds
 from kedfem.scene.records.links import GROUND
@@ -43,9 +45,7 @@ def rigid_faults(link: Entry, parts: Parts) -> Iterator[Fault]:
     on = [joint for joint in parts.joints.values() if link.name in link_names(joint)]
     slides, rides = any(map(is_slide, on)), any(joint.word("kind") == "prismatic" for joint in on)
     slides = slides or link.record is None or link.name in moving_grounds(parts.good)
-    if link.has("inertia") or link.has(
-        "centre"
-    ):  # a rigid body by numbers, with a fault that its record shows
+    if link.has("inertia") or link.has("centre"):  # a body by numbers, with a fault that its record shows
         return
     if link.has("shape"):
         if not link.has("material"):
@@ -68,9 +68,8 @@ def rigid_faults(link: Entry, parts: Parts) -> Iterator[Fault]:
                 got = link.word(key) or "one"
                 yield link.fault(key, f"must not be given for a rigid link without a shape, got {got!r}")
     if link.has("reduction") and link.raw["reduction"] != "none":
-        yield link.fault(
-            "reduction", f"must be left out for a rigid link, got {shown(link.raw['reduction'])}"
-        )
+        got = f"got {shown(link.raw['reduction'])}"
+        yield link.fault("reduction", f"must be left out for a rigid link, {got}")
 
 
 def is_slide(joint: Entry) -> bool:
@@ -92,9 +91,8 @@ def elastic_faults(link: Entry, sketch: bool) -> Iterator[Fault]:
     if element in every_element and element not in ELEMENTS[kind]:
         yield link.fault("element", f"must be {either(ELEMENTS[kind])} for a {noun}, got {element!r}")
     if link.record is not None and link.record.mass:
-        yield link.fault(
-            "mass", f"must be given for a rigid link only [kg], got {link.record.mass:.6g} for a {noun}"
-        )
+        got = f"got {link.record.mass:.6g} for a {noun}"
+        yield link.fault("mass", f"must be given for a rigid link only [kg], {got}")
 
 
 def meshing_faults(link: Entry) -> Iterator[Fault]:
@@ -125,11 +123,7 @@ def meshing_faults(link: Entry) -> Iterator[Fault]:
             got = f"got {shown(mesh['elements'])}"
             wanted = f"must be left out for a {shape} (it has size or elements_across)"
             yield link.fault("mesh", f"{wanted}, {got}", "elements")
-        for key, other in (
-            ("size", "elements_across"),
-            ("unknowns", "size"),
-            ("unknowns", "elements_across"),
-        ):
+        for key, other in pairs(("unknowns", "size", "elements_across"), 2):
             if link.has("mesh", key) and link.has("mesh", other):
                 yield link.fault("mesh", f"cannot be combined with {other}, got both", key)
 
@@ -147,3 +141,29 @@ def count_faults(link: Entry, counted: str) -> Iterator[Fault]:
         if isinstance(elements, int) or len(elements) != count:
             got = elements if isinstance(elements, int) else list(elements)
             yield link.fault("mesh", f"{wanted}, got {got}", "elements")
+
+
+def frame_faults(parts: Parts) -> Iterator[Fault]:
+    """Frames and segments that do not suit a link."""
+    for link in parts.links.values():
+        if slider(link):
+            for key in ("frames", "segments"):
+                if link.has(key):
+                    got = shown(link.raw[key])
+                    yield link.fault(key, f"must be left out for a rigid link without a shape, got {got}")
+        else:
+            yield from segment_faults(parts, link)
+
+
+def segment_faults(parts: Parts, link: Entry) -> Iterator[Fault]:
+    """A number of segments where there is nothing to cut."""
+    if not link.has("segments"):
+        return
+    got = f"got {shown(link.raw['segments'])}"
+    if category(link) == "rigid":
+        yield link.fault("segments", f"must be left out for a rigid link (it is one segment), {got}")
+    elif category(link) == "beam":
+        yield link.fault("segments", f"must be left out for a beam: its elements are its segments, {got}")
+    elif frames_of(parts, link) == "rigid-body":
+        wanted = "must be combined with co-rotational frames"
+        yield link.fault("segments", f"{wanted}, {got} with rigid-body ones")

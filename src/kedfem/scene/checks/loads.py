@@ -1,45 +1,23 @@
-"""Cross checks of loads, bodies and probes, and of all names."""
+"""Cross checks of loads, bodies, probes and springs, and of [fatigue]: links that must have what these ask for."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from kedfem.errors import Fault
 from kedfem.scene.checks.parts import Entry, Parts, category, link_names
 from kedfem.scene.records.analysis import ELASTIC
+from kedfem.scene.records.joints import ROTARY
 from kedfem.scene.records.links import GROUND
 from kedfem.scene.records.wording import unknown_name
-
-
-def reference_faults(parts: Parts) -> Iterator[Fault]:
-    """Names of materials, links and joints that do not exist."""
-    for link in parts.links.values():
-        material = link.word("material")
-        if material is not None and material not in parts.materials:
-            yield link.fault("material", unknown_name("a material", material, parts.materials))
-    for joint in parts.joints.values() if parts.links else ():
-        for i, name in enumerate(link_names(joint)):
-            if name not in parts.links and name != GROUND:
-                yield joint.fault("links", unknown_name("a link", name, [*parts.links, GROUND]), i)
-    for user in [*parts.loads.values(), *parts.bodies.values(), *parts.probes.values()]:
-        link_name = user.word("link")
-        if link_name is not None and parts.links and link_name not in parts.links:
-            yield user.fault("link", unknown_name("a link", link_name, parts.links))
-    for drive in parts.all_drives:
-        joint_name = drive.word("joint")
-        if joint_name is not None and parts.joints and joint_name not in parts.joints:
-            yield drive.fault("joint", unknown_name("a joint", joint_name, parts.joints))
 
 
 def load_faults(parts: Parts) -> Iterator[Fault]:
     """Loads, bodies and probes that do not suit their link."""
     for load in parts.loads.values():
-        link = parts.links.get(load.word("link") or "")
-        kind = load.word("kind")
-        if link is None:
-            continue
-        if kind == "torque" and load.word("joint") is not None and parts.joints:
+        known = load.word("link") in parts.links and parts.joints
+        if known and load.word("kind") == "torque" and load.word("joint") is not None:
             yield from torque_joint_faults(load, parts)
     for probe in parts.probes.values():
         link, quantity = parts.links.get(probe.word("link") or ""), probe.word("quantity")
@@ -66,24 +44,43 @@ def flywheel_faults(body: Entry, parts: Parts) -> Iterator[Fault]:
     link_name = body.word("link")
     if body.record is None or body.word("kind") != "flywheel" or link_name not in parts.links:
         return
-    hinges = [
-        joint
-        for joint in parts.joints.values()
-        if link_name in link_names(joint) and joint.word("kind") != "prismatic"
-    ]
-    if any(joint.record is None for joint in hinges):
+    own = [joint for joint in parts.joints.values() if link_name in link_names(joint)]
+    if any(joint.record is None and joint.word("kind") != "prismatic" for joint in own):
         return
-    turning = [
-        joint.record.on(link_name)
-        for joint in hinges
-        if joint.record.kind in {"revolute", "cylindrical", "screw"}
-    ]
-    apart = [
-        math.dist(joint.record.on(link_name), body.record.at)
-        for joint in parts.joints.values()
-        if joint.record
-    ]
+    turning = [joint.record.on(link_name) for joint in own if joint.word("kind") in ROTARY]
+    good = [joint.record for joint in parts.joints.values() if joint.record]
+    apart = [math.dist(joint.on(link_name), body.record.at) for joint in good]
     near = 1e-9 + 1e-7 * max(apart, default=0.0)
     if not any(not math.dist(at, body.record.at) > near for at in turning):
         at = ", ".join(f"{part:.6g}" for part in body.record.at)
         yield body.fault("at", f"must be the point of a revolute joint of links.{link_name} [m], got ({at})")
+
+
+def spring_faults(parts: Parts) -> Iterator[Fault]:
+    """Springs between two points of the ground."""
+    for spring in parts.springs.values():
+        ends = spring.raw.get("between")
+        given = ends if isinstance(ends, (list, tuple)) else ()
+        if [end.get("link") if isinstance(end, Mapping) else None for end in given] == [GROUND, GROUND]:
+            yield spring.fault("between", "must hold a link, got the ground twice")
+
+
+def fatigue_faults(parts: Parts) -> Iterator[Fault]:
+    """Links without stress, and data of nothing that the scene has."""
+    entry = parts.fatigue
+    materials, links = (named(entry.raw.get(key)) for key in ("materials", "links"))
+    for name in links:
+        if name in parts.links and category(parts.links[name]) == "rigid":
+            yield Fault(("fatigue", "links", name), "must name an elastic link, got a rigid one")
+    if not (materials or links) or {*links} - {*parts.links} or {*materials} - {*parts.materials}:
+        return
+    elastic = {name: link for name, link in parts.links.items() if category(link) != "rigid"}
+    of_material = any(link.word("material") in materials for link in elastic.values())
+    if elastic.keys().isdisjoint(links) and not of_material:
+        got = "data of none of them" if elastic else "rigid links only"
+        yield Fault(entry.where, f"must have data of an elastic link or of its material, got {got}")
+
+
+def named(table: object) -> list[str]:
+    """Names in a table, as given."""
+    return [str(name) for name in table] if isinstance(table, Mapping) else []

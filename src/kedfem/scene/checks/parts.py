@@ -11,48 +11,28 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from kedfem.errors import Fault
-from kedfem.scene.records.analysis import Analysis, Animation, Output, Probe
-from kedfem.scene.records.damping import Damping
-from kedfem.scene.records.drives import Drive, Gear
-from kedfem.scene.records.fatigue import Fatigue
-from kedfem.scene.records.force_elements import Limit, Motor, Spring
-from kedfem.scene.records.joints import Joint
-from kedfem.scene.records.links import LinkScene
-from kedfem.scene.records.loads import Body, Load
+from kedfem.scene.checks.hints import below
+from kedfem.scene.records.analysis import Output
 from kedfem.scene.records.materials import BUILT_IN
 from kedfem.scene.records.points import XYZ
 from kedfem.scene.records.scene import Scene
 
-TYPES: dict[str, Any] = {
-    "links": LinkScene,
-    "joints": Joint,
-    "loads": Load,
-    "bodies": Body,
-    "motors": Motor,
-    "springs": Spring,
-    "limits": Limit,
-    "probes": Probe,
-    "drive": Drive,
-    "drives": Drive,
-    "gears": Gear,
-    "damping": Damping,
-    "analysis": Analysis,
-    "animation": Animation,
-    "fatigue": Fatigue,
-}
 TABLES = ("links", "joints", "loads", "bodies", "motors", "springs", "limits", "drives", "gears")
 
 
 @cache
-def adapter(section: str) -> TypeAdapter[Any]:
-    """The check of one entry of a section."""
-    return TypeAdapter(TYPES[section])
+def adapter(*keys: str) -> TypeAdapter[Any]:
+    """The check of what stands at a place of the scene."""
+    hint: Any = Scene
+    for key in keys:
+        hint = below(hint, key, {})
+    return TypeAdapter(hint)
 
 
-def record_of(section: str, raw: Any) -> Any:
-    """The record of an entry, or None if it has a fault."""
+def record_of(raw: Any, *keys: str) -> Any:
+    """The record of what stands at a place, or None if it has a fault."""
     try:
-        return adapter(section).validate_python(raw)
+        return adapter(*keys).validate_python(raw)
     except ValidationError:
         return None
 
@@ -72,17 +52,19 @@ class Entry:
 
     def word(self, *path: str) -> str | None:
         """What a key holds, as given, if it is a word."""
-        value: Any = self.raw
-        for key in path:
-            value = value.get(key) if isinstance(value, Mapping) else None
+        value = self.given(*path)
         return value if isinstance(value, str) else None
 
     def has(self, *path: str) -> bool:
         """Whether a key is given."""
+        return self.given(*path) is not None
+
+    def given(self, *path: str) -> Any:
+        """What a key holds, as given; None of one that is not there."""
         value: Any = self.raw
         for key in path:
             value = value.get(key) if isinstance(value, Mapping) else None
-        return value is not None
+        return value
 
     def fault(self, key: str, message: str, *inner: str | int) -> Fault:
         """A fault of one of its keys."""
@@ -112,8 +94,8 @@ class Parts:
     analysis: Entry
     animation: Entry
     fatigue: Entry
-    gravity: XYZ
     materials: list[str]
+    raw: Mapping[str, Any]
     folder: Path
     sketch: bool
     good: Scene
@@ -135,53 +117,62 @@ class Parts:
         return {name for drive in self.all_drives if (name := drive.word("joint")) is not None}
 
 
-def entries(section: str, raw: Any, *above: str) -> dict[str, Entry]:
-    """The entries of a section that are tables, by name."""
-    found = raw.items() if isinstance(raw, Mapping) else ()
-    return {
-        str(name): Entry((*above, section, str(name)), value, record_of(section, value))
-        for name, value in found
-        if isinstance(value, Mapping)
-    }
+def scene_parts(raw: Mapping[str, Any], scene: Scene | None, folder: Path, sketch: bool = False) -> Parts:
+    """The parts of a raw scene; to be called where the names of its points are known.
 
+    Parameters
+    ----------
+    scene : the record of it all; None if it has a fault: then each part is validated by itself
+    """
 
-def single(section: str, raw: Any, *above: str) -> Entry:
-    """A section that is one table."""
-    return Entry((*above, section), raw if isinstance(raw, Mapping) else {}, record_of(section, raw))
+    def found(*keys: str) -> tuple[Any, Any]:
+        given: Any = raw
+        record: Any = scene
+        for key in keys:
+            given = given.get(key) if isinstance(given, Mapping) else None
+            record = getattr(record, key, None)
+        return given, record
 
+    def single(*keys: str) -> Entry:
+        given, record = found(*keys)
+        known = record if scene else record_of(given, *keys)
+        return Entry(keys, given if isinstance(given, Mapping) else {}, known)
 
-def scene_parts(raw: Mapping[str, Any], gravity: XYZ, folder: Path, sketch: bool = False) -> Parts:
-    """The parts of a raw scene; to be called where the names of its points are known."""
-    output = raw.get("output")
+    def entries(*keys: str) -> dict[str, Entry]:
+        given, records = found(*keys)
+        named = given.items() if isinstance(given, Mapping) else ()
+        return {
+            str(name): Entry((*keys, str(name)), x, records[name] if scene else record_of(x, *keys, "NAME"))
+            for name, x in named if isinstance(x, Mapping)
+        }  # fmt: skip
+
     own = raw.get("materials")
-    animation = output.get("animation") if isinstance(output, Mapping) else None
-    probes = output.get("probes") if isinstance(output, Mapping) else None
-    tables = {name: entries(name, raw.get(name)) for name in TABLES}
-    tables["probes"] = entries("probes", probes, "output")
-    drive = single("drive", raw.get("drive")) if raw.get("drive") is not None else NONE
+    tables = {name: entries(name) for name in TABLES} | {"probes": entries("output", "probes")}
+    drive = single("drive") if raw.get("drive") is not None else NONE
     return Parts(
         **tables,
         drive=drive,
-        damping=single("damping", raw.get("damping")),
-        analysis=single("analysis", raw.get("analysis")),
-        animation=single("animation", animation, "output"),
-        fatigue=single("fatigue", raw.get("fatigue")) if raw.get("fatigue") is not None else NONE,
-        gravity=gravity,
+        damping=single("damping"),
+        analysis=single("analysis"),
+        animation=single("output", "animation"),
+        fatigue=single("fatigue") if raw.get("fatigue") is not None else NONE,
         materials=[*(own if isinstance(own, Mapping) else ()), *BUILT_IN],
+        raw=raw,
         folder=folder,
         sketch=sketch,
-        good=good_scene(tables, drive, gravity),
+        good=scene or good_scene(tables, drive, record_of(raw.get("gravity"), "gravity")),
     )
 
 
-def good_scene(tables: Mapping[str, Mapping[str, Entry]], drive: Entry, gravity: XYZ) -> Scene:
+def good_scene(tables: Mapping[str, Mapping[str, Entry]], drive: Entry, gravity: XYZ | None) -> Scene:
     """The scene of all records without a fault, for questions about it; without its analysis."""
     good: dict[str, Any] = {
         section: {name: entry.record for name, entry in table.items() if entry.record is not None}
         for section, table in tables.items()
     }
     output = Output.model_construct(probes=good.pop("probes"))
-    return Scene.model_construct(**good, drive=drive.record, gravity=gravity, output=output)
+    still = gravity or (0.0, 0.0, 0.0)
+    return Scene.model_construct(**good, drive=drive.record, gravity=still, output=output)
 
 
 def category(link: Entry) -> str:

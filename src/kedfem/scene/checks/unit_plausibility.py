@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
-from kedfem.errors import Where, place
-from kedfem.scene.checks.hints import below, quantities
-from kedfem.scene.records.units import RPM
+from kedfem.errors import place
+from kedfem.scene.checks.hints import marks, walk
+from kedfem.scene.records.units import RPM, Quantity
 
 TURN = 2.0 * math.pi
 FAST = (
@@ -16,25 +16,19 @@ FAST = (
 )
 
 
-def bare_numbers(raw: Any, hint: Any, where: Where = ()) -> Iterator[str]:
+def bare_numbers(raw: Any, hint: Any) -> Iterator[str]:
     """Doubts about numbers without a unit in raw input that was found good; lists of numbers are not examined.
 
     Parameters
     ----------
     raw : the input
     hint : its type, a record
-    where : its place in the scene
     """
-    items = raw.items() if isinstance(raw, Mapping) else enumerate(raw)
-    for key, value in items:
-        inner = below(hint, key, raw)
-        if inner is None:
-            continue
-        if isinstance(value, (Mapping, list)):
-            yield from bare_numbers(value, inner, (*where, key))
-        elif isinstance(value, (int, float)) and abs(value) < 1e300 and isinstance(raw, Mapping):
-            units = {quantity.unit for quantity in quantities(inner)}
-            yield from doubts(place((*where, key)), float(value), units)
+    for where, value, inner in walk(raw, hint):
+        if isinstance(value, (int, float)) and abs(value) < 1e300 and isinstance(where[-1], str):
+            yield from doubts(
+                place(where), float(value), {quantity.unit for quantity in marks(inner, Quantity)}
+            )
 
 
 def doubts(where: str, value: float, units: set[str]) -> Iterator[str]:

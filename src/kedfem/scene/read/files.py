@@ -6,7 +6,7 @@ import math
 import re
 import stat
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from kedfem.errors import Fault, SceneError, Where
 from kedfem.scene.checks.faults import record_faults
+from kedfem.scene.checks.hints import replaced, walk
 from kedfem.scene.checks.parts import Parts
 from kedfem.scene.read.placing import Placement
 from kedfem.scene.records.points import known_points
@@ -25,28 +26,20 @@ DOTTED = re.compile(rf"\s*\[*\s*(?:[\w\-]+\s*\.\s*){{{DEEPEST},}}")
 
 
 def file_text(path: Path) -> str:
-    """Text of a file, UTF-8 with or without a byte order mark.
-
-    Raises
-    ------
-    SceneError
-        No such file, not a file, not readable, not text.
-    """
+    """Text of a file, UTF-8 with or without a byte order mark; a SceneError says why it cannot be read."""
     try:
         found = path.stat()
         if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):
             raise SceneError(f"{path}: must be a regular file, got a pipe or a device")
         if found.st_size > MOST_TEXT:
-            raise SceneError(
-                f"{path}: must be at most {MOST_TEXT / 1e6:g} MB, got {found.st_size / 1e6:.4g} MB"
-            )
+            got = f"got {found.st_size / 1e6:.4g} MB"
+            raise SceneError(f"{path}: must be at most {MOST_TEXT / 1e6:g} MB, {got}")
         return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise SceneError(f"{path}: must be a file, got nothing there") from None
     except UnicodeDecodeError as reason:
-        raise SceneError(
-            f"{path}: must be text in UTF-8, got other bytes at position {reason.start}"
-        ) from None
+        got = f"got other bytes at position {reason.start}"
+        raise SceneError(f"{path}: must be text in UTF-8, {got}") from None
     except ValueError:  # a zero byte in its name
         raise SceneError("must be a path without control characters, got one with a zero byte") from None
     except OSError as reason:
@@ -55,31 +48,22 @@ def file_text(path: Path) -> str:
 
 def outside(raw: Any, folder: Path) -> list[Fault]:
     """Faults of all names of files and folders in a raw scene that lead out of its own folder, links followed."""
-    names: list[tuple[Where, str]] = []
-
-    def noted(where: Where, name: str) -> str:
-        names.append((where, name))
-        return name
-
-    _with_names(raw, (), noted)
     wanted = "must be within the scene's folder (--within)"
-    return [Fault(where, f"{wanted}, got {name!r}") for where, name in names if not inside(folder, name)]
+    named = ((where, x) for where, x, _ in walk(raw, None) if names_file(where, x))
+    return [Fault(where, f"{wanted}, got {x!r}") for where, x in named if not inside(folder, x)]
 
 
 def renamed(raw: Mapping[str, Any], beside: Path) -> dict[str, Any]:
     """A raw scene with its names of files made relative to the folder that its own is `beside` of."""
-    changed: dict[str, Any] = _with_names(raw, (), lambda where, name: str(beside / name) if name else name)
+    changed: dict[str, Any] = replaced(
+        raw, None, lambda where, x, _: str(beside / x) if x and names_file(where, x) else x
+    )
     return changed
 
 
-def _with_names(x: Any, where: Where, of: Callable[[Where, str], str]) -> Any:
-    """Raw input with something in place of its names of files and folders."""
-    if isinstance(x, list):
-        return [_with_names(each, (*where, k), of) for k, each in enumerate(x)]
-    if isinstance(x, Mapping):
-        return {key: _with_names(each, (*where, str(key)), of) for key, each in x.items()}
-    names = where and isinstance(x, str) and where[-1] in {"file", "folder"}
-    return of(where, x) if names else x
+def names_file(where: Where, value: Any) -> bool:
+    """Whether raw input is the name of a file or folder."""
+    return isinstance(value, str) and where[-1:] in {("file",), ("folder",)}
 
 
 def inside(folder: Path, name: str | Path) -> bool:
@@ -91,13 +75,7 @@ def inside(folder: Path, name: str | Path) -> bool:
 
 
 def toml_table(path: Path) -> tuple[dict[str, Any], str]:
-    """Content and text of a TOML file.
-
-    Raises
-    ------
-    SceneError
-        Not readable, empty or not TOML; the line is named.
-    """
+    """Content and text of a TOML file; a SceneError names the line that is not TOML."""
     text = file_text(path)
     for k, line in enumerate(text.splitlines(), start=1):
         if DOTTED.match(line):
@@ -108,10 +86,8 @@ def toml_table(path: Path) -> tuple[dict[str, Any], str]:
         raise SceneError(f"{path}: must be nested less than {DEEPEST} deep, got more") from None
     except tomllib.TOMLDecodeError as reason:
         found = re.search(r"^(.*) \(at line (\d+), column (\d+)\)$", str(reason), re.DOTALL)
-        number = found[2] if found else str(len(text.splitlines()))
-        raise SceneError(
-            f"{path}, line {number}: must be valid TOML, got: {found[1] if found else str(reason)}"
-        ) from None
+        number, got = (found[2], found[1]) if found else (len(text.splitlines()), reason)
+        raise SceneError(f"{path}, line {number}: must be valid TOML, got: {got}") from None
     if not table:
         raise SceneError(f"{path}: must hold at least one key, got an empty file")
     return table, text
@@ -120,10 +96,7 @@ def toml_table(path: Path) -> tuple[dict[str, Any], str]:
 def part_geometry(path: Path) -> PartGeometry:
     """The geometry of a part from its TOML file; may hold a table of `points` of its own, like a scene.
 
-    Raises
-    ------
-    SceneError
-        With all faults of the file, each preceded by its name.
+    A SceneError has all faults of the file, each preceded by its name.
     """
     raw, _ = toml_table(path)
     placement = Placement(raw.get("points"), {})
@@ -146,9 +119,9 @@ def file_faults(parts: Parts) -> Iterator[Fault]:
         shape = link.record.shape if link.record is not None else None
         if isinstance(shape, Cad | MeshFile) and not (parts.folder / shape.file).is_file():
             what = "CAD" if isinstance(shape, Cad) else "mesh"
-            key, inner = ("file", ()) if link.has("file") else ("shape", ("file",))
+            keys = ("file",) if link.has("file") else ("shape", "file")
             yield link.fault(
-                key, f"must be a {what} file, got nothing at {parts.folder / shape.file}", *inner
+                keys[0], f"must be a {what} file, got nothing at {parts.folder / shape.file}", *keys[1:]
             )
         if isinstance(shape, Part):
             try:
@@ -158,7 +131,5 @@ def file_faults(parts: Parts) -> Iterator[Fault]:
                 continue
             wanted, got = math.dist(*shape.between), math.dist(part.origin, part.x_point)
             if abs(wanted - got) > 1e-6 * got:
-                message = (
-                    f"must be as far apart as origin and x_point of the part {got:.9g} [m], got {wanted:.9g}"
-                )
-                yield link.fault("shape", message, "between")
+                message = f"must be as far apart as origin and x_point of the part {got:.9g} [m]"
+                yield link.fault("shape", f"{message}, got {wanted:.9g}", "between")

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from kedfem.errors import Fault, Where
-from kedfem.scene.checks.hints import below, members
+from kedfem.scene.checks.hints import members, replaced
 from kedfem.scene.records.expressions import evaluated, plain_number
 from kedfem.scene.records.units import NUMBER, OVERFLOW, UNIT, Evaluated, unit_registry
 from kedfem.scene.records.wording import shown
@@ -47,9 +47,8 @@ class Parameters(Mapping[str, Any]):
             raise ValueError(f"it must not be defined by itself: {circle}")
         if name not in self._found:
             if len(self._pending) >= MOST_CHAINED:
-                raise ValueError(
-                    f"parameters must not be defined by each other more than {MOST_CHAINED} deep"
-                )
+                wanted = f"must not be defined by each other more than {MOST_CHAINED} deep"
+                raise ValueError(f"parameters {wanted}")
             self._pending.append(name)
             try:
                 self._found[name] = self._quantity(self._raw[name])
@@ -99,23 +98,20 @@ def with_expressions(raw: Mapping[str, Any], hint: Any) -> tuple[dict[str, Any],
     known = Parameters(raw.get("parameters"))
     faults = known.faults()
 
-    def of(value: Any, kind: Any, where: Where) -> Any:
-        if isinstance(value, str) and value.startswith(SIGN) and set(members(kind)) - {type(None)} != {str}:
-            try:
-                quantity = evaluated(value.removeprefix(SIGN), known)
-            except ValueError as reason:
-                faults.append(Fault(where, f"must be an expression, got {shown(value)}: {reason}"))
-                return value
-            number = plain_number(quantity)
-            return carrying(value, quantity) if number is None else number
-        if isinstance(value, Mapping):
-            return {key: of(x, below(kind, key, value), (*where, key)) for key, x in value.items()}
-        if isinstance(value, list):
-            return [of(x, below(kind, k, value), (*where, k)) for k, x in enumerate(value)]
-        return value
+    def of(where: Where, value: Any, kind: Any) -> Any:
+        if not isinstance(value, str) or not value.startswith(SIGN) or where[:1] == ("parameters",):
+            return value
+        if set(members(kind)) - {type(None)} == {str}:
+            return value
+        try:
+            quantity = evaluated(value.removeprefix(SIGN), known)
+        except ValueError as reason:
+            faults.append(Fault(where, f"must be an expression, got {shown(value)}: {reason}"))
+            return value
+        number = plain_number(quantity)
+        return carrying(value, quantity) if number is None else number
 
-    top = {key: of(x, below(hint, key, raw), (key,)) for key, x in raw.items() if key != "parameters"}
-    return ({"parameters": raw["parameters"]} if "parameters" in raw else {}) | top, faults
+    return replaced(raw, hint, of), faults
 
 
 def carrying(text: str, quantity: Any) -> Evaluated:

@@ -14,7 +14,8 @@ from pydantic_core import PydanticCustomError
 
 from kedfem.errors import Fault, Where
 from kedfem.scene.checks.faults import record_faults
-from kedfem.scene.checks.hints import below, members, quantities
+from kedfem.scene.checks.hints import below, marks, members
+from kedfem.scene.records.base import NameOf
 from kedfem.scene.records.inertia import inertia_tensor, moments_of_inertia
 from kedfem.scene.records.links import spelt_out
 from kedfem.scene.records.patterns import SECTIONS, Pattern
@@ -22,12 +23,6 @@ from kedfem.scene.records.points import XYZ
 from kedfem.scene.records.shapes import STEEP, Bar, Polyline
 from kedfem.scene.records.units import Quantity
 
-NAMES = {
-    "link": "links",
-    "links": "links",
-    "joint": "joints",
-    "joints": "joints",
-}  # keys that hold names of what
 BY_LINK = ("at", "coupling", "faces")  # keys of joints that may hold a table by links
 FLAT = ("plate_link", "extrusion", "part")  # shapes whose thickness is along z
 PLACED, LINES = ("cad", "mesh"), ("bar", "polyline")
@@ -58,7 +53,7 @@ class _Copy:
         """A raw value of this copy."""
         unit = _triple(hint)
         if isinstance(value, str):
-            return self._word(value, unit, key)
+            return self._word(value, unit, hint)
         if isinstance(value, list):
             if unit is not None and len(value) in (2, 3):
                 return self._vector(value, unit)
@@ -71,9 +66,8 @@ class _Copy:
         }
         if unit == "m" and "angle" in value and "from" in value:
             if self.pattern.turn and self.pattern.about != (0.0, 0.0, 1.0):
-                raise ValueError(
-                    "must be coordinates in a pattern turned about another axis than z, got an angle"
-                )
+                wanted = "must be coordinates in a pattern turned about another axis than z"
+                raise ValueError(f"{wanted}, got an angle")
             made["angle"] = ANGLE.number(value["angle"]) + self.number * self.pattern.turn
         if key in ("factor", "stiffness_factor") and self.pattern.phase and value.get("over") == "angle":
             if "at" not in value:
@@ -81,17 +75,15 @@ class _Copy:
             made["at"] = [ANGLE.number(x) + self.number * self.pattern.phase for x in value["at"]]
         return made
 
-    def _word(self, text: str, unit: str | None, key: str) -> Any:
+    def _word(self, text: str, unit: str | None, hint: Any) -> Any:
         if unit == "m":
             section, dot, name = text.partition(".")
-            return (
-                f"joints.{self.called('joints', name)}"
-                if dot and section == "joints"
-                else self.called("points", text)
-            )
+            of_joint = dot and section == "joints"
+            return f"joints.{self.called('joints', name)}" if of_joint else self.called("points", text)
         if unit == "1" and text in ("x", "y", "z") and self.pattern.turn:
             return (self.R @ np.eye(3)["xyz".index(text)]).tolist()
-        return self.called(NAMES[key], text) if key in NAMES else text
+        sections = {each.section for each in marks(hint, NameOf)} & {"links", "joints"}
+        return self.called(sections.pop(), text) if sections else text
 
     def _vector(self, value: list[Any], unit: str) -> Any:
         x = np.array([Quantity(unit).number(each) for each in (*value, 0.0)[:3]])
@@ -106,47 +98,36 @@ class _Copy:
             return made
         tilted = not np.allclose(self.R[:, 2], [0, 0, 1])
         if section == "joints":
-            if isinstance(raw.get("bushing"), Mapping) and any(
-                isinstance(x, list) for x in raw["bushing"].values()
-            ):
-                raise ValueError(
-                    "must have a bushing alike in all directions in a pattern that turns, got three numbers"
-                )
+            bushing = raw.get("bushing")
+            if isinstance(bushing, Mapping) and any(isinstance(x, list) for x in bushing.values()):
+                wanted = "must have a bushing alike in all directions in a pattern that turns"
+                raise ValueError(f"{wanted}, got three numbers")
             if raw.get("kind") == "revolute" and "axis" not in raw and tilted:
                 made = {**made, "axis": self.R[:, 2].tolist()}
-        if (
-            section in {"bodies", "links"}
-            and isinstance(raw.get("inertia"), list)
-            and len(raw["inertia"]) == 6
-        ):
-            J = inertia_tensor([INERTIA.number(x) for x in raw["inertia"]])
+        inertia = raw.get("inertia") if section in {"bodies", "links"} else None
+        if isinstance(inertia, list) and len(inertia) == 6:
+            J = inertia_tensor([INERTIA.number(x) for x in inertia])
             made = {**made, "inertia": list(moments_of_inertia(self.R @ J @ self.R.T))}
         shape = spelt_out(raw).get("shape") if section == "links" else None
         kind = shape.get("kind") if isinstance(shape, Mapping) else None
+        about = "in a pattern turned about another axis than z"
         if kind in PLACED:
             raise ValueError(
                 f"must not be a part of a file in a pattern that turns, got one of kind {kind!r}"
             )
         if kind in FLAT and tilted:
-            raise ValueError(
-                f"must be a bar or a polyline in a pattern turned about another axis than z, got {kind!r}"
-            )
+            raise ValueError(f"must be a bar or a polyline {about}, got {kind!r}")
         if kind in LINES and "up" not in (shape or {}) and tilted:
-            raise ValueError(
-                "must have a shape with `up` in a pattern turned about another axis than z, got none"
-            )
+            raise ValueError(f"must have a shape with `up` {about}, got none")
         return made
 
 
 def _triple(hint: Any) -> str | None:
     """The unit of a type that is three numbers: of points m, of axes 1; None of another type."""
     for part in members(hint):
-        if (
-            get_origin(part) is tuple
-            and len(get_args(part)) == 3
-            and float in set(members(get_args(part)[0]))
-        ):
-            return next((x.unit for x in quantities(part)), None)
+        inner = get_args(part) if get_origin(part) is tuple else ()
+        if len(inner) == 3 and float in members(inner[0]):
+            return next((x.unit for x in marks(part, Quantity)), None)
     return None
 
 
@@ -164,11 +145,8 @@ def with_patterns(raw: Mapping[str, Any], hint: Any) -> tuple[Tables, list[Fault
     given = raw.get("patterns")
     if not isinstance(given, Mapping):
         return dict(raw), [], {}
-    out, faults, origins = (
-        {key: x for key, x in raw.items() if key != "patterns"},
-        list[Fault](),
-        dict[Where, Where](),
-    )
+    out = {key: x for key, x in raw.items() if key != "patterns"}
+    faults, origins = list[Fault](), dict[Where, Where]()
     for name, each in given.items():
         where: Where = ("patterns", str(name))
         try:
@@ -226,12 +204,8 @@ def steep_faults(links: Mapping[str, Any], given: object) -> list[Fault]:
         pattern = Pattern.model_validate(each)
         for link in pattern.links if pattern.turn else ():
             shape, raw = links[f"{link}_1"].shape, pattern.links[link].get("shape")
-            if (
-                isinstance(shape, Bar | Polyline)
-                and isinstance(raw, Mapping)
-                and "up" not in raw
-                and _steep(shape)
-            ):
+            lacks_up = isinstance(raw, Mapping) and "up" not in raw
+            if isinstance(shape, Bar | Polyline) and lacks_up and _steep(shape):
                 wanted = "must have a shape with `up` where it is steep in a pattern that turns, got none"
                 found.append(Fault(("patterns", str(name), "links", link), wanted))
     return found

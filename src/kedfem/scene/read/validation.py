@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
 from kedfem.errors import Fault, SceneError
 from kedfem.scene.checks import cross_faults
@@ -20,15 +20,14 @@ from kedfem.scene.read.parameters import with_expressions
 from kedfem.scene.read.patterns import in_pattern, steep_faults, with_patterns
 from kedfem.scene.read.placing import Placement
 from kedfem.scene.read.rigid_links import with_rigid_bodies
-from kedfem.scene.read.tables import with_curve_tables, with_motion_tables
+from kedfem.scene.read.tables import with_tables
 from kedfem.scene.records.base import plain
 from kedfem.scene.records.links import spelt_out
 from kedfem.scene.records.materials import BUILT_IN
-from kedfem.scene.records.points import UNPLACED, XYZ, AccelerationVector, known_points
+from kedfem.scene.records.points import UNPLACED, XYZ, known_points
 from kedfem.scene.records.scene import Scene
 
 MOST_STEPS = 1e9  # of an analysis: days of computing, and more rows than a disk holds
-GRAVITY: TypeAdapter[XYZ] = TypeAdapter(AccelerationVector)
 
 
 def validated(given: Any, folder: Path, *, sketch: bool = False) -> Scene:
@@ -53,7 +52,7 @@ def validated(given: Any, folder: Path, *, sketch: bool = False) -> Scene:
     wrong, bare = wrong + more, raw
     placement = Placement(raw.get("points"), raw.get("joints"))
     points = {name: placement[name] for name in placement if not name.startswith("joints.")}
-    raw, faults = _with_files(_spelt_out(raw), folder)
+    raw, faults = with_tables(_spelt_out(raw), folder, Scene)
     faults = placement.faults + faults
     if (raw.get("drive") is not None or raw.get("drives")) and raw.get("joints", {}) == {}:
         faults.append(Fault(("joints",), "is required with a drive, got nothing"))
@@ -63,7 +62,7 @@ def validated(given: Any, folder: Path, *, sketch: bool = False) -> Scene:
             scene = Scene.model_validate(_prepared(raw, points))
         except ValidationError as error:
             scene, faults = None, faults + record_faults(error, Scene, raw)
-        parts = scene_parts(raw, _gravity(raw), folder, sketch)
+        parts = scene_parts(raw, scene, folder, sketch)
     faults += [*cross_faults(parts), *file_faults(parts)]
     if scene is not None and not wrong + faults:
         faults = steep_faults(scene.links, repeated)
@@ -98,13 +97,6 @@ def _left_open(link: Any) -> Any:
     return {**link, "model": "auto"}
 
 
-def _with_files(raw: dict[str, Any], folder: Path) -> tuple[dict[str, Any], list[Fault]]:
-    """A raw scene with the tables of numbers that it names files of; and faults."""
-    raw, faults = with_motion_tables(raw, folder)
-    raw, more = with_curve_tables(raw, folder)
-    return raw, faults + more
-
-
 def _prepared(raw: Mapping[str, Any], points: Mapping[str, XYZ]) -> dict[str, Any]:
     """A raw scene with its points placed and the built-in materials that its links name."""
     ready = dict(raw)
@@ -115,11 +107,3 @@ def _prepared(raw: Mapping[str, Any], points: Mapping[str, XYZ]) -> dict[str, An
         named = {str(link.get("material")) for link in links.values() if isinstance(link, Mapping)}
         ready["materials"] = {**{name: BUILT_IN[name] for name in BUILT_IN if name in named}, **own}
     return ready
-
-
-def _gravity(raw: Mapping[str, Any]) -> XYZ:
-    """The gravity of a raw scene; none if it has a fault."""
-    try:
-        return GRAVITY.validate_python(raw.get("gravity", [0.0, 0.0, 0.0]))
-    except ValidationError:
-        return (0.0, 0.0, 0.0)

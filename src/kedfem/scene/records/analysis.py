@@ -17,7 +17,7 @@ from pydantic import (
 )
 
 from kedfem.errors import Fault
-from kedfem.scene.records.base import FileName, Name, Record, refuse
+from kedfem.scene.records.base import FileName, JointName, LinkName, Name, Record, refuse
 from kedfem.scene.records.initial import InitialForce, InitialMotion, JointSpeed
 from kedfem.scene.records.links import Count, Frames
 from kedfem.scene.records.points import Point
@@ -70,10 +70,10 @@ class Analysis(Record):
     """rigid-body: the stiffness of links turns with the rigid-body motion, deflections are small; co-rotational: with the
     links themselves, which may bend as far as they like, or move freely. Rigid-body if not given, but without a drive
     co-rotational"""
-    initial_speeds: dict[str, JointSpeed] = Field(default_factory=dict)
+    initial_speeds: dict[JointName, JointSpeed] = Field(default_factory=dict)
     """speeds of joints at the start, by name of the joint, of what the drive does not move: of its first link that is not
     the ground against the other, about or along its axis; other joints then move as little as they can"""
-    initial_motions: dict[str, InitialMotion] = Field(default_factory=dict)
+    initial_motions: dict[LinkName, InitialMotion] = Field(default_factory=dict)
     """velocities of links at the start, by name of the link"""
     initial_deflection: dict[str, InitialForce] = Field(default_factory=dict)
     """forces that have deflected the mechanism and are let go at the start, by name: without a drive from static balance,
@@ -113,7 +113,7 @@ TOTAL = ("position", "travel", "total_velocity", "total_acceleration")
 class Probe(Record):
     """A quantity at a point of a link, at every time step."""
 
-    link: str
+    link: LinkName
     """the link; a rigid one for motions only"""
     at: Point
     """where, in the reference position; of a rigid link anywhere"""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import (
@@ -87,6 +88,21 @@ def checked_file(name: str) -> str:
 Name = Annotated[str, AfterValidator(checked_name)]
 FileName = Annotated[str, StringConstraints(min_length=1), AfterValidator(checked_file)]
 Line = Annotated[str, AfterValidator(printable)]
+
+
+@dataclass(frozen=True, slots=True)
+class NameOf:
+    """What a text names: an entry of a table of the scene, or the ground."""
+
+    section: str
+    what: str
+    ground: bool = False
+
+
+LinkName = Annotated[str, NameOf("links", "a link")]
+EndName = Annotated[str, NameOf("links", "a link", ground=True)]
+JointName = Annotated[str, NameOf("joints", "a joint")]
+MaterialName = Annotated[str, NameOf("materials", "a material")]
 
 
 def plain(value: Any) -> Any:

@@ -10,7 +10,7 @@ from pydantic import Field, StrictBool, StrictInt, model_validator
 from pydantic_core import PydanticCustomError
 
 from kedfem.errors import Fault
-from kedfem.scene.records.base import FileName, Record, refuse
+from kedfem.scene.records.base import FileName, JointName, Record, refuse
 from kedfem.scene.records.curves import curve_faults
 from kedfem.scene.records.damping import Frequency
 from kedfem.scene.records.units import (
@@ -171,7 +171,7 @@ class Drive(Record):
     """A joint that turns or slides in a given way: its first link that is not the ground against the other."""
 
     only_with = (("shaft_damping", "shaft_stiffness"),)
-    joint: str
+    joint: JointName
     """name of the driven joint: revolute or prismatic"""
     motion: MotionLaw
     """how it turns or slides, from the reference position"""
@@ -190,7 +190,7 @@ class Gear(Record):
 
     exactly_one = ("ratio", "teeth", "radius"), ", or teeth, or radius [m] of a rack"
     only_with = (("internal", "teeth"),)
-    joints: tuple[str, str]
+    joints: tuple[JointName, JointName]
     """the two joints: A and B revolute; of a rack A revolute and B prismatic"""
     ratio: Number | None = None
     """turn of B per turn of A, positive in the same direction about their axes; not zero"""

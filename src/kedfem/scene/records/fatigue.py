@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import BeforeValidator, Field, StrictBool, TypeAdapter, model_validator
 
 from kedfem.errors import Fault
-from kedfem.scene.records.base import Name, Record, refuse
+from kedfem.scene.records.base import LinkName, MaterialName, Record, refuse
 from kedfem.scene.records.units import PositivePressure, PositiveTime, Quantity
 
 STRENGTHS = {"steel": (300e6, 2000e6), "aluminium": (80e6, 800e6)}
@@ -124,9 +124,9 @@ class FatigueData(Record):
 class Fatigue(Record):
     """Damage at the surfaces of elastic links by the stresses of the last period of a motion that repeats itself."""
 
-    materials: dict[Name, FatigueData] = Field(default_factory=dict)
+    materials: dict[MaterialName, FatigueData] = Field(default_factory=dict)
     """data by name of the material of links"""
-    links: dict[Name, FatigueData] = Field(default_factory=dict)
+    links: dict[LinkName, FatigueData] = Field(default_factory=dict)
     """data of single links, before those of their material"""
     period: PositiveTime | None = None
     """after which stresses repeat; if not given after which linkage, drive and loads are where they were, as for a steady

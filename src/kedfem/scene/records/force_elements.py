@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from kedfem.errors import Fault
-from kedfem.scene.records.base import Record, refuse
+from kedfem.scene.records.base import EndName, JointName, Record, refuse
 from kedfem.scene.records.curves import (
     ONE,
     FactorOver,
@@ -40,7 +40,7 @@ class Motor(Record):
     """
 
     exactly_one = ("torque", "force"), " [N*m], or force [N] of a slider"
-    joint: str
+    joint: JointName
     """the joint: revolute, cylindrical or screw for a torque, prismatic or cylindrical for a force"""
     torque: TorqueOver | None = None
     """of a hinge, positive about its axis: a number, or `{ over = "speed", at = [...], value = [...] }`"""
@@ -64,7 +64,7 @@ FreeLength = Annotated[float, Quantity("m", least=0.0)]
 class SpringEnd(Record):
     """Where a spring is fixed."""
 
-    link: str
+    link: EndName
     """the link, or `"ground"`"""
     at: Point
     """where, in the reference position"""
@@ -126,7 +126,7 @@ class LineSpring(_Elastic):
     kind: Literal["spring"] = "spring"
     between: tuple[SpringEnd, SpringEnd] | None = None
     """its two ends, each `{ link = "...", at = point }`"""
-    joint: str | None = None
+    joint: JointName | None = None
     """a prismatic or cylindrical joint that it lies along, instead of two ends"""
     stiffness: Stiffness = 0.0
     """k"""
@@ -179,7 +179,7 @@ class TorsionSpring(_Elastic):
 
     effort = "torque"
     kind: Literal["torsion"] = "torsion"
-    joint: str
+    joint: JointName
     """the hinge, cylindrical joint or screw"""
     stiffness: TorsionStiffness = 0.0
     """k"""
@@ -239,7 +239,7 @@ class TravelLimit(_Range):
     """
 
     kind: Literal["travel"] = "travel"
-    joint: str
+    joint: JointName
     """a prismatic or cylindrical joint that no drive moves"""
     lower: Length | None = None
     """least travel that is free; no stop there if not given"""
@@ -259,7 +259,7 @@ class AngleLimit(_Range):
     """
 
     kind: Literal["angle"] = "angle"
-    joint: str
+    joint: JointName
     """a hinge, cylindrical joint or screw that no drive moves"""
     lower: Angle | None = None
     """least angle that is free; no stop there if not given"""

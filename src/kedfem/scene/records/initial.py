@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import BeforeValidator, PlainValidator
 from pydantic_core import PydanticCustomError
 
-from kedfem.scene.records.base import Record
+from kedfem.scene.records.base import LinkName, Record
 from kedfem.scene.records.drives import EitherSpeed
 from kedfem.scene.records.loads import ForceVector
 from kedfem.scene.records.points import Point, as_vector
@@ -31,7 +31,7 @@ def joint_speed(value: object) -> float:
 class InitialForce(Record):
     """A force at a point of a link that has deflected the mechanism, and is let go at the start."""
 
-    link: str
+    link: LinkName
     """the link it acts on, an elastic one"""
     at: Point
     """where, in the reference position"""

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, model_validator
 
 from kedfem.errors import Fault
-from kedfem.scene.records.base import Record, refuse
+from kedfem.scene.records.base import EndName, Record, refuse
 from kedfem.scene.records.faces import ChosenFace, Faces
 from kedfem.scene.records.points import XYZ, Apart, Axis, JointPoint, apart
 from kedfem.scene.records.units import Damper, Quantity, RotationalDamper, fault
@@ -91,7 +91,7 @@ class Joint(Record):
     cylindrical: slides along its axis and turns about it; screw: the same, one tied to the other; universal: cross of two
     axes; planar: slides in a plane and turns about its normal; slot: a pin of the first link slides along a line of
     the second"""
-    links: tuple[str, str]
+    links: tuple[EndName, EndName]
     """the two links that it joins; `"ground"` for the frame; of a slot first the link with the pin"""
     at: JointPoint
     """its centre; where the two links are drawn a little apart that on each of them, by link (`ground` too):

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
 from kedfem.errors import Fault, SceneError
-from kedfem.scene.records.base import FileName, Record, refuse
+from kedfem.scene.records.base import FileName, MaterialName, Record, refuse
 from kedfem.scene.records.inertia import Inertia, inertia_faults
 from kedfem.scene.records.points import Point
 from kedfem.scene.records.shapes import MESH_ENDINGS, Bar, Cad, MeshFile, Polyline, Shape
@@ -88,7 +88,7 @@ class LinkScene(Record):
     reduction: Annotated[Literal["none", "modal"] | Count, BeforeValidator(checked_reduction)] = "none"
     """whether an elastic link moves in the span of a few modes only: `modal`: as many as `analysis.reduction_tolerance`
     asks for, or their number; with co-rotational frames those of each segment, and beams stay unreduced"""
-    material: str | None = None
+    material: MaterialName | None = None
     """a name: built in or in `materials`; not for a rigid slider"""
     shape: Shape | None = None
     """its shape; not for a rigid link given by mass, centre and inertia, a rigid slider or a moving part of the ground"""

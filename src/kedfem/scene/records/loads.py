@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from kedfem.scene.records.base import Record, refuse
+from kedfem.scene.records.base import LinkName, Record, refuse
 from kedfem.scene.records.curves import ONE, FactorOver, Force, Torque
 from kedfem.scene.records.inertia import Inertia, inertia_faults
 from kedfem.scene.records.points import Point, as_vector
@@ -24,7 +24,7 @@ class _Load(Record):
     """What all loads share."""
 
     kind: str
-    link: str
+    link: LinkName
     """the link it acts on"""
     factor: FactorOver = ONE
     """a number, or a curve over time or the drive's angle or travel: `{ over = "angle", at = [...], value = [...] }`"""
@@ -96,7 +96,7 @@ class Flywheel(Record):
     """A disc on a bore, turning about the axis of the joint there."""
 
     kind: Literal["flywheel"] = "flywheel"
-    link: str
+    link: LinkName
     """the link that carries it"""
     at: Point
     """the joint's point: the bore that carries it"""
@@ -110,7 +110,7 @@ class PointMass(Record):
     """A mass without extension."""
 
     kind: Literal["point_mass"] = "point_mass"
-    link: str
+    link: LinkName
     """the link that carries it"""
     at: Point
     """where: anywhere on a link (of a planar beam on its axis)"""
@@ -122,7 +122,7 @@ class RigidBody(Record):
     """A rigid body with mass and full inertia."""
 
     kind: Literal["rigid_body"] = "rigid_body"
-    link: str
+    link: LinkName
     """the link that carries it"""
     at: Point
     """where: anywhere on a beam's axis or on a rigid link; on an elastic solid a bore, as of a joint"""
