@@ -1,6 +1,5 @@
 """A scene to start from, written for an assembly: its solids as links, joints as a comment to confirm."""
 
-import json
 import os
 import re
 import tomllib
@@ -15,6 +14,7 @@ from jaxtyping import Float
 from kedfem.errors import SceneError
 from kedfem.mesh.cad.assembly import AssemblySolid, Meeting, assembly_solids, meetings
 from kedfem.scene import GROUND, ChosenFace, link_from, scene_from
+from kedfem.scene.read.including import toml_string
 
 FRAME = re.compile(r"ground|frame|base|housing|casing|chassis|bed|gestell|gehäuse|rahmen", re.IGNORECASE)
 _BARE = re.compile(r"[A-Za-z0-9_-]+")  # names that stand without quotes in TOML
@@ -56,9 +56,8 @@ def draft_scene(assembly: Path, folder: Path, scale: float | None) -> str:
     SceneError
         The file's name or the scale cannot stand in a scene.
     """
-    link_from(
-        {"shape": {"kind": "cad", "file": assembly.name, **({} if scale is None else {"scale": scale})}}
-    )
+    scaled = {} if scale is None else {"scale": scale}
+    link_from({"shape": {"kind": "cad", "file": assembly.name, **scaled}})
     text = scene_text(assembly_solids(assembly, scale), _relative(assembly, folder), scale)
     scene_from(tomllib.loads(text), folder)
     return text
@@ -142,8 +141,8 @@ def _as_frame(table: str, name: str) -> str:
 def _joints(found: Sequence[Meeting], names: Sequence[str], ground: int | None) -> Iterator[str]:
     """The joints' tables and a drive's, all as comments."""
     if not found:
-        yield "\n# No pin in a bore, no bores in a line, no ball in its socket: joints are yours to write, "
-        "[joints.NAME].\n"
+        none = "No pin in a bore, no bores in a line, no ball in its socket"
+        yield f"\n# {none}: joints are yours to write, [joints.NAME].\n"
         return
     yield _ROUND
     if ground is None:
@@ -185,11 +184,8 @@ def _in_words(meeting: Meeting, links: Sequence[str]) -> str:
     phrase = ", ".join(f"{face} of {link}" for face, link in zip(faces, links, strict=True))
     if meeting.ball:
         return phrase
-    return (
-        f"{phrase}: their pin is not drawn"
-        if meeting.pinless
-        else f"{phrase}, together along {_mm(meeting.share)}"
-    )
+    where = ": their pin is not drawn" if meeting.pinless else f", together along {_mm(meeting.share)}"
+    return phrase + where
 
 
 def _face(inward: bool, kind: str, radius: float) -> str:
@@ -234,7 +230,7 @@ def _quoted(text: str) -> str:
         text.encode()
     except UnicodeEncodeError as error:
         raise SceneError(f"--from: must have names of whole letters, got {text!r}") from error
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007F")
+    return toml_string(text)
 
 
 def _shown(text: str) -> str:

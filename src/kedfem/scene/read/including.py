@@ -37,11 +37,6 @@ def with_includes(
     folder : what its file names are relative to
     file : the scene's own
     allowed : whether a file may be read
-
-    Raises
-    ------
-    SceneError
-        A file that is missing, not allowed, no regular file or not TOML; one that includes itself; too many.
     """
     return _Including(folder, allowed).of(raw, Path(), () if file is None else (file.resolve(),))
 
@@ -77,13 +72,7 @@ class _Including:
 
 
 def named_files(given: object) -> list[str]:
-    """The names of the files that a scene includes, one or a list.
-
-    Raises
-    ------
-    SceneError
-        They are no names of files.
-    """
+    """The names of the files that a scene includes, one or a list."""
     if given is None:
         return []
     listed = [given] if isinstance(given, str) else given
@@ -108,18 +97,19 @@ def joined(base: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
 
 def toml_text(table: Mapping[str, Any]) -> str:
     """A table of numbers, texts, lists and tables as TOML."""
-    return "".join(f"{_key(key)} = {_value(value)}\n" for key, value in table.items())
+    return "".join(f"{toml_string(key)} = {_value(value)}\n" for key, value in table.items())
 
 
 def _value(x: Any) -> str:
     if isinstance(x, Mapping):
-        return "{ " + ", ".join(f"{_key(key)} = {_value(value)}" for key, value in x.items()) + " }"
+        return "{ " + ", ".join(f"{toml_string(key)} = {_value(value)}" for key, value in x.items()) + " }"
     if isinstance(x, list):
         return "[" + ", ".join(map(_value, x)) + "]"
-    if isinstance(x, float):
-        return repr(x)
-    return json.dumps(x, ensure_ascii=False) if isinstance(x, (str, int, bool)) else str(x)
+    if isinstance(x, str):
+        return toml_string(x)
+    return json.dumps(x) if isinstance(x, (int, bool)) else str(x)
 
 
-def _key(key: str) -> str:
-    return json.dumps(key, ensure_ascii=False)
+def toml_string(text: str) -> str:
+    """A text as TOML writes it."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007F")
