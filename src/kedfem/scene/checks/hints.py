@@ -15,9 +15,11 @@ from kedfem.scene.records.points import AxisPoints, construction_of, is_construc
 from kedfem.scene.records.units import Quantity
 
 
-@cache
 def members(hint: Any) -> tuple[Any, ...]:
-    """The alternatives of a type: unions taken apart, annotations taken off."""
+    """The alternatives of a type: unions taken apart, annotations taken off.
+
+    Not kept by type: to Python choices of the same words in another order are equal.
+    """
     if get_origin(hint) is Annotated:
         return members(get_args(hint)[0])
     if get_origin(hint) in {Union, types.UnionType}:
@@ -79,13 +81,10 @@ def marks(hint: Any, kind: Any) -> frozenset[Any]:
 
 def construction(hint: Any, raw: Mapping[str, Any]) -> type[BaseModel] | None:
     """The record of a table that stands for a point or an axis; None if it stands for neither."""
-    units = {
-        frozenset(x.unit for x in marks(part, Quantity))
-        for part in members(hint)
-        if get_origin(part) is tuple
-    }
-    if models(hint) and not is_construction(raw):
+    if not marks(hint, Quantity) or (models(hint) and not is_construction(raw)):
         return None
+    tuples = (part for part in members(hint) if get_origin(part) is tuple)
+    units = {frozenset(x.unit for x in marks(part, Quantity)) for part in tuples}
     if units == {frozenset({"m"})}:
         return construction_of(raw)
     return AxisPoints if units == {frozenset({"1"})} else None
