@@ -13,7 +13,7 @@ from kedfem.links.record import BeamElement
 from tests.laws.strategies import LAW, MATERIAL, Motion, motions, seeds
 from tests.laws.test_spatial_beams import elements
 
-RIGIDITY = rigidities(rectangle(0.05, 0.03), MATERIAL)
+RIGIDITY = rigidities(rectangle(0.05, 0.03), MATERIAL.youngs_modulus, MATERIAL.shear_modulus)
 
 
 def element_of(x: np.ndarray, seed: int) -> tuple[BeamElement, np.ndarray, np.ndarray]:

@@ -26,7 +26,7 @@ from tests.laws.test_hexahedra import ROUNDING, dense_mass, node_rotation
 from tests.laws.test_loads_and_joints import kinetic_energy
 
 SECTION = rectangle(0.05, 0.03)
-RIGIDITY = rigidities(SECTION, MATERIAL)
+RIGIDITY = rigidities(SECTION, MATERIAL.youngs_modulus, MATERIAL.shear_modulus)
 
 
 @st.composite

@@ -30,7 +30,10 @@ class Rod:
         self.X, self.one, _ = functions(axis)
         first = np.append(np.flatnonzero(self.one), len(self.one))
         self.tip = int(first[-2])
-        x, rigidity = axis.frame[:, [0, 2, 3]], rigidities(section, material)
+        x, rigidity = (
+            axis.frame[:, [0, 2, 3]],
+            rigidities(section, material.youngs_modulus, material.shear_modulus),
+        )
         self.elements: list[tuple[np.ndarray, BeamElement]] = []
         for cell in axis.cells:
             stations = np.sort(cell)
@@ -167,7 +170,12 @@ def leaning(load: float, angle: float) -> np.ndarray:
 def exact_slanted(load: float, angle: float) -> np.ndarray:
     frame = straight_axis(np.array([[0.0, 0, 0], [1, 0, 0]]), 1, 3, np.array([0.0, 1, 0])).frame[0, 1:].T
     return exact_rod(
-        np.zeros(3), frame, np.zeros(3), PRINCETON, rigidities(STRIP, METAL), leaning(load, angle)
+        np.zeros(3),
+        frame,
+        np.zeros(3),
+        PRINCETON,
+        rigidities(STRIP, METAL.youngs_modulus, METAL.shear_modulus),
+        leaning(load, angle),
     )
 
 
@@ -226,7 +234,7 @@ def critical_load(elements: int) -> float:
 
 def lateral(length: float) -> float:
     """4.0126 √(EI GJ)/L², Timoshenko and Gere, Theory of Elastic Stability, §6.3."""
-    rigidity = rigidities(THIN, METAL)
+    rigidity = rigidities(THIN, METAL.youngs_modulus, METAL.shear_modulus)
     return float(4.0126 * np.sqrt(rigidity[3:5].min() * rigidity[5]) / length**2)
 
 

@@ -1,4 +1,7 @@
-"""Scene links made into records: shape → mesh → functions → constant matrices, attached bodies included."""
+"""Scene links made into records: shape → mesh → functions → constant matrices, attached bodies included.
+
+A MeshError says that a link cannot be meshed well enough.
+"""
 
 from collections.abc import Iterable, Mapping
 from functools import partial
@@ -41,11 +44,6 @@ def bare_links(scene: Scene, known: Mapping[str, Link] | None = None) -> dict[st
     Parameters
     ----------
     known : those that are made already, by name
-
-    Raises
-    ------
-    MeshError
-        If a link cannot be meshed well enough.
     """
     made = known or {}
     names = [name for name, link in scene.links.items() if link.shape is not None]
@@ -57,13 +55,7 @@ def bare_links(scene: Scene, known: Mapping[str, Link] | None = None) -> dict[st
 
 
 def part_meshes(scene: Scene, names: Iterable[str]) -> dict[str, SolidMesh]:
-    """Meshes of those solid links that are parts from CAD or mesh files, made side by side.
-
-    Raises
-    ------
-    MeshError
-        If one cannot be meshed well enough.
-    """
+    """Meshes of those solid links that are parts from CAD or mesh files, made side by side."""
     solids = (name for name in names if scene.links[name].family == "solid")
     return side_by_side(
         {
@@ -75,13 +67,7 @@ def part_meshes(scene: Scene, names: Iterable[str]) -> dict[str, SolidMesh]:
 
 
 def solid_mesh(scene: Scene, name: str) -> SolidMesh:
-    """The mesh of a solid link.
-
-    Raises
-    ------
-    MeshError
-        If it cannot be meshed well enough.
-    """
+    """The mesh of a solid link."""
     return link_mesh(name, scene.links[name], scene.folder, touched(scene, name))
 
 
@@ -109,11 +95,6 @@ def bare_link(
     ----------
     spatial : the beams of the scene that move in space, where that is known already
     mesh : of a solid link, where it is made already
-
-    Raises
-    ------
-    MeshError
-        If it cannot be meshed well enough.
     """
     link = scene.links[name]
     material = scene.materials[str(link.material)]

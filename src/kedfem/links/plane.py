@@ -7,8 +7,8 @@ import numpy as np
 import skfem
 from jaxtyping import Float
 
-from kedfem.links.record import Link, Mass, mass_constants, read_only
-from kedfem.links.solid import elastic_stiffness, gradient_products, pattern, scalar_mass
+from kedfem.links.record import Link
+from kedfem.links.solid import meshed_link
 from kedfem.mesh import QuadMesh
 from kedfem.scene import Material
 
@@ -39,21 +39,12 @@ def plane_link(name: str, mesh: QuadMesh, material: Material, axes: Float[np.nda
     ----------
     name : key of the link in the scene
     mesh : quadrilaterals in the reference position
-    material : ρ, E, ν
     axes : (3, 3) columns are the link axes, the third along z
     """
-    basis, t = plane_basis(mesh), mesh.thickness
-    on = pattern(basis)
-    m = scalar_mass(basis, on, material.density * t)
-    mass: Mass = (m, m)
-    lam, mu = plane_stress(material.lame())
+    basis = plane_basis(mesh)
     X = np.column_stack([basis.doflocs.T, np.full(basis.N, mesh.points[0, 2])])
-    one, cells = np.ones(len(X)), np.ascontiguousarray(basis.element_dofs.T)  # VTK's order, too
-    m1, mX = mass_constants(mass, one, X * [1, 1, 0])
-    read_only(X, one, cells, m1, mX)
-    return Link(
-        name=name, kind="plane", X=X, one=one, cells=cells, cell_type="quad9", axes=axes, mass=mass,
-        K0=elastic_stiffness(gradient_products(basis, on), (t * lam, t * mu)), m1=m1, mX=mX,
-        volume=m1[:, 0] / material.density, E=material.youngs_modulus, lame=(lam, mu), basis=basis, thickness=t,
-        method=mesh.method,
+    cells = np.ascontiguousarray(basis.element_dofs.T)  # VTK's order, too
+    return meshed_link(
+        name, basis, X, material, plane_stress(material.lame()), mesh.thickness, kind="plane", axes=axes, cells=cells,
+        cell_type="quad9", method=mesh.method,
     )  # fmt: skip

@@ -192,6 +192,13 @@ class Link:
         return self.kind in {"solid", "plane"}
 
 
+def section_of(link: Link) -> Section:
+    """The section of a beam, which has one."""
+    if link.section is None:
+        raise TypeError(f"links.{link.name}: has no section")
+    return link.section
+
+
 def as_rows(link: Link, vectors: Float[np.ndarray, "*k 3"]) -> Float[np.ndarray, "*k d"]:
     """Forces or accelerations in space as rows of a link's state: a planar link takes what lies in its plane."""
     match link.kind:

@@ -148,15 +148,24 @@ def reach(link: Link) -> float:
 
 def rigid_modes(link: Link) -> Float[np.ndarray, "k r"]:
     """States (dn,) of small rigid motion: translations and turns, column by column."""
-    translations = [np.outer(link.one, e) for e in np.eye(link.d)[: 2 if link.planar else 3]]
-    turns = []
-    for i, j in ((0, 1),) if link.planar else ((0, 1), (1, 2), (2, 0)):
-        u = np.zeros((link.n, link.d))
-        u[:, i], u[:, j] = -link.X[:, j], link.X[:, i]
-        if link.kind == "beam":
-            u[:, 2] = link.one
-        turns.append(u)
-    return np.stack([u.ravel() for u in (*translations, *turns)], axis=1)
+    modes = rigid_motions(link.X, link.one, 2 if link.planar else 3)
+    if link.kind != "beam":
+        return modes
+    out = np.zeros((link.n, 3, 3))
+    out[:, :2], out[:, 2, 2] = modes.reshape(link.n, 2, 3), link.one
+    return out.reshape(-1, 3)
+
+
+def rigid_motions(
+    X: Float[np.ndarray, "n 3"], one: Float[np.ndarray, " n"], d: int
+) -> Float[np.ndarray, "k r"]:
+    """Translations and turns about the origin, (n functions, d components) by motions."""
+    motions = [np.outer(one, e) for e in np.eye(d)]
+    for i, j in ((0, 1), (1, 2), (2, 0))[: 1 if d == 2 else 3]:
+        turn = np.zeros((len(X), d))
+        turn[:, i], turn[:, j] = -X[:, j], X[:, i]
+        motions.append(turn)
+    return np.stack(motions, axis=2).reshape(d * len(X), -1)
 
 
 def _weighted(link: Link, A: Float[np.ndarray, "k c"]) -> Float[np.ndarray, "k c"]:

@@ -6,6 +6,7 @@ The only wall to scikit-fem, with `surface`.
 
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -165,20 +166,28 @@ def solid_link(name: str, mesh: SolidMesh, material: Material, axes: Float[np.nd
     ----------
     name : key of the link in the scene
     mesh : hexahedra or tetrahedra in the reference position
-    material : ρ, E, ν
     axes : (3, 3) columns are the link axes
     """
     basis = solid_basis(mesh)
-    on = pattern(basis)
-    m = scalar_mass(basis, on, material.density)
-    mass: Mass = (m, m, m)
-    X = np.ascontiguousarray(basis.doflocs.T)
-    one = np.ones(len(X))
-    m1, mX = mass_constants(mass, one, X)
-    read_only(X, one, m1, mX)
+    return meshed_link(
+        name, basis, basis.doflocs.T, material, material.lame(), kind="solid", axes=axes, cells=vtk_cells(basis),
+        cell_type=CELL_TYPES[len(basis.element_dofs)], faces=link_faces(basis, mesh), method=mesh.method,
+    )  # fmt: skip
+
+
+def meshed_link(
+    name: str, basis: skfem.Basis, X: Float[np.ndarray, "n 3"], material: Material, lame: tuple[float, float],
+    thickness: float = 1.0, **given: Any,
+) -> Link:  # fmt: skip
+    """The record of a solid or plane link from its function space: mass and stiffness, and what else is given."""
+    on, X, one = pattern(basis), np.ascontiguousarray(X), np.ones(len(X))
+    m = scalar_mass(basis, on, material.density * thickness)
+    mass: Mass = (m,) * basis.mesh.dim()
+    m1, mX = mass_constants(mass, one, X * [1, 1, len(mass) - 2])
+    read_only(X, one, given["cells"], m1, mX)
+    lam, mu = (thickness * x for x in lame)
     return Link(
-        name=name, kind="solid", X=X, one=one, cells=vtk_cells(basis), cell_type=CELL_TYPES[len(basis.element_dofs)],
-        axes=axes, mass=mass, K0=elastic_stiffness(gradient_products(basis, on), material.lame()), m1=m1, mX=mX,
-        volume=m1[:, 0] / material.density,
-        E=material.youngs_modulus, lame=material.lame(), basis=basis, faces=link_faces(basis, mesh), method=mesh.method,
+        name=name, X=X, one=one, mass=mass, K0=elastic_stiffness(gradient_products(basis, on), (lam, mu)), m1=m1, mX=mX,
+        volume=m1[:, 0] / material.density, E=material.youngs_modulus, lame=lame, basis=basis, thickness=thickness,
+        **given,
     )  # fmt: skip

@@ -13,9 +13,8 @@ import skfem
 from jaxtyping import Float
 
 from kedfem.links.beams.beam import assembled, strain_rows
-from kedfem.links.beams.spatial_recovery import section_of
 from kedfem.links.beams.spatial_stress import spatial_stress_stiffness
-from kedfem.links.record import Link, Matrix
+from kedfem.links.record import Link, Matrix, section_of
 from kedfem.links.reduced import STRAIGHT
 from kedfem.links.solid import Pattern, pattern
 

@@ -131,6 +131,12 @@ def element_mass(x: Float[np.ndarray, "m 2"]) -> Float[np.ndarray, "m m"]:
     return m
 
 
+def planar_rigidities(section: Section, material: Material) -> Float[np.ndarray, "3"]:
+    """(EA, κGA, E I) [N, N, N m²]."""
+    E, G, A = material.youngs_modulus, material.shear_modulus, section.area
+    return np.array([E * A, section.shear_coefficient * G * A, E * section.second_moment])
+
+
 def beam_mesh(
     points: Float[np.ndarray, "p 3"], elements: int, nodes: int
 ) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e m"]]:
@@ -162,13 +168,12 @@ def beam_link(name: str, points: Float[np.ndarray, "p 3"], section: Section, mat
     nodes : per element
     """
     X, cells = beam_mesh(points, elements, nodes)
-    E, G = material.youngs_modulus, material.shear_modulus
-    A, I = section.area, section.second_moment  # noqa: E741
-    rigidity = np.array([E * A, section.shear_coefficient * G * A, E * I])
+    rigidity = planar_rigidities(section, material)
     gram = assembled([element_mass(X[c, :2]) for c in cells], cells, len(X))
     dofs = (3 * cells[:, :, None] + np.arange(3)).reshape(len(cells), -1)
     K0 = assembled([element_stiffness(X[c, :2], rigidity) for c in cells], dofs, 3 * len(X))
-    translation, rotation = material.density * A * gram, material.density * I * gram
+    translation = material.density * section.area * gram
+    rotation = material.density * section.second_moment * gram
     mass: Mass = (translation, translation, rotation)
     one = np.ones(len(X))
     m1, mX = mass_constants(mass, one, X * [1, 1, 0])
@@ -176,7 +181,7 @@ def beam_link(name: str, points: Float[np.ndarray, "p 3"], section: Section, mat
     return Link(
         name=name, kind="beam", X=X, one=one, cells=cells, cell_type=cell_type(nodes),
         axes=line_axes(points[0], points[-1]), mass=mass, K0=K0, m1=m1, mX=mX, volume=m1[:, 0] / material.density,
-        E=E, lame=material.lame(), section=section,
+        E=material.youngs_modulus, lame=material.lame(), section=section,
     )  # fmt: skip
 
 

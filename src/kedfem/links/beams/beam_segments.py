@@ -6,11 +6,11 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.links.beams.beam import beam_link, shape_functions, strain_rows, tangent_fit
+from kedfem.links.beams.beam import beam_link, planar_rigidities, shape_functions, strain_rows, tangent_fit
 from kedfem.links.beams.beam_axis import Axis
 from kedfem.links.beams.metric import beam_element
 from kedfem.links.beams.spatial_beam import rigidities, spatial_beam_link
-from kedfem.links.record import BeamPoint, Frame, Link
+from kedfem.links.record import BeamPoint, Frame, Link, section_of
 from kedfem.links.segments import Cut, Segments, corotational
 from kedfem.links.surfaces.coupling_surfaces import joint_surface, port_weights
 from kedfem.scene import Material
@@ -24,10 +24,7 @@ def beam_segments(link: Link, material: Material) -> Segments:
     nodes = link.cells.shape[1]
     parts = []
     for cell in link.cells:
-        section = link.section
-        if section is None:
-            raise TypeError(f"links.{link.name}: has no section")  # a beam has
-        part = beam_link(link.name, link.X[cell[:2]], section, material, 1, nodes)
+        part = beam_link(link.name, link.X[cell[:2]], section_of(link), material, 1, nodes)
         parts.append(replace(corotational(part), axes=link.axes, frames=_gauss_frames(part, material)))
     cuts = [
         Cut((k, k + 1), link.X[link.cells[k][1:2]], (_unit(parts[k], -1), _unit(parts[k + 1], 0)))
@@ -42,11 +39,7 @@ def _unit(part: Link, node: int) -> Float[np.ndarray, "1 n"]:
 
 
 def _gauss_frames(part: Link, material: Material) -> tuple[Frame, ...]:
-    section, x = part.section, part.X[part.cells[0]][:, :2]
-    if section is None:
-        raise TypeError(f"links.{part.name}: has no section")  # a beam has
-    E, G, A = material.youngs_modulus, material.shear_modulus, section.area
-    rigidity = np.array([E * A, section.shear_coefficient * G * A, E * section.second_moment])
+    x, rigidity = part.X[part.cells[0]][:, :2], planar_rigidities(section_of(part), material)
     place = np.argsort(part.cells[0])
     rows, rigidities, fits, tangents = [], [], [], []
     for r, w in zip(*np.polynomial.legendre.leggauss(len(x) - 1), strict=True):
@@ -80,13 +73,12 @@ def _space_part(link: Link, axis: Axis, cell: Int[np.ndarray, " m"], material: M
     stations = np.sort(cell)
     node = axis.node[stations] - axis.node[stations[0]]
     hub = axis.hub[axis.node[stations]]
-    section = link.section
-    if section is None:
-        raise TypeError(f"links.{link.name}: has no section")  # a beam has
+    section = section_of(link)
     own = Axis(axis.frame[stations], node, np.searchsorted(stations, cell)[None], hub)
     part = spatial_beam_link(link.name, own, section, material)
     x, order = own.frame[own.cells[0]][:, [0, 2, 3]], own.node[own.cells[0]]
-    element = beam_element(x, part.X, part.one, order, rigidities(section, material))
+    rigidity = rigidities(section, material.youngs_modulus, material.shear_modulus)
+    element = beam_element(x, part.X, part.one, order, rigidity)
     K0 = sp.csr_array((element.rows.T * element.stiffness) @ element.rows)
     return replace(corotational(part), axes=link.axes, K0=K0, element=element)
 

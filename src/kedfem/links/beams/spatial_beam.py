@@ -82,10 +82,9 @@ def section_strains(x: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3 3"]:
     return np.asarray(_within(np.ones(1), x[1], x[2])[:, 0])
 
 
-def rigidities(section: Section, material: Material) -> Float[np.ndarray, "6"]:
+def rigidities(section: Section, E: float, G: float) -> Float[np.ndarray, "6"]:
     """(EA, κ1 GA, κ2 GA, E I_y, E I_z, GJ) [N, N m²]."""
-    E, G, A = material.youngs_modulus, material.shear_modulus, section.area
-    k1, k2 = section.shear_coefficients
+    A, (k1, k2) = section.area, section.shear_coefficients
     return np.array([E * A, k1 * G * A, k2 * G * A, E * section.second_moment, E * section.second_moment_z,
                      G * section.torsion_constant])  # fmt: skip
 
@@ -140,7 +139,7 @@ def spatial_beam_link(
     """
     X, one, triples = functions(axis)
     x, cells, n = axis.frame[:, [0, 2, 3]], axis.cells, len(X)
-    rigidity = rigidities(section, material)
+    rigidity = rigidities(section, material.youngs_modulus, material.shear_modulus)
     by_station = _dofs(cells, 3)
     m = assembled([material.density * space_mass(x[c], section) for c in cells], by_station, 3 * len(x))
     K = assembled([space_stiffness(x[c], rigidity) for c in cells], _dofs(by_station, 3), 9 * len(x))
@@ -151,7 +150,8 @@ def spatial_beam_link(
         triples.T @ m @ triples + _diagonal(hubs[:, 0], HUB_INERTIA * material.density * cube, n)
     )
     K0 = sp.csr_array(
-        vectors.T @ K @ vectors + hub_stiffness(X, hubs, hubs_stiff * rigidity[0] * length_of(axis))
+        vectors.T @ K @ vectors
+        + hub_stiffness(X, hubs, hubs_stiff * rigidity[0] * length_of(axis.frame[:, 0], cells))
     )
     mass = (m, m, m)
     m1, mX = mass_constants(mass, one, X)
@@ -216,9 +216,9 @@ def hub_stiffness(X: Float[np.ndarray, "n 3"], hubs: Int[np.ndarray, "h 3"], k: 
     return assembled(blocks, _dofs(hubs, 3), 3 * len(X))
 
 
-def length_of(axis: Axis) -> float:
-    """Length of the axis by chords [m]."""
-    ends = axis.frame[axis.cells[:, :2], 0]
+def length_of(stations: Float[np.ndarray, "s 3"], cells: Int[np.ndarray, "e m"]) -> float:
+    """Length of an axis by the chords of its elements [m]."""
+    ends = stations[cells[:, :2]]
     return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
 
 

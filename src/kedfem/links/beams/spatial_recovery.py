@@ -7,19 +7,12 @@ from jaxtyping import Float, Int
 from kedfem.links.beams.beam import line_pairs, parent_nodes, shape_functions
 from kedfem.links.beams.section import Section, outline, torsion_stress
 from kedfem.links.beams.spatial_beam import space_strains
-from kedfem.links.record import Link
+from kedfem.links.record import Link, section_of
 
 
 def element_frame(link: Link, element: int) -> Float[np.ndarray, "m 3 3"]:
     """Position and the section's directions at an element's nodes."""
     return np.asarray((_triples(link, link.cells[element]) @ link.X).reshape(-1, 3, 3))
-
-
-def section_of(link: Link) -> Section:
-    """The section of a beam."""
-    if link.section is None:
-        raise TypeError(f"links.{link.name}: has no section")
-    return link.section
 
 
 def section_value(link: Link, element: int, r: float, y: float, z: float) -> Float[np.ndarray, " n"]:

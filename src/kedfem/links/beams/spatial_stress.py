@@ -13,11 +13,12 @@ from kedfem.links.beams.beam import assembled, parent_nodes, parent_weights, sha
 from kedfem.links.beams.spatial_beam import (
     HUB_STIFFNESS,
     hub_functions,
+    length_of,
+    rigidities,
     section_strains,
     space_strains,
 )
-from kedfem.links.beams.spatial_recovery import section_of
-from kedfem.links.record import Link
+from kedfem.links.record import Link, section_of
 
 T, N1, N2, N1_S, N2_S = range(5)  # the fields x', n1, n2, n1', n2'
 
@@ -57,23 +58,21 @@ def _element(
     link: Link, x: Float[np.ndarray, "m 3 3"], u: Float[np.ndarray, "m 3 3"]
 ) -> Float[np.ndarray, "k k"]:
     m, section = len(x), section_of(link)
-    E, G, A = link.E, link.lame[1], section.area
-    k1, k2 = section.shear_coefficients
-    I_y, I_z = section.second_moment, section.second_moment_z
-    rigidity = np.array([E * A, k1 * G * A, k2 * G * A, E * I_y, E * I_z, G * section.torsion_constant])
+    rigidity = rigidities(section, link.E, link.lame[1])
+    EA, _, _, EI_y, EI_z, _ = rigidity
     out = np.zeros((3 * m, 3 * m))
     for r, w in zip(*np.polynomial.legendre.leggauss(m - 1), strict=True):
         rows, det_J = space_strains(x, float(r))
         strain = np.einsum("imfc,mfc->i", rows, u)
         fields = _fields(float(r), m, det_J)
         c = np.einsum("i,iab->ab", rigidity * strain, metric(np.einsum("amf,mfc->ac", fields, x)))
-        c[N1_S, N1_S] += E * I_y * strain[0]
-        c[N2_S, N2_S] += E * I_z * strain[0]
+        c[N1_S, N1_S] += EI_y * strain[0]
+        c[N2_S, N2_S] += EI_z * strain[0]
         flat = fields.reshape(5, -1)
         out += w * det_J * flat.T @ c @ flat
     for a, (parent, weight) in enumerate(zip(parent_nodes(m), parent_weights(m), strict=True)):
         det_J = float(np.linalg.norm(shape_functions(parent, m)[1] @ x[:, 0]))
-        s = E * A * weight * det_J * np.einsum("ifc,fc->i", section_strains(x[a]), u[a])
+        s = EA * weight * det_J * np.einsum("ifc,fc->i", section_strains(x[a]), u[a])
         p, q = 3 * a + 1, 3 * a + 2
         out[p, p] += s[0]
         out[p, q] += s[1] / 2
@@ -99,9 +98,7 @@ def _fields(r: float, m: int, det_J: float) -> Float[np.ndarray, "5 m 3"]:
 
 def _hubs(link: Link, frame: Float[np.ndarray, "s 3 3"], g: Float[np.ndarray, "n 3"]) -> sp.csr_array:
     """Stresses of the hubs, stiffness times sym G, between their gradient functions."""
-    ends = frame[link.cells[:, :2], 0]
-    length = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
-    stiffness = HUB_STIFFNESS * link.E * section_of(link).area * length
+    stiffness = HUB_STIFFNESS * link.E * section_of(link).area * length_of(frame[:, 0], link.cells)
     hubs = hub_functions(link.one)
     H = np.einsum("hac,hbc->hab", link.X[hubs], g[hubs])
     return assembled(list(stiffness * (H + H.transpose(0, 2, 1)) / 2), hubs, link.n)

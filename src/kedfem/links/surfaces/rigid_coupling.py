@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from kedfem.links.record import Link
-from kedfem.links.reduced import reduced
+from kedfem.links.reduced import reduced, rigid_motions
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface
 from kedfem.links.surfaces.surface import surface_quadrature
 
@@ -45,7 +45,7 @@ def with_rigid_coupling(link: Link, surface: CouplingSurface, times: float = STI
     few = _far_apart(x)
     L, P = _affine(x, few), _choice(few, len(x))
     off = sp.csr_array(sp.eye_array(len(x)) - sp.csr_array(L) @ P)
-    D, B = np.kron(L.T @ (G @ L), np.eye(link.d)), _rigid_motions(x[few], link.d)
+    D, B = np.kron(L.T @ (G @ L), np.eye(link.d)), rigid_motions(x[few], np.ones(len(few)), link.d)
     bent = D - D @ B @ np.linalg.solve(B.T @ D @ B, B.T @ D)
     on_few = sp.csr_array(sp.kron(P, unit))
     within = sp.kron(off.T @ G @ off, unit) + on_few.T @ sp.csr_array(bent) @ on_few
@@ -101,13 +101,3 @@ def surface_gram(link: Link, facets: Int[np.ndarray, " f"]) -> tuple[Int[np.ndar
     used = (rows >= 0) & (columns >= 0)
     entries = sp.coo_array((local[used], (rows[used], columns[used])), shape=(len(nodes), len(nodes)))
     return nodes, sp.csr_array(entries)
-
-
-def _rigid_motions(x: Float[np.ndarray, "b 3"], d: int) -> Float[np.ndarray, "k r"]:
-    """Translations, and turns about the origin of x; (k nodes, d components) by motions."""
-    motions = [np.tile(e, (len(x), 1)) for e in np.eye(d)]
-    for i, j in ((0, 1), (1, 2), (2, 0))[: 1 if d == 2 else 3]:
-        turn = np.zeros((len(x), d))
-        turn[:, i], turn[:, j] = -x[:, j], x[:, i]
-        motions.append(turn)
-    return np.stack(motions, axis=2).reshape(d * len(x), -1)
