@@ -11,14 +11,7 @@ from jaxtyping import Float, Int
 from kedfem.accuracy.plan import plan_for
 from kedfem.dynamics.history import bent
 from kedfem.dynamics.modes.frozen import Modes
-from kedfem.dynamics.modes.link_modes import (
-    Support,
-    clamped_on,
-    held_at,
-    link_modes,
-    single_link,
-    together,
-)
+from kedfem.dynamics.modes.link_modes import Support, clamped_on, held_at, link_modes, single_link, together
 from kedfem.errors import MeshError, SceneError
 from kedfem.frequencies.linkage import frequencies_folder
 from kedfem.links.record import Link

@@ -9,12 +9,7 @@ from jaxtyping import Float
 from kedfem.errors import SceneError
 from kedfem.links.beams.beam import shape_functions
 from kedfem.links.beams.beam_recovery import fibre_row, nearest_on_beam
-from kedfem.links.beams.spatial_recovery import (
-    beam_strains,
-    nearest_on_axis,
-    section_stress,
-    section_value,
-)
+from kedfem.links.beams.spatial_recovery import beam_strains, nearest_on_axis, section_stress, section_value
 from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_gradients, stress_of_gradient
 from kedfem.mesh.elements.shape_functions import barycentric
@@ -38,10 +33,7 @@ class PointRows:
 
 
 def point_rows(
-    link: Link,
-    where: str,
-    point: Float[np.ndarray, "3"],
-    kinks: Float[np.ndarray, "_ 3"] | None = None,
+    link: Link, where: str, point: Float[np.ndarray, "3"], kinks: Float[np.ndarray, "_ 3"] | None = None
 ) -> PointRows:
     """The rows of a probe; its displacement is d = N g and f = N δ with the same N, [KED, eqs. (4b)(6)].
 

@@ -7,7 +7,7 @@ from types import ModuleType
 import numpy as np
 
 from kedfem.mesh.cad.solids import AROUND, USUAL, CadFace, Sizing, Solid
-from kedfem.mesh.session import gmsh_options
+from kedfem.mesh.session import boundary, gmsh_options
 
 _FINEST = 4.0  # the least size elsewhere over the least one here
 
@@ -31,8 +31,7 @@ def finer_hollows(
     if sizing.hollow >= USUAL or not tags:
         yield
         return
-    edges = gmsh.model.getBoundary([(2, tag) for tag in sorted(tags)], combined=False, oriented=False)
-    hollow = {(2, tag) for tag in tags} | set(edges)
+    hollow = {(2, tag) for tag in tags} | {(1, tag) for tag in boundary(gmsh, 2, *tags)}
 
     def wanted(dimension: int, tag: int, x: float, y: float, z: float, size: float) -> float:
         if (dimension, tag) in hollow:

@@ -2,13 +2,16 @@
 
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import combinations
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
+import scipy.sparse as sp
 from jaxtyping import Float, Int
+from scipy.sparse.csgraph import connected_components
 
 from kedfem.errors import MeshError
 
@@ -85,6 +88,27 @@ def gmsh_options(gmsh: ModuleType, options: dict[str, float]) -> Iterator[None]:
     finally:
         for name, value in before.items():
             gmsh.option.setNumber(name, value)
+
+
+def boundary(gmsh: ModuleType, dimension: int, *tags: int) -> set[int]:
+    """What bounds some entities: the tags of faces of solids, edges of faces, ends of edges."""
+    entities = [(dimension, tag) for tag in tags]
+    return {abs(int(tag)) for _, tag in gmsh.model.getBoundary(entities, combined=False, oriented=False)}
+
+
+def touching(
+    bounds: Sequence[set[int]], alike: Callable[[int, int], bool] = lambda one, other: True
+) -> list[list[int]]:
+    """Entities in groups that hang together: those that share some of what bounds them, and are alike."""
+    owners: dict[int, list[int]] = {}
+    for i, own in enumerate(bounds):
+        for tag in own:
+            owners.setdefault(tag, []).append(i)
+    pairs = {pair for several in owners.values() for pair in combinations(several, 2)}
+    ends = np.array([pair for pair in pairs if alike(*pair)], int).reshape(-1, 2).T
+    graph = sp.coo_array((np.ones(ends.shape[1]), tuple(ends)), shape=(len(bounds), len(bounds)))
+    label = connected_components(graph, directed=False)[1]
+    return [np.flatnonzero(label == k).tolist() for k in range(label.max(initial=-1) + 1)]
 
 
 def quadrilaterals(gmsh: ModuleType) -> tuple[Float[np.ndarray, "n 2"], Int[np.ndarray, "e 4"]] | None:

@@ -74,9 +74,7 @@ class AnimationWriter:
         self.entries += blocks
         self.count += 1
         path = self.folder / f"{self.stem}.pvd"
-        if not self._extended(
-            path, _rows(blocks)
-        ):  # a list written anew for each of n frames would take n² rows
+        if not self._extended(path, _rows(blocks)):  # each of n frames written anew would take n² rows
             write_collection(self.folder, self.stem, self.entries)
         self._listed = path.stat().st_size
         return [self.folder / name for name in files]

@@ -119,9 +119,8 @@ class _Source:
 
     def _keep(self, outer: Any) -> int:
         self.kept = np.asarray(outer.point_data["id"])
-        self.surface.triangles = (
-            np.asarray(outer.faces).reshape(-1, 4)[:, 1:].astype(np.int64)
-        )  # VTK's may be `longlong`
+        # VTK's may be `longlong`
+        self.surface.triangles = np.asarray(outer.faces).reshape(-1, 4)[:, 1:].astype(np.int64)
         return len(self.kept)
 
     def drawn(self, highest: Float[np.ndarray, " n"]) -> None:

@@ -105,10 +105,10 @@ def claimed(folder: Path, within: Sequence[str] = ()) -> Iterator[Path]:
                     path.unlink(missing_ok=True)
         yield folder
     finally:
-        with suppress(
-            OSError
-        ):  # while it is held: who waits for it sees that it is gone, and makes a new one
-            (folder / LOCK).unlink()
+        with suppress(OSError):
+            (
+                folder / LOCK
+            ).unlink()  # while it is held: who waits for it sees that it is gone, and makes a new one
         lock.release()
 
 

@@ -226,9 +226,8 @@ def outline(section: Section) -> tuple[Float[np.ndarray, "c 2"], Int[np.ndarray,
     """Points (y, z) of a section and quadrilaterals between them, to draw it."""
     h, t = section.height / 2, section.thickness / 2
     if section.kind in {"rectangle", "constants"}:
-        points = np.array(
-            [[y, z] for z in (-t, 0.0, t) for y in (-h, 0.0, h)]
-        )  # torsion is worst at middles of sides
+        # torsion is worst at middles of sides
+        points = np.array([[y, z] for z in (-t, 0.0, t) for y in (-h, 0.0, h)])
         return points, np.array([[k, k + 1, k + 4, k + 3] for k in (0, 1, 3, 4)])
     if section.kind == "box":
         return _box_outline(h, t, section.walls[0])

@@ -59,12 +59,7 @@ def offers(mesh: SolidMesh) -> list[Offer]:
     listed = [each for _, _, each in rows]
     return [
         Offer(
-            number,
-            each.face,
-            KINDS[kind],
-            _point(link, each),
-            _found(link, KINDS[kind], each, listed),
-            -area,
+            number, each.face, KINDS[kind], _point(link, each), _found(link, KINDS[kind], each, listed), -area
         )
         for number, (kind, area, each) in enumerate(rows, start=1)
     ]

@@ -10,6 +10,7 @@ from kedfem.mesh.cad.sides import boundary_sides, side_normals
 from kedfem.mesh.cad.solids import CadFace, Solid
 from kedfem.mesh.cad.words import face_form
 from kedfem.mesh.elements.hexahedra import Face, SolidMesh
+from kedfem.mesh.session import boundary, touching
 
 _FLAT = 1e-7  # of the solid's size: sides as near as that to a plane are in it
 _ALIKE = 1e-5  # of the radius: cylinders and spheres that are one
@@ -69,20 +70,8 @@ def _face(solid: Solid, group: list[int], sides: Int[np.ndarray, "f c"]) -> Face
 
 def one_surface(gmsh: ModuleType, solid: Solid) -> list[list[int]]:
     """Faces in groups: those of one cylinder or sphere that share an edge, without names or with the same one."""
-    edges = [
-        {tag for _, tag in gmsh.model.getBoundary([(2, face.tag)], combined=False, oriented=False)}
-        for face in solid.faces
-    ]
-    groups: list[list[int]] = []
-    for i, face in enumerate(solid.faces):
-        joined = [
-            group
-            for group in groups
-            if any(edges[i] & edges[j] and _same_surface(face, solid.faces[j]) for j in group)
-        ]
-        groups = [group for group in groups if group not in joined]
-        groups.append(sorted([i, *(j for group in joined for j in group)]))
-    return sorted(groups)
+    edges = [boundary(gmsh, 2, face.tag) for face in solid.faces]
+    return touching(edges, lambda i, j: _same_surface(solid.faces[i], solid.faces[j]))
 
 
 def _same_surface(a: CadFace, b: CadFace) -> bool:
@@ -197,6 +186,5 @@ def _closest(
 
 def beyond(gmsh: ModuleType, tag: int, place: Float[np.ndarray, "3"]) -> float:
     """How far a place is from the edges of a face [m]."""
-    edges = gmsh.model.getBoundary([(2, tag)], combined=False, oriented=False)
-    on = [gmsh.model.getClosestPoint(1, edge, place)[0] for _, edge in edges]
+    on = [gmsh.model.getClosestPoint(1, edge, place)[0] for edge in boundary(gmsh, 2, tag)]
     return min((float(np.linalg.norm(np.array(X) - place)) for X in on), default=0.0)

@@ -14,7 +14,7 @@ import numpy as np
 from kedfem.errors import MeshError
 from kedfem.mesh.cad.text import iges_unit, step_text, step_unit
 from kedfem.mesh.places import in_mm
-from kedfem.mesh.session import gmsh_options
+from kedfem.mesh.session import boundary, gmsh_options, touching
 from kedfem.processes import at_most
 
 Format = Literal["STEP", "IGES", "BREP"]
@@ -28,10 +28,8 @@ ENDINGS: dict[str, Format] = {
 _MILLIMETRE = 1e-3
 _BREP_UNIT = 1e-3
 SMALLEST, LARGEST = 1e-5, 1e3  # [m], of a part's box: beyond them the unit must be wrong
-_READING, _READING_MB = (
-    20.0,
-    10.0,
-)  # seconds of processor time that reading may take, and more per megabyte of the file
+# seconds of processor time that reading may take, and more per megabyte of the file
+_READING, _READING_MB = 20.0, 10.0
 _ENDLESS = 1e50  # OpenCASCADE's box of a face without an edge
 _GAPS = (1e-4, 3e-4, 1e-3)  # of the part's size: wider ones, closed by mending, which is reported
 _SEWING = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5)  # [m], gaps between faces that are closed, the least that will do
@@ -245,14 +243,9 @@ def _closed_solids(gmsh: ModuleType) -> list[int]:
 
 def _shells(gmsh: ModuleType) -> list[list[int]]:
     """Faces in groups that share edges."""
-    groups: list[tuple[list[int], set[int]]] = []
-    for face in _faces(gmsh):
-        edges = {tag for _, tag in gmsh.model.getBoundary([(2, face)], combined=False, oriented=False)}
-        touching = [group for group in groups if group[1] & edges]
-        groups = [group for group in groups if not group[1] & edges]
-        together = sorted([face, *(tag for tags, _ in touching for tag in tags)])
-        groups.append((together, edges.union(*(found for _, found in touching))))
-    return sorted(tags for tags, _ in groups)
+    faces = _faces(gmsh)
+    groups = touching([boundary(gmsh, 2, face) for face in faces])
+    return [[faces[i] for i in group] for group in groups]
 
 
 def _refusal(gmsh: ModuleType, file: CadFile) -> MeshError:

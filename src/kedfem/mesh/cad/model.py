@@ -15,7 +15,7 @@ from kedfem.mesh.cad.file import CadFile, cad_file, check_size, imported, read_s
 from kedfem.mesh.cad.solid_faces import SAME_VOLUME, cad_faces, enclosed_volume, solid_box
 from kedfem.mesh.cad.solids import Solid
 from kedfem.mesh.cad.text import Body, own_name, step_bodies, step_products, step_text
-from kedfem.mesh.session import gmsh_model
+from kedfem.mesh.session import boundary, gmsh_model
 from kedfem.scene.records.shapes import Cad
 from kedfem.scene.records.wording import nearest
 
@@ -78,7 +78,7 @@ def _named_solids(
 ) -> tuple[list[int], list[str], dict[int, Body | None], str]:
     """The tags of a file's solids, now in gmsh's model, names, bodies in the file's text, and what was mended."""
     tags, mended = read_solids(gmsh, file)
-    most = max(len(_boundary(gmsh, tag)) for tag in tags)
+    most = max(len(boundary(gmsh, 3, tag)) for tag in tags)
     if most > MOST_FACES:
         raise MeshError(
             f"{file.where}: must hold solids of at most {MOST_FACES:,} faces, got one of {most:,} in {file.path}; "
@@ -95,7 +95,7 @@ def _solid(gmsh: ModuleType, file: CadFile, tag: int, name: str, body: Body | No
     extent = float(np.linalg.norm(box[3:] - box[:3]))
     volume = float(gmsh.model.occ.getMass(3, tag))
     _check_solid(file, name, extent, volume)
-    faces = _boundary(gmsh, tag)
+    faces = sorted(boundary(gmsh, 3, tag))
     named = {face: text for face, text in zip(faces, body.faces, strict=True) if text} if body else {}
     known = cad_faces(gmsh, file.where, tag, extent, named)
     enclosed = enclosed_volume(gmsh, known)
@@ -135,21 +135,12 @@ def _choice(key: str, file: CadFile, names: list[str], link: str, wanted: str | 
     )
 
 
-def _boundary(gmsh: ModuleType, solid: int) -> list[int]:
-    """The faces of a solid, in order of their tags."""
-    return sorted({abs(tag) for _, tag in gmsh.model.getBoundary([(3, solid)], combined=False)})
-
-
 def leave_only(gmsh: ModuleType, solid: int) -> None:
     """Everything else out of the model."""
-    kept = {(3, solid), *((2, tag) for tag in _boundary(gmsh, solid))}
+    kept = {(3, solid), *((2, tag) for tag in boundary(gmsh, 3, solid))}
     for dimension in (1, 0):
-        kept |= {
-            (at, abs(tag))
-            for at, tag in gmsh.model.getBoundary(
-                [entity for entity in kept if entity[0] == dimension + 1], combined=False
-            )
-        }
+        above = [tag for at, tag in kept if at == dimension + 1]
+        kept |= {(dimension, tag) for tag in boundary(gmsh, dimension + 1, *above)}
     for dimension in (3, 2, 1, 0):
         others = [entity for entity in gmsh.model.getEntities(dimension) if tuple(entity) not in kept]
         gmsh.model.occ.remove(others)
@@ -204,7 +195,7 @@ def _body(gmsh: ModuleType, tag: int, texts: list[Body]) -> Body | None:
 
     Compared by distances of the faces' corners from each other, which a place in an assembly does not change.
     """
-    faces = _boundary(gmsh, tag)
+    faces = sorted(boundary(gmsh, 3, tag))
     likely = [body for body in texts if len(body.faces) == len(faces)]
     if not likely:
         return None

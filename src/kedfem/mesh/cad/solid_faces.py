@@ -14,6 +14,7 @@ from kedfem.mesh.cad.forms import Sample, fitted_form
 from kedfem.mesh.cad.solids import CadFace
 from kedfem.mesh.cad.words import face_form
 from kedfem.mesh.places import in_mm
+from kedfem.mesh.session import boundary
 
 _ACCURACY = 1e-4  # of points, in sizes of the face: what translators between CAD systems leave
 _SKEW = 1e-3
@@ -57,7 +58,7 @@ def cad_faces(
     MeshError
         A face has the solid on both sides, or on none: the solid cuts itself or is not closed.
     """
-    tags = sorted({abs(tag) for _, tag in gmsh.model.getBoundary([(3, solid)], combined=False)})
+    tags = sorted(boundary(gmsh, 3, solid))
     faces = tuple(_cad_face(gmsh, tag, names.get(tag, f"face {tag}"), 1.0) for tag in tags)
     slow = any(gmsh.model.getType(2, tag).startswith("Surface of") for tag in tags)
     volume = gmsh.model.occ.getMass(3, solid)

@@ -118,9 +118,7 @@ def _degree(k: int) -> int:
 
 
 @cache
-def _tables(
-    k: int,
-) -> tuple[Float[np.ndarray, "q k d"], Float[np.ndarray, "c q"], Float[np.ndarray, "c m"]]:
+def _tables(k: int) -> tuple[Float[np.ndarray, "q k d"], Float[np.ndarray, "c q"], Float[np.ndarray, "c m"]]:
     """Gradients at the places where det J is sampled; from its values its coefficients; from those the halves'."""
     if k == len(TET10):
         return _tetrahedron_tables()

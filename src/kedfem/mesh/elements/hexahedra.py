@@ -46,6 +46,14 @@ class Face:
     words: str = ""
 
 
+def keep_copies(mesh: object) -> None:
+    """Make points and cells of a mesh read-only copies."""
+    for name, kind in (("points", np.float64), ("cells", np.int64)):
+        array = np.array(getattr(mesh, name), dtype=kind, order="C")
+        array.setflags(write=False)
+        object.__setattr__(mesh, name, array)
+
+
 @dataclass(frozen=True, slots=True)
 class SolidMesh:
     """A mesh of hexahedra alone or of tetrahedra alone, every node used; the arrays are read-only copies.
@@ -63,10 +71,7 @@ class SolidMesh:
     method: str = ""
 
     def __post_init__(self) -> None:
-        for name, kind in (("points", np.float64), ("cells", np.int64)):
-            array = np.array(getattr(self, name), dtype=kind, order="C")
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
+        keep_copies(self)
 
     @property
     def cell_type(self) -> str:

@@ -10,9 +10,8 @@ from kedfem.mesh.layered.partition import Curve, Loop, Plan, Region, corner_angl
 CUSP = np.radians(6)  # an angle in which no element of quality can be
 _WIDE = 0.15  # of the size: how wide a cusp is where its tip ends
 _LOST = 2e-4  # of the volume: what all tips together may be
-_SLANT = np.tan(
-    np.radians(30)
-)  # the tip's end is turned so much, that the neighbour's corners are less sharp
+# the tip's end is turned so much, that the neighbour's corners are less sharp
+_SLANT = np.tan(np.radians(30))
 _STEPS = np.linspace(0.0, 0.4, 401)[1:]  # shares of the shorter curve where a tip may end
 
 

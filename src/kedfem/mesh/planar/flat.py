@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.mesh.elements.hexahedra import SolidMesh, extruded, placed
+from kedfem.mesh.elements.hexahedra import SolidMesh, extruded, keep_copies, placed
 from kedfem.mesh.planar.areas import Quads
 
 
@@ -25,10 +25,7 @@ class QuadMesh:
     method: str = ""
 
     def __post_init__(self) -> None:
-        for name, kind in (("points", np.float64), ("cells", np.int64)):
-            array = np.array(getattr(self, name), dtype=kind, order="C")
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
+        keep_copies(self)
 
 
 @dataclass(frozen=True, slots=True)

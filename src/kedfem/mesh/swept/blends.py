@@ -13,7 +13,7 @@ from kedfem.mesh.cad.solid_faces import cad_faces
 from kedfem.mesh.cad.solids import CadFace, OtherMethodError, Sizing, Solid
 from kedfem.mesh.elements.hexahedra import SolidMesh
 from kedfem.mesh.layered.layers import layered_mesh, slanted_faces
-from kedfem.mesh.session import gmsh_copy
+from kedfem.mesh.session import boundary, gmsh_copy, touching
 
 SHARE = 0.015  # of the part's size: convex blends smaller than that are left out by themselves
 MOST = 0.5  # % of the volume that they may change by themselves
@@ -53,9 +53,8 @@ def _width(gmsh: ModuleType, face: CadFace) -> float:
         return face.radius
     edges = gmsh.model.getBoundary([(2, face.tag)], oriented=False)
     around = sum(float(gmsh.model.occ.getMass(1, tag)) for _, tag in edges)
-    return (
-        2 * face.area / max(around, 1e-300) / _ARC * 1.13
-    )  # √2 of a chamfer's side, over what a round would be
+    # √2 of a chamfer's side, over what a round would be
+    return 2 * face.area / max(around, 1e-300) / _ARC * 1.13
 
 
 def _near(gmsh: ModuleType, faces: Sequence[CadFace], sizing: Sizing, small: float) -> bool:
@@ -86,7 +85,9 @@ def _without(gmsh: ModuleType, solid: Solid, faces: Sequence[CadFace], concave: 
     known = cad_faces(gmsh, solid.name, tag, solid.extent, {})
     goes = [_same(face, known, solid.extent).tag for face in faces]
     if not concave:
-        for group in _groups(gmsh, goes) if len(goes) <= _MANY else [goes]:
+        edges = [boundary(gmsh, 2, tag) for tag in goes]
+        groups = [[goes[i] for i in group] for group in touching(edges)] if len(goes) <= _MANY else [goes]
+        for group in groups:
             with gmsh_copy(gmsh, 1.0) as trial:  # tags of a copy of a copy are the same again
                 if _defeatured(trial, solid, group).volume < solid.volume:
                     raise OtherMethodError(f"{solid.name}: a concave fillet is in the way of layers")
@@ -117,17 +118,6 @@ def _defeatured(gmsh: ModuleType, solid: Solid, faces: Sequence[int]) -> Solid:
     if abs(volume / solid.volume - 1) > 0.2 or len(found) > len(solid.faces) - len(faces):
         raise OtherMethodError(f"{solid.name}: OpenCASCADE leaves another part than its blends out")
     return Solid(tag, solid.name, volume, solid.low, solid.high, found)
-
-
-def _groups(gmsh: ModuleType, tags: Sequence[int]) -> list[list[int]]:
-    """Faces in groups that hang together by edges."""
-    edges = {tag: {e for _, e in gmsh.model.getBoundary([(2, tag)], oriented=False)} for tag in tags}
-    groups: list[list[int]] = []
-    for tag in tags:
-        touching = [group for group in groups if any(edges[tag] & edges[other] for other in group)]
-        groups = [group for group in groups if group not in touching]
-        groups.append([tag, *(other for group in touching for other in group)])
-    return groups
 
 
 def _same(face: CadFace, among: Sequence[CadFace], extent: float, loose: bool = False) -> CadFace:

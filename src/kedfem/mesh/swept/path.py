@@ -16,7 +16,7 @@ from kedfem.mesh.layered.partition import Plan
 from kedfem.mesh.layered.plan_mesh import plan_mesh
 from kedfem.mesh.layered.sections import check_volume, laid_over, plan_axes, reporting, section
 from kedfem.mesh.layered.shares import sized
-from kedfem.mesh.session import gmsh_copy
+from kedfem.mesh.session import boundary, gmsh_copy
 
 _SAMPLES = np.linspace(0, 1, 9)  # along each edge
 _ENDS = 12  # plane faces that are tried as the first end
@@ -173,7 +173,7 @@ def _walked(gmsh: ModuleType, solid: Solid, every: dict[int, Looks], end: CadFac
     """The legs from one end on, if they lead past all faces to another end; else none."""
     legs: tuple[Leg, ...] = ()
     frame, left = Frame(end.centre, plan_axes(-end.direction)), set(every) - {end.tag}
-    walls = _behind(gmsh, _edges(gmsh, end.tag), left)
+    walls = _behind(gmsh, boundary(gmsh, 2, end.tag), left)
     while walls:
         leg, far = _leg(gmsh, solid, [every[tag] for tag in sorted(walls)], frame)
         if leg is None:
@@ -183,11 +183,6 @@ def _walked(gmsh: ModuleType, solid: Solid, every: dict[int, Looks], end: CadFac
         if len(walls) == 1 and _is_across(solid, every[min(walls)], frame):
             return legs if left == walls else ()
     return ()
-
-
-def _edges(gmsh: ModuleType, face: int) -> set[int]:
-    """Tags of a face's edges."""
-    return {int(tag) for _, tag in gmsh.model.getBoundary([(2, face)], combined=False, oriented=False)}
 
 
 def _behind(gmsh: ModuleType, edges: set[int], left: set[int]) -> set[int]:
@@ -206,7 +201,9 @@ def _leg(gmsh: ModuleType, solid: Solid, walls: list[Looks], frame: Frame) -> tu
     for leg in _motions(solid, walls, frame):
         slack = OFF * solid.extent / (leg.radius or 1.0)
         passed = {
-            edge: leg.passed(_places(gmsh, edge)) for wall in walls for edge in _edges(gmsh, wall.face.tag)
+            edge: leg.passed(_places(gmsh, edge))
+            for wall in walls
+            for edge in boundary(gmsh, 2, wall.face.tag)
         }
         travel = float(max(each.max() for each in passed.values()))
         ends = {edge for edge, each in passed.items() if each.min() > travel - slack}

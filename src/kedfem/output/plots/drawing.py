@@ -192,9 +192,8 @@ def _save(figure: Any, file: Path | io.BytesIO, title: str, kind: str) -> None:
     figure.suptitle(title, x=0.01, ha="left", fontsize=12)
     if figure.get_layout_engine() is not None:
         figure.get_layout_engine().execute(figure)
-        figure.set_layout_engine(
-            "none"
-        )  # it stays: saving would find it anew, by drawing all of it once more
+        # it stays: saving would find it anew, by drawing all of it once more
+        figure.set_layout_engine("none")
     metadata = {"Software": MARK} if kind == "png" else {"Creator": MARK, "Date": None}
     packed = {"pil_kwargs": {"compress_level": COMPRESSION}} if kind == "png" else {}
     with warnings.catch_warnings():

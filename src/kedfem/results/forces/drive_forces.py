@@ -8,13 +8,7 @@ from kedfem.dynamics.model import Model, PrescribedBody
 from kedfem.motion.joint_equations import joint_axis
 from kedfem.results.forces.constraint_forces import of_joint
 from kedfem.results.forces.hub_forces import hub_wrench, partner
-from kedfem.results.forces.port_forces import (
-    Forces,
-    holder,
-    loose,
-    negligible,
-    port_wrench,
-)
+from kedfem.results.forces.port_forces import Forces, holder, loose, negligible, port_wrench
 from kedfem.results.recorded import Recorded, Rows, drive_prefix
 from kedfem.results.records import Channel
 from kedfem.scene import GROUND, Scene

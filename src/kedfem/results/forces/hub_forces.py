@@ -9,13 +9,7 @@ from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model, PrescribedBody
 from kedfem.links.record import in_space
 from kedfem.motion.constraints import cross
-from kedfem.results.forces.port_forces import (
-    Forces,
-    Wrench,
-    holder,
-    port_wrench,
-    resultant,
-)
+from kedfem.results.forces.port_forces import Forces, Wrench, holder, port_wrench, resultant
 from kedfem.results.recorded import Rows
 from kedfem.scene import Scene
 

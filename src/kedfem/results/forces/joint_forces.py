@@ -11,14 +11,7 @@ from kedfem.dynamics.model import Model, PrescribedBody, Slider
 from kedfem.links.record import in_space
 from kedfem.results.forces.constraint_forces import known
 from kedfem.results.forces.hub_forces import constrained_joints, hub_wrench, partner
-from kedfem.results.forces.port_forces import (
-    Forces,
-    determinate,
-    holder,
-    loose,
-    negligible,
-    port_wrench,
-)
+from kedfem.results.forces.port_forces import Forces, determinate, holder, loose, negligible, port_wrench
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import XYZ, Channel
 from kedfem.scene import GROUND, Scene

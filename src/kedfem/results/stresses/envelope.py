@@ -263,9 +263,8 @@ def leading(
     head = int((size > HEAD * size[0]).sum())
     scale = np.zeros(len(gain))
     scale[: len(size)] = size
-    unit = np.sqrt(
-        np.maximum(scale, NOTHING * size[0])
-    )  # the rest in units in which Cauchy and Schwarz says much
+    # the rest in units in which Cauchy and Schwarz says much
+    unit = np.sqrt(np.maximum(scale, NOTHING * size[0]))
     turned = (parts.reshape(-1, len(gain)) @ (V.T / gain[:, None] * unit)).reshape(parts.shape)
     return np.ascontiguousarray((C * gain) @ V.T / unit), turned, head
 
