@@ -21,9 +21,7 @@ from kedfem.motion.assembly import assembled
 from kedfem.results.modelled import element_words
 from kedfem.scene import Scene, corotational, rayleigh, require_elastic
 
-MOST = 6000
-"""Unknowns up to which dense matrices are written: 300 MB each."""
-
+MOST = 6000  # unknowns up to which dense matrices are written: 300 MB each
 FORMAT = "kedfem link 1"
 
 

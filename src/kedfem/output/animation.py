@@ -17,8 +17,7 @@ from kedfem.processes import threads
 from kedfem.results.files import ready_folder, reason, replacing
 
 HEAD = b'<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
-TAIL = b"  </Collection>\n</VTKFile>\n"
-"""Of a PVD file."""
+TAIL = b"  </Collection>\n</VTKFile>\n"  # of a PVD file
 
 
 class AnimationWriter:
@@ -91,8 +90,7 @@ class AnimationWriter:
         return False
 
 
-Entry = tuple[float, str, str]
-"""Of a list of frames: time [s], name of the block, file beside the list."""
+Entry = tuple[float, str, str]  # of a list of frames: time [s], name of the block, file beside the list
 
 
 def write_collection(folder: Path, stem: str, entries: Sequence[Entry]) -> None:

@@ -5,5 +5,4 @@ LARGEST, SMALLEST = "largest principal stress [Pa]", "smallest principal stress 
 VELOCITY, ACCELERATION = "velocity [m/s]", "acceleration [m/s^2]"
 FORCE, MOMENT = "force [N]", "moment [N m]"
 DRIVE_FORCE, DRIVE_TORQUE = "drive force [N]", "drive torque [N m]"
-JOINTS = "joints"
-"""The block of points with what joints exert."""
+JOINTS = "joints"  # the block of points with what joints exert

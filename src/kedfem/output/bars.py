@@ -5,24 +5,14 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-SECTION = "height, thickness, round"
-"""The cell array of a frame that has the sections of beams."""
-
-THINNEST = 0.004
-"""Least height and thickness of a beam in the picture, as part of the diagonal."""
-
-JOINED = 1e-6
-"""Corners nearer than this part of the diagonal are one."""
-
-LINES = {3: 2, 21: 3}
-"""VTK's numbers of the line and the quadratic line, and their nodes."""
-
+SECTION = "height, thickness, round"  # the cell array of a frame that has the sections of beams
+THINNEST = 0.004  # least height and thickness of a beam in the picture, as part of the diagonal
+JOINED = 1e-6  # corners nearer than this part of the diagonal are one
+LINES = {3: 2, 21: 3}  # VTK's numbers of the line and the quadratic line, and their nodes
+# sections of height and thickness 2
 RECTANGLE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 ELLIPSE = np.column_stack([f(np.linspace(0, 2 * np.pi, 24, endpoint=False)) for f in (np.cos, np.sin)])
-"""Sections of height and thickness 2."""
-
-STATIONS = {2: 2, 3: 17}
-"""Points along a beam of so many nodes."""
+STATIONS = {2: 2, 3: 17}  # points along a beam of so many nodes
 
 
 def heights(grid: Any) -> Float[np.ndarray, "e 2"]:

@@ -15,8 +15,7 @@ from kedfem.mesh.elements.shape_functions import QUAD9, TRI6, shape_functions
 from kedfem.mesh.elements.tetrahedra import FORMS
 from kedfem.output.picture import draw_apart
 
-FINENESS = 4
-"""Straight pieces that a side of an element is drawn in."""
+FINENESS = 4  # straight pieces that a side of an element is drawn in
 
 
 @dataclass(frozen=True, slots=True)

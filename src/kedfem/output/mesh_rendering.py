@@ -12,17 +12,13 @@ import numpy as np
 
 from kedfem.processes import end_with_parent
 
-SIZE = 1500
-"""Pixels of the picture of one mesh, each way, before its margin is cut off."""
-
+SIZE = 1500  # pixels of the picture of one mesh, each way, before its margin is cut off
 COLOURS = ("#a50026", "#f46d43", "#fee08b", "#d9ef8b", "#8cc665")
 """From bad to good; the good ones light enough for black edges."""
 
+# how far edges are drawn before the surface, as part of the diagonal, so that it does not cover them
 LIFT = 2e-3
-"""How far edges are drawn before the surface, as part of the diagonal, so that it does not cover them."""
-
-BINS = 20
-"""Of the histogram, from 0 to 1."""
+BINS = 20  # of the histogram, from 0 to 1
 
 
 def render(npz: str, png: str, count: str) -> None:

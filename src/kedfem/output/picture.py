@@ -8,9 +8,7 @@ from pathlib import Path
 from kedfem.errors import OutputError, PictureError
 from kedfem.results import replacing
 
-TIMEOUT = 300
-"""Seconds after which rendering is given up, e.g. with a display that does not answer."""
-
+TIMEOUT = 300  # seconds after which rendering is given up, e.g. with a display that does not answer
 ADVICE = "picture: must be drawn by VTK, for which Linux without a display needs libEGL (package libegl1)"
 
 

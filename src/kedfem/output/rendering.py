@@ -15,25 +15,15 @@ from kedfem.output.bars import LINES, bars, heights
 from kedfem.output.views import LIFT, View, view
 from kedfem.processes import end_with_parent
 
-WIDTHS, HEIGHTS = (1000, 1600), (700, 1100)
-"""Least and most pixels; in between as the linkage asks."""
-
-LEFT, RIGHT, TOP, BOTTOM = 60, 260, 130, 60
-"""Pixels kept free: title above, colour bar and axes on the right."""
+WIDTHS, HEIGHTS = (1000, 1600), (700, 1100)  # least and most pixels; in between as the linkage asks
+LEFT, RIGHT, TOP, BOTTOM = 60, 260, 130, 60  # pixels kept free: title above, colour bar and axes on the right
 
 
-THROUGH = 0.12
-"""Opacity of what lies before the highest stress where it would be hidden from both sides."""
-
+THROUGH = 0.12  # opacity of what lies before the highest stress where it would be hidden from both sides
+# quadratic faces are halved so many times, unless that makes more triangles than this
 FINEST, TRIANGLES = 4, 200_000
-"""Quadratic faces are halved so many times, unless that makes more triangles than this."""
-
-SHARP = 35.0
-"""Degrees between faces from which an edge is drawn."""
-
-QUADRILATERAL = 28
-"""VTK's number of the biquadratic quadrilateral, of plane links."""
-
+SHARP = 35.0  # degrees between faces from which an edge is drawn
+QUADRILATERAL = 28  # VTK's number of the biquadratic quadrilateral, of plane links
 FLAT_CELLS = {QUADRILATERAL, *LINES}
 
 

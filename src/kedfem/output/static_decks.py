@@ -21,9 +21,8 @@ from kedfem.results.table import text_file, write_rows
 from kedfem.scene import Material
 
 Forces = Float[np.ndarray, "n 3"]
+# by meshio's names, nodes in the same order; CalculiX has no 27-node hexahedra
 ELEMENTS = {"hexahedron": "C3D8", "hexahedron20": "C3D20", "tetra10": "C3D10"}
-"""By meshio's names, nodes in the same order; CalculiX has no 27-node hexahedra."""
-
 LINE = 15  # numbers after the first on a line
 
 

@@ -10,11 +10,9 @@ from jaxtyping import Float
 from kedfem.output.array_names import VON_MISES
 from kedfem.output.bars import LINES, THINNEST, heights
 
+# how far planar links that lie in one plane are drawn apart, as part of the diagonal: each covers those before it
 LIFT = 1e-3
-"""How far planar links that lie in one plane are drawn apart, as part of the diagonal: each covers those before it."""
-
-FLAT = 0.35
-"""A linkage whose least extent is below this part of its second is seen from that side."""
+FLAT = 0.35  # a linkage whose least extent is below this part of its second is seen from that side
 
 
 @dataclass(frozen=True, slots=True)

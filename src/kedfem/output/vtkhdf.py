@@ -14,8 +14,7 @@ from kedfem.errors import OutputError
 from kedfem.output.fields import JointField, LinkField
 from kedfem.results.files import ready_folder, reason, require_space
 
-VERSION = (2, 3)
-"""Of the format: field data over time."""
+VERSION = (2, 3)  # of the format: field data over time
 
 Blocks = Sequence[LinkField | JointField]
 TYPES = {

@@ -17,8 +17,7 @@ from kedfem.results.files import replacing
 STRESS_COMPONENTS = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
 GRID = b"<UnstructuredGrid>"
 Points = Float[np.ndarray, "n 3"]
-Cells = tuple[str, Int[np.ndarray, "e m"]]
-"""Elements of one type: its name in meshio, and their nodes."""
+Cells = tuple[str, Int[np.ndarray, "e m"]]  # elements of one type: its name in meshio, and their nodes
 
 
 def write_vtu(path: Path, points: Points, cells: Sequence[Cells], **values: Any) -> None:

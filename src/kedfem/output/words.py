@@ -10,8 +10,7 @@ from kedfem.scene import Scene
 
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
 
-PLAIN = frozenset({"", "-", "1", "rad", "deg", "°", "°/s", "°/s²", "kg", "%"})
-"""Units that take no prefix."""
+PLAIN = frozenset({"", "-", "1", "rad", "deg", "°", "°/s", "°/s²", "kg", "%"})  # units that take no prefix
 NOTHING = 1e-9  # of the largest value of the same unit: rounding errors
 UNITS = tuple((10.0**k, prefix) for k, prefix in reversed(PREFIXES.items()) if abs(k) <= 9)
 

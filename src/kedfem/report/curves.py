@@ -19,8 +19,8 @@ GROUPS = {
 }  # fmt: skip
 """What the first part of a channel's name means to a reader, in the order of the page."""
 
+# pictures of several channels: to which group they belong, and that they come before the others there
 FIRST = {"joint_forces": "joints", "joint_angles": "joints", "joint_travels": "joints", "energies": "energy"}
-"""Pictures of several channels: to which group they belong, and that they come before the others there."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,8 +12,7 @@ from kedfem.report.records import Fact, Rows, Table
 from kedfem.results import Peak, Results
 from kedfem.results.frequencies import Summary
 
-STEADY = "steady "
-"""What notes of a steady motion begin with."""
+STEADY = "steady "  # what notes of a steady motion begin with
 
 
 def facts(results: Results, highest: Peak | None, moment: Callable[[float, float], str]) -> list[Fact]:

@@ -13,9 +13,7 @@ from kedfem.output.rendering import QUADRILATERAL, SHARP
 from kedfem.output.stress_files import KINDS
 from kedfem.output.views import LIFT
 
-NODES = 20_000
-"""Most frames, and most nodes on the surfaces of all links: what a browser draws at once."""
-
+NODES = 20_000  # most frames, and most nodes on the surfaces of all links: what a browser draws at once
 HIGHEST = f"{KINDS[0]} stress [Pa]"
 Places = Float[np.ndarray, "n 3"]
 

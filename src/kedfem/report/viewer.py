@@ -15,15 +15,9 @@ from kedfem.report.animated import Animated, bounds, extent
 from kedfem.report.surfaces import Placement, Surface
 from kedfem.results.extras import of_extra
 
-EXTRA = "report"
-"""The extra with what a report needs."""
-
-FINE = 1e-4
-"""Of the mechanism's size: to what places are rounded, so that the document packs well."""
-
-SHADES = 400
-"""Steps of the colour scale."""
-
+EXTRA = "report"  # the extra with what a report needs
+FINE = 1e-4  # of the mechanism's size: to what places are rounded, so that the document packs well
+SHADES = 400  # steps of the colour scale
 COMPRESSION = 6  # of zlib; 9 takes much longer for a hundredth
 LEAST = 0.08  # where the colour scale begins on matplotlib's turbo, whose lowest end is nearly black
 GREY, DARK, HOT = 0xB8BEC6, 0x1F2933, 0xC01030

@@ -5,8 +5,7 @@ from typing import Any
 
 from kedfem.errors import OutputError
 
-DATA = "data"
-"""The extra with xarray, pandas and what they write files with."""
+DATA = "data"  # the extra with xarray, pandas and what they write files with
 
 
 def of_extra(package: str, where: str, extra: str = DATA) -> Any:

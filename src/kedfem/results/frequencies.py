@@ -10,8 +10,7 @@ from jaxtyping import Float
 from kedfem.results.files import replacing
 from kedfem.results.table import text_file, write_numbers
 
-FREQUENCIES = "frequencies"
-"""Name of their folder beside that of a run: `results.files.beside`."""
+FREQUENCIES = "frequencies"  # name of their folder beside that of a run: `results.files.beside`
 OVER_TURN, CAMPBELL, SUMMARY = "frequencies.png", "campbell.png", "frequencies.json"
 
 

@@ -12,17 +12,12 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, UInt8
 
-FORMAT = 3
-"""Version of the file's layout."""
-
+FORMAT = 3  # version of the file's layout
 CACHED = 2**18  # bytes of chunks of each series: some chunks; HDF5 would hold 8 MB of each that is open
+# rows of a chunk: tens of kilobytes for the widest channel, little waste for the shortest run
 CHUNK_ROWS = 512
-"""Rows of a chunk: tens of kilobytes for the widest channel, little waste for the shortest run."""
-
 PEAKS, WARNINGS, TIMING, FATIGUE = "peaks", "warnings", "timing", "fatigue"
-ADDED = (PEAKS, WARNINGS, TIMING, FATIGUE)
-"""Groups that come after the rows."""
-
+ADDED = (PEAKS, WARNINGS, TIMING, FATIGUE)  # groups that come after the rows
 OF_CHANNELS, OF_NOTES = "digest_of_channels", "digest_of_notes"
 CHECKSUM = 4  # bytes of a chunk
 

@@ -30,8 +30,10 @@ class Channel:
 
 
 XYZ = ("x", "y", "z")
-STRESS = ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises")
-"""Columns of vectors and of stresses."""
+STRESS = ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises")  # columns of vectors and of stresses
+TIME = Channel("time", (), "s", "", "time")
+ANGLE = Channel("drive_angle", (), "rad", "", "drive angle from the reference position")
+TRAVEL = Channel("drive_travel", (), "m", "", "drive travel from the reference position")
 
 
 def largest_by_unit(channels: Iterable[tuple[Channel, Float[np.ndarray, "T c"]]]) -> dict[str, float]:
@@ -40,11 +42,6 @@ def largest_by_unit(channels: Iterable[tuple[Channel, Float[np.ndarray, "T c"]]]
     for channel, values in channels:
         out[channel.unit] = max(out.get(channel.unit, 0.0), float(np.abs(values).max()))
     return out
-
-
-TIME = Channel("time", (), "s", "", "time")
-ANGLE = Channel("drive_angle", (), "rad", "", "drive angle from the reference position")
-TRAVEL = Channel("drive_travel", (), "m", "", "drive travel from the reference position")
 
 
 @dataclass(frozen=True, slots=True)

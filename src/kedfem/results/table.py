@@ -15,8 +15,8 @@ from kedfem.results.files import replacing
 from kedfem.results.records import Results
 
 ROWS = 100_000  # of a table, put together at a time
+# of numbers in tables: more than any result is exact to, half as long as what gives back the same float
 DIGITS = "%.9g"
-"""Of numbers in tables: more than any result is exact to, half as long as what gives back the same float."""
 
 
 def write_csv(results: Results, path: Path) -> None:

@@ -30,8 +30,7 @@ from kedfem.results.layout import (
 from kedfem.results.reader import read_results
 from kedfem.results.records import ANGLE, TIME, Channel
 
-SPARE_SPACE = 1_000_000
-"""Bytes kept for HDF5's own tables and for the last words of an interrupted run."""
+SPARE_SPACE = 1_000_000  # bytes kept for HDF5's own tables and for the last words of an interrupted run
 
 
 def installed_version() -> str:

@@ -6,9 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-TICKS = (1, 2, 5, 10, 15, 30, 45, 60, 90, 180)
-"""Steps of degrees that read well; beyond, whole turns."""
-
+TICKS = (1, 2, 5, 10, 15, 30, 45, 60, 90, 180)  # steps of degrees that read well; beyond, whole turns
 MOST_TICKS = 13
 
 

@@ -19,25 +19,16 @@ from kedfem.results import Channel, Results, replacing
 
 T = TypeVar("T")
 
-SIZE = (11.0, 6.2)
-"""Inches, at DPI dots each."""
-
-PAGE_SIZE = (8.4, 4.8)
-"""Inches of a figure that is one of many on a page."""
-
+SIZE = (11.0, 6.2)  # inches, at DPI dots each
+PAGE_SIZE = (8.4, 4.8)  # inches of a figure that is one of many on a page
 DPI = 120
 
+# groups of points in a long curve, about one per pixel; each keeps its smallest and largest value
 BINS = 1500
-"""Groups of points in a long curve, about one per pixel; each keeps its smallest and largest value."""
-
-NEGLIGIBLE = 1e-9
-"""A component below this part of the channel's peak is named in the legend instead of drawn."""
-
-COMPRESSION = 3
-"""Of PNGs: files a fifth larger than with the usual 6, written in a third of the time."""
-
+NEGLIGIBLE = 1e-9  # a component below this part of the channel's peak is named in the legend instead of drawn
+COMPRESSION = 3  # of PNGs: files a fifth larger than with the usual 6, written in a third of the time
+# what a PNG of this room says of itself, so that stale ones are distinguished from a user's own
 MARK = "kedfem plot"
-"""What a PNG of this room says of itself, so that stale ones are distinguished from a user's own."""
 
 
 def _largest(values: Float[np.ndarray, "..."]) -> float:

@@ -19,21 +19,12 @@ from kedfem.output.plots.drawing import (
 from kedfem.output.plots.groups import Panel, Picture
 from kedfem.results import Results, ready_folder
 
-COLUMNS, MOST = 2, 14
-"""Of panels on a page, and how many it takes."""
-
-WIDTH, HEIGHT = 7.2, 2.0
-"""Inches of a panel with all that belongs to it."""
-
+COLUMNS, MOST = 2, 14  # of panels on a page, and how many it takes
+WIDTH, HEIGHT = 7.2, 2.0  # inches of a panel with all that belongs to it
+# inches beside the axes of a panel (labels, legend), above the first, between two, below the last
 LEFT, RIGHT, ABOVE, BETWEEN, BELOW = 0.85, 1.45, 0.85, 0.42, 0.5
-"""Inches beside the axes of a panel (labels, legend), above the first, between two, below the last."""
-
-CURVES = 9
-"""In one panel: so many its legend has room for."""
-
-FONT = 7.5
-"""Points of the small print."""
-
+CURVES = 9  # in one panel: so many its legend has room for
+FONT = 7.5  # points of the small print
 FORCE = "/force"
 
 

@@ -10,16 +10,11 @@ from kedfem.results import Channel, Results
 from kedfem.results.records import XYZ
 
 Curves = Mapping[str, Float[np.ndarray, " n"]]
-Panel = tuple[str, str, Curves]
-"""Quantity, unit, curves."""
-
+Panel = tuple[str, str, Curves]  # quantity, unit, curves
 ENERGY = "energy/"
-RIGID = "rigid_"
-"""How the name of a channel begins that has the same of rigid links."""
-
+RIGID = "rigid_"  # how the name of a channel begins that has the same of rigid links
+# what is added to the name of a curve of rigid links; it is drawn dashed, in the colour of the elastic one
 STIFF = ", rigid"
-"""What is added to the name of a curve of rigid links; it is drawn dashed, in the colour of the elastic one."""
-
 MOTIONS = {
     "motion": ("position", "velocity", "acceleration"),
     "rotation": ("rotation", "angular_velocity", "angular_acceleration"),

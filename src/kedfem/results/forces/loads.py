@@ -18,9 +18,7 @@ from kedfem.results.recorded import drive_prefix
 from kedfem.results.records import Results
 from kedfem.scene import Joint, Scene
 
-BALL, ROLLER = 3.0, 10.0 / 3.0
-"""Exponents of bearing lives, ISO 281: point and line contact."""
-
+BALL, ROLLER = 3.0, 10.0 / 3.0  # exponents of bearing lives, ISO 281: point and line contact
 HINGES = ("revolute", "cylindrical", "screw")
 REPORTED = 3  # components of a force that is reported whole
 Vectors = Float[np.ndarray, "T 3"]
