@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from kedfem.output.animation import read_collection
-from kedfem.output.array_names import JOINTS
+from kedfem.output.fields import JOINTS
 
 
 def frames(folder: Path, stem: str = "animation") -> list[Any]:

@@ -49,7 +49,6 @@ from kedfem.results.additions import add_account, add_fatigue, add_peaks, mark_d
 from kedfem.results.audit import Account, balance_warning
 from kedfem.results.balance import Balance, balance_notes
 from kedfem.results.cross_checks import CrossChecks
-from kedfem.results.data_sets import drive_heading
 from kedfem.results.fatigue.damage import fatigue_of, kept_since, stress_period
 from kedfem.results.fatigue.strength import require_fatigue
 from kedfem.results.forces.force_elements import measured_elements
@@ -59,7 +58,7 @@ from kedfem.results.recording import recording
 from kedfem.results.stresses.envelope import Envelope
 from kedfem.results.stresses.peaks import highest, hot_spots, peaks
 from kedfem.results.stresses.singular_stress import doubtful
-from kedfem.results.table import require_parquet
+from kedfem.results.table import drive_heading, require_parquet
 from kedfem.resume import EVERY, Keeper, remove_state
 from kedfem.scene import Scene, without_vibration
 from kedfem.stepping import Clock, Watch, Watched, stepped

@@ -26,11 +26,11 @@ from kedfem.output.frames import rigid_fields, sights
 from kedfem.output.plots import write_plots
 from kedfem.results import Results, ResultsWriter, claimed, read_results, write_csv
 from kedfem.results.additions import add_account
-from kedfem.results.data_sets import drive_heading
 from kedfem.results.files import beside
 from kedfem.results.forces.rigid import RigidForces, rigid_forces
 from kedfem.results.kinematic import Kinematics, kinematics_of, transmission_key
 from kedfem.results.recorded import drive_channel
+from kedfem.results.table import drive_heading
 from kedfem.scene import Bar, Cad, LinkScene, MeshFile, Meshing, Scene, time_grid
 from kedfem.stepping import Clock, Watch, frame_steps
 

@@ -27,8 +27,8 @@ from kedfem.output.static_decks import (
     write_resultants,
 )
 from kedfem.results import Results, read_results, ready_folder, results_file
-from kedfem.results.data_sets import drive_heading
 from kedfem.results.forces.load_cases import LoadCase, Statics, load_case
+from kedfem.results.table import drive_heading
 from kedfem.scene import Scene, corotational, scene_from
 from kedfem.stepping import Watch
 

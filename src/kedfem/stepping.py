@@ -31,11 +31,11 @@ from kedfem.output.frames import joint_field, link_fields
 from kedfem.output.vtkhdf import AnimationFile
 from kedfem.results import Channel, ResultsWriter
 from kedfem.results.cross_checks import CrossChecks
-from kedfem.results.data_sets import drive_heading
 from kedfem.results.modelled import modelled
 from kedfem.results.recorded import Recorded, drive_channel
 from kedfem.results.recording import rows
 from kedfem.results.stresses.envelope import Envelope
+from kedfem.results.table import drive_heading
 from kedfem.resume import Keeper, remove_state
 from kedfem.scene import Scene, time_grid, turn_steps
 

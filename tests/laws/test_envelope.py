@@ -14,7 +14,7 @@ from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.links.recovery import nodal_state, nodal_stress, stress_recovery, von_mises
 from kedfem.links.singular_stress import re_entrant, reach
-from kedfem.output.array_names import VON_MISES
+from kedfem.output.fields import VON_MISES
 from kedfem.results import read_results
 from kedfem.results.stresses.envelope import EXACT, Envelope, leading
 from kedfem.scene import scene_from

@@ -32,7 +32,7 @@ from kedfem.links.record import mass_times
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.period import over_one_period
 from kedfem.motion.rigid import rigid_motion
-from kedfem.output.array_names import DISPLACEMENT, VON_MISES
+from kedfem.output.fields import DISPLACEMENT, VON_MISES
 from kedfem.results import read_results
 from kedfem.scene import path_parameter, scene_from
 from tests.frames import frames

@@ -12,8 +12,7 @@ from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.constraint_matrices import joint_rows
 from kedfem.results.audit import Account
 from kedfem.results.cross_checks import CrossChecks
-from kedfem.results.forces.constraint_forces import ConstraintForces
-from kedfem.results.forces.constraint_work import interface
+from kedfem.results.forces.constraint_forces import ConstraintForces, interface
 from kedfem.results.forces.force_elements import Measured, measured_elements
 from kedfem.results.recording import recording, rows
 from kedfem.scene import scene_from

@@ -19,8 +19,7 @@ from kedfem.mesh.layered.cusps import Cusp, cusps
 from kedfem.mesh.layered.layers import layer_directions, layered_mesh
 from kedfem.mesh.layered.mapping import Rim
 from kedfem.mesh.layered.partition import Plan
-from kedfem.mesh.layered.plan_mesh import plan_mesh
-from kedfem.mesh.layered.polygons import crosses_itself, polygon_quads
+from kedfem.mesh.layered.plan_mesh import crosses_itself, plan_mesh, polygon_quads
 from kedfem.mesh.layered.sections import plan_of_slabs
 from kedfem.mesh.session import gmsh_model
 from kedfem.mesh.swept.blocks import block_mesh

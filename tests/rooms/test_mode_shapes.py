@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from kedfem.errors import SceneError
 from kedfem.frequencies import Wanted, frequencies, link_of_scene, part_frequencies
-from kedfem.output.array_names import DISPLACEMENT, VON_MISES
+from kedfem.output.fields import DISPLACEMENT, VON_MISES
 from kedfem.output.shapes import AMPLITUDE, FRAMES
 from kedfem.scene import scene_from
 from tests.frames import frames

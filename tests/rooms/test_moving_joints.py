@@ -17,8 +17,7 @@ from kedfem.dynamics.stepping.transient import transient
 from kedfem.errors import MeshError, SceneError
 from kedfem.motion.linkage import linkage
 from kedfem.output.words import clock, moment
-from kedfem.results.forces.constraint_forces import ConstraintForces
-from kedfem.results.forces.constraint_work import deflections
+from kedfem.results.forces.constraint_forces import ConstraintForces, deflections
 from kedfem.scene import scene_from
 from tests.cells import Cell, scene_of
 from tests.joint_checks import unbalanced

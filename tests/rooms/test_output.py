@@ -14,9 +14,8 @@ import pytest
 from kedfem.errors import OutputError
 from kedfem.links.recovery import stress_recovery
 from kedfem.output.animation import AnimationWriter, read_collection, remove_animation
-from kedfem.output.array_names import DISPLACEMENT, LARGEST, SMALLEST, STRESS, VON_MISES
 from kedfem.output.bars import SECTION, THINNEST, bars, heights, shape_functions
-from kedfem.output.fields import JointField, LinkField
+from kedfem.output.fields import DISPLACEMENT, LARGEST, SMALLEST, STRESS, VON_MISES, JointField, LinkField
 from kedfem.output.frames import link_fields
 from kedfem.output.picture import write_picture
 from kedfem.output.plots import write_plots

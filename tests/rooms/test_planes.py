@@ -18,8 +18,7 @@ from kedfem.links.build import bare_links
 from kedfem.links.surfaces.coupling_surfaces import joint_surface
 from kedfem.mesh import QuadMesh, SolidMesh, link_mesh, mesh_quality, plane_mesh
 from kedfem.motion.linkage import linkage
-from kedfem.output.array_names import DISPLACEMENT, STRESS, VON_MISES
-from kedfem.output.fields import LinkField
+from kedfem.output.fields import DISPLACEMENT, STRESS, VON_MISES, LinkField
 from kedfem.output.picture import write_picture
 from kedfem.output.rendering import lifted
 from kedfem.output.vtu import write_frame

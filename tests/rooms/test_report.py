@@ -21,8 +21,8 @@ from kedfem.cli.results import written_page
 from kedfem.errors import OutputError, SceneError
 from kedfem.frequencies import Wanted, frequencies
 from kedfem.kinematics import kinematics
-from kedfem.output.array_names import VON_MISES
 from kedfem.output.bars import bars, heights
+from kedfem.output.fields import VON_MISES
 from kedfem.output.words import with_prefix
 from kedfem.report import animated as over_frames
 from kedfem.report import surfaces, write_report

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from kedfem.analysis import analyse
 from kedfem.errors import OutputError
-from kedfem.output.array_names import DISPLACEMENT, FORCE, LARGEST, SMALLEST, STRESS, VON_MISES
+from kedfem.output.fields import DISPLACEMENT, FORCE, LARGEST, SMALLEST, STRESS, VON_MISES
 from kedfem.output.vtkhdf import AnimationFile
 from kedfem.scene import scene_from
 from kedfem.stepping import refuse_without

@@ -10,8 +10,7 @@ from kedfem.dynamics.joints.attachments import Attachment, SharedCut
 from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.model import Model, Slider, link_keys
 from kedfem.links.record import Link
-from kedfem.links.reduced import on_functions, reduced
-from kedfem.links.stored import can_be_stored, restored, stored
+from kedfem.links.reduced import can_be_stored, on_functions, reduced, restored, stored
 
 
 def reduced_model(model: Model, functions: Sequence[Float[np.ndarray, "_ s"] | None]) -> Model:

@@ -6,16 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.output.array_names import (
-    ACCELERATION,
-    DISPLACEMENT,
-    JOINTS,
-    LARGEST,
-    SMALLEST,
-    STRESS,
-    VELOCITY,
-    VON_MISES,
-)
+# names of arrays, each with its unit
+STRESS, VON_MISES, DISPLACEMENT = "stress [Pa]", "von Mises [Pa]", "displacement [m]"
+LARGEST, SMALLEST = "largest principal stress [Pa]", "smallest principal stress [Pa]"
+VELOCITY, ACCELERATION = "velocity [m/s]", "acceleration [m/s^2]"
+FORCE, MOMENT = "force [N]", "moment [N m]"
+DRIVE_FORCE, DRIVE_TORQUE = "drive force [N]", "drive torque [N m]"
+JOINTS = "joints"  # the block of points with what joints exert
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,8 +26,7 @@ from kedfem.motion.constraints import cross
 from kedfem.motion.joint_equations import joint_axis
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
-from kedfem.output.array_names import DRIVE_FORCE, DRIVE_TORQUE, FORCE, MOMENT
-from kedfem.output.fields import JointField, LinkField, RigidField
+from kedfem.output.fields import DRIVE_FORCE, DRIVE_TORQUE, FORCE, MOMENT, JointField, LinkField, RigidField
 from kedfem.results.recorded import drive_prefix
 from kedfem.scene import Scene
 

@@ -10,9 +10,8 @@ from jaxtyping import Bool, Float
 from kedfem.output.plots.drawing import figure_saved
 from kedfem.output.words import prefixed
 from kedfem.results import Results
-from kedfem.results.data_sets import drive_heading
 from kedfem.results.forces.loads import DriveLoad, JointLoad, facing
-from kedfem.results.table import text_file, write_numbers, write_rows
+from kedfem.results.table import drive_heading, text_file, write_numbers, write_rows
 
 XYZ = "xyz"
 Columns = dict[str, Float[np.ndarray, " T"]]

@@ -9,9 +9,8 @@ from jaxtyping import Float
 
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
-from kedfem.results.data_sets import drive_heading
 from kedfem.results.recorded import drive_channel
-from kedfem.results.table import DIGITS, text_file
+from kedfem.results.table import DIGITS, drive_heading, text_file
 from kedfem.scene import Scene
 
 QUANTITIES = (

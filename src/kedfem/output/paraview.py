@@ -5,10 +5,10 @@ from string import Template
 
 import numpy as np
 
-from kedfem.output.array_names import DISPLACEMENT, DRIVE_FORCE, DRIVE_TORQUE, FORCE, JOINTS, VON_MISES
+from kedfem.output.fields import DISPLACEMENT, DRIVE_FORCE, DRIVE_TORQUE, FORCE, JOINTS, VON_MISES
 from kedfem.output.stress_files import ENVELOPE, KINDS
 from kedfem.results import Peak, Results, replacing
-from kedfem.results.data_sets import drive_heading
+from kedfem.results.table import drive_heading
 from kedfem.scene import Scene
 
 STATE = "paraview.py"

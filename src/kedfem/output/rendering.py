@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.output.array_names import VON_MISES
 from kedfem.output.bars import LINES, bars, heights
+from kedfem.output.fields import VON_MISES
 from kedfem.output.views import LIFT, View, view
 from kedfem.processes import end_with_parent
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.output.array_names import VON_MISES
 from kedfem.output.bars import LINES, THINNEST, heights
+from kedfem.output.fields import VON_MISES
 
 # how far planar links that lie in one plane are drawn apart, as part of the diagonal: each covers those before it
 LIFT = 1e-3

@@ -9,9 +9,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.mesh import SolidMesh, mesh_quality
-from kedfem.output.array_names import STRESS
 from kedfem.output.bars import SECTION
-from kedfem.output.fields import Block, JointField
+from kedfem.output.fields import STRESS, Block, JointField
 from kedfem.results.files import replacing
 
 STRESS_COMPONENTS = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")

@@ -19,7 +19,7 @@ from kedfem.report.animated import animated
 from kedfem.report.surfaces import Surface
 from kedfem.report.viewer import EXTRA, scale
 from kedfem.results import read_results, replacing, results_file
-from kedfem.results.extras import of_extra
+from kedfem.results.files import of_extra
 
 GREY = (0.6, 0.6, 0.6)
 ENDING = ".glb"

@@ -32,8 +32,7 @@ from kedfem.report.fatigue_facts import fatigue_table
 from kedfem.report.records import Table
 from kedfem.report.viewer import EXTRA, Mark, gradient, viewer
 from kedfem.results import Peak, Results, read_results, replacing, results_file
-from kedfem.results.extras import of_extra
-from kedfem.results.files import beside
+from kedfem.results.files import beside, of_extra
 from kedfem.results.frequencies import CAMPBELL, FREQUENCIES, OVER_TURN, read_summary
 from kedfem.scene import scene_from
 

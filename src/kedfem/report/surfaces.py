@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.output.array_names import DISPLACEMENT, VON_MISES
 from kedfem.output.bars import LINES, THINNEST, heights, rims
+from kedfem.output.fields import DISPLACEMENT, VON_MISES
 from kedfem.output.rendering import QUADRILATERAL, SHARP
 from kedfem.output.stress_files import KINDS
 from kedfem.output.views import LIFT

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from kedfem.output.views import picture_axes, sight
 from kedfem.report.animated import Animated, bounds, extent
 from kedfem.report.surfaces import Placement, Surface
-from kedfem.results.extras import of_extra
+from kedfem.results.files import of_extra
 
 EXTRA = "report"  # the extra with what a report needs
 FINE = 1e-4  # of the mechanism's size: to what places are rounded, so that the document packs well

@@ -27,8 +27,7 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.balance import Balance, Flow, fields_of, flow, prescribed_fields
-from kedfem.results.forces.constraint_forces import ConstraintForces
-from kedfem.results.forces.constraint_work import row_work
+from kedfem.results.forces.constraint_forces import ConstraintForces, row_work
 from kedfem.results.forces.force_elements import Measured
 from kedfem.results.forces.moments import Constants, RigidRates, constants, rates_of_bodies
 from kedfem.results.forces.resistance import Last, last_of, products, resistance

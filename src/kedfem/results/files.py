@@ -1,15 +1,18 @@
-"""Folders and files that can be written, and files that appear only when they are whole."""
+"""Folders and files that can be written, files that appear only when they are whole, packages that some outputs need."""
 
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from kedfem.errors import OutputError
 from kedfem.folders import PART, whole
 from kedfem.processes import reserve
 
 LOCK = ".kedfem.lock"
+DATA = "data"  # the extra with xarray, pandas and what they write files with
 
 
 def reason(error: OSError | RuntimeError) -> str:
@@ -130,3 +133,23 @@ def replacing(path: Path) -> Iterator[Path]:
     except OSError as error:
         ready_folder(path.parent)  # or says what is wrong with it
         raise OutputError(f"{path}: must be a file that can be written, got {reason(error)}") from error
+
+
+def of_extra(package: str, where: str, extra: str = DATA) -> Any:
+    """A package of an extra of kedfem.
+
+    Parameters
+    ----------
+    where : what needs it, as the user wrote it
+
+    Raises
+    ------
+    OutputError
+        It is not installed; with the one command that installs it.
+    """
+    try:
+        return import_module(package)
+    except ImportError as error:
+        raise OutputError(
+            f"{where}: needs {package}, which is not installed: pip install 'kedfem[{extra}]'"
+        ) from error

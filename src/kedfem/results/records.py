@@ -185,7 +185,7 @@ class Results:
         OutputError
             xarray is not installed.
         """
-        from kedfem.results.data_sets import as_data_tree
+        from kedfem.results.table import as_data_tree
 
         return as_data_tree(self)
 
@@ -197,6 +197,6 @@ class Results:
         OutputError
             pandas is not installed.
         """
-        from kedfem.results.data_sets import as_data_frame
+        from kedfem.results.table import as_data_frame
 
         return as_data_frame(self)

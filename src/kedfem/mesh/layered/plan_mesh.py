@@ -1,6 +1,8 @@
-"""The mesh of a plan: its regions filled one by one between nodes that they share, put together to quad9 cells."""
+"""The mesh of a plan: its regions filled one by one, mapped or by gmsh, between nodes that they share; as quad9 cells."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from types import ModuleType
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -10,12 +12,16 @@ from kedfem.mesh.layered.cusps import CUSP, cusps
 from kedfem.mesh.layered.division import Division, divided
 from kedfem.mesh.layered.mapping import Mapping, Rim, mapped
 from kedfem.mesh.layered.partition import Plan, Region
-from kedfem.mesh.layered.polygons import polygon_quads
 from kedfem.mesh.places import in_mm
-from kedfem.mesh.planar.areas import PlaneQuads, quadratic_quads
-from kedfem.mesh.planar.choice import GOOD, SETTINGS, best_quads
+from kedfem.mesh.planar.areas import PlaneQuads, directed_sides, quadratic_quads
+from kedfem.mesh.planar.choice import GOOD, SETTINGS, Setting, best_quads
+from kedfem.mesh.session import gmsh_model, gmsh_options, quadrilaterals
 
 _BETTER = 0.05  # by which gmsh's quadrilaterals must be better than mapped ones
+_LINE, _POINT = 1, 15  # gmsh's numbers of elements
+# of a region's rim: a sliver of micrometres asks for more; all are compared with each other
+_MOST_SIDES = 4000
+_ROUNDING = 1e-24  # square of the area between sides that are on one line
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,3 +120,111 @@ def _filled(
             "({:.6g}, {:.6g}, {:.6g})".format(*x)
         )
     return best.corners, algorithm
+
+
+def polygon_quads(rim: Rim) -> Iterator[PlaneQuads | None]:
+    """What gmsh makes of a region under each setting, on the rim's own nodes; None if not quadrilaterals alone."""
+    if len(rim.sides) > _MOST_SIDES or crosses_itself(rim.points, rim.sides):
+        return  # gmsh might never come back
+    for setting in SETTINGS:
+        with gmsh_model() as gmsh:
+            try:
+                mesh = _meshed(gmsh, rim, setting)
+            except Exception:  # noqa: BLE001  (gmsh raises nothing more special)
+                mesh = None
+        yield mesh
+
+
+def _meshed(gmsh: ModuleType, rim: Rim, setting: Setting) -> PlaneQuads | None:
+    """The mesh under one setting; where that halves all sides, gmsh is given every other node."""
+    step = 1 + setting.subdivision
+    surface = _drawn(gmsh, rim, step)
+    sides = np.linalg.norm(np.diff(rim.points[rim.sides], axis=1)[:, 0], axis=1)
+    options = {
+        "Mesh.ElementOrder": 1,
+        "Mesh.Algorithm": setting.algorithm,
+        "Mesh.RecombinationAlgorithm": setting.recombination,
+        "Mesh.SubdivisionAlgorithm": setting.subdivision,
+        "Mesh.MeshSizeExtendFromBoundary": 1,
+        "Mesh.MeshSizeMax": step * float(sides.max()),
+    }
+    gmsh.model.mesh.setRecombine(2, surface)
+    with gmsh_options(gmsh, options):
+        gmsh.model.mesh.generate(2)
+    if (found := quadrilaterals(gmsh)) is None:
+        return None
+    points, cells = found
+    return _on_rim(rim, step, points, cells)
+
+
+def _drawn(gmsh: ModuleType, rim: Rim, step: int) -> int:
+    """The region as a plane surface between divided curves of gmsh's model."""
+    model, loops = gmsh.model, []
+    for node in np.unique([curve[[0, -1]] for loop in rim.loops for curve in loop]):
+        place = [*rim.points[node], 0.0]
+        model.addDiscreteEntity(0, int(node) + 1)
+        model.setCoordinates(int(node) + 1, *place)
+        model.mesh.addNodes(0, int(node) + 1, [int(node) + 1], place)
+        model.mesh.addElementsByType(int(node) + 1, _POINT, [], [int(node) + 1])
+    for loop in rim.loops:
+        curves = []
+        for curve in loop:
+            chosen = curve[::step]
+            tag = model.addDiscreteEntity(1, -1, [int(chosen[0]) + 1, int(chosen[-1]) + 1])
+            inner = np.column_stack([rim.points[chosen[1:-1]], np.zeros(len(chosen) - 2)])
+            model.mesh.addNodes(1, tag, chosen[1:-1] + 1, inner.ravel())
+            sides = np.stack([chosen[:-1], chosen[1:]], axis=1) + 1
+            model.mesh.addElementsByType(tag, _LINE, [], sides.ravel())
+            curves.append(tag)
+        loops.append(model.geo.addCurveLoop(curves))
+    surface = model.geo.addPlaneSurface(loops)
+    model.geo.synchronize()
+    return int(surface)
+
+
+def _on_rim(
+    rim: Rim, step: int, points: Float[np.ndarray, "n 2"], cells: Int[np.ndarray, "e 4"]
+) -> PlaneQuads | None:
+    """The mesh with the rim's nodes first, at their places; None if its boundary is another one."""
+    diagonals = points[cells[:, 2:]] - points[cells[:, :2]]
+    if np.linalg.det(diagonals).sum() < 0:
+        cells = cells[:, ::-1]
+    where = _given_places(rim, step)
+    from scipy.spatial import KDTree
+
+    distance, nearest = KDTree(points).query(where)
+    if distance.max() > 1e-6 or len(np.unique(nearest)) < len(nearest):
+        return None
+    inner = np.setdiff1d(np.arange(len(points)), nearest)
+    number = np.empty(len(points), dtype=int)
+    number[nearest], number[inner] = np.arange(len(nearest)), len(nearest) + np.arange(len(inner))
+    cells = number[cells]
+    size = len(points)
+    sides = directed_sides(cells) @ [size, 1]
+    once = np.sort(sides[~np.isin(sides, directed_sides(cells) @ [1, size])])
+    if not np.array_equal(once, np.sort(rim.sides @ [size, 1])):
+        return None
+    return PlaneQuads(np.concatenate([rim.points, points[inner]]), cells, rim.sides, rim.middles)
+
+
+def _given_places(rim: Rim, step: int) -> Float[np.ndarray, "n 2"]:
+    """Where gmsh has the rim's nodes: those that it makes by halving are half way along straight sides."""
+    where = rim.points.copy()
+    if step == 2:
+        for curve in (curve for loop in rim.loops for curve in loop):
+            where[curve[1::2]] = (where[curve[:-1:2]] + where[curve[2::2]]) / 2
+    return where
+
+
+def crosses_itself(points: Float[np.ndarray, "n 2"], sides: Int[np.ndarray, "s 2"]) -> bool:
+    """Whether two sides of a polygon that share no node meet."""
+    start, end = points[sides[:, 0]], points[sides[:, 1]]
+    along = end - start
+
+    def left_of(places: Float[np.ndarray, "s 2"]) -> Float[np.ndarray, "s s"]:
+        arms = places - start[:, None]
+        return np.asarray(along[:, None, 0] * arms[..., 1] - along[:, None, 1] * arms[..., 0])
+
+    divided = left_of(start) * left_of(end) < -_ROUNDING
+    apart = ~(sides[:, None, :, None] == sides[None, :, None, :]).any(axis=(2, 3))
+    return bool((divided & divided.T & apart).any())

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.results.extras import of_extra
+from kedfem.results.files import of_extra
 from kedfem.scene import FatigueData, StrainLife
 
 EXTRA = "fatigue"
