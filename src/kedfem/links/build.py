@@ -127,11 +127,6 @@ def parted(scene: Scene, name: str, link: Link) -> Segments:
     Parameters
     ----------
     link : its record, without attached bodies
-
-    Raises
-    ------
-    MeshError
-        If the mesh has fewer layers of elements than segments.
     """
     given = scene.links[name]
     if link_frames(scene, name) == "rigid-body":

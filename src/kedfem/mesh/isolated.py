@@ -141,14 +141,11 @@ def apart(where: str, words: tuple[str, str], seconds: float, work: Callable[...
 def limited(folder: str, seconds: float, work: Callable[..., T], *given: Any) -> T:
     """What a function returns, in silence; the process is ended if that takes more processor time than so much.
 
+    A MemoryError says that it would hold more than MOST_MEMORY.
+
     Parameters
     ----------
     folder : that paths are relative to; the process may have begun in another
-
-    Raises
-    ------
-    MemoryError
-        It would hold more than MOST_MEMORY.
     """
     end_with_parent()
     os.chdir(folder)

@@ -79,11 +79,6 @@ def part_mesh(link: LinkScene, folder: Path, kept_whole: KeptWhole = NOTHING) ->
     ----------
     link : its shape is a part from CAD or a mesh file
     kept_whole : as of `link_mesh`
-
-    Raises
-    ------
-    MeshError
-        As `link_mesh`.
     """
     match link.shape:
         case Cad() as shape:

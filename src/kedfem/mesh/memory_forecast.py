@@ -32,11 +32,6 @@ def check_room(where: str, unknowns: float, factored: bool = True, plane: bool =
     unknowns : of its mesh, or at least so many
     factored : whether its effective matrix is; that of a rigid link is not
     plane : whether it is a plane mesh
-
-    Raises
-    ------
-    MeshError
-        With the forecast, and what to change.
     """
     kept, factor = least_bytes(unknowns, factored, plane)
     if kept + factor > memory():

@@ -182,11 +182,6 @@ def best_mesh(
     ----------
     form : what becomes of hexahedra, whose quality counts: of 20 nodes they may be worse than of 27
     methods : to be tried in turn
-
-    Raises
-    ------
-    MeshError
-        No method gives a mesh; with the reasons of each.
     """
     found: list[tuple[float, SolidMesh]] = []
     reasons: list[str] = []

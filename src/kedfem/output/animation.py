@@ -28,11 +28,6 @@ class AnimationWriter:
     folder : where ``STEM.pvd`` goes, and the folder ``STEM`` with ``NAME_0000.vtu``, ``NAME_0001.vtu``, … of each link
     stem : beginning of the names
     drive : what the drive's position is called, with its unit; empty without one
-
-    Raises
-    ------
-    OutputError
-        From :meth:`add`: the folder or a file cannot be written.
     """
 
     REMEMBERED = ("entries", "count")
@@ -102,10 +97,7 @@ def write_collection(folder: Path, stem: str, entries: Sequence[Entry]) -> None:
 def read_collection(path: Path) -> list[tuple[float, list[Path]]]:
     """Frames that a PVD file lists, in its order: time [s] and the files of its blocks that are there.
 
-    Raises
-    ------
-    OutputError
-        It is damaged.
+    An OutputError says that it is damaged.
     """
     import xml.etree.ElementTree as ET
 

@@ -39,11 +39,6 @@ def write_shapes(folder: Path, shapes: Sequence[Shape], gravity: Gravity = (0, 0
     """``shape_1.pvd`` with its frames over a cycle, ``shape_1.png``, ...; those of an earlier command go.
 
     Shapes are written with a largest displacement of AMPLITUDE, stresses with it.
-
-    Raises
-    ------
-    OutputError
-        A file cannot be written, or VTK cannot draw here.
     """
     for old in folder.glob(f"{STEM}_*.pvd"):
         remove_animation(folder, old.stem)
@@ -65,11 +60,6 @@ def write_growing(
     Parameters
     ----------
     frames : time [s], and the fields of all links as a `Shape` has them, of one and the same amplitude
-
-    Raises
-    ------
-    OutputError
-        A file cannot be written, or VTK cannot draw here.
     """
     k = int(np.argmax([_largest(fields(1.0, 0.0)) for _, fields in frames]))
     _write(folder, GROWING, title, frames, k, gravity)

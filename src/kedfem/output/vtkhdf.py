@@ -31,11 +31,6 @@ class AnimationFile:
 
     path : the file; the first frame replaces an older one
     drive : what the drive's position is called, with its unit: a field of each frame
-
-    Raises
-    ------
-    OutputError
-        From :meth:`add`: the file cannot be written.
     """
 
     REMEMBERED = ("written",)

@@ -80,13 +80,7 @@ def animated(folder: Path, deformation_scale: float) -> Animated | None:
 
 
 def _read(paths: Sequence[Path]) -> Any:
-    """The links of one or several VTU files as one grid.
-
-    Raises
-    ------
-    OutputError
-        One is not kedfem's, or damaged.
-    """
+    """The links of one or several VTU files as one grid; OutputError of damaged ones and others."""
     import pyvista
 
     grids = []

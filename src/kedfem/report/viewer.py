@@ -68,11 +68,6 @@ def viewer(
     ----------
     highest : stress at the upper end of the colour scale [Pa]
     first : the frame that is shown at first
-
-    Raises
-    ------
-    OutputError
-        k3d is not installed.
     """
     k3d = of_extra("k3d", "kedfem report", EXTRA)
     taken = extent(shown.surfaces)

@@ -11,13 +11,7 @@ from kedfem.results.records import Channel
 def require_channels(
     channels: Sequence[Channel], length: int, values: Mapping[str, Float[np.ndarray, "b c"]]
 ) -> None:
-    """Names and shapes of a block.
-
-    Raises
-    ------
-    ValueError
-        A channel is missing, unknown or of the wrong shape.
-    """
+    """Names and shapes of a block; ValueError where they are others."""
     expected = {channel.name: (length, len(channel.columns)) for channel in channels}
     found = {name: np.shape(block) for name, block in values.items()}
     if found != expected:

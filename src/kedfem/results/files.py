@@ -64,15 +64,10 @@ def _in_the_way(folder: Path) -> str:
 
 
 def require_space(folder: Path, size: int) -> None:
-    """Make sure that `size` bytes can be written in a folder, disk and quota allowing.
+    """Make sure that `size` bytes can be written in a folder, disk and quota allowing; OSError if not.
 
     HDF5 cannot close a file after a refused write (it takes the process down, and the file with it): space is
     asked for before, on a file without a name that is gone at once.
-
-    Raises
-    ------
-    OSError
-        There is not that much space.
     """
     with tempfile.TemporaryFile(dir=folder) as file:
         reserve(file, size)
@@ -141,11 +136,6 @@ def of_extra(package: str, where: str, extra: str = DATA) -> Any:
     Parameters
     ----------
     where : what needs it, as the user wrote it
-
-    Raises
-    ------
-    OutputError
-        It is not installed; with the one command that installs it.
     """
     try:
         return import_module(package)

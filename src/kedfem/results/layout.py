@@ -23,13 +23,7 @@ CHECKSUM = 4  # bytes of a chunk
 
 
 def opened(path: Path, mode: str, locking: bool | str = "best-effort") -> Any:
-    """The file, locked against a second writer where the disk knows locks.
-
-    Raises
-    ------
-    OSError
-        As HDF5 says.
-    """
+    """The file, locked against a second writer where the disk knows locks; OSError as HDF5 says."""
     import h5py
 
     return h5py.File(path, mode, locking=locking, libver=("v108", "v110"), rdcc_nbytes=CACHED)

@@ -22,16 +22,11 @@ UNITS = {"velocity": "m/s", "acceleration": "m/s^2", "total_velocity": "m/s", "t
 
 
 def probe_channels(scene: Scene, model: Model, linked: Linkage | None = None) -> list[Recorded]:
-    """The channels of all probes.
+    """The channels of all probes; SceneError of a point outside its link.
 
     Parameters
     ----------
     linked : the scene's linkage, where that is at hand
-
-    Raises
-    ------
-    SceneError
-        If a point is not in its link.
     """
     if not scene.output.probes:
         return []

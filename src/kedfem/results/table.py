@@ -68,13 +68,7 @@ def cell(x: float) -> str:
 
 
 def write_parquet(results: Results, path: Path) -> None:
-    """Write the table of `write_csv` as Parquet, all digits kept, time as index; how the run ended is in its `attrs`.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written, or pandas or pyarrow is not installed.
-    """
+    """Write the table of `write_csv` as Parquet, all digits kept, time as index; how the run ended is in its `attrs`."""
     require_parquet("output.parquet")
     table = as_data_frame(results)
     table.attrs = {"status": results.status, "reason": results.reason, "kedfem_version": results.version}
@@ -89,13 +83,7 @@ def require_parquet(where: str) -> None:
 
 
 def as_data_tree(results: Results) -> Any:
-    """An xarray.DataTree with the groups and names of the results file.
-
-    Raises
-    ------
-    OutputError
-        xarray is not installed.
-    """
+    """An xarray.DataTree with the groups and names of the results file."""
     xarray = of_extra("xarray", "Results.to_xarray")
     time = xarray.Variable("time", results.time, {"units": "s", "long_name": "time"})
     attributes = {"units": results.drive.unit, "long_name": results.drive.description}
@@ -119,13 +107,7 @@ def as_data_tree(results: Results) -> Any:
 
 
 def as_data_frame(results: Results) -> Any:
-    """A pandas.DataFrame with the columns of the table, over time [s].
-
-    Raises
-    ------
-    OutputError
-        pandas is not installed.
-    """
+    """A pandas.DataFrame with the columns of the table, over time [s]."""
     pandas = of_extra("pandas", "Results.to_pandas")
     first, *names = header(results)
     return pandas.DataFrame(columns_of(results)[:, 1:], pandas.Index(results.time, name=first), names)

@@ -120,13 +120,7 @@ def rigid_link_surface(link: Link, at: Float[np.ndarray, "3"]) -> CouplingSurfac
 
 
 def face_surface(link: Link, where: str, point: Float[np.ndarray, "3"]) -> CouplingSurface:
-    """The flat or cylindrical face of a link that passes through a point, e.g. to carry a surface force.
-
-    Raises
-    ------
-    MeshError
-        If no face does.
-    """
+    """The flat or cylindrical face of a link that passes through a point, e.g. to carry a surface force."""
     if link.full is not None and link.Q is not None:
         surface = face_surface(link.full, where, point)
         return replace(surface, fit=surface.fit @ link.Q)

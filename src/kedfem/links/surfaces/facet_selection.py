@@ -69,10 +69,7 @@ def _picked(
 ) -> Facets:
     """A ball if no axis is given; else a bore about the axis (or one of the link's), a journal, a flat face.
 
-    Raises
-    ------
-    MeshError
-        If there is nothing of that, or if it cannot be determined which.
+    A MeshError says that there is none, or that it cannot be determined which.
     """
     seen = in_its_plane(link, point)
     if axis is None and link.d == 3 and len(found := ball(link, point)):
@@ -99,13 +96,7 @@ def _first(several: Iterable[list[Round]]) -> list[Round]:
 
 
 def _told(link: Link, where: str, point: Float[np.ndarray, "3"], found: list[Round]) -> Facets:
-    """The facets of the one that a joint sits on, or of several that one pin fits.
-
-    Raises
-    ------
-    MeshError
-        If there are several of different radius.
-    """
+    """The facets of the one that a joint sits on, or of several that one pin fits; MeshError if they differ in radius."""
     chosen = nearest_rounds(found, link.d == 2)
     size = [each.radius for each in chosen]
     if max(size) - min(size) > CYLINDER_TOLERANCE * max(size):

@@ -64,10 +64,7 @@ def chosen_solid(gmsh: ModuleType, file: CadFile, key: str, link: str, wanted: s
 def all_solids(gmsh: ModuleType, file: CadFile) -> list[Solid]:
     """Every solid of a file, which is read into gmsh's empty model and stays there, where the file has it.
 
-    Raises
-    ------
-    MeshError
-        As `solid_model`, for any of them.
+    Errors are those of `solid_model`.
     """
     tags, names, bodies, _ = _named_solids(gmsh, file)
     return [_solid(gmsh, file, tag, name, bodies[tag]) for tag, name in zip(tags, names, strict=True)]

@@ -125,11 +125,6 @@ def checked_mesh(where: str, mesh: Mesh, min_quality: float | None) -> Mesh:
     ----------
     where : the mesh's link, for messages: ``links.rod``
     min_quality : None for LEAST, of tetrahedra 0
-
-    Raises
-    ------
-    MeshError
-        The worst element, where it is, and what to change.
     """
     quality = mesh_quality(mesh)
     if min_quality is None:

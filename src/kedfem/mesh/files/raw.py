@@ -64,13 +64,7 @@ class RawMesh:
 
 
 def read_mesh(path: Path) -> RawMesh:
-    """What a mesh file holds; to be called where a library may hang or break down.
-
-    Raises
-    ------
-    MeshError
-        The reason why the library cannot read it, without a place.
-    """
+    """What a mesh file holds; to be called where a library may hang or break down."""
     ending = path.suffix.lower()
     try:
         return _through_gmsh(path) if ending in THROUGH_GMSH else _through_meshio(path)

@@ -67,10 +67,7 @@ def layered_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
 def layer_directions(gmsh: ModuleType, solid: Solid) -> tuple[Float[np.ndarray, "3"], ...]:
     """The directions along which a solid consists of layers, that with the largest area across it first.
 
-    Raises
-    ------
-    OtherMethodError
-        There is none; the largest face that is in the way of the best direction.
+    An OtherMethodError says what is in the way.
     """
     found: list[Float[np.ndarray, "3"]] = []
     obstacles: list[tuple[float, str]] = []

@@ -21,15 +21,12 @@ T = TypeVar("T")
 def first_good(mesh_of: Callable[[float], T], quality: Callable[[T], float]) -> tuple[float, T]:
     """The first good mesh of some shares of the size, else the best, after its quality.
 
+    An OtherMethodError says why none is made of the whole size.
+
     Parameters
     ----------
     mesh_of : the mesh with elements of a share of the size
     quality : its least scaled Jacobian
-
-    Raises
-    ------
-    OtherMethodError
-        None is made; why not of the whole size.
     """
     found: list[tuple[float, T]] = []
     refusals: list[str] = []
@@ -48,17 +45,12 @@ def first_good(mesh_of: Callable[[float], T], quality: Callable[[T], float]) -> 
 
 
 def sized(solid: Solid, sizing: Sizing, mesh_of: Callable[[float], SolidMesh]) -> SolidMesh:
-    """The first good mesh of some shares of the size, or a cheaper one; else the best.
+    """The first good mesh of some shares of the size, or a cheaper one; else the best; OtherMethodError if all are poor.
 
     Parameters
     ----------
     solid, sizing : what is meshed, and how fine
     mesh_of : the mesh with elements of a share of that size
-
-    Raises
-    ------
-    OtherMethodError
-        None is made, or all are poor.
     """
     least, mesh = first_good(mesh_of, lambda each: mesh_quality(each).least)
     return _cheaper(sizing, mesh, mesh_of) if least >= GOOD else not_too_bad(solid, mesh)

@@ -76,10 +76,7 @@ def _near(gmsh: ModuleType, faces: Sequence[CadFace], sizing: Sizing, small: flo
 def _without(gmsh: ModuleType, solid: Solid, faces: Sequence[CadFace], concave: bool) -> Solid:
     """The solid in gmsh's copy without some faces of its original, names of the others kept.
 
-    Raises
-    ------
-    OtherMethodError
-        OpenCASCADE cannot, or a blend is concave and those are to stay.
+    An OtherMethodError says that OpenCASCADE cannot, or that a blend is concave and those are to stay.
     """
     ((_, tag),) = gmsh.model.getEntities(3)
     known = cad_faces(gmsh, solid.name, tag, solid.extent, {})

@@ -151,15 +151,10 @@ def _section(gmsh: ModuleType, solid: Solid, frame: Frame) -> list[tuple[int, in
 
 
 def path(gmsh: ModuleType, solid: Solid) -> tuple[Leg, ...]:
-    """The path along which a plane end, moved rigidly, sweeps the whole solid.
+    """The path along which a plane end, moved rigidly, sweeps the whole solid; OtherMethodError if there is none.
 
     From the end on, the faces that meet it must all run along a line square to it, or turn about an axis in its plane, up
     to one more such plane; from there the faces behind go on, to the other end.
-
-    Raises
-    ------
-    OtherMethodError
-        No plane face is an end of that kind.
     """
     every = looks(gmsh, solid)
     planes = sorted((face for face in solid.faces if face.kind == "plane"), key=lambda face: face.area)

@@ -61,13 +61,7 @@ def revolved_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
 
 
 def revolution(gmsh: ModuleType, solid: Solid) -> Revolution:
-    """The axis of a solid whose faces all turn about it.
-
-    Raises
-    ------
-    OtherMethodError
-        There is none; the largest face that is in the way.
-    """
+    """The axis of a solid whose faces all turn about it; OtherMethodError with what is in the way."""
     every = list(looks(gmsh, solid).values())
     obstacles: list[tuple[float, str]] = []
     for axis in common_axes(solid, every):

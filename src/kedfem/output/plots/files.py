@@ -45,11 +45,6 @@ def write_plots(results: Results, folder: Path, each: bool = False) -> list[Path
     folder : made where missing
     each : whether every channel is also plotted on its own: ``probes-rocker_mid-stress.png``, …, ``energies.png``, and
         ``joint_forces.png`` for all joints
-
-    Raises
-    ------
-    OutputError
-        The folder or a file cannot be written.
     """
     remove_plots(ready_folder(Path(folder)))
     if not len(results.time):

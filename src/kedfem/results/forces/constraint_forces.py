@@ -1,4 +1,4 @@
-"""Joints enforced by constraint equations: their forces, Σ Bᵀ R λ = Cᵀ μ, and the energy of springs and dampers in them."""
+"""Joints enforced by constraint equations: their forces, Σ Bᵀ R λ = Cᵀ μ, and the energy of springs in them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -96,13 +96,7 @@ class Measured:
 
 
 def measured_elements(scene: Scene, model: Model) -> Measured:
-    """Motors, springs and limits of a scene and, without a drive, the turns of its hinges.
-
-    Raises
-    ------
-    MeshError, SceneError
-        If a force element does not fit its link.
-    """
+    """Motors, springs and limits of a scene and, without a drive, the turns of its hinges."""
     turns = () if scene.driven is not None else hinges(scene, model)
     every = (*force_elements(scene, model), *turns)
     return Measured(every, kernel_table(every))

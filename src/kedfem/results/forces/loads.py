@@ -164,10 +164,7 @@ def _load(
 def acted_links(name: str, joint: Joint, description: str) -> tuple[str, str]:
     """The link that a joint's force acts on, and the one that it is from, as its channel's description says.
 
-    Raises
-    ------
-    ValueError
-        It says neither.
+    A ValueError says that it says neither.
     """
     one, other = joint.links
     for on, by in ((one, other), (other, one)):
