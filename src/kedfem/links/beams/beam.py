@@ -51,6 +51,16 @@ def shape_functions(r: float, nodes: int) -> tuple[Float[np.ndarray, " m"], Floa
     return N, dN
 
 
+def nearest_parameter(x: Float[np.ndarray, "m d"], point: Float[np.ndarray, " d"]) -> float:
+    """Parent coordinate in [-1, 1] of the point of a line element that is nearest to a point."""
+    r = 0.0
+    for _ in range(20):
+        N, dN = shape_functions(r, len(x))
+        tangent = dN @ x
+        r = float(np.clip(r + tangent @ (point - N @ x) / (tangent @ tangent), -1, 1))
+    return r
+
+
 def spaced(elements: int, nodes: int) -> Float[np.ndarray, " n"]:
     """Places of the nodes of elements in a row, each of length one."""
     within = (1 + np.sort(parent_nodes(nodes))[:-1]) / 2

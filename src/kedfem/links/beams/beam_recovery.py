@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.links.beams.beam import parent_nodes, shape_functions, strain_rows
+from kedfem.links.beams.beam import nearest_parameter, parent_nodes, shape_functions, strain_rows
 from kedfem.links.record import Link
 
 THROUGH = 4  # Gauss points of a probe at least
@@ -37,11 +37,7 @@ def beam_coordinates(
     x: Float[np.ndarray, "m 2"], point: Float[np.ndarray, "2"]
 ) -> tuple[float, float, float]:
     """Parent coordinate of the nearest axis point, signed offset to the left of the axis, distance beyond the ends."""
-    r = 0.0
-    for _ in range(20):
-        N, dN = shape_functions(r, len(x))
-        tangent = dN @ x
-        r = float(np.clip(r + tangent @ (point - N @ x) / (tangent @ tangent), -1, 1))
+    r = nearest_parameter(x, point)
     N, dN = shape_functions(r, len(x))
     t = dN @ x / np.linalg.norm(dN @ x)
     d = point - N @ x

@@ -4,7 +4,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.links.beams.beam import line_pairs, parent_nodes, shape_functions
+from kedfem.links.beams.beam import line_pairs, nearest_parameter, parent_nodes, shape_functions
 from kedfem.links.beams.section import Section, outline, torsion_stress
 from kedfem.links.beams.spatial_beam import space_strains
 from kedfem.links.record import Link, section_of
@@ -48,11 +48,7 @@ def nearest_on_axis(
     found = []
     for e in range(len(link.cells)):
         x = element_frame(link, e)
-        r = 0.0
-        for _ in range(20):
-            N, dN = shape_functions(r, len(x))
-            tangent = dN @ x[:, 0]
-            r = float(np.clip(r + tangent @ (point - N @ x[:, 0]) / (tangent @ tangent), -1, 1))
+        r = nearest_parameter(x[:, 0], point)
         N, dN = shape_functions(r, len(x))
         d, t = point - N @ x[:, 0], dN @ x[:, 0] / np.linalg.norm(dN @ x[:, 0])
         y, z = float(d @ (N @ x[:, 1])), float(d @ (N @ x[:, 2]))
