@@ -213,7 +213,7 @@ class _Reader:
         largest = np.max([np.abs(u).max(axis=(1, 2), initial=0.0) for u in shapes], axis=0)
         size = SMALL * min(link.size for link in self.model.links)
         by = size / np.where(largest > 0, largest, 1.0)
-        ahead, back = (self._values(field, [x * u for u in shapes], count) for x in _both(by))
+        ahead, back = (self._values(field, [x[:, None, None] * u for u in shapes], count) for x in (by, -by))
         return np.asarray((ahead - back) / (2 * by))
 
     def _values(self, field: str, moved: Sequence[Float[np.ndarray, "c n d"]], count: int) -> Matrix:
@@ -225,10 +225,6 @@ class _Reader:
         block = Block(0, motion, links)
         rows = [x.rows(block).reshape(count, -1)[:, : len(_columns(x))] for x in self.channels]
         return np.hstack([np.zeros((count, 0)), *rows]).T
-
-
-def _both(by: Float[np.ndarray, " c"]) -> tuple[np.ndarray, np.ndarray]:
-    return by[:, None, None], -by[:, None, None]
 
 
 def _history(

@@ -35,6 +35,8 @@ from kedfem.results.frequencies import (
     write_frequencies,
     write_summary,
 )
+from kedfem.results.recorded import drive_channel
+from kedfem.results.table import drive_heading
 from kedfem.scene import Scene, path_parameter, time_grid, turn_steps
 from kedfem.scene.records.units import RPM
 
@@ -155,7 +157,7 @@ def _write_files(
     fastest : speed of the drive up to which frequencies were found [rad/s]
     """
     t, angle, values, speed = done.time, done.angle, done.values, done.speed
-    write_frequencies(target / "frequencies.csv", t, angle, values, _slides(scene))
+    write_frequencies(target / "frequencies.csv", t, angle, values, drive_heading(drive_channel(scene)))
     write_summary(target, _summary(done, scene.source, wanted))
     for name in (OVER_TURN, CAMPBELL):
         (target / name).unlink(missing_ok=True)
@@ -243,7 +245,3 @@ def _positions(scene: Scene, count: int) -> Float[np.ndarray, " P"]:
     grid, turn = time_grid(scene), turn_steps(scene)
     span = min(turn * grid.step, grid.end) if turn else grid.end
     return np.asarray(grid.end - span + span * np.arange(count) / count)
-
-
-def _slides(scene: Scene) -> bool:
-    return any(scene.joints[name].kind == "prismatic" for name in list(scene.driven_joints)[:1])

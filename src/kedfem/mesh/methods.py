@@ -186,7 +186,10 @@ def best_mesh(
     found: list[tuple[float, SolidMesh]] = []
     reasons: list[str] = []
     for method in methods:
-        if method in (filled_mesh, subdivided_mesh) and _best_of(found) >= FAIR:
+        if (
+            method in (filled_mesh, subdivided_mesh)
+            and max((least for least, _ in found), default=-1.0) >= FAIR
+        ):
             break
         try:
             mesh = method(gmsh, solid, sizing)
@@ -207,11 +210,6 @@ def best_mesh(
             "take another size (mesh.size) or simplify the part there"
         )
     return max(found, key=lambda each: each[0])[1]
-
-
-def _best_of(found: list[tuple[float, SolidMesh]]) -> float:
-    """The best quality so far."""
-    return max((least for least, _ in found), default=-1.0)
 
 
 def healed(gmsh: ModuleType, where: str, solid: Solid, size: float) -> Iterator[tuple[Solid, str]]:

@@ -119,8 +119,8 @@ class Account:
     @property
     def balance(self) -> Balance:
         """Up to now."""
-        exchanged, *left = (float(x) for x in self._largest)
-        return Balance(*(_share(x, exchanged) for x in left))
+        exchanged, *left = self._largest.tolist()
+        return Balance(*(x / exchanged if exchanged else 0.0 for x in left))
 
     def _added(self, block: Block) -> dict[str, Rows]:
         """Energies and sums of one more block."""
@@ -228,7 +228,3 @@ def _grouped(of: Sequence[Constants], k: int) -> list[list[int]]:
 
 def _bodies(of: Sequence[Constants]) -> Int[np.ndarray, " S"]:
     return np.array([x.body for x in of])
-
-
-def _share(x: float, of: float) -> float:
-    return x / of if of else 0.0

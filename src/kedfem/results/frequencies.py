@@ -53,11 +53,10 @@ def read_summary(folder: Path) -> Summary | None:
 
 def write_frequencies(
     path: Path, t: Float[np.ndarray, " P"], place: Float[np.ndarray, " P"], values: Float[np.ndarray, "P f"],
-    slides: bool,
+    drive: str,
 ) -> None:  # fmt: skip
     """One row a position: time [s], drive angle [rad] or travel [m], natural frequencies [Hz]."""
-    header = ["time [s]", "drive travel [m]" if slides else "drive angle [rad]"]
-    header += [f"frequency {k + 1} [Hz]" for k in range(values.shape[1])]
+    header = ["time [s]", drive, *(f"frequency {k + 1} [Hz]" for k in range(values.shape[1]))]
     with text_file(path) as file:
         write_numbers(file, header, [np.column_stack([t, place, values])])
 

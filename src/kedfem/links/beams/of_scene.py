@@ -21,7 +21,11 @@ def scene_beam(scene: Scene, name: str, spatial: frozenset[str]) -> Link:
     shape, material = link.shape, scene.materials[str(link.material)]
     if not isinstance(shape, Bar | Polyline):
         raise TypeError(f"links.{name}: a beam is a bar or a polyline")  # refused by the scene already
-    of_section = shape.of_section if isinstance(shape, Polyline) else _of_bar(shape)
+    of_section = (
+        shape.of_section
+        if isinstance(shape, Polyline)
+        else RectangleSection(width=shape.width, thickness=shape.thickness)
+    )
     section = scene_section(of_section, link.shear_coefficient, material.poisson_ratio)
     if name in spatial:
         return spatial_beam_link(name, scene_axis(scene, name), section, material)
@@ -77,10 +81,6 @@ def beam_points(scene: Scene, name: str, spatial: bool) -> Float[np.ndarray, "p 
 def beam_nodes(link: LinkScene) -> int:
     """Nodes of each element of a beam: the number in its name."""
     return int(str(link.element).removeprefix("beam"))
-
-
-def _of_bar(bar: Bar) -> RectangleSection:
-    return RectangleSection(width=bar.width, thickness=bar.thickness)
 
 
 def _is_slot_of(joint: Joint, name: str) -> bool:

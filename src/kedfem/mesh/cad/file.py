@@ -119,7 +119,8 @@ def _solids(gmsh: ModuleType, file: CadFile) -> tuple[list[int], str]:
         extent = float(np.linalg.norm(boxes[:, 3:].max(axis=0) - boxes[:, :3].min(axis=0)))
         check_size(file, "its faces", extent)
     for gap in _SEWING:
-        _clear(gmsh)
+        gmsh.model.remove()
+        gmsh.model.add("kedfem")  # tags begin anew
         imported(gmsh, file, scaling, sewing=gap)
         if not _free_edges(gmsh, _faces(gmsh)):
             break
@@ -213,12 +214,6 @@ def silent() -> Iterator[None]:
         for stream, copy in zip((1, 2), kept, strict=True):
             os.dup2(copy, stream)
             os.close(copy)
-
-
-def _clear(gmsh: ModuleType) -> None:
-    """Everything out of the model; tags begin anew."""
-    gmsh.model.remove()
-    gmsh.model.add("kedfem")
 
 
 def _faces(gmsh: ModuleType) -> list[int]:

@@ -188,12 +188,12 @@ def _from_outside(plan: Plan, fitting: tuple[Mapping | None, ...]) -> list[tuple
     """The mapped rings, those around others first."""
     rings = [(region, mapping) for region, mapping in zip(plan.regions, fitting, strict=True) if mapping]
     rings = [(region, mapping) for region, mapping in rings if len(region.loops) == 2]
-    return sorted(rings, key=lambda ring: -float(np.ptp(_outer_points(plan, ring[0]), axis=0).max()))
 
+    def extent(ring: tuple[Region, Mapping]) -> float:
+        outer = [plan.curves[i].samples for i, _ in ring[0].loops[0]]
+        return float(np.ptp(np.concatenate(outer), axis=0).max())
 
-def _outer_points(plan: Plan, region: Region) -> Float[np.ndarray, "_ 2"]:
-    """Samples of the outer loop of a region."""
-    return np.concatenate([plan.curves[i].samples for i, _ in region.loops[0]])
+    return sorted(rings, key=extent, reverse=True)
 
 
 def _opposite(
@@ -212,7 +212,10 @@ def _opposite(
         towards = towards[::-1]
     # a mean between facing each node and an even division keeps both the angles and the lengths fair
     facing = np.interp(
-        _monotone(turned * (towards - around[0])), turned * (around - around[0]), finer, period=2 * np.pi
+        np.maximum.accumulate(turned * (towards - around[0])),
+        turned * (around - around[0]),
+        finer,
+        period=2 * np.pi,
     )
     facing = np.unwrap(facing * 2 * np.pi / curve.length) * curve.length / (2 * np.pi)
     even = np.arange(count) * curve.length / count
@@ -222,11 +225,6 @@ def _opposite(
     if steps.min() < even[1] / 3:  # the outer loop goes back somewhere, seen from the centre
         lengths = even + shift
     return np.append(lengths, lengths[0] + curve.length)
-
-
-def _monotone(angles: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-    """Angles that never go back."""
-    return np.asarray(np.maximum.accumulate(angles))
 
 
 def _loop_nodes(

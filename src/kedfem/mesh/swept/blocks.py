@@ -119,19 +119,9 @@ def _transfinite(gmsh: ModuleType, groups: list[set[int]], counts: list[int]) ->
 def gmsh_hexahedra(
     gmsh: ModuleType, points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e 27"]
 ) -> SolidMesh:
-    """The mesh of hexahedra whose nodes are in gmsh's order."""
-    return _right_handed(points, cells[:, _from_gmsh(gmsh)])
-
-
-def _from_gmsh(gmsh: ModuleType) -> list[int]:
-    """Of each node in VTK's order its place in gmsh's."""
+    """The mesh of hexahedra whose nodes are in gmsh's order, which may have numbered them the other way round."""
     theirs = np.reshape(gmsh.model.mesh.getElementProperties(_HEX27)[4], (-1, 3)).round()
-    return node_numbers(theirs, HEX27)
-
-
-def _right_handed(points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e 27"]) -> SolidMesh:
-    """The mesh, mirrored in its elements if gmsh has numbered them the other way round."""
-    mesh = without_spare_nodes(SolidMesh(points, cells))
+    mesh = without_spare_nodes(SolidMesh(points, cells[:, node_numbers(theirs, HEX27)]))
     if (mesh_quality(mesh).scaled_jacobian < 0).all():
         mesh = SolidMesh(mesh.points, mesh.cells[:, node_numbers(HEX27, HEX27 * [-1, 1, 1])])
     return mesh

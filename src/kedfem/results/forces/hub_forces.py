@@ -47,7 +47,8 @@ def hub_wrench(
     held += [each for _, _, below in riders for each in below]
 
     def wrench(block: Block) -> tuple[Rows, Rows]:
-        F, R = _on_prescribed(prescribed, block), block.motion.R[:, prescribed.body]
+        F = applied(link, prescribed.loads, block.motion, prescribed.body)
+        R = block.motion.R[:, prescribed.body]
         arms = (link.X - np.outer(link.one, hub)) @ R.transpose(0, 2, 1)
         centre = block.motion.p[:, prescribed.body] + R @ hub
         force, moment = forces.force_elements.on(link.name, block, centre)
@@ -90,8 +91,3 @@ def _geared(
             else:
                 moment = moment + along
     return force, moment
-
-
-def _on_prescribed(prescribed: PrescribedBody, block: Block) -> Float[np.ndarray, "T n d"]:
-    """P − M R0'' of a prescribed link."""
-    return applied(prescribed.link, prescribed.loads, block.motion, prescribed.body)

@@ -148,11 +148,8 @@ def _damping(link: Link, full: Link, of: Rayleigh, now: LinkMoment, omega: Float
     if not of.present:
         return np.zeros((full.n, 3))
     rate = nodal_state(link, (now.v - cross(omega, now.u)) @ now.R)
-    return np.asarray(of.alpha * mass_times(full.mass, rate) + of.beta * _elastic(full, rate))
-
-
-def _elastic(link: Link, g: Forces) -> Forces:
-    return np.asarray(link.K0 @ g.ravel()).reshape(g.shape)
+    elastic = (full.K0 @ rate.ravel()).reshape(rate.shape)
+    return np.asarray(of.alpha * mass_times(full.mass, rate) + of.beta * elastic)
 
 
 def _force_elements(model: Model, k: int, at: Snapshot, now: LinkMoment) -> Forces:
