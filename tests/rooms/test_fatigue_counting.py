@@ -1,7 +1,5 @@
 """Cycles, planes and strengths of fatigue: published series, closed forms, and pyLife beside our own."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -116,8 +114,8 @@ def principal(H: np.ndarray) -> np.ndarray:
     return dominant(H @ H.transpose(0, 2, 1) / T, H.mean(axis=2))
 
 
-def amplitudes(planes: Any) -> np.ndarray:
-    return np.ptp(planes.h, axis=2)[0] / 2
+def amplitudes(h: np.ndarray) -> np.ndarray:
+    return np.ptp(h, axis=2)[0] / 2
 
 
 @pytest.mark.parametrize("normal", NORMALS.values(), ids=NORMALS)

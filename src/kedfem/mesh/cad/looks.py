@@ -6,6 +6,7 @@ from types import ModuleType
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.mesh.cad.solid_faces import places_on
 from kedfem.mesh.cad.solids import CadFace, Solid
 
 _SHARES = np.linspace(0.03, 0.97, 7)  # of a face's parameters: off the poles, where normals are unknown
@@ -40,12 +41,9 @@ def looks(gmsh: ModuleType, solid: Solid) -> dict[int, Looks]:
 
 def _looks(gmsh: ModuleType, solid: Solid, face: CadFace) -> Looks:
     """Those of one face."""
-    low, high = (np.array(bound) for bound in gmsh.model.getParametrizationBounds(2, face.tag))
-    at = low + np.stack(np.meshgrid(_SHARES, _SHARES), axis=-1).reshape(-1, 2) * (high - low)
-    places = np.reshape(gmsh.model.getValue(2, face.tag, at.ravel()), (-1, 3))
-    normals = np.reshape(gmsh.model.getNormal(face.tag, at.ravel()), (-1, 3))
-    known = np.isfinite(places).all(axis=1) & (abs(np.linalg.norm(normals, axis=1) - 1) < 1e-6)
-    return Looks(face, (places[known] - solid.middle) / solid.extent, normals[known])
+    on = places_on(gmsh, face.tag, _SHARES)
+    known = np.isfinite(on.points).all(axis=1) & (abs(np.linalg.norm(on.normals, axis=1) - 1) < 1e-6)
+    return Looks(face, (on.points[known] - solid.middle) / solid.extent, on.normals[known])
 
 
 def common_axes(solid: Solid, every: list[Looks]) -> list[Axis]:

@@ -99,7 +99,7 @@ def solid_box(gmsh: ModuleType, faces: tuple[CadFace, ...]) -> Float[np.ndarray,
     for face in faces:
         box = np.array(gmsh.model.getBoundingBox(2, face.tag)).reshape(2, 3) + _PADDING
         if face.kind == "other":
-            points = _places(gmsh, face.tag, np.linspace(0, 1, 33)).points
+            points = places_on(gmsh, face.tag, np.linspace(0, 1, 33)).points
             box = np.stack([np.maximum(box[0], points.min(axis=0)), np.minimum(box[1], points.max(axis=0))])
         boxes.append(box)
     return np.stack([np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]])
@@ -107,8 +107,8 @@ def solid_box(gmsh: ModuleType, faces: tuple[CadFace, ...]) -> Float[np.ndarray,
 
 def _cad_face(gmsh: ModuleType, tag: int, name: str, sign: float) -> CadFace:
     """One face: its form, with gmsh's normals times `sign` as the outward ones."""
-    all_over = _places(gmsh, tag, np.linspace(0, 1, 9))
-    within = _places(gmsh, tag, np.linspace(0, 1, 9)[1:-1])
+    all_over = places_on(gmsh, tag, np.linspace(0, 1, 9))
+    within = places_on(gmsh, tag, np.linspace(0, 1, 9)[1:-1])
     form = fitted_form(Sample(all_over.points, within.points, sign * within.normals), _ACCURACY, _SKEW)
     centroid = np.array(gmsh.model.occ.getCenterOfMass(2, tag))
     return CadFace(
@@ -146,7 +146,7 @@ def _least_radius(gmsh: ModuleType, tag: int, places: Places) -> float:
     return float(1 / bend) if bend > 0 else np.nan
 
 
-def _places(gmsh: ModuleType, tag: int, share: Float[np.ndarray, "m"]) -> Places:
+def places_on(gmsh: ModuleType, tag: int, share: Float[np.ndarray, "m"]) -> Places:
     """Places at shares of both parameters of a face, within it or beside it on the same surface."""
     low, high = (np.array(bound) for bound in gmsh.model.getParametrizationBounds(2, tag))
     at = low + np.stack(np.meshgrid(share, share), axis=-1).reshape(-1, 2) * (high - low)
@@ -157,7 +157,7 @@ def _places(gmsh: ModuleType, tag: int, share: Float[np.ndarray, "m"]) -> Places
 def _inner_places(gmsh: ModuleType, tag: int, most: int) -> Places:
     """A few places within a face, as far apart as a grid allows; none if it is too narrow for the finest."""
     for fineness in _FINENESS:
-        grid = _places(gmsh, tag, (np.arange(fineness) + _ASIDE) / fineness)
+        grid = places_on(gmsh, tag, (np.arange(fineness) + _ASIDE) / fineness)
         inside = [i for i, at in enumerate(grid.at) if gmsh.model.isInside(2, tag, at, parametric=True)]
         if len(inside) >= _LEAST:
             break

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.errors import KedfemError
+from kedfem.mesh.cad.solid_faces import places_on
 from kedfem.mesh.cad.solids import CadFace, OtherMethodError, Sizing, Solid
 from kedfem.mesh.cad.words import direction_in_words, face_in_words
 from kedfem.mesh.elements.hexahedra import SolidMesh, stacked, without_spare_nodes
@@ -94,7 +95,7 @@ def slanted_faces(gmsh: ModuleType, solid: Solid) -> list[list[CadFace]]:
 
 def _slanted(gmsh: ModuleType, solid: Solid) -> list[tuple[Float[np.ndarray, "3"], list[CadFace]]]:
     """The directions with plane faces across them, the largest area first, and the faces in the way of each."""
-    normals = {face.tag: _face_normals(gmsh, face) for face in solid.faces}
+    normals = {face.tag: places_on(gmsh, face.tag, _SAMPLES).normals for face in solid.faces}
     flat = [face for face in solid.faces if _fits(normals[face.tag], normals[face.tag][0])]
     directions = _directions([normals[face.tag][0] for face in flat], [face.area for face in flat])
     return [
@@ -116,14 +117,6 @@ def _directions(normals: list[Float[np.ndarray, "3"]], areas: list[float]) -> li
         else:
             groups.append((near / np.linalg.norm(near), area))
     return [direction for direction, _ in sorted(groups, key=lambda group: -group[1])]
-
-
-def _face_normals(gmsh: ModuleType, face: CadFace) -> Float[np.ndarray, "_ 3"]:
-    """Unit normals on a grid over the face's parameters."""
-    (u0, v0), (u1, v1) = gmsh.model.getParametrizationBounds(2, face.tag)
-    u, v = np.meshgrid(u0 + _SAMPLES * (u1 - u0), v0 + _SAMPLES * (v1 - v0))
-    flat = np.stack([u.ravel(), v.ravel()], axis=1).ravel()
-    return np.asarray(gmsh.model.getNormal(face.tag, flat)).reshape(-1, 3)
 
 
 def _fits(normals: Float[np.ndarray, "_ 3"], direction: Float[np.ndarray, "3"]) -> bool:

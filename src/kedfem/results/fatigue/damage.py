@@ -11,7 +11,6 @@ import numpy as np
 
 from kedfem.dynamics.model import Model
 from kedfem.errors import SceneError
-from kedfem.links.recovery import StressRecovery
 from kedfem.motion.period import repeats_after
 from kedfem.results.fatigue.strength import Strength, strength_of, verdict
 from kedfem.results.fatigue.surface import CRITERIA, FINDLEY, LinkFatigue, Look, Period, Stressed
@@ -57,7 +56,7 @@ def fatigue_of(
         if link.name in strengths and not link.rigid
     }
     fields = {k: look.field() for k, look in looks.items()}
-    nothing = [_nothing(recovery) for recovery in envelope.recoveries]
+    nothing = [LinkFatigue(x, *np.full((6, x.points), np.nan)) for x in envelope.recoveries]
     of = {name: {k: x for k, x in looks.items() if x.name == name} for name in strengths}
     spots = {name: _spots(each, fields, asked, period) for name, each in of.items()}
     repeats = max((look.repeats for look in looks.values()), default=0.0)
@@ -103,10 +102,6 @@ def _doubt(scene: Scene, period: Period, repeats: float) -> str:
             "take analysis.kind = 'steady'"
         )
     return ""
-
-
-def _nothing(recovery: StressRecovery) -> LinkFatigue:
-    return LinkFatigue(recovery, *np.full((6, recovery.points), np.nan))
 
 
 def _spots(

@@ -5,8 +5,6 @@ H (k, 6, T) : stress of points over a period as `links.recovery.stress_modes` ha
 axes (k, 3, 3) : two tangents and the normal of the surface, as rows
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float
 
@@ -30,18 +28,6 @@ def _to_tensor() -> Float[np.ndarray, "6 6"]:
 
 
 TENSOR = _to_tensor()
-
-
-@dataclass(frozen=True, slots=True)
-class Planes:
-    """Histories on planes of points.
-
-    h : (k, P, T) [Pa]
-    angle : (P,) of the trace of each plane's normal in the surface, from the first tangent [rad]
-    """
-
-    h: Float[np.ndarray, "k P T"]
-    angle: Float[np.ndarray, " P"]
 
 
 def dominant(moments: Float[np.ndarray, "k 6 6"], mean: Float[np.ndarray, "k 6"]) -> Float[np.ndarray, "k 6"]:
@@ -71,17 +57,19 @@ def signed_von_mises(H: Float[np.ndarray, "k 6 T"], d: Float[np.ndarray, "k 6"])
     return np.asarray(np.where(np.matmul(d[:, None], H)[:, 0] < 0, -size, size))
 
 
-def normal_stresses(H: Float[np.ndarray, "k 6 T"], axes: Float[np.ndarray, "k 3 3"]) -> Planes:
-    """Normal stress on planes at right angles to the surface."""
+def normal_stresses(
+    H: Float[np.ndarray, "k 6 T"], axes: Float[np.ndarray, "k 3 3"]
+) -> Float[np.ndarray, "k P T"]:
+    """Normal stress on planes at right angles to the surface [Pa]."""
     angle = np.radians(np.arange(0.0, 180.0, STEP))
     n = _normals(axes, angle, np.pi / 2)
-    return Planes(np.matmul(_rows(n, n), H), angle)
+    return np.asarray(np.matmul(_rows(n, n), H))
 
 
 def findley_stresses(
     H: Float[np.ndarray, "k 6 T"], axes: Float[np.ndarray, "k 3 3"], factor: float
-) -> Planes:
-    """Findley's parameter as an amplitude of tension: shear on planes, raised by the largest normal stress.
+) -> Float[np.ndarray, "k P T"]:
+    """Findley's parameter as an amplitude of tension [Pa]: shear on planes, raised by the largest normal stress.
 
     Planes are at right angles to the surface, and inclined as those are that tension across the surface shears most. On
     each the direction with the largest range of shear counts: τ (1 + k σ_max / τ_a) 2 / (√(1 + k²) + k), so that the
@@ -98,7 +86,7 @@ def findley_stresses(
     sheared &= amplitude > SOME * np.abs(normal)
     raised = np.maximum(1 + factor * normal / np.where(sheared, amplitude, 1.0), 0.0)
     h *= (2 / (np.sqrt(1 + factor**2) + factor) * np.where(sheared, raised, 0.0))[:, :, None]
-    return Planes(h, np.concatenate([angle, angle]))
+    return np.asarray(h)
 
 
 def _sheared(

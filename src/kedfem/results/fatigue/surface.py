@@ -162,9 +162,9 @@ class Look:
         if kind == SIGNED:
             h = signed_von_mises(H, d)[:, None]
         elif kind == NORMAL:
-            h = normal_stresses(H, axes).h
+            h = normal_stresses(H, axes)
         else:
-            h = findley_stresses(H, axes, self.asked.findley_factor).h
+            h = findley_stresses(H, axes, self.asked.findley_factor)
         found = np.zeros((h.shape[0] * h.shape[1], 4))
         M = 0.0 if kind == FINDLEY else known.M  # the largest normal stress is in the amplitude
         counted(h.reshape(len(found), -1), M, known.S, known.N, known.floor, found)
