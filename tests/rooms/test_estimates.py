@@ -10,16 +10,18 @@ from benchmarks.indicator import judged
 from numpy.testing import assert_allclose
 
 from kedfem.accuracy import estimates
-from kedfem.accuracy.error_budget import Budget, Share, budget_warning, by_kind
+from kedfem.accuracy.error_budget import Budget, Share, budget_warning, by_kind, meaningless
 from kedfem.accuracy.estimates import budget, step_errors, watcher
 from kedfem.accuracy.histories import Histories, histories, relative_errors
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.variants import with_steps
+from kedfem.analysis import analyse
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.links.build import bare_link
 from kedfem.links.indicator import indicator
 from kedfem.links.singular_stress import re_entrant
+from kedfem.results import read_results
 from kedfem.scene import scene_from, time_grid
 
 from ..laws.test_envelope import ROUND, SHARP, angled
@@ -139,6 +141,33 @@ def test_what_is_too_large_for_a_run_beside_it_has_plain_estimates(monkeypatch: 
     found, _ = estimated(example("four_bar_beams", 60, {"model": "plane"}))
     assert {share.source for share in found.shares} == {"mesh", "step", "frames"}
     assert found.together["stress"] > found.together["displacement"] > 0.0
+
+
+def lost(mesh: float = 1.93, step: float = 1.02) -> Budget:
+    """Of a lift that fell through its floor: marches with other elements and other steps differ from it altogether."""
+    parts = {"mesh": mesh, "step": step}
+    return Budget(tuple(Share(source, {"joint forces": x, "drive": 0.3 * x}) for source, x in parts.items()))
+
+
+def test_beyond_all_scale_no_part_is_blamed() -> None:
+    (said,) = budget_warning(lost(), 0.01)
+    assert "mesh over 100 % and step over 100 %" in said
+    assert "most of it" not in said
+    assert "take finer elements" not in said
+    assert "most of it from the mesh" in budget_warning(lost(step=0.01), 0.01)[0]
+    assert "most of it from the step" in budget_warning(lost(mesh=0.4, step=0.5), 0.01)[0]
+
+
+def test_a_run_with_errors_over_its_results_is_doubtful_in_its_file(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("kedfem.analysis.budget", lambda *given: lost())
+    raw = example("four_bar_beams", 60, revolutions=0.1)
+    run = analyse(scene_from(raw, tmp_path))
+    stored = read_results(run.folder / "results.h5")
+    assert stored.status == run.results.status == "doubtful"
+    assert stored.reason == "estimated error of joint forces over 100 %"
+    assert meaningless(lost(mesh=0.6, step=0.39), None, 0.0) == ""
 
 
 def test_kinds_sums_and_warnings_of_a_budget() -> None:

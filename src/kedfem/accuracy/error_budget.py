@@ -9,7 +9,8 @@ KINDS = ("displacement", "stress", "joint forces", "drive")
 SOURCES = ("mesh", "step", "reduction", "frames", "rounding")
 WARNED = 0.05  # an error that no run leaves without a warning
 TWICE = 2.0  # of the accuracy asked for: estimates are no better than that
-MEANINGLESS = 3.0  # estimates are right within a factor 3: an error as large as the result
+MEANINGLESS = 1.0  # an error as large as the result
+ALIKE = 3.0  # estimates are right within this factor: of parts that differ by less none is the larger one for certain
 UNACCOUNTED = 0.5  # of energy
 UNKNOWNS = 60_000  # of a model, beyond which no mesh is made finer unasked
 LEAST = 0.005  # what no run warns of
@@ -108,8 +109,21 @@ def budget_warning(budget: Budget, asked: float | None = None) -> tuple[str, ...
     if not over or share is None:
         return ()
     message = ", ".join(f"{kind} {percent(error)}" for kind, error in over.items())
-    remedy = share.remedy or REMEDIES[share.source]
-    return (f"estimated error: {message}; most of it from the {share.source}: {remedy}",)
+    return (f"estimated error: {message}; {_advice(budget, share)}",)
+
+
+def _advice(budget: Budget, share: Share) -> str:
+    """What would lower the error, of which a share is the largest; beyond all scale no part is blamed before others."""
+    kind = max(budget.together, key=lambda kind: budget.together[kind])
+    alike = [x for x in budget.shares if x.errors.get(kind, 0.0) * ALIKE > share.errors[kind]]
+    if budget.worst > MEANINGLESS and len(alike) > 1:
+        parts = " and ".join(f"{x.source} {percent(x.errors[kind])}" for x in alike)
+        return (
+            f"no part of it can be told from the others ({kind}: {parts}): the motion is another one with every change, "
+            "so that finer elements alone do not help; look at the animation and at the other warnings, then take a "
+            "step ten times shorter, and if the motion stays as it is, look for a link or a joint that gives way"
+        )
+    return f"most of it from the {share.source}: {share.remedy or REMEDIES[share.source]}"
 
 
 def meaningless(budget: Budget, balance: Balance | None, unworked: float, stiffened: bool = False) -> str:
@@ -124,7 +138,7 @@ def meaningless(budget: Budget, balance: Balance | None, unworked: float, stiffe
     worst = {f"estimated error of {kind}": error for kind, error in budget.together.items()}
     energy = {"energy": balance.energy} if balance and not stiffened else {}
     left = {"the drive's work": unworked} | energy
-    message = [f"{what} {percent(error)}" for what, error in worst.items() if error >= MEANINGLESS]
+    message = [f"{what} {percent(error)}" for what, error in worst.items() if error > MEANINGLESS]
     message += [
         f"{percent(share)} of {what} unaccounted for" for what, share in left.items() if share >= UNACCOUNTED
     ]
