@@ -8,16 +8,14 @@ from pathlib import Path as FilePath
 from kedfem.accuracy.error_budget import Budget, attributes, budget_warning, kind_of_name, meaningless
 from kedfem.accuracy.estimates import Strained, budget
 from kedfem.accuracy.histories import Histories, steady_state
+from kedfem.accuracy.meshes import stubby_warning
 from kedfem.accuracy.plan import Plan, plan_for
-from kedfem.accuracy.prepared import Prepared
+from kedfem.accuracy.prepared import ALONE, Neighbours, Prepared
 from kedfem.accuracy.reduction import Reduction, prepared
-from kedfem.accuracy.resolution import resolution, resolution_warnings
+from kedfem.accuracy.resolution import resolution, resolution_warnings, stability_warning
 from kedfem.accuracy.rounding import IDLE, unstressed
-from kedfem.accuracy.segments import stubby_warning
-from kedfem.accuracy.shared_modes import ALONE, Neighbours
 from kedfem.accuracy.singular import SingularPasses
 from kedfem.accuracy.sizes import Sizes, size_warnings, sizes
-from kedfem.accuracy.stability import stability_warning
 from kedfem.accuracy.steady import Steady, steady_of, steady_warning, unstable
 from kedfem.accuracy.step_estimate import StepEstimate
 from kedfem.dynamics.loads import coarse_steps

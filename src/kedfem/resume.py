@@ -80,13 +80,7 @@ class Keeper:
         return int(self.stored.content["rows"]) if self.stored else 0
 
     def prepared(self, ready: Prepared) -> None:
-        """What was planned and meshed belongs to the state to go on from.
-
-        Raises
-        ------
-        SceneError
-            It does not.
-        """
+        """What was planned and meshed belongs to the state to go on from."""
         self.origin |= {f"planned {key}": value for key, value in flat(ready.scene).items()}
         model = _fingerprint(ready)
         if self.stored:
@@ -100,13 +94,7 @@ class Keeper:
         self.origin["model"] = model
 
     def put_back(self, memories: Mapping[str, Any]) -> None:
-        """Everything that the run remembers, as it was.
-
-        Raises
-        ------
-        OutputError
-            The state is damaged.
-        """
+        """Everything that the run remembers, as it was."""
         if self.stored:
             try:
                 for name, each in memories.items():

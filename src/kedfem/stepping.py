@@ -178,12 +178,7 @@ class _Frames:
         return cls(ready, recoveries, frames, one, set(frame_steps(scene).tolist()))
 
     def add(self, block: Block, values: dict[str, Float[np.ndarray, "T c"]]) -> None:
-        """The frames among the time points of a block, with what joints exert; an error of an earlier one comes here.
-
-        Raises
-        ------
-        OutputError
-        """
+        """The frames among the time points of a block, with what joints exert; an error of an earlier one comes here."""
         scene, model = self.ready.scene, self.ready.model
         ahead = min(AHEAD, max(1, int(HELD / (8 * 10 * model.unknowns))))
         for k in (k for k in range(len(block)) if block.step + k in self.wanted):
@@ -200,22 +195,12 @@ class _Frames:
             self.one.add(now.t, now.phi, [*drawn, *exerted])
 
     def finish(self, but: int = 0) -> None:
-        """Wait for the frames that were begun, but for so many.
-
-        Raises
-        ------
-        OutputError
-        """
+        """Wait for the frames that were begun, but for so many."""
         while len(self._waiting) > but:
             self._waiting.popleft().result()
 
     def close(self) -> None:
-        """Wait for the last frame; where one failed, for none of those after it.
-
-        Raises
-        ------
-        OutputError
-        """
+        """Wait for the last frame; where one failed, for none of those after it."""
         try:
             self.finish()
         finally:
@@ -223,12 +208,7 @@ class _Frames:
 
 
 def refuse_without(*writers: AnimationWriter | AnimationFile | None) -> None:
-    """A run goes on only where the frames that it wrote are still there.
-
-    Raises
-    ------
-    OutputError
-    """
+    """A run goes on only where the frames that it wrote are still there."""
     for missing in (writer.missing for writer in writers if writer):
         if missing is not None:
             raise OutputError(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kedfem.accuracy.prepared import meshed
-from kedfem.accuracy.stability import stability_warning
+from kedfem.accuracy.resolution import stability_warning
 from kedfem.analysis import analyse
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient

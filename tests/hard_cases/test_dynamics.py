@@ -11,8 +11,7 @@ from numpy.testing import assert_allclose
 from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
 from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.reduction import prepared
-from kedfem.accuracy.resolution import resolution, resolution_warnings
-from kedfem.accuracy.stability import stability_warning
+from kedfem.accuracy.resolution import resolution, resolution_warnings, stability_warning
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.errors import SolveError

@@ -9,9 +9,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.accuracy.histories import histories, relative_errors, worst
-from kedfem.accuracy.prepared import Prepared, meshed
+from kedfem.accuracy.prepared import Prepared, meshed, training_motion
 from kedfem.accuracy.reduction import reduced
-from kedfem.accuracy.training import training_motion
 from kedfem.dynamics.matrices.substructure import coupled
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.bases import bases

@@ -11,9 +11,8 @@ from rich.console import Console
 from kedfem.accuracy.geometric import GeometricError
 from kedfem.accuracy.histories import histories, relative_errors, worst
 from kedfem.accuracy.plan import SEGMENTS, planned
-from kedfem.accuracy.prepared import Prepared, meshed
+from kedfem.accuracy.prepared import Prepared, meshed, training_motion
 from kedfem.accuracy.reduction import prepared
-from kedfem.accuracy.training import training_motion
 from kedfem.analysis import analyse
 from kedfem.dynamics.model import Model, segments
 from kedfem.dynamics.modes.bases import bases

@@ -11,8 +11,7 @@ import pytest
 from rich.console import Console
 
 from kedfem.accuracy.prepared import Prepared, meshed
-from kedfem.accuracy.resolution import resolution
-from kedfem.accuracy.stability import stability_warning
+from kedfem.accuracy.resolution import resolution, stability_warning
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.rigid_body import drive_range, forcings, motions
 from kedfem.dynamics.stepping.start import initial_rates

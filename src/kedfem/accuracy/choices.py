@@ -4,11 +4,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from kedfem.accuracy.error_budget import percent
 from kedfem.accuracy.free_step import free_step
 from kedfem.accuracy.geometric import GeometricError
 from kedfem.accuracy.histories import histories, relative_errors, worst
-from kedfem.accuracy.stability import fewest_steps
+from kedfem.accuracy.resolution import fewest_steps
 from kedfem.accuracy.step_estimate import IN_STEP, LEAST_ORDER, StepEstimate, cheapest, single_level
 from kedfem.accuracy.trials import Trials
 from kedfem.accuracy.variants import (
@@ -76,9 +75,9 @@ def beams_only(scene: Scene) -> bool:
     return all(link.category in {"beam", "rigid"} for link in scene.links.values() if link.shape)
 
 
-def elastic(link: LinkScene, family: str) -> bool:
-    """Whether a link is elastic and of a family, stated so."""
-    return link.shape is not None and link.model not in {"rigid", "auto"} and link.family == family
+def elastic(link: LinkScene, *families: str) -> bool:
+    """Whether a link is elastic and of one of some families, stated so."""
+    return link.shape is not None and link.model not in {"rigid", "auto"} and link.family in families
 
 
 def chosen_frames(search: Trials, scene: Scene) -> tuple[Scene, float]:
@@ -92,29 +91,20 @@ def chosen_frames(search: Trials, scene: Scene) -> tuple[Scene, float]:
     geometric = GeometricError(ready.model)
     histories(ready, look=geometric.add)
     error = geometric.worst
-    if error <= frames_allowed(search, scene):
+    if error <= (FOLLOWED if beams_only(scene) else DEARER) * search.asked:
         return scene, error
     corotational = with_analysis(scene, frames="co-rotational")
     try:
         scene_from(corotational.model_dump(mode="json"))
-        search.run(
-            with_steps(shortened(with_beams(corotational, open_beams(scene), ELEMENTS[2])), _few(trial))
-        )
+        tried = with_beams(corotational, open_beams(scene), ELEMENTS[2])
+        search.run(with_steps(shortened(tried), time_grid(trial).steps))
     except KedfemError as fault:
         message = str(fault).splitlines()[0]
         search.notes.append(f"co-rotational frames would be needed, but cannot be taken: {message}")
         return scene, error
-    search.notes.append(f"rigid-body frames would be off by {percent(error)}: frames are co-rotational")
+    off = f"{100 * min(error, 1.0):.2g} %"
+    search.notes.append(f"rigid-body frames would be off by {off}: frames are co-rotational")
     return corotational, 0.0
-
-
-def frames_allowed(search: Trials, scene: Scene) -> float:
-    """The error of rigid-body frames beyond which links have co-rotational ones."""
-    return (FOLLOWED if beams_only(scene) else DEARER) * search.asked
-
-
-def _few(scene: Scene) -> int:
-    return time_grid(scene).steps
 
 
 def _least(scene: Scene) -> float:
@@ -158,7 +148,7 @@ def chosen_beams(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, f
                 continue
             if error <= allowed:
                 return now, error
-    search.notes.append(f"the finest beams tried still leave an error of {percent(error)}")
+    search.notes.append(f"the finest beams tried still leave an error of {error:.2g}")
     return with_beams(scene, names, choices[-1]), error
 
 
@@ -175,9 +165,9 @@ def chosen_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, fl
     if not open_step(scene):
         error = _stated_error(search, trial)
         if error > allowed:
-            search.notes.append(
-                f"the scene states its step; its error is about {percent(error)}{_with_levels(scene)}"
-            )
+            more = "; analysis.extrapolation_levels = 2 would make it smaller"
+            remedy = "" if scene.analysis.extrapolation_levels else more
+            search.notes.append(f"the scene states its step; its error is about {error:.2g}{remedy}")
         return scene, error
     if not scene.driven_joints or scene.limits:
         return free_step(search, scene, allowed)
@@ -206,9 +196,8 @@ def chosen_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, fl
     if error > allowed:
         names = sorted(left, key=left.__getitem__, reverse=True) or _over(found, allowed)
         search.notes.append(_unresolved(math.ceil(whole / choice.h), error, names))
-    return with_analysis(
-        scene, step=choice.h, steps_per_revolution=None, extrapolation_levels=choice.levels
-    ), error
+    keys = {"step": choice.h, "steps_per_revolution": None, "extrapolation_levels": choice.levels}
+    return with_analysis(scene, **keys), error
 
 
 def _fewest_rows(trial: Scene) -> int:
@@ -249,18 +238,9 @@ def _stated_error(search: Trials, trial: Scene) -> float:
     return max((D * single_level(q)[1] for D, q in left), default=0.0)
 
 
-def _with_levels(scene: Scene) -> str:
-    return (
-        ""
-        if scene.analysis.extrapolation_levels
-        else "; analysis.extrapolation_levels = 2 would make it smaller"
-    )
-
-
 def _unresolved(steps: int, error: float, channels: Sequence[str]) -> str:
     names = ", ".join(channels[:3]) + (" and others" if len(channels) > 3 else "")
     return (
-        f"the error of the time step stays at {percent(error)} with {steps} steps in {names}: the motion excites "
-        "vibration beyond them (a start from rest at full speed, a load put on at once?); a smoother start or damping "
-        "would help"
+        f"the error of the time step stays at {error:.2g} with {steps} steps in {names}: the motion excites vibration "
+        "beyond them (a start from rest at full speed, a load put on at once?); a smoother start or damping would help"
     )

@@ -23,9 +23,8 @@ from kedfem.accuracy.histories import Histories, counted, extent, histories
 from kedfem.accuracy.mesh_estimate import FUNCTIONS, link_errors, mesh_share, plain_mesh_share
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, first_reduced
-from kedfem.accuracy.resolution import StepError, step_error
+from kedfem.accuracy.resolution import StepError, fewest_steps, step_error
 from kedfem.accuracy.rounding import Rounding
-from kedfem.accuracy.stability import fewest_steps
 from kedfem.accuracy.step_estimate import SINGLE, single_errors
 from kedfem.accuracy.variants import with_analysis
 from kedfem.dynamics.history import Block
@@ -130,7 +129,9 @@ def budget(
         reduction_share(reduction), frames_share(seen.geometric, kinds), seen.rounding.share(kinds),
     ]  # fmt: skip
     if small is None:
-        marched = _running_share(SINGLE * seen.running.total, kinds) if step is None else _step_share(step)
+        local = dict.fromkeys(kinds, SINGLE * seen.running.total)
+        alone = Share("step", local, "local errors of its steps: no run beside one so large")
+        marched = alone if step is None else _step_share(step)
         shares += [marched if seen.steps else None, plain_mesh_share(eta, kinds)]
         return Budget(joined(shares), tuple(limits), eta)
     own = ran is not None and small.model is ready.model and len(ran.time) > 1
@@ -153,11 +154,8 @@ def budget(
 
 def wanted(ready: Prepared) -> tuple[str, ...]:
     """Kinds of channels that a scene has."""
-    return tuple(
-        by_kind(
-            {each.channel.name: 0.0 for each in recording(ready.scene, ready.model, linked=ready.linkage)}
-        )
-    )
+    every = recording(ready.scene, ready.model, linked=ready.linkage)
+    return tuple(by_kind({each.channel.name: 0.0 for each in every}))
 
 
 def spanned(scene: Scene, model: Model) -> Scene:
@@ -192,13 +190,12 @@ def step_errors(ready: Prepared, base: Histories) -> dict[str, float]:
     That one has steps twice as long; where those would grow without bound, half as long.
     """
     grid = time_grid(ready.scene)
-    if grid.steps // 2 >= max(fewest_steps(ready.scene), 4):
-        return single_errors(
-            base, histories(replace(ready, scene=_beside(ready.scene, 2.0, grid.steps // 2)), near=base.begun)
-        )[0]
-    return single_errors(
-        histories(replace(ready, scene=_beside(ready.scene, 0.5, 2 * grid.steps)), near=base.begun), base
-    )[1]
+    longer = grid.steps // 2 >= max(fewest_steps(ready.scene), 4)
+    scene = (
+        _beside(ready.scene, 2.0, grid.steps // 2) if longer else _beside(ready.scene, 0.5, 2 * grid.steps)
+    )
+    other = histories(replace(ready, scene=scene), near=base.begun)
+    return single_errors(base, other)[0] if longer else single_errors(other, base)[1]
 
 
 def _beside(scene: Scene, factor: float, steps: int) -> Scene:
@@ -213,12 +210,6 @@ def _step_share(errors: Mapping[str, float]) -> Share:
     return Share("step", by_kind(errors), "longer steps, or levels in time")
 
 
-def _running_share(running: float, kinds: tuple[str, ...]) -> Share:
-    return Share(
-        "step", dict.fromkeys(kinds, running), "local errors of its steps: no run beside one so large"
-    )
-
-
 def reduction_share(reduction: Reduction | None) -> Share | None:
     """What reduced links cost."""
     if reduction is None or not reduction.estimate:
@@ -228,27 +219,21 @@ def reduction_share(reduction: Reduction | None) -> Share | None:
 
 def _limits(ready: Prepared, found: Mapping[int, Indicator]) -> list[str]:
     """Places where stress depends on the mesh, however fine it is."""
-    scene, out = ready.scene, []
+    scene, out, grows = ready.scene, [], "it grows as elements shrink"
     at_edges = dict.fromkeys(ready.model.links[k].name for k, each in found.items() if each.singular)
     if at_edges:
         out.append(
-            f"stress of {', '.join(at_edges)} at an edge that points inwards without a fillet: "
-            "it grows as elements shrink"
+            f"stress of {', '.join(at_edges)} at an edge that points inwards without a fillet: {grows}"
         )
     meshed = {link.name for link in ready.model.links if link.meshed}
     loads = scene.loads.items()
     points = [name for name, x in loads if isinstance(x, ForceLoad) and x.link in meshed and x.at is not None]
     if points:
-        out.append(f"stress where {', '.join(points)} acts on a point: it grows as elements shrink")
+        out.append(f"stress where {', '.join(points)} acts on a point: {grows}")
     stiff = [
-        name for name, joint in scene.joints.items() if _stiff(joint.coupling) and set(joint.links) & meshed
-    ]
+        name for name, joint in scene.joints.items()
+        if set(joint.links) & meshed and any(joint.stiff(link) for link in joint.links)
+    ]  # fmt: skip
     if stiff:
-        out.append(
-            f"stress around joints {', '.join(stiff)} with rigid couplings: it grows as elements shrink"
-        )
+        out.append(f"stress around joints {', '.join(stiff)} with rigid couplings: {grows}")
     return out
-
-
-def _stiff(port: object) -> bool:
-    return port == "rigid" or (isinstance(port, Mapping) and "rigid" in port.values())

@@ -17,6 +17,7 @@ from kedfem.dynamics.system.period.map import Carried, carried
 from kedfem.dynamics.system.period.search import Periodic, Search
 from kedfem.results import Channel
 from kedfem.results.recording import recording, rows
+from kedfem.results.records import largest_by_unit
 
 FAINT = (
     3e-3  # of the largest force at the linkage's size: a torque below is what is left of others that cancel
@@ -117,12 +118,11 @@ def relative_errors(found: Histories, reference: Histories) -> dict[str, float]:
 
 def counted(reference: Histories) -> dict[str, float]:
     """Channel that counts → its largest value; those that hold next to nothing are left out."""
-    units: dict[str, float] = {}
-    sizes: dict[str, tuple[str, float]] = {}
-    for name, (channel, values) in reference.channels.items():
-        units[channel.unit] = max(units.get(channel.unit, 0.0), float(np.abs(values).max()))
-        if asked_for(name):
-            sizes[name] = channel.unit, float(np.linalg.norm(values, axis=1).max())
+    units = largest_by_unit(reference.channels.values())
+    sizes = {
+        name: (channel.unit, float(np.linalg.norm(values, axis=1).max()))
+        for name, (channel, values) in reference.channels.items() if asked_for(name)
+    }  # fmt: skip
     least = {unit: NOTHING * value for unit, value in units.items()}
     least["N m"] = max(least.get("N m", 0.0), FAINT * reference.size * units.get("N", 0.0))
     return {name: size for name, (unit, size) in sizes.items() if size > least[unit]}

@@ -1,6 +1,8 @@
-"""What an accuracy chooses for solid and plane links by trial runs: their meshes, and whether they are reduced."""
+"""What an accuracy chooses for links by trial runs: meshes, segments, simpler models, and whether they are reduced."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -11,12 +13,34 @@ from kedfem.accuracy.histories import histories, worst
 from kedfem.accuracy.mesh_estimate import link_errors, mesh_errors
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.trials import Trials
-from kedfem.accuracy.variants import filleted, refinable, refined, shortened, with_links
-from kedfem.scene import Cad, Extrusion, MeshFile, Part, Scene, time_grid
+from kedfem.accuracy.variants import (
+    families,
+    filleted,
+    of_family,
+    refinable,
+    refined,
+    shortened,
+    with_links,
+)
+from kedfem.dynamics.model import Model, segments
+from kedfem.errors import KedfemError, SceneError
+from kedfem.links.build import most_segments
+from kedfem.links.segments import most_slices
+from kedfem.scene import Cad, Extrusion, LinkScene, MeshFile, Part, Scene, link_frames, time_grid
 
 MESH_ORDER = 2.0  # at which the error of a mesh falls; at edges that point inwards it does worse
 FACTOR, LITTLE = 2.0, 1.2  # by which elements are made smaller in one go: at most, and at least
+FINER = (1.0, 1.5, 2.0, 3.0, 4.0)  # meshes tried of links whose model is open
 FILLETS, FINEST_FILLET = ((0.1, 45.0), (0.05, 22.5)), 15.0  # degrees an element turns, by accuracy
+COUNTS = (
+    3,
+    4,
+    6,
+    8,
+    12,
+    16,
+    24,
+)  # of segments, tried: their error falls alike, as what bends within one is not seen
 LARGE, DEAR = 4_000, 2e7  # unknowns, and their product with steps (5 s), from which links are reduced unasked
 
 
@@ -24,7 +48,7 @@ def open_meshes(scene: Scene) -> list[str]:
     """Names of the elastic solid and plane links whose mesh it leaves open."""
     return [
         name for name, link in scene.links.items()
-        if (elastic(link, "solid") or elastic(link, "plane")) and "mesh" not in link.model_fields_set
+        if elastic(link, "solid", "plane") and "mesh" not in link.model_fields_set
         and not isinstance(link.shape, MeshFile)
     ]  # fmt: skip
 
@@ -50,8 +74,30 @@ def open_modes(scene: Scene) -> list[str]:
     return [
         name
         for name, link in scene.links.items()
-        if (elastic(link, "solid") or elastic(link, "plane")) and not link.model_fields_set & {"reduction"}
+        if elastic(link, "solid", "plane") and not link.model_fields_set & {"reduction"}
     ]
+
+
+def with_mesh(
+    search: Trials, scene: Scene, left_open: Sequence[str], allowed: float
+) -> tuple[Scene, float, float]:
+    """The scene with the coarsest mesh of links whose model is open whose error is allowed, that error, and by what
+    it is finer."""
+    names = [
+        name for name in left_open
+        if "mesh" not in scene.links[name].model_fields_set and refinable(scene.links[name])
+    ]  # fmt: skip
+    if not names:
+        return scene, 0.0, 1.0
+    ladder = [(factor, _finer(scene, names, factor)) for factor in FINER]
+    pairs = zip(ladder, [None, *ladder], strict=False)  # few elements become more by whole numbers only
+    ladder = [now for now, before in pairs if before is None or now[1].links != before[1].links]
+    k, error = first_enough(search, ladder, allowed, "finer meshes")
+    return ladder[k][1], error, ladder[k][0]
+
+
+def _finer(scene: Scene, names: Sequence[str], factor: float) -> Scene:
+    return with_links(scene, {name: refined(scene.links[name], factor) for name in names})
 
 
 def chosen_meshes(search: Trials, scene: Scene, allowed: float, auto: Sequence[str]) -> tuple[Scene, float]:
@@ -71,7 +117,7 @@ def chosen_meshes(search: Trials, scene: Scene, allowed: float, auto: Sequence[s
             break
         factor = min((error / allowed) ** (1 / MESH_ORDER), FACTOR, room)
         worst_links = [name for name in names if eta.get(name, 0.0) >= 0.3 * max(eta.values())]
-        scene = with_links(scene, {name: refined(scene.links[name], factor) for name in worst_links})
+        scene = _finer(scene, worst_links, factor)
     if error > allowed:
         search.notes.append(
             f"meshes of {unknowns:,} unknowns leave an error of {percent(error)}; finer ones are not taken unasked"
@@ -85,12 +131,6 @@ def _mesh_error(ready: Prepared, names: Sequence[str]) -> tuple[float, dict[str,
     base = histories(ready, look=strained.add)
     eta = link_errors(ready.model, strained.indicators)
     return worst(mesh_errors(ready, base, {name: eta[name] for name in names if name in eta})), eta
-
-
-def distinct(meshes: list[tuple[float, Scene]]) -> list[tuple[float, Scene]]:
-    """Without those that are like the one before: few elements become more by whole numbers only."""
-    pairs = zip(meshes, [None, *meshes], strict=False)
-    return [now for now, before in pairs if before is None or now[1].links != before[1].links]
 
 
 def with_modes(search: Trials, scene: Scene, names: Sequence[str]) -> Scene:
@@ -108,3 +148,111 @@ def with_modes(search: Trials, scene: Scene, names: Sequence[str]) -> Scene:
     )
     links = {name: scene.links[name].model_copy(update={"reduction": "modal"}) for name in names}
     return with_links(scene, links)
+
+
+def open_segments(scene: Scene) -> list[str]:
+    """Names of the links whose number of segments the scene leaves open."""
+    return [
+        name for name, link in scene.links.items()
+        if link.model in {"solid", "plane"} and link.segments is None and link_frames(scene, name) == "co-rotational"
+    ]  # fmt: skip
+
+
+def with_segments(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, float]:
+    """The scene with the fewest segments whose error is allowed, the same number in all links that are not stubby, and
+    that error."""
+    most = {name: most_segments(scene, name) for name in open_segments(scene)}
+    ladder = [(count, _segmented(scene, most, count)) for count in COUNTS]
+    k, error = first_enough(search, ladder, allowed, "more segments")
+    return (scene, 0.0) if error == math.inf else (ladder[k][1], error)
+
+
+def first_enough(
+    search: Trials, ladder: Sequence[tuple[float, Scene]], allowed: float, finer: str
+) -> tuple[int, float]:
+    """Which of ever finer scenes, each with how fine it is, is the first whose error is allowed, and that error.
+
+    What two of them differ by shows what is left beyond the finer one; infinite if these two could not be compared.
+    """
+    error = math.inf
+    for k, ((fine, now), (next_fine, better)) in enumerate(pairwise(ladder)):
+        try:
+            change = search.difference(now, better)
+        except KedfemError as fault:
+            search.notes.append(f"{finer} could not be tried: {str(fault).splitlines()[0]}")
+            return k, error
+        beyond = change / ((next_fine / fine) ** MESH_ORDER - 1)
+        if change + beyond <= allowed:
+            return k, change + beyond
+        error = beyond
+        if error <= allowed:
+            return k + 1, error
+    search.notes.append(
+        f"{finer} than those tried would be needed: these still leave an error of {error:.2g}"
+    )
+    return len(ladder) - 1, error
+
+
+def _segmented(scene: Scene, most: Mapping[str, int], count: int) -> Scene:
+    """Links in segments, none in more than do not soften it."""
+    links = {
+        name: scene.links[name].model_copy(update={"segments": min(count, least)})
+        for name, least in most.items()
+    }
+    return with_links(scene, links)
+
+
+def stubby_warning(model: Model) -> tuple[str, ...]:
+    """A warning of links that are cut into slices shorter than they are wide, which soften them."""
+    stubby = []
+    for name, parts in segments(model).items():
+        if len(parts) > 1 and parts[0].meshed:
+            X = [(part.full or part).X for part in parts]
+            e = X[-1].mean(axis=0) - X[0].mean(axis=0)
+            if len(parts) > (most := most_slices(np.concatenate(X), e / np.linalg.norm(e))):
+                stubby.append(f"{name} ({len(parts)} segments: at most {most})")
+    if not stubby:
+        return ()
+    return (
+        f"segments shorter than their link is wide make it too soft: links {', '.join(stubby)}; leave "
+        "links.NAME.segments out, or give fewer",
+    )
+
+
+def with_simpler_links(
+    search: Trials, scene: Scene, left_open: list[str], allowed: float
+) -> tuple[Scene, float]:
+    """The scene with links made rigid, beams or plane as far as that changes little, and by how much it does.
+
+    Allowed is what the mesh left of both shares: a simpler link is compared with the one on that mesh.
+    """
+    reference, error = scene, 0.0
+    for name in left_open:
+        for simpler in _simpler(scene.links[name], search.asked):
+            trial = with_links(scene, {name: simpler})
+            try:
+                change = search.difference(trial, reference)
+            except SceneError:  # such a model makes no sense, as one without any elastic link
+                continue
+            except KedfemError as fault:
+                search.notes.append(f"{name}: not {simpler.model}, {str(fault).splitlines()[0]}")
+                continue
+            verdict = "taken" if change <= allowed else "left out"
+            search.notes.append(f"{name}: as {_noun(simpler)} the results change by {change:.2g}, {verdict}")
+            if change <= allowed:
+                scene, error = trial, change
+                break
+    return scene, error
+
+
+def _simpler(link: LinkScene, asked: float) -> Iterator[LinkScene]:
+    """Simpler models of a link, simplest first."""
+    for family in families(link)[:-1]:
+        other = of_family(link, family, reduced=True)
+        if family == "beam":
+            other = refined(other, math.ceil(4 / math.sqrt(asked)))
+        yield other if family in {"rigid", "beam"} else refined(other, 2.0)
+
+
+def _noun(link: LinkScene) -> str:
+    return {"rigid": "a rigid link", "beam": "a beam", "plane": "a plane link"}.get(link.category, "a solid")

@@ -6,39 +6,40 @@ meshes of hexahedra and quadrilaterals from their indicator, segments of links w
 simpler links by putting them in. What the scene states stays; what it leaves open is chosen.
 """
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import pairwise
-from typing import Any
 
 from kedfem.accuracy.choices import (
+    DEARER,
     beams_only,
     chosen_beams,
     chosen_frames,
     chosen_step,
-    frames_allowed,
     open_beams,
     open_frames,
     open_step,
     with_beams,
 )
-from kedfem.accuracy.error_budget import percent
-from kedfem.accuracy.meshes import chosen_meshes, distinct, open_meshes, open_modes, with_fillets, with_modes
+from kedfem.accuracy.meshes import (
+    chosen_meshes,
+    open_meshes,
+    open_modes,
+    open_segments,
+    with_fillets,
+    with_mesh,
+    with_modes,
+    with_segments,
+    with_simpler_links,
+)
 from kedfem.accuracy.prepared import key
-from kedfem.accuracy.segments import open_segments, with_segments
-from kedfem.accuracy.simpler_models import with_simpler_links
 from kedfem.accuracy.trials import Stage, Trials
 from kedfem.accuracy.variants import (
     families,
     of_family,
-    refinable,
-    refined,
     with_analysis,
     with_links,
 )
-from kedfem.errors import KedfemError
 from kedfem.links.record import Link
 from kedfem.scene import LinkScene, Scene
 from kedfem.store import itself, kept
@@ -46,11 +47,7 @@ from kedfem.store import itself, kept
 STEP, MESH, MODEL, REDUCTION = 0.3, 0.4, 0.2, 0.1  # shares of the error asked for
 SEGMENTS = 0.2  # of the mesh's share, where links with co-rotational frames leave their number open
 VAIN = 0.1  # error of the step beyond which finer meshes would be in vain
-FINER = (1.0, 1.5, 2.0, 3.0, 4.0)  # meshes tried of links whose model is open
 ROUGH = "beam5", 2  # elements of beams where the first step of a motion without a drive is looked for
-MESH_ORDER = (
-    2.0  # at which probes are taken to converge with the mesh: stresses at rounded corners do no better
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,13 +120,7 @@ def anything_open(scene: Scene) -> bool:
 
 
 def planned(scene: Scene, stage: Stage = lambda name: None) -> Plan:
-    """Choose models, mesh sizes, modes, frames and step of a scene with `analysis.accuracy`.
-
-    Raises
-    ------
-    MotionError, MeshError, SceneError, SolveError
-        If the scene cannot be run even as it stands.
-    """
+    """Choose models, mesh sizes, modes, frames and step of a scene with `analysis.accuracy`."""
     asked = scene.analysis.accuracy
     if asked == "quick":
         raise ValueError("the scene asks for no accuracy")
@@ -156,22 +147,17 @@ def _chosen(search: Trials, scene: Scene) -> Plan:
     stage("plan: frames")
     scene, frames = chosen_frames(search, scene)
     if frames:
-        shares.append(Share("frames", frames, frames_allowed(search, scene)))
+        shares.append(Share("frames", frames, DEARER * asked))
     if not (left_open or open_beams(scene) or open_meshes(scene)):
         search.notes.append("the scene states all meshes; the run reports their error")
         if not open_step(scene) and not open_segments(scene):
-            return Plan(
-                with_analysis(scene, accuracy="quick"), asked, 1.0, tuple(shares), tuple(search.notes)
-            )
+            scene = with_analysis(scene, accuracy="quick")
+            return Plan(scene, asked, 1.0, tuple(shares), tuple(search.notes))
     stage("plan: beams")
-    free = (
-        open_step(scene) and not scene.driven_joints
-    )  # beams are compared in a step that a rough model is given
-    analysis = scene.analysis
-    if free and open_beams(scene):
-        rough, _ = chosen_step(
-            Trials(asked, stage), with_beams(scene, open_beams(scene), ROUGH), MESH / 2 * asked
-        )
+    free, analysis = open_step(scene) and not scene.driven_joints, scene.analysis
+    if free and open_beams(scene):  # beams are compared in a step that a rough model is given
+        coarse = with_beams(scene, open_beams(scene), ROUGH)
+        rough, _ = chosen_step(Trials(asked, stage), coarse, MESH / 2 * asked)
         scene = with_analysis(scene, step=rough.analysis.step)
     scene, beams = chosen_beams(search, scene, MESH / 2 * asked)
     scene = scene.model_copy(update={"analysis": analysis}) if free else scene
@@ -180,7 +166,7 @@ def _chosen(search: Trials, scene: Scene) -> Plan:
     stage("plan: mesh")
     cut = SEGMENTS if open_segments(scene) else 0.0  # of the mesh's share
     loose = max(asked, step / STEP)
-    scene, mesh, finer = _with_mesh(search, scene, left_open, (MESH - cut) * loose)
+    scene, mesh, finer = with_mesh(search, scene, left_open, (MESH - cut) * loose)
     scene, meshes = chosen_meshes(search, scene, MESH * (asked if step < VAIN else loose), left_open)
     segments = 0.0
     if cut:
@@ -218,60 +204,18 @@ def _limits(plan: Plan) -> Iterator[str]:
         limit = max(plan.shares, key=lambda share: share.error)
         yield (
             f"the accuracy of {100 * plan.asked:.3g} % could not be reached: {limit.what} limits it, "
-            f"{percent(plan.error)} is expected"
+            f"{100 * plan.error:.2g} % is expected"
         )
 
 
 def _opened(scene: Scene, left_open: list[str]) -> Scene:
     """Links that leave their model open as the best that their shape allows, reduced."""
-    links = {
-        name: _remeshed(
-            scene.links[name], of_family(scene.links[name], families(scene.links[name])[-1], True)
-        )
-        for name in left_open
-    }
-    return with_links(scene, links)
+    named = {name: scene.links[name] for name in left_open}
+    best = {name: _remeshed(link, of_family(link, families(link)[-1], True)) for name, link in named.items()}
+    return with_links(scene, best)
 
 
 def _remeshed(link: LinkScene, other: LinkScene) -> LinkScene:
     """Another model of a link with the mesh that the link states, if it does."""
-    keep: dict[str, Any] = {
-        key: getattr(link, key) for key in ("mesh", "element") if key in link.model_fields_set
-    }
-    return other.model_copy(update=keep)
-
-
-def _with_mesh(
-    search: Trials, scene: Scene, left_open: list[str], allowed: float
-) -> tuple[Scene, float, float]:
-    """The scene with the coarsest mesh of links whose model is open whose error is allowed, that error, and by what
-    it is finer.
-    """
-    open_links = [
-        name
-        for name in left_open
-        if "mesh" not in scene.links[name].model_fields_set and refinable(scene.links[name])
-    ]
-    if not open_links:
-        return scene, 0.0, 1.0
-    meshes = distinct([(factor, _finer(scene, open_links, factor)) for factor in FINER])
-    error = math.inf
-    for (factor, now), (next_factor, finer) in pairwise(meshes):
-        try:
-            change = search.difference(now, finer)
-        except KedfemError as fault:
-            search.notes.append(f"a finer mesh could not be tried: {str(fault).splitlines()[0]}")
-            return now, error, factor
-        beyond = change / ((next_factor / factor) ** MESH_ORDER - 1)
-        error = change + beyond
-        if error <= allowed:
-            return now, error, factor
-        if beyond <= allowed:
-            return finer, beyond, next_factor
-        error = beyond
-    search.notes.append(f"the finest mesh tried still leaves an error of {percent(error)}")
-    return meshes[-1][1], error, meshes[-1][0]
-
-
-def _finer(scene: Scene, names: list[str], factor: float) -> Scene:
-    return with_links(scene, {name: refined(scene.links[name], factor) for name in names})
+    stated = link.model_fields_set & {"mesh", "element"}
+    return other.model_copy(update={key: getattr(link, key) for key in stated})

@@ -1,19 +1,48 @@
-"""A scene with everything that does not need a time step, and the key that what was found for it is kept under."""
+"""A scene with everything that does not need a time step: alone, or sharing what it can with scenes that are alike.
+
+What was found for it is kept under its `key`. Scenes that differ in the speed of their drive and in damping alone have
+links with the same modes.
+"""
 
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from hashlib import sha256
+from typing import Any, TypeVar
+
+import numpy as np
+from jaxtyping import Float, Int
 
 from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_body import drive_range
+from kedfem.dynamics.stepping.state import Rayleigh
+from kedfem.dynamics.system.period.map import Carried
 from kedfem.links.record import Link
 from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import Linkage, linkage
 from kedfem.motion.path import Path, path
-from kedfem.scene import Cad, MeshFile, Part, Scene
+from kedfem.motion.rigid import RigidMotion, rigid_motion
+from kedfem.scene import (
+    Cad,
+    ConstantSpeed,
+    MeshFile,
+    Part,
+    Ramp,
+    Scene,
+    corotational_links,
+    drive_angle,
+    path_parameter,
+    rayleigh,
+    time_grid,
+    turn_steps,
+)
 from kedfem.store import contents
+
+INSTANTS = 16  # where the linkage is examined before the first run
+MOMENTS = 16  # of a run where its residual is taken
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,10 +63,6 @@ def meshed(
     Parameters
     ----------
     known : links that are made already, by name; the others are meshed
-
-    Raises
-    ------
-    MotionError, MeshError, SceneError
     """
     stage("motion")
     joined, along = moving(scene)
@@ -46,12 +71,7 @@ def meshed(
 
 
 def moving(scene: Scene) -> tuple[Linkage, Path]:
-    """The linkage of a scene, and its rigid motion over the drive's range; the speeds at the start are possible.
-
-    Raises
-    ------
-    MotionError
-    """
+    """The linkage of a scene, and its rigid motion over the drive's range; the speeds at the start are possible."""
     joined = linkage(scene)
     initial_twists(scene, joined)
     return joined, path(joined, *drive_range(scene))
@@ -65,3 +85,80 @@ def key(scene: Scene) -> str:
     shapes = (link.shape for link in scene.links.values())
     digest.update(contents(scene.folder / x.file for x in shapes if isinstance(x, Cad | MeshFile | Part)))
     return digest.hexdigest()
+
+
+@dataclass(frozen=True, slots=True)
+class Neighbours:
+    """What a run takes over from runs of scenes that differ little.
+
+    ends : assembled scenes with which reduced links are shared (`accuracy.reduction.prepared`)
+    near : the state with which the steady motion of one of them begins, to look for this one's from there
+    """
+
+    ends: Sequence[Scene] = ()
+    near: Carried | None = None
+
+
+ALONE = Neighbours()
+_LAST: dict[str, Any] = {}
+"""The last reduction that scenes of this process share."""
+
+
+def alike(scene: Scene) -> str | None:
+    """What scenes have in common whose reduced links may be the same; None of one that shares them with none.
+
+    It is all but the damping and the speed of a drive that turns steadily, or comes to. Rigid links with co-rotational
+    frames depend on the step.
+    """
+    if scene.drive is None or not any(link.reduced for link in scene.links.values()):
+        return None
+    if corotational_links(scene) or not isinstance(scene.drive.motion, ConstantSpeed | Ramp):
+        return None
+    motion = scene.drive.motion.model_copy(update={"speed": 1.0})
+    drive = scene.drive.model_copy(update={"motion": motion})
+    return key(scene.model_copy(update={"drive": drive, "damping": None}))
+
+
+def last_of(name: str, made: Callable[[], T]) -> T:
+    """What this process has under a name, the last one alone."""
+    if name not in _LAST:
+        _LAST.clear()
+        _LAST[name] = made()
+    found: T = _LAST[name]
+    return found
+
+
+def as_alike(scene: Scene, model: Model) -> Prepared:
+    """A scene prepared with the model of another that is `alike`."""
+    return Prepared(scene, *moving(scene), damped_as(scene, model))
+
+
+def damped_as(scene: Scene, model: Model) -> Model:
+    """A model with the damping of a scene."""
+    return replace(model, damping=Rayleigh(*rayleigh(scene.damping)))
+
+
+def training_motion(full: Prepared) -> RigidMotion:
+    """Rigid motion at the instants where the linkage is examined: over the whole time, the last turn more closely."""
+    scene, grid = full.scene, time_grid(full.scene)
+    per_turn = turn_steps(scene)
+    half = INSTANTS // 2
+    t = grid.end * (np.arange(half) + 0.5) / half
+    if per_turn is not None:
+        turn = min(per_turn * grid.step, grid.end)
+        t = np.concatenate([t, grid.end - turn * np.arange(INSTANTS - half) / (INSTANTS - half)])
+    t = np.unique(np.concatenate([t, _loaded(full, grid.step * np.arange(grid.steps + 1))]))
+    return rigid_motion(full.linkage, full.path, t, path_parameter(scene, t))
+
+
+def _loaded(full: Prepared, t: Float[np.ndarray, " T"]) -> Float[np.ndarray, " l"]:
+    """The time at which each load is greatest, so that short ones are not missed."""
+    phi = drive_angle(full.scene.motion, t)[0]
+    factors = [np.abs(load.factor(t, phi)) for loads in full.model.loads for load in loads]
+    return np.array([t[f.argmax()] for f in factors if np.ptp(f) > 0.0])
+
+
+def residual_moments(full: Prepared) -> set[int]:
+    """Steps of a run at which its residual is taken, evenly over it."""
+    steps: Int[np.ndarray, " k"] = np.linspace(1, time_grid(full.scene).steps, MOMENTS).astype(int)
+    return set(steps.tolist())

@@ -20,9 +20,16 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
-from kedfem.accuracy.prepared import Prepared, key, meshed
-from kedfem.accuracy.shared_modes import as_alike, damped_as, last_of
-from kedfem.accuracy.training import residual_moments, training_motion
+from kedfem.accuracy.prepared import (
+    Prepared,
+    as_alike,
+    damped_as,
+    key,
+    last_of,
+    meshed,
+    residual_moments,
+    training_motion,
+)
 from kedfem.accuracy.variants import shortened, with_analysis
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.matrices.dense import SMALL
@@ -37,10 +44,7 @@ from kedfem.errors import SceneError
 from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
-from kedfem.scene import (
-    Scene,
-    without_vibration,
-)
+from kedfem.scene import Scene, without_vibration
 from kedfem.store import kept
 
 Stage = Callable[[str], None]
@@ -71,21 +75,15 @@ class Reduction:
 
 
 def prepared(
-    scene: Scene,
-    stage: Stage = lambda name: None,
-    ends: Sequence[Scene] = (),
+    scene: Scene, stage: Stage = lambda name: None, ends: Sequence[Scene] = (),
     known: Mapping[str, Link] | None = None,
-) -> tuple[Prepared, Reduction | None]:
+) -> tuple[Prepared, Reduction | None]:  # fmt: skip
     """Everything of a scene that does not need a time step; links that ask for it are reduced.
 
     Parameters
     ----------
     ends : scenes that share their modes with this one, as `alike` says; none: it has its own
     known : links that are made already, by name: of this scene, or of all that share modes
-
-    Raises
-    ------
-    MotionError, MeshError, SceneError
     """
     chosen = {name: link.modes for name, link in scene.links.items() if link.reduced}
     if not chosen:
@@ -118,9 +116,8 @@ def _packed(reduction: Reduction) -> Stored | None:
 
 def _unpacked(stored: Stored, scene: Scene) -> Reduction:
     joined, along, model, estimate = stored
-    return Reduction(
-        Prepared(scene, joined, along, restored_model(model)), estimate, scene.analysis.reduction_tolerance
-    )
+    ready = Prepared(scene, joined, along, restored_model(model))
+    return Reduction(ready, estimate, scene.analysis.reduction_tolerance)
 
 
 def reduced(
@@ -240,10 +237,8 @@ def _settled(
         if worst(estimate) <= tolerance or set(chosen) <= set(fixed) or k == ROUNDS:
             break
         segments = _closer(full.model, Q, first(CLOSER ** (k + 1)), more)
-        Q = [
-            old if link.name in fixed else new
-            for link, old, new in zip(full.model.links, Q, segments, strict=True)
-        ]
+        both = zip(full.model.links, Q, segments, strict=True)
+        Q = [old if link.name in fixed else new for link, old, new in both]
         unchanged = all(new is tried for new, tried in zip(Q, more, strict=True))
         small, run = (richer, better) if unchanged else _run(full, Q, moments)
     return Q, estimate
@@ -269,9 +264,5 @@ def _enriched(
 ) -> Functions:
     """Functions with the answers to the residual at some moments added."""
     answers = residual_deflections(full.model, parts, small.model, kept)
-    return [
-        None if link is whole else enriched(link, each, ADDED)
-        for whole, link, each in zip(
-            full.model.links, small.model.links, zip(*answers, strict=True), strict=True
-        )
-    ]
+    links = zip(full.model.links, small.model.links, zip(*answers, strict=True), strict=True)
+    return [None if link is whole else enriched(link, each, ADDED) for whole, link, each in links]

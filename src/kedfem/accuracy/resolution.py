@@ -1,5 +1,6 @@
-"""Whether the time step resolves the motion, and whether the drive meets a frequency of the linkage."""
+"""Whether the time step resolves the motion and lets vibration die as links turn; whether the drive meets a frequency."""
 
+import math
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import ClassVar
@@ -15,13 +16,25 @@ from kedfem.dynamics.rigid_body import instants
 from kedfem.dynamics.stepping.scheme import Scheme, generalised_alpha
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import rigid_motion
-from kedfem.scene import path_parameter, time_grid, turn_steps
+from kedfem.scene import (
+    Scene,
+    corotational,
+    drive_angle,
+    enforced_by_equations,
+    path_parameter,
+    rayleigh,
+    time_grid,
+    turn_steps,
+)
 
 POSES = 8  # of the last turn in which the linkage stands still in thought
 LARGE = 100_000  # unknowns of a model whose stiffness is not factored only to look at its frequencies
 FEWEST = 10  # steps in a period: the period is then 3 % too long
 HARMONICS = 5  # of the drive
 NEAR = 0.03  # of a frequency
+MARGIN = (
+    0.8  # of the turn 1 − ρ∞ [rad] in a step, at which unresolved vibration neither grows nor dies (measured)
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,16 +184,9 @@ def resolution_warnings(found: Resolution | None) -> list[str]:
             f"of {1 / (FEWEST * found.first.max()):.2g} s"
         )
     if found is not None and found.meetings:
-        numbers, speeds, angles = (
-            ", ".join(texts)
-            for texts in zip(
-                *(
-                    (f"{x.harmonic}", f"{x.frequency:.4g}", f"{np.degrees(x.angle) % 360:.0f}")
-                    for x in found.meetings
-                ),
-                strict=True,
-            )
-        )
+        numbers = ", ".join(f"{x.harmonic}" for x in found.meetings)
+        speeds = ", ".join(f"{x.frequency:.4g}" for x in found.meetings)
+        angles = ", ".join(f"{np.degrees(x.angle) % 360:.0f}" for x in found.meetings)
         out.append(
             f"the drive's harmonic {numbers} ({speeds} Hz) meets the first frequency of the linkage, "
             f"{found.first.min():.3g} to {found.first.max():.3g} Hz over the turn, near drive angle {angles} deg: "
@@ -191,3 +197,42 @@ def resolution_warnings(found: Resolution | None) -> list[str]:
 
 def _largest(x: Float[np.ndarray, "T k"]) -> float:
     return float(np.sqrt((x**2).sum(axis=1).max(initial=0.0)))
+
+
+def fewest_steps(scene: Scene) -> float:
+    """Steps of an analysis below which it may grow: the drive then turns by more than 1 − ρ∞ in a step."""
+    rho_inf = scene.analysis.rho_inf
+    if rayleigh(scene.damping)[1] == 0.0 and not corotational(scene) and not _moving(scene):
+        return 0.0
+    if rho_inf == 1.0:
+        return math.inf
+    end = time_grid(scene).end
+    t = np.linspace(0.0, end, 2001)
+    turning = [
+        each.motion for name, each in scene.driven_joints.items() if scene.joints[name].kind != "prismatic"
+    ]
+    fastest = max((float(np.abs(drive_angle(law, t)[1]).max()) for law in turning), default=0.0)
+    return fastest * end / (MARGIN * (1 - rho_inf))
+
+
+def _moving(scene: Scene) -> str | None:
+    """A joint enforced by constraint equations, from whose force vibration comes that grows alike (from twice MARGIN on,
+    measured)."""
+    return next((name for name in scene.joints if enforced_by_equations(scene, name)), None)
+
+
+def stability_warning(scene: Scene) -> tuple[str, ...]:
+    """A warning where vibration that the step cannot resolve may grow (docs/theory/errors.md)."""
+    fewest, steps = fewest_steps(scene), time_grid(scene).steps
+    if steps >= fewest:
+        return ()
+    cause = "co-rotational frames" if corotational(scene) else "damping in proportion to the stiffness"
+    if not corotational(scene) and (name := _moving(scene)):
+        cause = f"joint {name} between links that move"
+    what = f"with {cause} vibration that the step cannot resolve grows in links that turn"
+    if fewest == math.inf:
+        return (f"analysis.rho_inf = 1: {what}; take 0.95",)
+    return (
+        f"the step is too long for rho_inf = {scene.analysis.rho_inf:g}: {what} by more than 1 - rho_inf in a step; "
+        f"take {math.ceil(fewest)} steps instead of {steps}, or a smaller rho_inf",
+    )

@@ -6,13 +6,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from kedfem.dynamics.model import Model
-from kedfem.scene import ConstantSpeed, Material, Ramp, Scene
+from kedfem.scene import ConstantSpeed, Ramp, Scene
 from kedfem.scene.records.units import RPM
 
 LENGTHS = 1e-4, 30.0  # m, of a link: watches, booms of cranes
 MASSES = 1e-9, 1e6  # kg, of a link
 MODULI = 1e6, 2e12  # Pa: soft rubber, diamond
 DENSITIES = 10.0, 3e4  # kg/m³: foam, osmium
+DOUBTED = (
+    ("youngs_modulus", "Pa", MODULI, "softer than rubber (1e6)", "stiffer than diamond (1.2e12)",
+     ((1e3, "MPa"), (0.0, "GPa"))),
+    ("density", "kg/m^3", DENSITIES, "lighter than any foam", "heavier than any metal",
+     ((1e-2, "g/cm^3"), (1e-7, "kg/mm^3"), (0.0, "t/mm^3"))),
+)  # fmt: skip
+"""Keys of materials: unit, range, what is beyond its ends, and from which value on another unit was probably meant."""
 GRAVITY = 100.0  # m/s²
 TURNS = 1e6  # rpm: beyond dental drills and turbochargers
 WIDE = 3.0, 2.0  # lengths of a link, and m, that its section may be wide
@@ -73,12 +80,8 @@ def sizes(scene: Scene, model: Model) -> Sizes:
 
 def size_warnings(scene: Scene, found: Sizes) -> tuple[str, ...]:
     """Doubts about sizes that no machine has, each with the unit that was probably meant."""
-    return (
-        *scene.doubts,
-        *_length_doubts(scene, found),
-        *_material_doubts(scene),
-        *_other_doubts(scene, found),
-    )
+    lengths, others = _length_doubts(scene, found), _other_doubts(scene, found)
+    return (*scene.doubts, *lengths, *_material_doubts(scene), *others)
 
 
 def _length_doubts(scene: Scene, found: Sizes) -> Iterator[str]:
@@ -92,10 +95,7 @@ def _length_doubts(scene: Scene, found: Sizes) -> Iterator[str]:
             sizes = " to ".join(f"{x:.4g}" for x in dict.fromkeys((min(names.values()), max(names.values()))))
             yield f"links.{', '.join(names)}: {sizes} m long, {what} than any machine's ({limit:g} m): {unit}"
     if found.lengths and not (long or short):
-        a, b = (
-            min(found.lengths, key=found.lengths.__getitem__),
-            max(found.lengths, key=found.lengths.__getitem__),
-        )
+        a, b = (pick(found.lengths, key=found.lengths.__getitem__) for pick in (min, max))
         if found.lengths[b] > APART * found.lengths[a]:
             sizes = f"{found.lengths[a]:.4g} m long beside links.{b} of {found.lengths[b]:.4g} m"
             yield f"links.{a}: {sizes}: are all lengths in one unit?"
@@ -114,30 +114,13 @@ def _length_doubts(scene: Scene, found: Sizes) -> Iterator[str]:
 def _material_doubts(scene: Scene) -> Iterator[str]:
     used = {link.material for link in scene.links.values()}
     for name, material in scene.materials.items():
-        if name in used:
-            yield from _moduli(f"materials.{name}", material)
-            rho, (low, high) = material.density, DENSITIES
-            if rho < low:
-                unit = "g/cm^3" if rho > 0.01 else "kg/mm^3" if rho > 1e-7 else "t/mm^3"
-                yield (
-                    f"materials.{name}.density: {rho:.4g} kg/m^3 is lighter than any foam: "
-                    f"is it in {unit}? write '{rho:.4g} {unit}'"
-                )
-            elif rho > high:
-                yield f"materials.{name}.density: {rho:.4g} kg/m^3 is heavier than any metal: which unit is it in?"
-
-
-def _moduli(where: str, material: Material) -> Iterator[str]:
-    low, high = MODULI
-    value = material.youngs_modulus
-    if value < low:
-        unit = "GPa" if value < 1000 else "MPa"
-        yield (
-            f"{where}.youngs_modulus: {value:.4g} Pa is softer than rubber (1e6): is it in {unit}? "
-            f"write '{value:.4g} {unit}'"
-        )
-    elif value > high:
-        yield f"{where}.youngs_modulus: {value:.4g} Pa is stiffer than diamond (1.2e12): which unit is it in?"
+        for key, unit, (low, high), below, above, meant in DOUBTED if name in used else ():
+            value, where = getattr(material, key), f"materials.{name}.{key}"
+            if value < low:
+                other = next(each for least, each in meant if value >= least)
+                yield f"{where}: {value:.4g} {unit} is {below}: is it in {other}? write '{value:.4g} {other}'"
+            elif value > high:
+                yield f"{where}: {value:.4g} {unit} is {above}: which unit is it in?"
 
 
 def _other_doubts(scene: Scene, found: Sizes) -> Iterator[str]:

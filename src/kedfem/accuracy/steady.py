@@ -107,14 +107,11 @@ def unstable(steady: Steady | None) -> str:
     """Why a machine does not run as its steady motion says; empty if it does, or nothing is known of that."""
     if steady is None or steady.growth is None or not steady.unstable:
         return ""
+    sure = "; that the steps are short enough for this only extrapolation_levels = 2 shows"
     return (
         f"the steady motion is unstable: a vibration about it grows by {100 * (steady.growth - 1):.3g} % in each period "
         f"of {steady.period:.4g} s{steady.vibration and f', {steady.vibration}'}, until something else limits it"
-        + (
-            ""
-            if len(steady.levels) > 1
-            else "; that the steps are short enough for this only extrapolation_levels = 2 shows"
-        )
+        f"{'' if len(steady.levels) > 1 else sure}"
     )
 
 

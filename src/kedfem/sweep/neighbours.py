@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path as FilePath
 
-from kedfem.accuracy.shared_modes import alike
+from kedfem.accuracy.prepared import alike
 from kedfem.errors import SceneError, Where
 from kedfem.scene import Scene
 from kedfem.scene.questions.timing import scene_speed

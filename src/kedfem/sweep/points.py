@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.accuracy.plan import plan_for
-from kedfem.accuracy.shared_modes import Neighbours
+from kedfem.accuracy.prepared import Neighbours
 from kedfem.accuracy.trials import Stage
 from kedfem.analysis import analyse
 from kedfem.dynamics.system.period.map import Carried

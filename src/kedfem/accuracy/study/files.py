@@ -17,12 +17,8 @@ COLUMNS = (
 MARKERS = "osD^vP*X<>"
 
 
-def study_rows(study: Study) -> list[dict[str, str]]:
-    """One row per variant; numbers have the digits that give back the same float."""
-    return [dict(zip(COLUMNS, _row(row), strict=True)) for row in study.rows]
-
-
-def _row(row: Measured) -> tuple[str, ...]:
+def written(row: Measured) -> tuple[str, ...]:
+    """One variant; numbers have the digits that give back the same float."""
     v, s = row.variant, row.seconds
     tolerance = "" if v.tolerance is None else repr(v.tolerance)
     model = (v.fidelity.name, repr(v.fineness), str(v.steps), tolerance)
@@ -34,35 +30,17 @@ def _row(row: Measured) -> tuple[str, ...]:
 
 
 def write_study(study: Study, path: Path, machine: str) -> None:
-    """Write all variants as comma-separated values, below the machine's name and the reference's own error.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """Write all variants as comma-separated values, below the machine's name and the reference's own error."""
     with text_file(path) as file:
         file.write(f"# measured on: {machine}\n")
         file.write(f"# reference: {study.reference.variant.name}; its own error about {study.floor!r}\n")
-        table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        table.writeheader()
-        table.writerows(study_rows(study))
-
-
-def read_study(path: Path) -> list[dict[str, str]]:
-    """The rows of a written study."""
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(COLUMNS)
+        table.writerows(map(written, study.rows))
 
 
 def write_study_plot(study: Study, path: Path, machine: str) -> None:
-    """Time against error, one marker per fidelity; the front is drawn and its points are named.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be written.
-    """
+    """Time against error, one marker per fidelity; the front is drawn and its points are named."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -71,9 +49,8 @@ def write_study_plot(study: Study, path: Path, machine: str) -> None:
     axes = figure.add_subplot()
     ran = [row for row in study.rows if row.seconds]
     least = _least(study, ran)
-    for marker, name in zip(
-        cycle(MARKERS), dict.fromkeys(row.variant.fidelity.name for row in ran), strict=False
-    ):
+    names = dict.fromkeys(row.variant.fidelity.name for row in ran)
+    for marker, name in zip(cycle(MARKERS), names, strict=False):
         points = [_point(row, least) for row in ran if row.variant.fidelity.name == name]
         axes.plot(*zip(*points, strict=True), marker, label=name, markersize=7, alpha=0.75)
     front = _front(ran, least)
@@ -112,14 +89,7 @@ def _name_points(axes: Any, front: Sequence[tuple[tuple[float, float], Measured]
     """Numbers at the points of the front, their names in a list beside the axes."""
     lines = []
     for number, (point, row) in enumerate(front, start=1):
-        axes.annotate(
-            str(number),
-            point,
-            xytext=(-6, -6),
-            textcoords="offset points",
-            ha="right",
-            va="top",
-            weight="bold",
-        )
+        beside = {"xytext": (-6, -6), "textcoords": "offset points", "ha": "right", "va": "top"}
+        axes.annotate(str(number), point, weight="bold", **beside)
         lines.append(f"{number}  " + row.variant.name.replace(", mesh", ",\n    mesh", 1))
     axes.text(1.02, 0.0, "\n".join(lines), transform=axes.transAxes, va="bottom", fontsize=8)

@@ -78,13 +78,7 @@ def _shaped(scene: Scene) -> list[LinkScene]:
 
 
 def varied(scene: Scene, variant: Variant) -> Scene:
-    """The scene as a variant has it, checked like any other.
-
-    Raises
-    ------
-    SceneError
-        If it cannot be so.
-    """
+    """The scene as a variant has it, checked like any other."""
     fidelity = variant.fidelity
     links = {
         name: of_family(link, "rigid") if name == fidelity.rigid else _modelled(link, variant)

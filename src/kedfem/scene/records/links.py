@@ -215,12 +215,7 @@ class LinkScene(Record):
 
 
 def require_elastic(links: Mapping[str, LinkScene], name: str) -> None:
-    """An elastic link of a scene, named by --link.
-
-    Raises
-    ------
-    SceneError
-    """
+    """An elastic link of a scene, named by --link."""
     if name not in links:
         raise SceneError(f"--link: {one_of(list(links), name)}")
     if links[name].model == "rigid":
