@@ -3,9 +3,9 @@
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from benchmarks.memory import memory_held, most_memory
 from benchmarks.pages import ROOT, apart, script, table, write_page
 from benchmarks.scenes import mechanisms, with_reduced_links
-from kedfem.processes import memory_held, most_memory
 from kedfem.scene import Scene, read_scene, scene_from
 
 EXAMPLES = (

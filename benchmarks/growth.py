@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.memory import most_memory
 from benchmarks.pages import apart, script, seconds, table, write_loglog, write_page
 from kedfem.mesh.memory_forecast import least_bytes
-from kedfem.processes import most_memory
 
 SIZES = ((40, 8, 2), (64, 14, 2), (110, 24, 2), (200, 44, 2))  # a plate, 1 m x 0.22 m x 20 mm
 

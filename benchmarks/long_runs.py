@@ -3,9 +3,9 @@
 import tempfile
 from pathlib import Path
 
+from benchmarks.memory import memory_held, most_memory
 from benchmarks.pages import ROOT, apart, script, table, write_page
 from kedfem.analysis import analyse
-from kedfem.processes import memory_held, most_memory
 from kedfem.scene import read_keys, scene_from
 
 COUNTS = (10_000, 100_000, 1_000_000)

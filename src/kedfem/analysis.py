@@ -9,9 +9,9 @@ from kedfem.accuracy.error_budget import Budget, attributes, budget_warning, kin
 from kedfem.accuracy.estimates import Strained, budget
 from kedfem.accuracy.histories import Histories, steady_state
 from kedfem.accuracy.meshes import stubby_warning
-from kedfem.accuracy.plan import Plan, plan_for
+from kedfem.accuracy.plan import Plan, ready_to_step
 from kedfem.accuracy.prepared import ALONE, Neighbours, Prepared
-from kedfem.accuracy.reduction import Reduction, prepared
+from kedfem.accuracy.reduction import Reduction
 from kedfem.accuracy.resolution import resolution, resolution_warnings, stability_warning
 from kedfem.accuracy.rounding import IDLE, unstressed
 from kedfem.accuracy.singular import SingularPasses
@@ -26,7 +26,7 @@ from kedfem.dynamics.stepping.monolithic import MonolithicSteps
 from kedfem.dynamics.stepping.solvers import Steps, eased_warning
 from kedfem.dynamics.system.period.map import Carried
 from kedfem.dynamics.vibration import Vibration, vibration
-from kedfem.links.recovery import StressRecovery, stress_recovery
+from kedfem.links.recovery import stress_recovery
 from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.motion.counted_turns import require_counted
 from kedfem.output.derived import (
@@ -150,9 +150,8 @@ def _analysed(
     scene, assembly = assembled(scene)
     period = stress_period(scene)
     asked = None if scene.analysis.accuracy == "quick" else scene.analysis.accuracy
-    plan = plan_for(scene, clock.stage)
-    scene = plan.scene if plan else scene
-    ready, reduction = prepared(scene, clock.stage, beside.ends, plan.links if plan else {})
+    plan, ready, reduction = ready_to_step(scene, clock.stage, beside.ends)
+    scene = ready.scene
     plain = sizes(scene, ready.model)
     notices = [*size_warnings(scene, plain), *assembly_warning(assembly), *stubby_warning(ready.model)]
     solvers = clock.timed("factor", lambda: _solvers(ready, beside), factor_words(ready.model))
@@ -195,7 +194,7 @@ def _analysed(
     steady, grows = _growing(ready, solvers)
     notices += [
         *([IDLE] if idle else budget_warning(found, asked)),
-        *_drawn(ready, recoveries, grows, folder),
+        *(write_vibration(scene, ready.model, recoveries, grows, folder) if grows else ()),
         *steady_warning(steady),
     ]
     notes = attributes(found) | step.notes | (balance_notes(balance) if balance else {})
@@ -237,12 +236,6 @@ def _growing(ready: Prepared, solvers: Sequence[Steps]) -> tuple[Steady | None, 
     found = vibration(over, solver, solver.steady)
     steady = steady.reported(found.frequency, found.words, solver.ready.c.h)
     return steady, found if steady.unstable else None
-
-
-def _drawn(
-    ready: Prepared, recoveries: list[StressRecovery], grows: Vibration | None, folder: FilePath
-) -> tuple[str, ...]:
-    return write_vibration(ready.scene, ready.model, recoveries, grows, folder) if grows else ()
 
 
 def _about_steps(ready: Prepared, clock: Clock) -> list[str]:

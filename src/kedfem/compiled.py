@@ -20,8 +20,7 @@ from typing import Any
 import numba
 from numba.core import codegen, event
 
-from kedfem.digests import drop_changed, note
-from kedfem.folders import KERNELS, compiled_folder
+from kedfem.folders import KERNELS, compiled_folder, drop_changed, note
 
 ROOT = Path(__file__).parent
 RECORDS = ("dynamics/system/arrays.py", "dynamics/system/state.py", "dynamics/metric.py")

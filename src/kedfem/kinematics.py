@@ -104,11 +104,8 @@ def rigid_links(scene: Scene) -> dict[str, Link]:
     MeshError
         If a link cannot be meshed.
     """
-    named = {
-        name: link
-        for name, link in scene.links.items()
-        if link.shape is not None and link.material is not None
-    }
+    every = scene.links.items()
+    named = {name: link for name, link in every if link.shape is not None and link.material is not None}
     out, meshes = {}, part_meshes(scene, named)
     for name, link in named.items():
         simple = scene.model_copy(update={"links": {name: coarse(link)}})
@@ -137,10 +134,8 @@ def _stepped(
     """All time points to the results file, frames to the animation."""
     recorded, forces, links = what
     channels = [channel for channel, _ in recorded.every] + [each.channel for each in forces.every]
-    wanted, frames = (
-        set(frame_steps(scene).tolist()),
-        AnimationWriter(folder, STEM, drive_heading(drive_channel(scene))),
-    )
+    drive, wanted = drive_channel(scene), set(frame_steps(scene).tolist())
+    frames = AnimationWriter(folder, STEM, drive_heading(drive))
     seen = sights(scene, linked, links)
     notes: dict[str, str | float] = {"kind": "kinematics", "step [s]": time_grid(scene).step}
     with ResultsWriter(

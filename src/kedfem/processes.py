@@ -178,24 +178,6 @@ def threads() -> int:
     return int(given) if given.isdecimal() and int(given) > 0 else os.cpu_count() or 1
 
 
-def most_memory() -> float:
-    """The most that this process has held so far [bytes]; nan where the system does not report it."""
-    try:
-        import resource
-    except ImportError:
-        return float("nan")
-    return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-
-
-def memory_held() -> float:
-    """What this process holds now [bytes]; where the system does not report it, the most that it has held so far."""
-    try:
-        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
-    except (OSError, ValueError, IndexError):
-        return most_memory()
-    return float(pages * os.sysconf("SC_PAGE_SIZE"))
-
-
 def reserve(file: IO[bytes], size: int) -> None:
     """Take so many bytes of the disk for a file; written where the system cannot reserve them.
 

@@ -17,8 +17,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from kedfem.accuracy.prepared import Prepared
-from kedfem.digests import sealed, unsealed
 from kedfem.errors import OutputError, SceneError
+from kedfem.folders import sealed, unsealed
 from kedfem.memory import Packed, packed
 from kedfem.results import replacing
 from kedfem.results.writer import installed_version
@@ -110,10 +110,8 @@ class Keeper:
     def keep(self, rows: int, memories: Mapping[str, Any]) -> None:
         """Store a state that belongs to so many rows; where it cannot be, the run goes on without."""
         began = perf_counter()
-        header = {"format": FORMAT, "run": self.run, "rows": rows, "all": self.origin}
-        header |= {
-            "origin": {k: v for k, v in self.origin.items() if k != "model" and not k.startswith("planned ")}
-        }
+        own = {k: v for k, v in self.origin.items() if k != "model" and not k.startswith("planned ")}
+        header = {"format": FORMAT, "run": self.run, "rows": rows, "all": self.origin, "origin": own}
         content = packed(header | dict(memories))
         try:
             with replacing(self.folder / STATE) as part:

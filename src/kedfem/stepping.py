@@ -53,11 +53,8 @@ def frame_steps(scene: Scene) -> Int[np.ndarray, " f"]:
     if animation is None:
         return np.zeros(0, int)
     turn = turn_steps(scene) or float(grid.steps)
-    first = (
-        0.0
-        if animation.last_revolutions is None
-        else max(0.0, grid.steps - animation.last_revolutions * turn)
-    )
+    last = animation.last_revolutions
+    first = 0.0 if last is None else max(0.0, grid.steps - last * turn)
     count = int((grid.steps - first) * animation.frames_per_revolution / turn + 1e-9)
     steps = grid.steps - np.arange(count, -1, -1) * turn / animation.frames_per_revolution
     return np.unique(np.clip(np.round(steps), 0, grid.steps).astype(int))

@@ -17,8 +17,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar
 
-from kedfem.digests import sealed, unsealed
-from kedfem.folders import KERNELS, cache_folder, whole
+from kedfem.folders import KERNELS, cache_folder, sealed, unsealed, whole
 from kedfem.processes import private
 
 LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh", "meshio")

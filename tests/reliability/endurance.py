@@ -10,11 +10,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
+from benchmarks.memory import memory_held
 
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.stepping.levels import level_steps, leveled
-from kedfem.processes import memory_held
 from kedfem.results.audit import Account
 from kedfem.scene import GROUND, Scene, scene_from, time_grid
 from tests.joint_checks import bodies, port_motion, sides

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.memory import memory_held, most_memory
 
 from kedfem.errors import KedfemError
-from kedfem.processes import memory_held, most_memory
 from kedfem.scene import scene_from
 from tests.reliability import endurance, fuzz, kills, phases
 from tests.reliability.mutations import damaged, mutated, nudged, places, short

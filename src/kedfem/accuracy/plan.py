@@ -6,7 +6,7 @@ meshes of hexahedra and quadrilaterals from their indicator, segments of links w
 simpler links by putting them in. What the scene states stays; what it leaves open is chosen.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -32,7 +32,8 @@ from kedfem.accuracy.meshes import (
     with_segments,
     with_simpler_links,
 )
-from kedfem.accuracy.prepared import key
+from kedfem.accuracy.prepared import Prepared, key
+from kedfem.accuracy.reduction import Reduction, prepared
 from kedfem.accuracy.trials import Stage, Trials
 from kedfem.accuracy.variants import (
     families,
@@ -111,6 +112,21 @@ def plan_for(scene: Scene, stage: Stage = lambda name: None) -> Plan | None:
             return None
         return Plan(with_analysis(finer, accuracy="quick"), scene.analysis.accuracy, 1.0, (), ())
     return planned(finer, stage)
+
+
+def as_planned(scene: Scene, stage: Stage = lambda name: None) -> Scene:
+    """The scene with what its plan chooses."""
+    plan = plan_for(scene, stage)
+    return plan.scene if plan else scene
+
+
+def ready_to_step(
+    scene: Scene, stage: Stage = lambda name: None, ends: Sequence[Scene] = ()
+) -> tuple[Plan | None, Prepared, Reduction | None]:
+    """A scene as a run takes it: its plan, and all that does not need a time step (`accuracy.reduction.prepared`)."""
+    plan = plan_for(scene, stage)
+    ready, reduction = prepared(plan.scene if plan else scene, stage, ends, plan.links if plan else None)
+    return plan, ready, reduction
 
 
 def anything_open(scene: Scene) -> bool:

@@ -90,8 +90,7 @@ def _version(file: Path) -> tuple[int, int] | None:
 
 def check(scene: ScenePath, quick: Quick = False, within: Within = False) -> None:
     """Show what would be modelled and its cost; solve nothing."""
-    from kedfem.accuracy.plan import plan_for
-    from kedfem.accuracy.reduction import prepared
+    from kedfem.accuracy.plan import ready_to_step
     from kedfem.accuracy.sizes import size_warnings, sizes
     from kedfem.motion.assembly import assembled
     from kedfem.scene import read_scene
@@ -100,8 +99,7 @@ def check(scene: ScenePath, quick: Quick = False, within: Within = False) -> Non
     read = read_scene(scene, within=within)
     loaded, assembly = assembled(with_plain_defaults(read) if quick else read)
     with stages() as stage:
-        plan = plan_for(loaded, stage)
-        ready, reduction = prepared(plan.scene, stage, known=plan.links) if plan else prepared(loaded, stage)
+        plan, ready, reduction = ready_to_step(loaded, stage)
     found = sizes(loaded, ready.model)
     say(size_line(found))
     show([assembly_table(assembly), *check_tables(ready, reduction, plan)], size_warnings(loaded, found))

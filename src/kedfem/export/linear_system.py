@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.accuracy.plan import plan_for
+from kedfem.accuracy.plan import as_planned
 from kedfem.accuracy.prepared import moving
 from kedfem.dynamics.history import Block, LinkHistory
 from kedfem.dynamics.loads import unit_forces
@@ -98,8 +98,7 @@ def state_space(
     """
     _require(scene, modes, at, free)
     scene, assembly = assembled(scene)
-    plan = plan_for(scene, stage)
-    scene = plan.scene if plan else scene
+    scene = as_planned(scene, stage)
     stage("mesh and matrices")
     linkage, along = moving(scene)
     loose, elements = _let_go(scene) if free else (scene, ())

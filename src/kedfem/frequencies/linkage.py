@@ -8,7 +8,7 @@ from pathlib import Path as FilePath
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.accuracy.plan import plan_for
+from kedfem.accuracy.plan import as_planned
 from kedfem.accuracy.prepared import moving
 from kedfem.dynamics.history import Snapshot, bent
 from kedfem.dynamics.modes.frozen import Frozen, Modes, UnstableError, require_drive, tangent_warning
@@ -112,8 +112,7 @@ def frequencies(
         raise SceneError(f"--shapes: must be between 0 and --modes ({wanted.modes}), got {wanted.shapes}")
     require_drive(scene, wanted.free)
     scene, assembly = assembled(scene)
-    plan = plan_for(scene, lambda name: watch(name, 0, 0))
-    scene = plan.scene if plan else scene
+    scene = as_planned(scene, lambda name: watch(name, 0, 0))
     watch("mesh and matrices", 0, 0)
     linkage, along = moving(scene)
     loose = scene.model_copy(update={"drive": None, "drives": {}}) if wanted.free else scene

@@ -8,7 +8,7 @@ from pathlib import Path as FilePath
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.accuracy.plan import plan_for
+from kedfem.accuracy.plan import as_planned
 from kedfem.dynamics.history import bent
 from kedfem.dynamics.modes.frozen import Modes
 from kedfem.dynamics.modes.link_modes import Support, clamped_on, held_at, link_modes, single_link, together
@@ -118,8 +118,7 @@ def link_of_scene(scene: Scene, name: str, joints: Sequence[str] = ()) -> Part:
     require_elastic(scene.links, name)
     for joint in joints:
         _check(scene, name, joint)
-    plan = plan_for(scene, lambda stage: None)
-    scene = plan.scene if plan else scene
+    scene = as_planned(scene)
     link = single_link(scene, name)
     support = together(link, [held_at(scene, joint, link, _turns(scene, joint)) for joint in joints])
     folder = frequencies_folder(scene)
