@@ -1,8 +1,8 @@
 """Where kedfem keeps what it need not find out twice; files that appear only when they are whole; digests.
 
 By digests changed bytes are noticed before anything is made of them. Of content: it is kept behind its digest. Of a
-folder of files that others write and read, so that changed ones go: numba reads what it compiled by unpickling and linking
-it, where a flipped bit would end in a library's error, or worse.
+folder of files that others write and read, so that changed ones go: numba reads what it compiled by unpickling and
+linking it, where a flipped bit would end in a library's error, or worse.
 """
 
 import json
