@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from kedfem.accuracy.error_budget import percent
 from kedfem.accuracy.free_step import free_step
 from kedfem.accuracy.geometric import GeometricError
 from kedfem.accuracy.histories import histories, relative_errors, worst
@@ -91,7 +92,7 @@ def chosen_frames(search: Trials, scene: Scene) -> tuple[Scene, float]:
     geometric = GeometricError(ready.model)
     histories(ready, look=geometric.add)
     error = geometric.worst
-    if error <= (FOLLOWED if beams_only(scene) else DEARER) * search.asked:
+    if error <= frames_allowed(search, scene):
         return scene, error
     corotational = with_analysis(scene, frames="co-rotational")
     try:
@@ -102,9 +103,13 @@ def chosen_frames(search: Trials, scene: Scene) -> tuple[Scene, float]:
         message = str(fault).splitlines()[0]
         search.notes.append(f"co-rotational frames would be needed, but cannot be taken: {message}")
         return scene, error
-    off = f"{100 * min(error, 1.0):.2g} %"
-    search.notes.append(f"rigid-body frames would be off by {off}: frames are co-rotational")
+    search.notes.append(f"rigid-body frames would be off by {percent(error)}: frames are co-rotational")
     return corotational, 0.0
+
+
+def frames_allowed(search: Trials, scene: Scene) -> float:
+    """The error of rigid-body frames beyond which links have co-rotational ones."""
+    return (FOLLOWED if beams_only(scene) else DEARER) * search.asked
 
 
 def _least(scene: Scene) -> float:
@@ -148,7 +153,7 @@ def chosen_beams(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, f
                 continue
             if error <= allowed:
                 return now, error
-    search.notes.append(f"the finest beams tried still leave an error of {error:.2g}")
+    search.notes.append(f"the finest beams tried still leave an error of {percent(error)}")
     return with_beams(scene, names, choices[-1]), error
 
 
@@ -167,7 +172,7 @@ def chosen_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, fl
         if error > allowed:
             more = "; analysis.extrapolation_levels = 2 would make it smaller"
             remedy = "" if scene.analysis.extrapolation_levels else more
-            search.notes.append(f"the scene states its step; its error is about {error:.2g}{remedy}")
+            search.notes.append(f"the scene states its step; its error is about {percent(error)}{remedy}")
         return scene, error
     if not scene.driven_joints or scene.limits:
         return free_step(search, scene, allowed)
@@ -241,6 +246,7 @@ def _stated_error(search: Trials, trial: Scene) -> float:
 def _unresolved(steps: int, error: float, channels: Sequence[str]) -> str:
     names = ", ".join(channels[:3]) + (" and others" if len(channels) > 3 else "")
     return (
-        f"the error of the time step stays at {error:.2g} with {steps} steps in {names}: the motion excites vibration "
-        "beyond them (a start from rest at full speed, a load put on at once?); a smoother start or damping would help"
+        f"the error of the time step stays at {percent(error)} with {steps} steps in {names}: the motion excites "
+        "vibration beyond them (a start from rest at full speed, a load put on at once?); a smoother start or damping "
+        "would help"
     )

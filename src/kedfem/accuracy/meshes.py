@@ -188,7 +188,7 @@ def first_enough(
         if error <= allowed:
             return k + 1, error
     search.notes.append(
-        f"{finer} than those tried would be needed: these still leave an error of {error:.2g}"
+        f"{finer} than those tried would be needed: these still leave an error of {percent(error)}"
     )
     return len(ladder) - 1, error
 
@@ -238,7 +238,8 @@ def with_simpler_links(
                 search.notes.append(f"{name}: not {simpler.model}, {str(fault).splitlines()[0]}")
                 continue
             verdict = "taken" if change <= allowed else "left out"
-            search.notes.append(f"{name}: as {_noun(simpler)} the results change by {change:.2g}, {verdict}")
+            note = f"{name}: as {_noun(simpler)} the results change by {percent(change)}, {verdict}"
+            search.notes.append(note)
             if change <= allowed:
                 scene, error = trial, change
                 break

@@ -11,16 +11,17 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from kedfem.accuracy.choices import (
-    DEARER,
     beams_only,
     chosen_beams,
     chosen_frames,
     chosen_step,
+    frames_allowed,
     open_beams,
     open_frames,
     open_step,
     with_beams,
 )
+from kedfem.accuracy.error_budget import percent
 from kedfem.accuracy.meshes import (
     chosen_meshes,
     open_meshes,
@@ -163,7 +164,7 @@ def _chosen(search: Trials, scene: Scene) -> Plan:
     stage("plan: frames")
     scene, frames = chosen_frames(search, scene)
     if frames:
-        shares.append(Share("frames", frames, DEARER * asked))
+        shares.append(Share("frames", frames, frames_allowed(search, scene)))
     if not (left_open or open_beams(scene) or open_meshes(scene)):
         search.notes.append("the scene states all meshes; the run reports their error")
         if not open_step(scene) and not open_segments(scene):
@@ -220,7 +221,7 @@ def _limits(plan: Plan) -> Iterator[str]:
         limit = max(plan.shares, key=lambda share: share.error)
         yield (
             f"the accuracy of {100 * plan.asked:.3g} % could not be reached: {limit.what} limits it, "
-            f"{100 * plan.error:.2g} % is expected"
+            f"{percent(plan.error)} is expected"
         )
 
 
