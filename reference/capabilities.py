@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 
 from kedfem.scene.checks.capabilities import CONSTRAINED, KINDS, REFUSALS, SHARED, Facts, Refusal, refusals
-from kedfem.scene.questions.moving_joints import SHARED as SHARED_KINDS
+from kedfem.scene.questions.modelling import SHARED as SHARED_KINDS
 
 INTRODUCTION = """\
 # Capabilities

@@ -19,13 +19,10 @@ from kedfem.scene.checks.hints import field_hint, keys, kind_of, models, options
 from kedfem.scene.records import (
     analysis,
     curves,
-    damping,
     drives,
     expressions,
-    faces,
     fatigue,
     force_elements,
-    initial,
     joints,
     links,
     loads,
@@ -109,7 +106,7 @@ SECTIONS: list[tuple[str, str, Sequence[type[BaseModel]]]] = [
         "A face by what it is",
         "One of `plane`, `cylinder`, `sphere`. What is missing or ambiguous is refused with the faces that the link\n"
         "has, each as it would be written here, nearest first.",
-        [faces.ChosenFace],
+        [joints.ChosenFace],
     ),
     (
         "bushing of a joint",
@@ -135,10 +132,10 @@ SECTIONS: list[tuple[str, str, Sequence[type[BaseModel]]]] = [
     ("factor of a load", "", [curves.Factor]),
     ("[bodies.NAME]", "", models(loads.Body)),
     ("[patterns.NAME]", "", [patterns.Pattern]),
-    ("[damping]", "", [damping.Damping]),
+    ("[damping]", "", [materials.Damping]),
     ("[analysis]", "", [analysis.Analysis]),
-    ("[analysis.initial_motions.NAME]", "", [initial.InitialMotion]),
-    ("[analysis.initial_deflection.NAME]", "", [initial.InitialForce]),
+    ("[analysis.initial_motions.NAME]", "", [analysis.InitialMotion]),
+    ("[analysis.initial_deflection.NAME]", "", [analysis.InitialForce]),
     (
         "[fatigue]",
         "See [fatigue.md](fatigue.md).",
@@ -173,14 +170,14 @@ NAMED = {
     drives.DriveSpeed: ("number", "rad/s or m/s"),
     drives.Smoothing: ("number", "rad or m"),
     curves.Span: ("number", "s, rad/s, rad, m/s or m"),
-    damping.Ratios: ("number or 2 × number ≥ 0, < 1", ""),
+    materials.Ratios: ("number or 2 × number ≥ 0, < 1", ""),
     joints.Rates: ("number or 3 × number > 0", "N/m"),
     joints.Dampers: ("number or 3 × number ≥ 0", "N·s/m"),
     joints.TurningRates: ("number or 3 × number > 0", "N·m/rad"),
     joints.TurningDampers: ("number or 3 × number ≥ 0", "N·m·s/rad"),
-    initial.JointSpeed: ("number", "rad/s or m/s"),
-    initial.VelocityVector: ("vector", "m/s"),
-    initial.AngularVelocity: ("vector", "rad/s"),
+    analysis.JointSpeed: ("number", "rad/s or m/s"),
+    analysis.VelocityVector: ("vector", "m/s"),
+    analysis.AngularVelocity: ("vector", "rad/s"),
 }
 
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from kedfem.errors import KedfemError
 from kedfem.scene import scene_from, spatial_beams
-from kedfem.scene.questions.moving_joints import SHARED
+from kedfem.scene.questions.modelling import SHARED
 from tests.laws.test_joint_rows import ROUNDING, assert_the_same, moved
 from tests.moving import channels, ran
 from tests.partners import IN_PLANE, IN_SPACE, PLANAR, SPATIAL, Z, axis_of, chain

@@ -205,7 +205,7 @@ def test_what_is_missing_is_refused_with_what_there_is_of_that_form() -> None:
     [
         ({"near": [0, 0]}, r"joints.A.faces.part: must say what the face is by one of plane, cylinder, sphere, got none"),
         ({"plane": "z", "cylinder": 1}, r"joints.A.faces.part: must say .* got plane and cylinder"),
-        ({"plane": "z", "axis": "z"}, r"joints.A.faces.part.axis: must be combined with cylinder, got it with plane"),
+        ({"plane": "z", "axis": "z"}, r"joints.A.faces.part.axis: must be combined with cylinder, got it alone"),
         ({"cylinder": "-8 mm"}, r"joints.A.faces.part.cylinder: must be positive \[m\], got '-8 mm'"),
         ([{"cylinder": 1, "close": "B"}], r"joints.A.faces.part\[0\].close: unknown key, known: plane, cyl"),
         ({"sphere": 1, "near": "C"}, r"joints.A.faces.part.near: must name a point, got 'C'"),

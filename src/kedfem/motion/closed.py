@@ -33,7 +33,7 @@ from kedfem.scene import (
     moments_of_inertia,
 )
 from kedfem.scene.records.base import Record
-from kedfem.scene.records.faces import FaceName
+from kedfem.scene.records.joints import FaceName
 from kedfem.scene.records.points import XYZ
 
 TILTED = 1e-9  # rad: shapes that are level with the xy plane may be out of it by rounding

@@ -1,7 +1,6 @@
 """The scene: what a user describes, validated completely; SI units, points as coordinates."""
 
 from kedfem.scene.questions.curves import Pieces, pieces
-from kedfem.scene.questions.frames import corotational, corotational_links, link_frames
 from kedfem.scene.questions.laws import (
     curves,
     drive_angle,
@@ -12,14 +11,19 @@ from kedfem.scene.questions.laws import (
     load_factor,
     path_parameter,
 )
-from kedfem.scene.questions.moving_joints import enforced_by_equations, moving_grounds
+from kedfem.scene.questions.modelling import (
+    corotational,
+    corotational_links,
+    enforced_by_equations,
+    link_frames,
+    moving_grounds,
+)
 from kedfem.scene.questions.planes import spatial_beams
 from kedfem.scene.questions.timing import TimeGrid, cycle, time_grid, turn_steps, without_vibration
 from kedfem.scene.read.files import part_geometry
 from kedfem.scene.read.scenes import face_from, link_from, material_from, read_keys, read_scene, scene_from
-from kedfem.scene.records.analysis import Analysis, Animation, Output, Probe
+from kedfem.scene.records.analysis import Analysis, Animation, InitialMotion, Output, Probe
 from kedfem.scene.records.curves import Curve, Factor, ForceCurve, PullCurve, TorqueCurve
-from kedfem.scene.records.damping import Damping, rayleigh
 from kedfem.scene.records.drives import (
     ConstantSpeed,
     Cycloidal,
@@ -31,7 +35,6 @@ from kedfem.scene.records.drives import (
     Ramp,
     Table,
 )
-from kedfem.scene.records.faces import ChosenFace
 from kedfem.scene.records.fatigue import Fatigue, FatigueData, StrainLife
 from kedfem.scene.records.force_elements import (
     AngleLimit,
@@ -43,9 +46,7 @@ from kedfem.scene.records.force_elements import (
     TorsionSpring,
     TravelLimit,
 )
-from kedfem.scene.records.inertia import inertia_tensor, moments_of_inertia
-from kedfem.scene.records.initial import InitialMotion
-from kedfem.scene.records.joints import DIRECTED, ROTARY, Joint
+from kedfem.scene.records.joints import DIRECTED, ROTARY, ChosenFace, Joint
 from kedfem.scene.records.links import GROUND, LinkScene, Meshing, require_elastic
 from kedfem.scene.records.loads import (
     Body,
@@ -58,8 +59,10 @@ from kedfem.scene.records.loads import (
     RigidBody,
     SurfaceLoad,
     TorqueLoad,
+    inertia_tensor,
+    moments_of_inertia,
 )
-from kedfem.scene.records.materials import Material
+from kedfem.scene.records.materials import Damping, Material, rayleigh
 from kedfem.scene.records.outlines import Arc, Hole
 from kedfem.scene.records.scene import Scene
 from kedfem.scene.records.sections import (

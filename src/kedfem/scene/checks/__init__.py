@@ -18,7 +18,7 @@ from kedfem.scene.checks.joints import beam_faults, joint_faults, planar_faults
 from kedfem.scene.checks.links import frame_faults, link_faults
 from kedfem.scene.checks.loads import fatigue_faults, load_faults, spring_faults
 from kedfem.scene.checks.parts import Parts
-from kedfem.scene.checks.references import reference_faults
+from kedfem.scene.checks.values import reference_faults
 
 CHECKS = (
     reference_faults, link_faults, joint_faults, drive_faults, gear_faults, load_faults, planar_faults, beam_faults,

@@ -7,10 +7,9 @@ from collections.abc import Iterator, Mapping
 from kedfem.errors import Fault, Where
 from kedfem.scene.checks.capabilities import BESIDE, CONSTRAINED, MIXED, SHARED, Facts, refusals
 from kedfem.scene.checks.parts import Entry, Parts, category, link_names
-from kedfem.scene.questions.frames import default_frames
-from kedfem.scene.questions.moving_joints import enforced_by_equations
+from kedfem.scene.questions.modelling import default_frames, enforced_by_equations
 from kedfem.scene.questions.planes import rigid_in_space, spatial_beams
-from kedfem.scene.records.damping import rayleigh
+from kedfem.scene.records.materials import rayleigh
 from kedfem.scene.records.scene import Scene
 from kedfem.scene.records.wording import NOUNS, shown
 

@@ -11,7 +11,7 @@ from itertools import combinations as pairs
 from kedfem.errors import Fault
 from kedfem.scene.checks.combinations import frames_of, slider
 from kedfem.scene.checks.parts import Entry, Parts, category, link_names
-from kedfem.scene.questions.moving_joints import moving_grounds
+from kedfem.scene.questions.modelling import moving_grounds
 from kedfem.scene.records.links import GROUND
 from kedfem.scene.records.wording import NOUNS, either, shown
 

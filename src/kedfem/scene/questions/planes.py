@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 from kedfem.errors import Fault, Where
-from kedfem.scene.questions.moving_joints import enforced_by_equations
+from kedfem.scene.questions.modelling import enforced_by_equations
 from kedfem.scene.records.joints import Joint
 from kedfem.scene.records.points import XYZ, Apart
 from kedfem.scene.records.scene import Scene

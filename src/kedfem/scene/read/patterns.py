@@ -16,8 +16,8 @@ from kedfem.errors import Fault, Where
 from kedfem.scene.checks.faults import record_faults
 from kedfem.scene.checks.hints import below, marks, members
 from kedfem.scene.records.base import NameOf
-from kedfem.scene.records.inertia import inertia_tensor, moments_of_inertia
 from kedfem.scene.records.links import spelt_out
+from kedfem.scene.records.loads import inertia_tensor, moments_of_inertia
 from kedfem.scene.records.patterns import SECTIONS, Pattern
 from kedfem.scene.records.points import XYZ
 from kedfem.scene.records.shapes import STEEP, Bar, Polyline

@@ -12,8 +12,7 @@ from jaxtyping import Float
 from pydantic import TypeAdapter, ValidationError
 
 from kedfem.scene.records.base import plain
-from kedfem.scene.records.inertia import inertia_faults, inertia_tensor, moments_of_inertia
-from kedfem.scene.records.loads import RigidBody
+from kedfem.scene.records.loads import RigidBody, inertia_faults, inertia_tensor, moments_of_inertia
 from kedfem.scene.records.points import XYZ, Apart, JointPoint
 
 LIGHT = 1e-4  # of the mass: that of the line, whose own modes are made as stiff as they are heavy (1e-9: forces 10 % off)

@@ -14,8 +14,8 @@ from kedfem.scene.checks import cross_faults
 from kedfem.scene.checks.faults import record_faults
 from kedfem.scene.checks.links import ELEMENTS, meshing_faults
 from kedfem.scene.checks.parts import Entry, scene_parts
-from kedfem.scene.checks.unit_plausibility import bare_numbers
-from kedfem.scene.questions.frames import default_frames
+from kedfem.scene.checks.values import bare_numbers
+from kedfem.scene.questions.modelling import default_frames
 from kedfem.scene.questions.timing import time_grid
 from kedfem.scene.read.files import file_faults, inside, outside, toml_table
 from kedfem.scene.read.including import KEY, toml_text, with_includes
@@ -25,7 +25,7 @@ from kedfem.scene.read.placing import Placement
 from kedfem.scene.read.rigid_links import with_rigid_bodies
 from kedfem.scene.read.tables import with_tables
 from kedfem.scene.records.base import Record, plain
-from kedfem.scene.records.faces import ChosenFace
+from kedfem.scene.records.joints import ChosenFace
 from kedfem.scene.records.links import LinkScene, spelt_out
 from kedfem.scene.records.materials import BUILT_IN, Material
 from kedfem.scene.records.points import UNPLACED, XYZ, known_points

@@ -12,7 +12,7 @@ from pydantic_core import PydanticCustomError
 from kedfem.errors import Fault
 from kedfem.scene.records.base import FileName, JointName, Record, refuse
 from kedfem.scene.records.curves import curve_faults
-from kedfem.scene.records.damping import Frequency
+from kedfem.scene.records.materials import Frequency
 from kedfem.scene.records.units import (
     Angle,
     Duration,

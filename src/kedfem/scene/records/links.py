@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
 from kedfem.errors import Fault, SceneError
 from kedfem.scene.records.base import FileName, MaterialName, Record, refuse
-from kedfem.scene.records.inertia import Inertia, inertia_faults
+from kedfem.scene.records.loads import Inertia, inertia_faults
 from kedfem.scene.records.points import Point
 from kedfem.scene.records.shapes import MESH_ENDINGS, Bar, Cad, MeshFile, Polyline, Shape
 from kedfem.scene.records.units import Mass, PositiveLength, Quantity, fault

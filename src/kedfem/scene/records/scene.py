@@ -10,7 +10,6 @@ from pydantic import Field, PrivateAttr
 
 from kedfem.scene.records.analysis import Analysis, Output
 from kedfem.scene.records.base import FileName, Line, Name, Record
-from kedfem.scene.records.damping import Damping
 from kedfem.scene.records.drives import Drive, Gear, MotionLaw
 from kedfem.scene.records.expressions import Parameter, ParameterName
 from kedfem.scene.records.fatigue import Fatigue
@@ -18,7 +17,7 @@ from kedfem.scene.records.force_elements import Limit, Motor, Spring
 from kedfem.scene.records.joints import Joint
 from kedfem.scene.records.links import LinkScene
 from kedfem.scene.records.loads import Body, Load
-from kedfem.scene.records.materials import Material
+from kedfem.scene.records.materials import Damping, Material
 from kedfem.scene.records.patterns import Pattern
 from kedfem.scene.records.points import AccelerationVector, Point
 

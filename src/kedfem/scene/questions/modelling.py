@@ -1,4 +1,4 @@
-"""Joints whose directions vary in time, as they slide or turn between links that move."""
+"""How links and joints are modelled: frames of links, joints enforced by equations, moving parts of the ground."""
 
 from __future__ import annotations
 
@@ -6,8 +6,29 @@ from collections.abc import Iterator
 
 from kedfem.scene.records.drives import Drive
 from kedfem.scene.records.joints import Joint
-from kedfem.scene.records.links import GROUND
+from kedfem.scene.records.links import GROUND, Frames
 from kedfem.scene.records.scene import Scene
+
+
+def link_frames(scene: Scene, name: str) -> Frames:
+    """The frames of one link: its own choice, else that of the analysis."""
+    return scene.links[name].frames or scene.analysis.frames or default_frames(bool(scene.driven_joints))
+
+
+def default_frames(driven: bool) -> Frames:
+    """Frames where none are asked for: rigid-body ones with a drive; without one nothing prescribes them."""
+    return "rigid-body" if driven else "co-rotational"
+
+
+def corotational_links(scene: Scene) -> frozenset[str]:
+    """Names of the links with co-rotational frames."""
+    return frozenset(name for name in scene.links if link_frames(scene, name) == "co-rotational")
+
+
+def corotational(scene: Scene) -> bool:
+    """Whether any link has co-rotational frames: the equation is then not linear."""
+    return bool(corotational_links(scene))
+
 
 SHARED = ("revolute", "spherical", "weld")  # kinds that hold points together, wherever these go
 
