@@ -42,13 +42,7 @@ class KedfemError(Exception):
 
 
 class SceneError(KedfemError):
-    """The scene cannot be accepted.
-
-    Parameters
-    ----------
-    faults
-        All that is wrong; a text is a fault of no key.
-    """
+    """The scene cannot be accepted: its faults are all that is wrong; a text is a fault of no key."""
 
     def __init__(self, faults: Iterable[Fault | str] | str) -> None:
         given = [faults] if isinstance(faults, str) else faults

@@ -82,9 +82,7 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
              ) -> tuple[Envelope, Seen, StepEstimate]:  # fmt: skip
     """All time steps: rows to the results file, frames to the animation; also what the steps show of errors.
 
-    Parameters
-    ----------
-    keeper : of states on the disk, if the run can be resumed; it may have one to go on from
+    A keeper stores states on the disk, and may have one to go on from.
     """
     scene, model, steps = ready.scene, ready.model, time_grid(ready.scene).steps
     shown = _Frames.of(ready, watched.recoveries, folder)

@@ -197,13 +197,9 @@ def _count(link: Link, basis: Basis, tolerance: float) -> int:
 def first_reduced(
     full: Prepared, tolerance: float, known: Sequence[Float[np.ndarray, "_ _"] | None] | None = None
 ) -> Prepared:
-    """All large links of a prepared scene reduced about as far as a tolerance allows; the error is not examined.
+    """All large links of a prepared scene reduced about as far as a tolerance allows, on known modes where there are any.
 
-    None is where the drive leaves motions free.
-
-    Parameters
-    ----------
-    known : modes of links that need not be found any more, link by link
+    None is where the drive leaves motions free; the error is not examined.
     """
     links = full.model.links
     if full.linkage.mobility or all(link.unknowns <= SMALL and link.full is None for link in links):

@@ -13,12 +13,7 @@ PATIENCE = 10  # s, in which a scheduler must answer
 
 
 class OnCluster(Executor):
-    """A scheduler's workers, each with one thread, as an executor that a sweep can take.
-
-    Parameters
-    ----------
-    client : of `distributed`, which is closed at the end
-    """
+    """The workers of a `distributed` client, each with one thread, as an executor that a sweep can take."""
 
     def __init__(self, client: Any) -> None:
         self._client, self._executor = client, client.get_executor(pure=False)
@@ -36,13 +31,7 @@ class OnCluster(Executor):
 
 
 def cluster(address: str, folder: FilePath) -> OnCluster:
-    """The workers of a scheduler.
-
-    Parameters
-    ----------
-    address : ``tcp://host:8786``
-    folder : of the scene, whose files the workers read themselves
-
+    """The workers of a scheduler, as ``tcp://host:8786``, that see the files in a scene's folder.
     Raises
     ------
     OutputError

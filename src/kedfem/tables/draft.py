@@ -43,12 +43,7 @@ step = "1 ms"     # with a drive leave it out: kedfem chooses the step, meshes a
 
 
 def draft_scene(assembly: Path, folder: Path, scale: float | None) -> str:
-    """The text of a scene for a CAD file, to be written into a folder.
-
-    Parameters
-    ----------
-    scale : metres per unit of the file; None: the file's own unit
-
+    """The text of a scene for a CAD file in metres per unit, or its own unit, to be written into a folder.
     Raises
     ------
     MeshError

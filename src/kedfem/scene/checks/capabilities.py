@@ -199,10 +199,5 @@ REFUSALS = (
 
 
 def refusals(of: str, facts: Facts) -> Iterator[Refusal]:
-    """All lines of the table that a part of a scene meets.
-
-    Parameters
-    ----------
-    of : its section
-    """
+    """All lines of the table that a part of a section of the scene meets."""
     return (each for each in REFUSALS if each.of == of and each.meets(facts))

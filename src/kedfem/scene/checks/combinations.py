@@ -72,13 +72,7 @@ def joints(parts: Parts) -> Iterator[Told]:
 
 
 def partners(good: Scene, held: list[Entry], spatial: frozenset[str]) -> str:
-    """What a joint joins, as far as the table asks for it.
-
-    Parameters
-    ----------
-    good : the scene of records without a fault
-    spatial : names of the beams in space
-    """
+    """What a joint joins, as far as the table asks for it, of records without a fault; some beams are in space."""
     if not any(category(link) == "plane" for link in held):
         return ""
     if any(category(link) == "solid" or link.name in spatial for link in held):

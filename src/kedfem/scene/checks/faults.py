@@ -35,15 +35,7 @@ WANTED = {
 
 
 def record_faults(error: ValidationError, hint: Any, raw: Any, prefix: Where = ()) -> list[Fault]:
-    """The faults that pydantic found in raw input for a record.
-
-    Parameters
-    ----------
-    error : what pydantic raised
-    hint : the record, or another type, that was validated
-    raw : what it was validated from
-    prefix : where it stands in the scene
-    """
+    """The faults that pydantic found in raw input for a record or another type, which stands at a place in the scene."""
     found = (described(detail, hint, raw).under(*prefix) for detail in error.errors(include_url=False))
     return list(dict.fromkeys(found))  # missing values of one list are one fault
 

@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping
 from kedfem.errors import Fault
 from kedfem.scene.checks.parts import Entry, Parts, category, link_names
 from kedfem.scene.questions.planes import (
-    FLAT,
     Placed,
     leaving,
     obstacles,
@@ -16,13 +15,13 @@ from kedfem.scene.questions.planes import (
     on_links,
     spatial_beams,
     spring_ends,
-    vector,
+    tilted,
+    turned_up,
     welded,
 )
 from kedfem.scene.records.joints import DIRECTED, SQUARE
 from kedfem.scene.records.links import GROUND
 from kedfem.scene.records.scene import Scene
-from kedfem.scene.records.shapes import Bar
 from kedfem.scene.records.wording import NOUNS, unknown_name
 
 
@@ -101,19 +100,11 @@ def planar_faults(parts: Parts) -> Iterator[Fault]:
 def _leaving_plane(scene: Scene, here: str) -> Iterator[Fault]:
     """Axes, gravity, loads and points that are not in the plane of plane links."""
     for name, joint in scene.joints.items():
-        axis, where = joint.axis, ("joints", name, "axis")
-        if axis is None:
-            continue
-        if joint.kind == "revolute" and max(abs(axis[0]), abs(axis[1])) > FLAT:
-            yield Fault(where, f"must be along z in {here}, got {vector(axis)}")
-        if joint.kind in {"prismatic", "slot"} and abs(axis[2]) > FLAT:
-            yield Fault(where, f"must lie in the xy plane in {here}, got {vector(axis)}")
+        yield from tilted(("joints", name), joint, f"in {here}", {"revolute"})
     yield from leaving(scene, f"in {here}")
     for name, link in scene.links.items():
-        shape = link.shape
-        if link.category == "plane" and isinstance(shape, Bar) and math.hypot(*shape.upward[:2]) > FLAT:
-            up = "links", name, "shape", "up"
-            yield Fault(up, f"must be along z in {here}, got {vector(shape.upward)}")
+        if link.category == "plane":
+            yield from turned_up(name, link.shape, f"in {here}")
     yield from off_plane(_beside_plane(scene), f"the other points of {here}")
 
 

@@ -42,13 +42,7 @@ FAST = (
 
 
 def bare_numbers(raw: Any, hint: Any) -> Iterator[str]:
-    """Doubts about numbers without a unit in raw input that was found good; lists of numbers are not examined.
-
-    Parameters
-    ----------
-    raw : the input
-    hint : its type, a record
-    """
+    """Doubts about numbers without a unit in raw input of a type that was found good, but for lists of numbers."""
     for where, value, inner in walk(raw, hint):
         if isinstance(value, (int, float)) and abs(value) < 1e300 and isinstance(where[-1], str):
             yield from doubts(

@@ -59,11 +59,6 @@ def path_parameter(scene: Scene, t: Times) -> Law:
     """Place on the linkage's path and its derivatives: the drive's angle or travel; of several drives the time.
 
     In a static analysis the mechanism stands still in each place: the derivatives are zero.
-
-    Parameters
-    ----------
-    t : (t,) [s]
-
     Raises
     ------
     MotionError

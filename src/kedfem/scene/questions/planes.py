@@ -6,7 +6,7 @@ What moves one out of it is reported as faults, each with its place, as a beam m
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from typing import Any
 
 from kedfem.errors import Fault, Where
@@ -66,7 +66,11 @@ def obstacles(scene: Scene, name: str) -> Iterator[Fault]:
 def _common_obstacles(scene: Scene, whose: str) -> Iterator[Fault]:
     """What moves any beam of the scene out of the plane: axes of joints, gravity, loads."""
     for name, joint in scene.joints.items():
-        yield from _joint_obstacles(("joints", name), joint, whose)
+        where: Where = ("joints", name)
+        yield from tilted(where, joint, whose, {"revolute", "cylindrical", "screw", "planar"})
+        if joint.kind == "universal":
+            got = "got a universal joint"
+            yield Fault((*where, "kind"), f"must be one that turns about z only {whose}, {got}")
     yield from leaving(scene, whose)
 
 
@@ -78,8 +82,7 @@ def _own_obstacles(scene: Scene, name: str, around: Iterable[Placed]) -> Iterato
         for key in ("smooth", "up"):
             if getattr(shape, key):
                 yield Fault((*place, key), "must be left out for a planar beam, got one")
-    if isinstance(shape, Bar) and math.hypot(*shape.upward[:2]) > FLAT:
-        yield Fault((*place, "up"), f"must be along z {whose}, got {vector(shape.upward)}")
+    yield from turned_up(name, shape, whose)
     for where, record in around:
         others = [x for x in getattr(record, "links", ()) if x in scene.links and x != name]
         if getattr(record, "kind", None) == "weld" and others:
@@ -108,16 +111,20 @@ def leaving(scene: Scene, whose: str) -> Iterator[Fault]:
             yield Fault(("loads", name, "vector"), f"must lie in the xy plane {whose}, got {vector(given)}")
 
 
-def _joint_obstacles(where: Where, joint: Joint, whose: str) -> Iterator[Fault]:
-    """A joint that turns or moves something out of the plane."""
+def tilted(where: Where, joint: Joint, whose: str, upright: Collection[str]) -> Iterator[Fault]:
+    """A joint of a kind that must be upright and is not, or one that slides out of the plane."""
     axis, kind = joint.axis, joint.kind
-    upright = kind in {"revolute", "cylindrical", "screw", "planar"}
-    if upright and axis is not None and math.hypot(*axis[:2]) > FLAT:
+    if kind in upright and axis is not None and math.hypot(*axis[:2]) > FLAT:
         yield Fault((*where, "axis"), f"must be along z {whose}, got {vector(axis)}")
     if kind in {"prismatic", "slot"} and axis is not None and abs(axis[2]) > FLAT:
         yield Fault((*where, "axis"), f"must lie in the xy plane {whose}, got {vector(axis)}")
-    if kind == "universal":
-        yield Fault((*where, "kind"), f"must be one that turns about z only {whose}, got a universal joint")
+
+
+def turned_up(name: str, shape: Any, whose: str) -> Iterator[Fault]:
+    """A bar whose thickness is not along z."""
+    if isinstance(shape, Bar) and math.hypot(*shape.upward[:2]) > FLAT:
+        where = "links", name, "shape", "up"
+        yield Fault(where, f"must be along z {whose}, got {vector(shape.upward)}")
 
 
 def vector(parts: tuple[float, ...]) -> str:

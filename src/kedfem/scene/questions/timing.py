@@ -18,13 +18,7 @@ POSITIONS = 72  # in a revolution where the mechanism does not vibrate
 
 @dataclass(frozen=True, slots=True)
 class TimeGrid:
-    """Equal time steps from t = 0.
-
-    Parameters
-    ----------
-    step : time step [s]
-    steps : number of steps; the analysis has one time point more.
-    """
+    """Equal time steps [s] from t = 0, and their number; the analysis has one time point more."""
 
     step: float
     steps: int

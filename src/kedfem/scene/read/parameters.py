@@ -83,13 +83,7 @@ WANTED = "a number, a text of a number and a unit, or an expression"
 
 
 def with_expressions(raw: Mapping[str, Any], hint: Any) -> tuple[dict[str, Any], list[Fault]]:
-    """A raw scene with its expressions worked out, and faults.
-
-    Parameters
-    ----------
-    raw : the keys and values of a scene
-    hint : its type: texts that are no numbers are left alone
-
+    """A raw scene with its expressions worked out by the types of its keys, and faults.
     Returns
     -------
     A changed copy: plain numbers where an expression has no unit, else texts that carry their quantity; what has a fault

@@ -132,12 +132,7 @@ def _triple(hint: Any) -> str | None:
 
 
 def with_patterns(raw: Mapping[str, Any], hint: Any) -> tuple[Tables, list[Fault], dict[Where, Where]]:
-    """A raw scene with its patterns written out.
-
-    Parameters
-    ----------
-    hint : type of the scene
-
+    """A raw scene of a type with its patterns written out.
     Returns
     -------
     a changed copy without patterns; faults; and where each table that was made stands in a pattern, by its own place

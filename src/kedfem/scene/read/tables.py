@@ -16,12 +16,7 @@ from kedfem.scene.records.units import si_number
 
 
 def two_columns(path: Path, names: tuple[str, str], si: tuple[str, str]) -> tuple[list[float], list[float]]:
-    """Two columns of a CSV file, in SI units, under an optional heading with units.
-
-    Parameters
-    ----------
-    names, si : what the columns are, and their SI units
-    """
+    """Two columns of a CSV file, by what they are, in SI units, under an optional heading with units."""
     rows = [(i, row.split(",")) for i, row in enumerate(file_text(path).splitlines(), start=1) if row.strip()]
     factors = (1.0, 1.0)
     if rows and not _numbers(rows[0][1]):
@@ -72,12 +67,7 @@ def _heading_factors(
 
 
 def with_tables(raw: Mapping[str, Any], folder: Path, hint: Any) -> tuple[dict[str, Any], list[Fault]]:
-    """A raw scene with its motion tables and curves read from the files that they name; and faults.
-
-    Parameters
-    ----------
-    hint : type of the scene
-    """
+    """A raw scene of a type with its motion tables and curves read from the files that they name; and faults."""
     faults: list[Fault] = []
 
     def of(where: Where, value: Any, kind: Any) -> Any:
