@@ -11,13 +11,7 @@ from kedfem.accuracy.histories import histories, relative_errors, worst
 from kedfem.accuracy.resolution import fewest_steps
 from kedfem.accuracy.step_estimate import IN_STEP, LEAST_ORDER, StepEstimate, cheapest, single_level
 from kedfem.accuracy.trials import Trials
-from kedfem.accuracy.variants import (
-    TRIAL_STEPS,
-    shortened,
-    with_analysis,
-    with_links,
-    with_steps,
-)
+from kedfem.accuracy.variants import TRIAL_STEPS, shortened, with_analysis, with_links, with_steps
 from kedfem.dynamics.stepping.levels import most_levels
 from kedfem.errors import KedfemError
 from kedfem.scene import LinkScene, Scene, scene_from, time_grid, turn_steps, without_vibration

@@ -13,15 +13,7 @@ from kedfem.accuracy.histories import histories, worst
 from kedfem.accuracy.mesh_estimate import link_errors, mesh_errors
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.trials import Trials
-from kedfem.accuracy.variants import (
-    families,
-    filleted,
-    of_family,
-    refinable,
-    refined,
-    shortened,
-    with_links,
-)
+from kedfem.accuracy.variants import families, filleted, of_family, refinable, refined, shortened, with_links
 from kedfem.dynamics.model import Model, segments
 from kedfem.errors import KedfemError, SceneError
 from kedfem.links.build import most_segments

@@ -36,12 +36,7 @@ from kedfem.accuracy.meshes import (
 from kedfem.accuracy.prepared import Prepared, key
 from kedfem.accuracy.reduction import Reduction, prepared
 from kedfem.accuracy.trials import Stage, Trials
-from kedfem.accuracy.variants import (
-    families,
-    of_family,
-    with_analysis,
-    with_links,
-)
+from kedfem.accuracy.variants import families, of_family, with_analysis, with_links
 from kedfem.links.record import Link
 from kedfem.scene import LinkScene, Scene
 from kedfem.store import itself, kept

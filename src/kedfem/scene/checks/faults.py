@@ -8,15 +8,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from kedfem.errors import Fault, Where
-from kedfem.scene.checks.hints import (
-    kind_of,
-    known_keys,
-    length_of,
-    marks,
-    models,
-    options,
-    walked,
-)
+from kedfem.scene.checks.hints import kind_of, known_keys, length_of, marks, models, options, walked
 from kedfem.scene.records.units import Quantity
 from kedfem.scene.records.wording import either, one_of, shown, unknown_key
 
