@@ -1,6 +1,6 @@
 """Speed against error: a scene in many variants, measured and compared with its own finest one."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from statistics import median
 from time import perf_counter
@@ -11,7 +11,6 @@ from kedfem.accuracy.reduction import reduced
 from kedfem.accuracy.study.variants import (
     FINENESS,
     STEPS,
-    Fidelity,
     Variant,
     coarser,
     exponent,
@@ -140,11 +139,11 @@ class _Bench:
     def _measured(self, variant: Variant) -> Measured:
         scene = varied(self.scene, variant)
         times: list[tuple[float, float]] = []
-        while not times or (
-            len(times) < self.repeats and sum(times[0]) < SHORT * self.most and self.left > 0
-        ):
+        again = True
+        while again:
             *spent, unknowns = self._once(scene, variant)
             times.append((spent[0], spent[1]))
+            again = len(times) < self.repeats and sum(times[0]) < SHORT * self.most and self.left > 0
         preparation, stepping = zip(*times, strict=True)
         seconds = Seconds(median(preparation), median(stepping), median(map(sum, times)), len(times))
         return Measured(variant, time_grid(scene).steps, int(unknowns), seconds)
@@ -202,9 +201,11 @@ def studied(
     first = first_variants(scene)
     if not first:
         raise SceneError("links: must hold an elastic link with a shape, got rigid ones only")
-    _warm_up(bench, first[0])
+    bench.run(first[0])  # libraries are loaded and the inner loop compiled before the clock runs
+    bench.rows.clear()
     for variant in first:
-        if variant.fidelity.reduced or _reduced(variant) not in [each.fidelity for each in first]:
+        reduced_one = replace(variant.fidelity, reduced=True)
+        if variant.fidelity.reduced or reduced_one not in [each.fidelity for each in first]:
             bench.run(variant)
     reference = _reference(bench, quick)
     further = [*first, *([] if quick else further_variants(scene, reference))]
@@ -218,24 +219,10 @@ def studied(
     return _compared(bench, reference)
 
 
-def _reduced(variant: Variant) -> Fidelity:
-    return replace(variant.fidelity, reduced=True)
-
-
-def _warm_up(bench: _Bench, variant: Variant) -> None:
-    """Load libraries and compile the inner loop before the clock runs."""
-    bench.run(variant)
-    bench.rows.clear()
-
-
 def _unbuildable(bench: _Bench, variant: Variant) -> bool:
     """Whether the same fidelity failed already: one row says why."""
-    return any(
-        row.variant.fidelity == variant.fidelity
-        and row.seconds is None
-        and not row.note.startswith("left out")
-        for row in bench.rows.values()
-    )
+    failed = [row for row in bench.rows.values() if not row.seconds and not row.note.startswith("left out")]
+    return any(row.variant.fidelity == variant.fidelity for row in failed)
 
 
 def _reference(bench: _Bench, quick: bool) -> Variant:
@@ -287,12 +274,9 @@ def pareto_front(points: Sequence[tuple[float, float]]) -> set[int]:
     >>> sorted(pareto_front([(1.0, 0.1), (2.0, 0.2), (3.0, 0.05), (3.0, 0.05)]))
     [0, 2]
     """
-    return set(_undominated(points))
-
-
-def _undominated(points: Sequence[tuple[float, float]]) -> Iterator[int]:
-    least = float("inf")
+    front, least = set[int](), float("inf")
     for k in sorted(range(len(points)), key=lambda k: points[k]):
         if points[k][1] < least:
             least = points[k][1]
-            yield k
+            front.add(k)
+    return front

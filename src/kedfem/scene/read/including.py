@@ -38,37 +38,28 @@ def with_includes(
     file : the scene's own
     allowed : whether a file may be read
     """
-    return _Including(folder, allowed).of(raw, Path(), () if file is None else (file.resolve(),))
+    read = 0
 
-
-class _Including:
-    """One scene's included files, counted."""
-
-    def __init__(self, folder: Path, allowed: Callable[[Path], bool]) -> None:
-        self.folder, self.allowed, self.read = folder, allowed, 0
-
-    def of(self, raw: Mapping[str, Any], beside: Path, within: tuple[Path, ...]) -> dict[str, Any]:
+    def of(raw: Mapping[str, Any], beside: Path, within: tuple[Path, ...]) -> dict[str, Any]:
         """A table of keys, in a file of a folder `beside` the scene's, with all that it includes."""
-        own = {key: value for key, value in raw.items() if key != KEY}
+        nonlocal read
         base: dict[str, Any] = {}
         for name in named_files(raw.get(KEY)):
-            path = self.folder / beside / name
-            self._refuse(path, name, within)
+            path = folder / beside / name
+            read += 1
+            if not allowed(path):
+                raise SceneError(f"{KEY}: must be within the scene's folder (--within), got {name!r}")
+            if path.resolve() in within:
+                circle = " → ".join(each.name for each in (*within, path.resolve()))
+                raise SceneError(f"{KEY}: must not include itself, got {circle}")
+            if read > MOST_FILES:
+                raise SceneError(f"{KEY}: must read at most {MOST_FILES} files, got more")
             found, _ = toml_table(path)
-            inner = (beside / name).parent
-            tables = self.of(found, inner, (*within, path.resolve()))
+            tables = of(found, (beside / name).parent, (*within, path.resolve()))
             base = joined(base, renamed(tables, Path(name).parent))
-        return joined(base, own)
+        return joined(base, {key: value for key, value in raw.items() if key != KEY})
 
-    def _refuse(self, path: Path, name: str, within: tuple[Path, ...]) -> None:
-        self.read += 1
-        if not self.allowed(path):
-            raise SceneError(f"{KEY}: must be within the scene's folder (--within), got {name!r}")
-        if path.resolve() in within:
-            circle = " → ".join(each.name for each in (*within, path.resolve()))
-            raise SceneError(f"{KEY}: must not include itself, got {circle}")
-        if self.read > MOST_FILES:
-            raise SceneError(f"{KEY}: must read at most {MOST_FILES} files, got more")
+    return of(raw, Path(), () if file is None else (file.resolve(),))
 
 
 def named_files(given: object) -> list[str]:
