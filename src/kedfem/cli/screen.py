@@ -24,14 +24,14 @@ def show(tables: Iterable[Any], warnings: Iterable[str] = ()) -> None:
 
 def say(*words: object) -> None:
     """One line, however long: mostly a file and what it is."""
-    out.print("  ".join(map(str, words)), markup=False, soft_wrap=True)
+    out.print("  ".join(str(each) for each in words if each), markup=False, soft_wrap=True)
 
 
 def say_written(folder: Path, files: Mapping[str, str]) -> None:
     """Those files of a folder that are there, with what they are."""
     for name, what in files.items():
         if (folder / name).exists():
-            say(folder / name, *filter(None, [what]))
+            say(folder / name, what)
 
 
 def warn(text: str, style: str = "yellow", soft_wrap: bool = True) -> None:
