@@ -24,7 +24,7 @@ A warning never stops a run. It is printed, kept in `results.h5` and shown in th
 | it says | what it is about | what to do |
 |---|---|---|
 | `... m long, longer than any machine's`, `is it in mm?`, `are all lengths in one unit?` | a number that looks like one of another unit | write the unit: `"25 mm"` |
-| `the step resolves the first frequency ... by ... steps in a period` | vibration of the mechanism is faster than the time step | nothing where the motion is meant without vibration; else a shorter `analysis.step`, or leave it open ([accuracy](../accuracy.md)) |
+| `the step resolves the first frequency ... by ... steps in a period` | vibration of the mechanism is faster than the time step, whose estimated error is above 1 % | a shorter `analysis.step`, or leave it open; a smoother start or load, or damping ([accuracy](../accuracy.md)) |
 | `the drive's harmonic ... meets the first frequency` | resonance somewhere on the revolution | `kedfem frequencies`, another speed, damping ([frequencies](../frequencies.md)) |
 | `estimated error: ...; most of it from the ...` | mesh, step, modes, frames or rounding leave more than 5 %, or more than twice what was asked for | what the warning names; [how far to trust results](../tutorial/trust.md) |
 | `the elastic rotation of links is up to ... deg` | links bend so far that stiffness has to follow them | `frames = "co-rotational"` in `[analysis]` |
@@ -33,6 +33,7 @@ A warning never stops a run. It is printed, kept in `results.h5` and shown in th
 | `joints/NAME/force: not reported` | a force that rigid-body statics leaves open | looser joints, as `kedfem check` proposes |
 | `the highest stress, ..., is at a sharp re-entrant corner` | stress there grows with every refinement | [peak stress](../how-to/peak-stress.md) |
 | `comes near a singular position` | a mechanism that moves freely passes a position with two ways to go on | damping, or a shorter step to compare with |
+| `the work of the drive is off ..., no more` | steps whose iterations do not end quite, or levels in time that differ | where that is more than you need, a shorter step |
 | `... contradicts ...`, `a part of its effort is missing` | two routes to one force differ | do not use the run; it is worth a report as a defect |
 
 ## Faults of a scene

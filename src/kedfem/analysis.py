@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path as FilePath
 
+from kedfem.accuracy.choices import open_step
 from kedfem.accuracy.error_budget import Budget, attributes, budget_warning, kind_of_name, meaningless
 from kedfem.accuracy.estimates import Strained, budget
 from kedfem.accuracy.histories import Histories, steady_state
@@ -149,7 +150,7 @@ def _analysed(
     clock = Clock(watch)
     scene, assembly = assembled(scene)
     period = stress_period(scene)
-    asked = None if scene.analysis.accuracy == "quick" else scene.analysis.accuracy
+    asked, chosen = None if scene.analysis.accuracy == "quick" else scene.analysis.accuracy, open_step(scene)
     plan, ready, reduction = ready_to_step(scene, clock.stage, beside.ends)
     scene = ready.scene
     plain = sizes(scene, ready.model)
@@ -161,7 +162,8 @@ def _analysed(
     )
     every = [*ready.model.links, *(each.link for each in ready.model.prescribed)]
     recoveries = clock.timed("recovery", lambda: [stress_recovery(link) for link in every])
-    notices += _about_steps(ready, clock)
+    notices += _about_steps(ready)
+    moving = None if without_vibration(scene) else clock.timed("frequencies", lambda: resolution(ready))
     channels = [each.channel for each in recorded]
     untold = undetermined(scene, ready.model, [each.name for each in channels])
     efforts = CrossChecks(scene, ready.linkage, channels, account)
@@ -193,12 +195,15 @@ def _analysed(
     step = replace(step, errors=found.step or step.errors)
     steady, grows = _growing(ready, solvers)
     notices += [
-        *([IDLE] if idle else budget_warning(found, asked)),
+        *resolution_warnings(moving, found.error_of("step")),
+        *([IDLE] if idle else budget_warning(found, asked, chosen and plan is not None)),
         *(write_vibration(scene, ready.model, recoveries, grows, folder) if grows else ()),
         *steady_warning(steady),
     ]
-    notes = attributes(found) | step.notes | (balance_notes(balance) if balance else {})
-    notes |= steady.notes if steady else {}
+    notes = {
+        **attributes(found), **step.notes,
+        **(balance_notes(balance) if balance else {}), **(steady.notes if steady else {}),
+    }  # fmt: skip
     add_notes(folder / "results.h5", notes)
     results = replace(results, notes={**results.notes, **notes})
     why = meaningless(found, balance, efforts.unworked, bool(scene.analysis.stiffening))
@@ -238,13 +243,12 @@ def _growing(ready: Prepared, solvers: Sequence[Steps]) -> tuple[Steady | None, 
     return steady, found if steady.unstable else None
 
 
-def _about_steps(ready: Prepared, clock: Clock) -> list[str]:
-    """Warnings of steps that are too long for what moves and for what loads do; refused if turns cannot be counted."""
+def _about_steps(ready: Prepared) -> list[str]:
+    """Warnings of steps that are too long for what turns and for what loads do; refused if turns cannot be counted."""
     require_counted(ready.scene, ready.linkage, ready.path)
     if without_vibration(ready.scene):
         return []
-    resolved = resolution_warnings(clock.timed("frequencies", lambda: resolution(ready)))
-    return [*stability_warning(ready.scene), *resolved, *coarse_steps(ready.scene)]
+    return [*stability_warning(ready.scene), *coarse_steps(ready.scene)]
 
 
 def _stress_files(

@@ -70,6 +70,21 @@ def test_a_drive_that_is_dropped_beside_constraints_that_vary_is_noticed(effort:
 
 
 @pytest.mark.parametrize(
+    ("share", "said"),
+    [
+        (0.0005, ""),
+        (0.0011, "0.11 % of the energy exchanged, no more"),
+        (0.075, "7.5 % of the energy exchanged: a part of its effort is missing"),
+    ],
+)
+def test_a_little_work_that_is_left_over_is_no_missing_effort(share: float, said: str) -> None:
+    checks, _ = compared(*ran(BEAMS["driven hinge and slide"]()))
+    checks._left = share * checks.exchanged
+    assert [said in each for each in checks.warnings()] == [True] * bool(said)
+    assert all("missing" in each for each in checks.warnings()) == (share > 0.02 or not said)
+
+
+@pytest.mark.parametrize(
     ("kind", "part"), [("prismatic", 1e-4), ("cylindrical", 1e-3), ("screw", 1e-2), ("universal", 5e-9)]
 )
 def test_what_constraints_that_vary_do_on_the_elastic_motion_is_their_forces_times_how_they_vary(

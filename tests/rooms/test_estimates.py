@@ -170,6 +170,16 @@ def test_a_run_with_errors_over_its_results_is_doubtful_in_its_file(
     assert meaningless(lost(mesh=0.6, step=0.39), None, 0.0) == ""
 
 
+def test_a_step_that_the_accuracy_chose_is_not_told_to_be_left_out() -> None:
+    found = Budget((Share("step", {"drive": 0.1}),))
+    (stated,), (left_open,) = (budget_warning(found, 0.01, chosen) for chosen in (False, True))
+    assert "leave it out so that analysis.accuracy chooses it" in stated
+    assert "leave it out" not in left_open
+    assert "analysis.accuracy chose it" in left_open
+    assert found.error_of("step") == 0.1
+    assert found.error_of("mesh") is None
+
+
 def test_kinds_sums_and_warnings_of_a_budget() -> None:
     shares = Share("mesh", {"stress": 0.03}), Share("step", {"stress": 0.01, "drive": 0.002})
     found = Budget(shares)

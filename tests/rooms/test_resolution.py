@@ -61,6 +61,10 @@ def test_steps_in_a_period_are_counted_and_too_few_are_said() -> None:
         assert found is not None
         assert_allclose(found.steps_per_period, per_period, rtol=0.02)
         assert ["steps in a period" in x for x in resolution_warnings(found)] == [True] * said
+        assert not resolution_warnings(found, 0.002)  # what it does not follow is that little
+        assert [
+            "error is estimated to be 10 %: vibration is not" in x for x in resolution_warnings(found, 0.1)
+        ] == [True] * said
 
 
 def test_a_harmonic_that_meets_the_first_frequency_is_said() -> None:

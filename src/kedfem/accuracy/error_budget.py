@@ -71,6 +71,11 @@ class Budget:
         kind = max(self.together, key=lambda kind: self.together[kind])
         return max(self.shares, key=lambda share: share.errors.get(kind, 0.0))
 
+    def error_of(self, source: str) -> float | None:
+        """The error of a source where it is worst; None where it is not known."""
+        share = self.of(source)
+        return max(share.errors.values(), default=None) if share else None
+
     def of(self, source: str) -> Share | None:
         """The share of a source."""
         return next((share for share in self.shares if share.source == source), None)
@@ -101,18 +106,24 @@ def by_kind(errors: Mapping[str, float]) -> dict[str, float]:
     return out
 
 
-def budget_warning(budget: Budget, asked: float | None = None) -> tuple[str, ...]:
-    """A warning where a run is worse than WARNED, or clearly worse than what was asked for, with what limits it."""
+def budget_warning(budget: Budget, asked: float | None = None, chosen: bool = False) -> tuple[str, ...]:
+    """A warning where a run is worse than WARNED, or clearly worse than what was asked for, with what limits it.
+
+    Parameters
+    ----------
+    asked : the accuracy
+    chosen : whether the step is what that chose
+    """
     limit = WARNED if asked is None else min(WARNED, max(TWICE * asked, LEAST))
     over = {kind: error for kind, error in budget.together.items() if error > limit}
     share = budget.limiting
     if not over or share is None:
         return ()
     message = ", ".join(f"{kind} {percent(error)}" for kind, error in over.items())
-    return (f"estimated error: {message}; {_advice(budget, share)}",)
+    return (f"estimated error: {message}; {_advice(budget, share, chosen)}",)
 
 
-def _advice(budget: Budget, share: Share) -> str:
+def _advice(budget: Budget, share: Share, chosen: bool) -> str:
     """What would lower the error, of which a share is the largest; beyond all scale no part is blamed before others."""
     kind = max(budget.together, key=lambda kind: budget.together[kind])
     alike = [x for x in budget.shares if x.errors.get(kind, 0.0) * ALIKE > share.errors[kind]]
@@ -123,7 +134,8 @@ def _advice(budget: Budget, share: Share) -> str:
             "so that finer elements alone do not help; look at the animation and at the other warnings, then take a "
             "step ten times shorter, and if the motion stays as it is, look for a link or a joint that gives way"
         )
-    return f"most of it from the {share.source}: {share.remedy or REMEDIES[share.source]}"
+    usual = CHOSEN_STEP if share.source == "step" and chosen else REMEDIES[share.source]
+    return f"most of it from the {share.source}: {share.remedy or usual}"
 
 
 def meaningless(budget: Budget, balance: Balance | None, unworked: float, stiffened: bool = False) -> str:
@@ -154,6 +166,12 @@ REMEDIES = {
     "frames": 'analysis.frames = "co-rotational" is right at any deflection; with it, more segments or elements',
     "rounding": 'links that are much stiffer than all others as model = "rigid"',
 }  # fmt: skip
+
+
+CHOSEN_STEP = (
+    "analysis.accuracy chose it, among those that its trials may take (notes of the plan say what limits them): state a "
+    "shorter one, analysis.step; a smoother start or load, or damping, leaves less vibration to follow"
+)
 
 
 def percent(error: float) -> str:

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 from jaxtyping import Float
 
+from kedfem.accuracy.error_budget import percent
 from kedfem.accuracy.prepared import Prepared
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model
@@ -30,6 +31,7 @@ from kedfem.scene import (
 POSES = 8  # of the last turn in which the linkage stands still in thought
 LARGE = 100_000  # unknowns of a model whose stiffness is not factored only to look at its frequencies
 FEWEST = 10  # steps in a period: the period is then 3 % too long
+UNFOLLOWED = 0.01  # error of a step below which what vibrates unresolved is no matter
 HARMONICS = 5  # of the drive
 NEAR = 0.03  # of a frequency
 MARGIN = (
@@ -174,14 +176,22 @@ def step_error(ready: Prepared) -> StepError:
     return StepError(ready.model, local_error(scheme), scheme.h)
 
 
-def resolution_warnings(found: Resolution | None) -> list[str]:
-    """What a user should know about the step and the drive's speed."""
+def resolution_warnings(found: Resolution | None, error: float | None = None) -> list[str]:
+    """What a user should know about the step and the drive's speed.
+
+    Few steps in a period are told where the error of the step shows that something vibrates: others follow what moves.
+
+    Parameters
+    ----------
+    error : of the step, as far as it is known
+    """
     out = []
-    if found is not None and found.steps_per_period < FEWEST:
+    if found is not None and found.steps_per_period < FEWEST and (error is None or error > UNFOLLOWED):
+        known = "" if error is None else f", and its error is estimated to be {percent(error)}"
         out.append(
             f"the step resolves the first frequency of the linkage, {found.first.max():.3g} Hz, by "
-            f"{found.steps_per_period:.2g} steps in a period: vibration is not followed; take {FEWEST} or more, a step "
-            f"of {1 / (FEWEST * found.first.max()):.2g} s"
+            f"{found.steps_per_period:.2g} steps in a period{known}: vibration is not followed; take {FEWEST} or more, a "
+            f"step of {1 / (FEWEST * found.first.max()):.2g} s"
         )
     if found is not None and found.meetings:
         numbers = ", ".join(f"{x.harmonic}" for x in found.meetings)

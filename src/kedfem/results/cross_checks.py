@@ -26,6 +26,9 @@ CONTRADICTION = 0.5
 SWING = 1.0  # and by this part of what swings beside it, whose share in c and mean falls with the length of the run
 AMPLIFIED = 3.0  # times as much as rigid links: near a resonance elastic links bear more, in phase
 SMALL = 0.01  # of the largest effort of its unit: what is smaller is not compared
+MISSING = (
+    0.02  # of it: that a part of an effort is missing; less is what steps leave that do not converge quite
+)
 UNWORKED = 1e-3  # of the energy exchanged: trapezoidal sums of one and the same step agree to rounding
 
 
@@ -133,10 +136,15 @@ class CrossChecks:
                     "elastic links do not explain that, unless links or springs are very soft: one of both is wrong"
                 )
         if self.unworked > UNWORKED:
-            names = ", ".join(self.drives)
+            names, left = ", ".join(self.drives), f"{100 * self.unworked:.2g} % of the energy exchanged"
+            meaning = (
+                f"by {left}: a part of its effort is missing"
+                if self.unworked > MISSING
+                else f"by {left}, no more: so far efforts and energies are uncertain; a shorter step shows whether it is "
+                "the steps'"
+            )
             out.append(
-                f"{names}: the work of the drive is off the change of energy and the other work by "
-                f"{100 * self.unworked:.2g} % of the energy exchanged: a part of its effort is missing"
+                f"{names}: the work of the drive is off the change of energy and the other work {meaning}"
             )
         return tuple(out)
 

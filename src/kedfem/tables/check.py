@@ -6,6 +6,7 @@ from tempfile import TemporaryDirectory
 from time import perf_counter
 
 import numpy as np
+from jaxtyping import Float
 from rich.table import Table
 
 from kedfem.accuracy.plan import Plan
@@ -37,6 +38,9 @@ from kedfem.stepping import Watched, frame_steps, stepped
 from kedfem.tables.layout import facts
 from kedfem.tables.model import link_tables, mobility_table
 from kedfem.tables.run import plan_tables, reduction_table
+
+PARALLEL = 1e-6  # of the largest: turns about other axes that rounding leaves
+NEARLY = 0.01  # deg: of a full revolution, by rounding
 
 
 def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None) -> list[Table]:
@@ -111,10 +115,26 @@ def _motion(ready: Prepared) -> Table:
     drive = f"{of_joints(names)}, {_over(ready)}" if names else "none: the mechanism moves by itself"
     table = facts("Rigid motion", [("drive", drive), *_initial_speeds(ready)])
     for k, name in enumerate(ready.linkage.bodies[1:] if names else (), start=1):
-        cosine = (np.trace(along.R[:, k], axis1=1, axis2=2) - 1) / 2
-        turned = np.degrees(np.arccos(np.clip(cosine, -1, 1))).max()
-        table.add_row(f"link {name}", f"turns up to {turned:.4g}° from the reference position")
+        table.add_row(f"link {name}", _turns(along.R[:, k]))
     return table
+
+
+def _turns(R: Float[np.ndarray, "T 3 3"]) -> str:
+    """How far a link turns on its way, in words; about one axis its angle is counted on, beyond half a turn too."""
+    from scipy.spatial.transform import Rotation
+
+    start = Rotation.from_matrix(R[0]).as_rotvec()
+    steps = Rotation.from_matrix(R[1:] @ R[:-1].transpose(0, 2, 1)).as_rotvec()
+    sizes, axes = np.linalg.svd(np.vstack([start, steps]), full_matrices=False)[1:]
+    if sizes[1] > PARALLEL * sizes[0]:
+        cosine = (np.trace(R, axis1=1, axis2=2) - 1) / 2
+        turned = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))).max())
+    else:
+        angles = np.degrees(np.cumsum(np.vstack([start, steps]) @ axes[0]))
+        if (whole := (np.ptp(angles) + NEARLY) // 360) >= 1:
+            return "turns a full revolution" if whole == 1 else f"turns {whole:.0f} full revolutions"
+        turned = float(np.abs(angles).max())
+    return f"turns up to {turned:.4g}° from the reference position"
 
 
 def _over(ready: Prepared) -> str:

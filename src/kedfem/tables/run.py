@@ -29,6 +29,7 @@ def plan_tables(plan: Plan) -> list[Table]:
         f"Accuracy asked for: {100 * plan.asked:.3g} %",
         [*left("part of the error"), *right("expected", "allowed")],
         ((share.what, percent(share.error), percent(share.allowed)) for share in plan.shares),
+        caption="each part by itself may take what is allowed; simpler links may take what the mesh leaves, too",
     )
     budget.add_row("together", percent(plan.error), percent(plan.asked))
     return [budget, chosen_table(plan)]

@@ -1,0 +1,36 @@
+"""How far links turn, in the words of a check."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from kedfem.tables.check import _turns
+
+OBLIQUE = np.array([1.0, -2.0, 2.0]) / 3
+
+
+@pytest.mark.parametrize("axis", [np.array([0.0, 0.0, 1.0]), OBLIQUE])
+@pytest.mark.parametrize(
+    ("start", "end", "said"),
+    [
+        (0, 360, "turns a full revolution"),
+        (-90, 270, "turns a full revolution"),
+        (0, -720, "turns 2 full revolutions"),
+        (0, 359, "turns up to 359° from the reference position"),
+        (0, 60, "turns up to 60° from the reference position"),
+        (-20, 5, "turns up to 20° from the reference position"),
+        (0, 0, "turns up to 0° from the reference position"),
+    ],
+)
+def test_a_link_that_goes_round_makes_a_full_revolution(
+    axis: np.ndarray, start: float, end: float, said: str
+) -> None:
+    angles = np.radians(np.linspace(start, end, 73))
+    assert _turns(Rotation.from_rotvec(angles[:, None] * axis).as_matrix()) == said
+
+
+def test_about_several_axes_it_is_the_angle_between_both_positions() -> None:
+    t = np.linspace(0, 1, 50)[:, None]
+    R = Rotation.from_rotvec(t * [0.5, 0, 0]) * Rotation.from_rotvec(t * [0, 0.5, 0])
+    angle = np.degrees(np.linalg.norm(R[-1].as_rotvec()))
+    assert _turns(R.as_matrix()) == f"turns up to {angle:.4g}° from the reference position"
