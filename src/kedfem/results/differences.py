@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.results.records import Channel, Results
+from kedfem.results.records import Channel, Results, largest_by_unit
 
 Over = Literal["time", "drive"]
 NOTHING = 1e-9  # of the largest value of the same unit in the first run: rounding, which is not compared
@@ -102,7 +102,7 @@ def _smooth(
 
 def differences(runs: Sequence[Results], over: Over, at: Float[np.ndarray, " T"]) -> list[Difference]:
     """Of all channels that every run has with the same columns, in the first one's order; rounding is left out."""
-    out, highest = [], _highest(runs[0])
+    out, highest = [], largest_by_unit(runs[0].channels.values())
     for name in in_common(runs):
         channel, _ = runs[0].channels[name]
         values = tuple(_smooth(_along(run, over), run.channels[name][1], at) for run in runs)
@@ -139,14 +139,6 @@ def magnitude(channel: Channel, values: Float[np.ndarray, "T c"]) -> Float[np.nd
     if set(channel.columns) <= set("xyz"):
         return np.asarray(np.linalg.norm(values, axis=1))
     return np.asarray(np.abs(values).max(axis=1))
-
-
-def _highest(run: Results) -> dict[str, float]:
-    """The largest value of each unit."""
-    out: dict[str, float] = {}
-    for channel, values in run.channels.values():
-        out[channel.unit] = max(out.get(channel.unit, 0.0), float(np.abs(values).max(initial=0.0)))
-    return out
 
 
 def differing_keys(runs: Sequence[Results]) -> dict[str, tuple[Any, ...]]:

@@ -21,7 +21,7 @@ from kedfem.scene import Scene
 FLAT = 1e-9  # of the fastest turn: what leaves the common plane is rounding
 RATES = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 TRANSMISSION = "/transmission_angle"
-TURNS = (("angular_velocity", "rad/s"), ("angular_acceleration", "rad/s^2"))
+TURNS = (("angular_velocity", "rad/s", "omega"), ("angular_acceleration", "rad/s^2", "alpha"))
 
 
 @dataclass(slots=True)
@@ -114,33 +114,32 @@ def _turn(
     name: str, body: int, normal: Float[np.ndarray, "3"] | None
 ) -> list[tuple[Channel, Callable[[RigidMotion], Rows]]]:
     """Orientation of a link and its rates: about the normal of the plane of motion, or in space."""
-    text, key = f"of link {name}", f"links/{name}"
-    rates = [lambda motion: motion.omega[:, body], lambda motion: motion.alpha[:, body]]
-    if normal is None:
-        vector = Channel(
-            f"{key}/rotation", XYZ, "rad", "world", f"rotation vector {text} from the reference position"
-        )
-        out = [(vector, lambda motion: rotation_vector(motion.R[:, body]))]
-        return out + [
-            (Channel(f"{key}/{what}", XYZ, unit, "world", f"{what.replace('_', ' ')} {text}"), rate)
-            for (what, unit), rate in zip(TURNS, rates, strict=True)
-        ]
-    mark = np.eye(3)[np.abs(normal).argmin()]
-    turn = Coordinate("", "angle", "angle", body, 0, np.zeros(3), normal, mark - (mark @ normal) * normal)
-    about = "(" + ", ".join(f"{x + 0.0:.3g}" for x in np.round(normal, 9)) + ")"
-    angle = Channel(
-        f"{key}/rotation", ("angle",), "rad", "", f"turn {text} about {about} from the reference position"
-    )
+    text, key, turn = f"of link {name}", f"links/{name}", None
+    what, frame = "rotation vector", "world"
+    angles: tuple[str, ...] = XYZ
+    rates: tuple[str, ...] = XYZ
+    if normal is not None:
+        mark = np.eye(3)[np.abs(normal).argmin()]
+        turn = Coordinate("", "angle", "angle", body, 0, np.zeros(3), normal, mark - (mark @ normal) * normal)
+        what, frame, angles, rates = "turn", "", ("angle",), ("rate",)
+        text += " about (" + ", ".join(f"{x + 0.0:.3g}" for x in np.round(normal, 9)) + ")"
+
+    def turned(motion: RigidMotion) -> Rows:
+        return rotation_vector(motion.R[:, body]) if turn is None else turn.values(motion)[:, None]
+
+    def rate(of: str) -> Callable[[RigidMotion], Rows]:
+        def rows(motion: RigidMotion) -> Rows:
+            vector = getattr(motion, of)[:, body]
+            return np.asarray(vector if normal is None else (vector @ normal)[:, None])
+
+        return rows
+
+    rotation = Channel(f"{key}/rotation", angles, "rad", frame, f"{what} {text} from the reference position")
     return [
-        (angle, lambda motion: turn.values(motion)[:, None]),
+        (rotation, turned),
         *(
-            (
-                Channel(
-                    f"{key}/{what}", ("rate",), unit, "", f"{what.replace('_', ' ')} {text} about {about}"
-                ),
-                lambda motion, rate=rate: (rate(motion) @ normal)[:, None],
-            )
-            for (what, unit), rate in zip(TURNS, rates, strict=True)
+            (Channel(f"{key}/{word}", rates, unit, frame, f"{word.replace('_', ' ')} {text}"), rate(of))
+            for word, unit, of in TURNS
         ),
     ]
 

@@ -51,6 +51,11 @@ def shape_functions(r: float, nodes: int) -> tuple[Float[np.ndarray, " m"], Floa
     return N, dN
 
 
+def lagrange(at: float, points: Float[np.ndarray, " q"]) -> Float[np.ndarray, " q"]:
+    """Weights of the values at some points of the polynomial through them at another place."""
+    return np.array([np.prod([(at - q) / (p - q) for q in points if q != p]) for p in points])
+
+
 def nearest_parameter(x: Float[np.ndarray, "m d"], point: Float[np.ndarray, " d"]) -> float:
     """Parent coordinate in [-1, 1] of the point of a line element that is nearest to a point."""
     r = 0.0

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.links.beams.beam import nearest_parameter, parent_nodes, shape_functions, strain_rows
+from kedfem.links.beams.beam import lagrange, nearest_parameter, parent_nodes, shape_functions, strain_rows
 from kedfem.links.record import Link
 
 THROUGH = 4  # Gauss points of a probe at least
@@ -63,9 +63,8 @@ def fibre_row(
     at = float((_on_axis(link, element, r) - start) @ along / length)
     through = max(THROUGH, len(_gauss(link)))  # no fewer than the element has itself
     nearest = np.sort(np.argsort(np.abs(s - at), kind="stable")[:through])
-    weights = [np.prod([(at - s[k]) / (s[j] - s[k]) for k in nearest if k != j]) for j in nearest]
     out = np.zeros((link.n, 3))
-    for j, w in zip(nearest, weights, strict=True):
+    for j, w in zip(nearest, lagrange(at, s[nearest]), strict=True):
         e, q = points[j]
         rows = strain_rows(link.X[link.cells[e]][:, :2], q)[0]
         out[link.cells[e]] += w * link.E * (rows[0] - offset * rows[2]).reshape(-1, 3)

@@ -4,7 +4,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
-from kedfem.links.beams.beam import line_pairs, nearest_parameter, parent_nodes, shape_functions
+from kedfem.links.beams.beam import lagrange, line_pairs, nearest_parameter, parent_nodes, shape_functions
 from kedfem.links.beams.section import Section, outline, torsion_stress
 from kedfem.links.beams.spatial_beam import space_strains
 from kedfem.links.record import Link, section_of
@@ -25,8 +25,7 @@ def beam_strains(link: Link, element: int, r: float) -> Float[np.ndarray, "6 k"]
     """Rows (6, 3n) of (ε, γ1, γ2, κ1, κ2, τ): those of the reduced Gauss points, extended to r."""
     x = element_frame(link, element)
     gauss = np.polynomial.legendre.leggauss(len(x) - 1)[0]
-    weights = [np.prod([(r - q) / (p - q) for q in gauss if q != p]) for p in gauss]
-    rows = sum(w * space_strains(x, float(p))[0] for w, p in zip(weights, gauss, strict=True))
+    rows = sum(w * space_strains(x, float(p))[0] for w, p in zip(lagrange(r, gauss), gauss, strict=True))
     triples = _triples(link, link.cells[element])
     out = np.einsum("smfc,mfn->snc", rows, triples.reshape(len(x), 3, link.n))
     return np.asarray(out.reshape(6, -1))

@@ -73,38 +73,30 @@ def scaled_jacobian(
     """
     nodes = NODES[cells.shape[1]]
     if len(nodes) == len(TET10):
-        return _scaled_tetrahedra(points, cells)
-    places = HEX27 if len(nodes) == len(HEX20) else nodes  # its Gauss points are 3³ too
-    inner = np.sqrt(3 / 5 if len(nodes) != len(HEX8) else 1 / 3)
-    gradients = shape_gradients(nodes, np.concatenate([places, inner * places]))
-    chunks = np.array_split(cells, max(1, len(cells) // _CHUNK))
-    return np.concatenate([_scaled_determinants(points[chunk], gradients).min(axis=1) for chunk in chunks])
-
-
-def _scaled_determinants(
-    corners: Float[np.ndarray, "e k d"], gradients: Float[np.ndarray, "q k d"]
-) -> Float[np.ndarray, "e q"]:
-    """det J over the product of the lengths of its columns, at each place of each element."""
-    J = np.swapaxes(np.tensordot(corners, gradients, axes=(1, 1)), 1, 2)
-    lengths = np.linalg.norm(J, axis=2).prod(axis=-1)
-    determinants = np.linalg.det(J)
-    return np.asarray(determinants / np.where(lengths > 0, lengths, np.inf))
-
-
-def _scaled_tetrahedra(
-    points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e 10"]
-) -> Float[np.ndarray, " e"]:
-    """The scaled Jacobians of tetrahedra, at their nodes and centres."""
-    gradients = shape_gradients(TET10, np.concatenate([TET10, np.full((1, 3), 0.25)]))
-    least = []
+        factor, scale, places = np.sqrt(2), _largest_corner, np.concatenate([TET10, np.full((1, 3), 0.25)])
+    else:
+        outer = HEX27 if len(nodes) == len(HEX20) else nodes  # its Gauss points are 3³ too
+        inner = np.sqrt(3 / 5 if len(nodes) != len(HEX8) else 1 / 3)
+        factor, scale, places = 1.0, _columns, np.concatenate([outer, inner * outer])
+    gradients, least = shape_gradients(nodes, places), []
     for chunk in np.array_split(cells, max(1, len(cells) // _CHUNK)):
         J = np.swapaxes(np.tensordot(points[chunk], gradients, axes=(1, 1)), 1, 2)
-        a, b, c = (J[..., j] for j in range(3))
-        edge = [np.linalg.norm(v, axis=-1) for v in (a, b - a, b, c, c - a, c - b)]
-        corners = [edge[i] * edge[j] * edge[k] for i, j, k in ((0, 2, 3), (0, 1, 4), (1, 2, 5), (3, 4, 5))]
-        largest = np.maximum.reduce(corners)
-        least.append((np.sqrt(2) * np.linalg.det(J) / np.where(largest > 0, largest, np.inf)).min(axis=1))
+        size = scale(J)
+        least.append((factor * np.linalg.det(J) / np.where(size > 0, size, np.inf)).min(axis=1))
     return np.concatenate(least)
+
+
+def _columns(J: Float[np.ndarray, "e q d d"]) -> Float[np.ndarray, "e q"]:
+    """The product of the lengths of J's columns."""
+    return np.asarray(np.linalg.norm(J, axis=2).prod(axis=-1))
+
+
+def _largest_corner(J: Float[np.ndarray, "e q 3 3"]) -> Float[np.ndarray, "e q"]:
+    """The largest product of the three edges that meet in a corner of a tetrahedron."""
+    a, b, c = (J[..., j] for j in range(3))
+    edge = [np.linalg.norm(v, axis=-1) for v in (a, b - a, b, c, c - a, c - b)]
+    corners = [edge[i] * edge[j] * edge[k] for i, j, k in ((0, 2, 3), (0, 1, 4), (1, 2, 5), (3, 4, 5))]
+    return np.asarray(np.maximum.reduce(corners))
 
 
 def mesh_quality(mesh: SolidMesh | QuadMesh) -> Quality:

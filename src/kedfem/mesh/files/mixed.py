@@ -69,9 +69,12 @@ def one_kind(
 
 def triangles(quads: Int[np.ndarray, "q 4"]) -> Int[np.ndarray, "t 3"]:
     """Two triangles of each four-sided side, from its corner of least number."""
-    at = (quads.argmin(axis=1)[:, None] + np.arange(4)) % 4
-    turned = np.take_along_axis(quads, at, axis=1)
+    turned = _from_least(quads)
     return np.concatenate([turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]])
+
+
+def _from_least(quads: Int[np.ndarray, "q 4"]) -> Int[np.ndarray, "q 4"]:
+    return np.take_along_axis(quads, (quads.argmin(axis=1)[:, None] + np.arange(4)) % 4, axis=1)
 
 
 def _tetrahedra(corners: Cells, count: int) -> Int[np.ndarray, "t 4"]:
@@ -146,9 +149,7 @@ def _check_fit(fours: Int[np.ndarray, "t 4"], blocks: Mapping[int, list[Cells]])
     wrong = 0
     for count, several in blocks.items():
         for side in (side for side in _SIDES[count] if len(side) == 4):
-            quads = np.concatenate([cells[:, list(side)] for cells in several])
-            at = (quads.argmin(axis=1)[:, None] + np.arange(4)) % 4
-            turned = np.take_along_axis(quads, at, axis=1)
+            turned = _from_least(np.concatenate([cells[:, list(side)] for cells in several]))
             other = np.sort(turned[:, [0, 1, 3]], axis=1).tolist()
             wrong += sum(tuple(three) in outer for three in other)
     if wrong:
