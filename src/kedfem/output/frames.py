@@ -27,7 +27,7 @@ from kedfem.motion.joint_equations import joint_axis
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.output.fields import DRIVE_FORCE, DRIVE_TORQUE, FORCE, MOMENT, JointField, LinkField, RigidField
-from kedfem.results.recorded import drive_prefix
+from kedfem.results.recorded import drive_effort
 from kedfem.scene import Scene
 
 Place = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]
@@ -225,10 +225,9 @@ def joint_field(scene: Scene, linked: Linkage, motion: RigidMotion, rows: Rows, 
         force[n] = rows[f"joints/{name}/force"][k]
         moment[n] = rows.get(f"joints/{name}/moment", np.zeros((k + 1, 3)))[k]
         if name in scene.driven_joints:
-            axis, prefix = motion.R[k, j] @ joint_axis(joint), drive_prefix(scene, name)
-            for what, out in (("force", push), ("torque", torque)):
-                if (found := rows.get(f"{prefix}{what}")) is not None:
-                    out[n] = found[k] * axis
+            key, what, _ = drive_effort(scene, name)
+            if (found := rows.get(key)) is not None:
+                (push if what == "force" else torque)[n] = found[k] * (motion.R[k, j] @ joint_axis(joint))
     vectors = {FORCE: force, MOMENT: moment}
     slides = {scene.joints[name].kind == "prismatic" for name in scene.driven_joints}
     vectors |= {DRIVE_FORCE: push} if True in slides else {}

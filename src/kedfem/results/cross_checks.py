@@ -7,7 +7,7 @@ nothing in common with r. So both e ≈ c r with c = ⟨e r⟩/⟨r r⟩ and the
 or counted twice, not of one that swings.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,7 +17,7 @@ from kedfem.dynamics.history import Block
 from kedfem.motion.linkage import Linkage
 from kedfem.results.audit import Account
 from kedfem.results.forces.loads import joint_rate
-from kedfem.results.recorded import Rows, drive_prefix
+from kedfem.results.recorded import Rows, drive_effort
 from kedfem.results.records import Channel
 from kedfem.scene import Scene, without_vibration
 
@@ -91,9 +91,9 @@ class CrossChecks:
             and "without what is along" not in known[rigid].description
             and not linkage.mobility
         ]
-        self.drives = {_effort(scene, known, name): scene.joints[name] for name in scene.driven_joints}
+        self.drives = {drive_effort(scene, name)[0]: scene.joints[name] for name in scene.driven_joints}
         self.account = account
-        all_known = bool(self.drives) and all(self.drives)
+        all_known = bool(self.drives) and known.keys() >= self.drives.keys()
         self.worked = all_known and not without_vibration(scene)  # else there is no account of energy
         self._last: tuple[float, float] | None = None
         self._work, self._left = 0.0, 0.0
@@ -151,12 +151,6 @@ class CrossChecks:
     def _arm(self, each: _Pair) -> float:
         """By which moments are compared with forces [m]."""
         return 1.0 if each.unit == "N" else self.size
-
-
-def _effort(scene: Scene, known: Collection[str], name: str) -> str:
-    """The channel of a drive's effort; "" if there is none."""
-    names = (f"{drive_prefix(scene, name)}{what}" for what in ("torque", "force"))
-    return next((each for each in names if each in known), "")
 
 
 def _rigid_name(name: str) -> str:

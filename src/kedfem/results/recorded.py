@@ -26,6 +26,12 @@ def drive_prefix(scene: Scene, driven: str) -> str:
     return f"drive/{driven}/" if len(scene.driven_joints) > 1 else "drive/"
 
 
+def drive_effort(scene: Scene, driven: str, rigid: str = "") -> tuple[str, str, str]:
+    """Name of the channel of what the drive of a joint exerts, or `rigid_` links would ask of it; quantity and unit."""
+    quantity, unit = ("force", "N") if scene.joints[driven].kind == "prismatic" else ("torque", "N m")
+    return f"{drive_prefix(scene, driven)}{rigid}{quantity}", quantity, unit
+
+
 def drive_channel(scene: Scene) -> Channel:
     """What the position of a scene's drive is called; of several drives that of the first."""
     names = list(scene.driven_joints)

@@ -9,7 +9,7 @@ from kedfem.motion.joint_equations import joint_axis
 from kedfem.results.forces.constraint_forces import of_joint
 from kedfem.results.forces.hub_forces import hub_wrench, partner
 from kedfem.results.forces.port_forces import Forces, holder, loose, negligible, port_wrench
-from kedfem.results.recorded import Recorded, Rows, drive_prefix
+from kedfem.results.recorded import Recorded, Rows, drive_effort
 from kedfem.results.records import Channel
 from kedfem.scene import GROUND, Scene
 
@@ -49,10 +49,8 @@ def _hub_drive(scene: Scene, model: Model, prescribed: PrescribedBody, forces: F
 
 def _drive_channel(scene: Scene, driven: str, on: str) -> Channel:
     """What the drive of a joint exerts on its first link."""
-    slide = scene.joints[driven].kind == "prismatic"
-    quantity, unit = ("force", "N") if slide else ("torque", "N m")
-    text = f"{quantity} of the drive on link {on}"
-    return Channel(f"{drive_prefix(scene, driven)}{quantity}", (quantity,), unit, "world", text)
+    key, quantity, unit = drive_effort(scene, driven)
+    return Channel(key, (quantity,), unit, "world", f"{quantity} of the drive on link {on}")
 
 
 def gear_channel(model: Model, name: str, forces: Forces) -> Recorded:

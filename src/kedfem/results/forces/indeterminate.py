@@ -7,7 +7,7 @@ import numpy as np
 from kedfem.dynamics.model import Model
 from kedfem.results.forces.constraint_forces import shared_rows
 from kedfem.results.forces.port_forces import INDETERMINATE, rows_of_joint
-from kedfem.results.recorded import drive_prefix
+from kedfem.results.recorded import drive_effort
 from kedfem.scene import GROUND, Scene
 
 
@@ -24,9 +24,8 @@ def undetermined(scene: Scene, model: Model, channels: Collection[str]) -> dict[
             if f"joints/{name}/{what}" not in channels and not (what == "moment" and _on_slider(model, name)):
                 out[f"joints/{name}/{what}"] = _reason(scene, model, name)
     for name in scene.driven_joints:
-        prefix = drive_prefix(scene, name)
-        if not any(f"{prefix}{what}" in channels for what in ("torque", "force")):
-            out[f"{prefix}torque"] = _reason(scene, model, name)
+        if (key := drive_effort(scene, name)[0]) not in channels:
+            out[key] = _reason(scene, model, name)
     return out
 
 

@@ -14,7 +14,7 @@ from kedfem.motion.constraints import cross
 from kedfem.motion.joint_equations import joint_axis, moving_pair
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
-from kedfem.results.recorded import drive_prefix
+from kedfem.results.recorded import drive_effort
 from kedfem.results.records import Results
 from kedfem.scene import Joint, Scene
 
@@ -186,8 +186,7 @@ def drive_loads(
     """Of all drives whose effort the results show, elastic if they have it, else that of rigid links."""
     out = []
     for name in scene.driven_joints:
-        prefix = drive_prefix(scene, name)
-        keys = [f"{prefix}{rigid}{what}" for rigid in ("", "rigid_") for what in ("torque", "force")]
+        keys = [drive_effort(scene, name, rigid)[0] for rigid in ("", "rigid_")]
         found = next((results.channels[key] for key in keys if key in results.channels), None)
         if found is not None:
             rate = (

@@ -17,7 +17,7 @@ from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path, path
 from kedfem.motion.reactions import BlockReactions, Reactions, reactions
 from kedfem.motion.rigid import RigidMotion
-from kedfem.results.recorded import Rows, drive_prefix
+from kedfem.results.recorded import Rows, drive_effort
 from kedfem.results.records import XYZ, Channel
 from kedfem.scene import GROUND, ConstantSpeed, Joint, Scene, turn_steps
 
@@ -167,9 +167,8 @@ def stated_link(scene: Scene, joint: Joint) -> str:
 def _drive(scene: Scene, linkage: Linkage, name: str) -> Borne:
     joint = scene.joints[name]
     link = moving_pair(joint)[0]
-    what, unit = ("force", "N") if joint.kind == "prismatic" else ("torque", "N m")
-    text = f"{what} of the drive on link {link} were all links rigid"
-    channel = Channel(f"{drive_prefix(scene, name)}rigid_{what}", (what,), unit, "world", text)
+    key, what, unit = drive_effort(scene, name, "rigid_")
+    channel = Channel(key, (what,), unit, "world", f"{what} of the drive on link {link} were all links rigid")
     return Borne(channel, name, 2, linkage.bodies.index(link), np.asarray(joint.at), np.zeros((1, 3)))
 
 
