@@ -248,20 +248,11 @@ def _idle(space: StateSpace) -> tuple[str, ...]:
 def write_state_space(space: StateSpace, path: Path) -> None:
     """Write the matrices with names and units as `.npz` of NumPy or `.mat` of MATLAB, version 5.
 
-    Raises
-    ------
-    OutputError
-        The file has another ending, or cannot be written.
+    An OutputError says that the file has another ending, or cannot be written.
     """
     write_record(space, path, FORMAT)
 
 
 def read_state_space(path: Path) -> StateSpace:
-    """The linear system of a file that :func:`write_state_space` wrote.
-
-    Raises
-    ------
-    OutputError
-        It is not such a file.
-    """
+    """The linear system of a file that :func:`write_state_space` wrote; OutputError if it is not such a file."""
     return read_record(path, StateSpace, FORMAT, "a state space")

@@ -149,20 +149,11 @@ def _rotation(link: Link, surface: CouplingSurface) -> tuple[Bool[np.ndarray, "3
 def write_link(link: ExportedLink, path: Path) -> None:
     """Write the matrices as `.npz` of NumPy or `.mat` of MATLAB, version 5.
 
-    Raises
-    ------
-    OutputError
-        The file has another ending, or cannot be written.
+    An OutputError says that the file has another ending, or cannot be written.
     """
     write_record(link, path, FORMAT)
 
 
 def read_link(path: Path) -> ExportedLink:
-    """The matrices of a file that :func:`write_link` wrote.
-
-    Raises
-    ------
-    OutputError
-        It is not such a file.
-    """
+    """The matrices of a file that :func:`write_link` wrote; OutputError if it is not such a file."""
     return read_record(path, ExportedLink, FORMAT, "a link")

@@ -33,14 +33,7 @@ def plane_stress(lame: tuple[float, float]) -> tuple[float, float]:
 
 
 def plane_link(name: str, mesh: QuadMesh, material: Material, axes: Float[np.ndarray, "3 3"]) -> Link:
-    """The record of a plane link, rows (u, v).
-
-    Parameters
-    ----------
-    name : key of the link in the scene
-    mesh : quadrilaterals in the reference position
-    axes : (3, 3) columns are the link axes, the third along z
-    """
+    """The record of a plane link, rows (u, v); columns of `axes` are the link axes, the third along z."""
     basis = plane_basis(mesh)
     X = np.column_stack([basis.doflocs.T, np.full(basis.N, mesh.points[0, 2])])
     cells = np.ascontiguousarray(basis.element_dofs.T)  # VTK's order, too

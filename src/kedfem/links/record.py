@@ -220,17 +220,7 @@ def in_space(link: Link, rows: Float[np.ndarray, "*k d"]) -> Float[np.ndarray, "
 
 
 def mass_times(mass: Mass, u: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "n d"]:
-    """M u for a state u, component by component: M = m ⊗ I3, [KED, eqs. (9)(11)].
-
-    Parameters
-    ----------
-    mass : d scalar matrices (n, n)
-    u : (n, d)
-
-    Returns
-    -------
-    (n, d)
-    """
+    """M u for a state u, component by component: M = m ⊗ I3, [KED, eqs. (9)(11)]."""
     out = np.empty_like(u)
     for k, m in enumerate(mass):
         out[:, k] = m @ np.ascontiguousarray(u[:, k])
@@ -240,12 +230,7 @@ def mass_times(mass: Mass, u: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "n 
 def mass_constants(
     mass: Mass, one: Float[np.ndarray, " n"], X: Float[np.ndarray, "n 3"]
 ) -> tuple[Float[np.ndarray, "n d"], Float[np.ndarray, "n 3"]]:
-    """(m·1, m·X): all that the inertia load −M R0'' needs of a link, [KED, eq. (17)].
-
-    Returns
-    -------
-    (n, d) [kg] and (n, 3) [kg m]
-    """
+    """(m·1, m·X) [kg, kg m]: all that the inertia load −M R0'' needs of a link, [KED, eq. (17)]."""
     m1 = mass_times(mass, np.repeat(one[:, None], len(mass), axis=1))
     mX = np.asarray(mass[0] @ X)
     return m1, mX

@@ -88,16 +88,7 @@ def pattern(basis: skfem.Basis) -> Pattern:
 
 
 def scalar_mass(basis: skfem.Basis, on: Pattern, density: float) -> sp.csr_array:
-    """Scalar Gram matrix m_ab = ∫ ρ N_a N_b det(J), [KED, eqs. (9)(11)].
-
-    Parameters
-    ----------
-    density : ρ [kg/m³]
-
-    Returns
-    -------
-    (n, n) [kg]
-    """
+    """Scalar Gram matrix m_ab = ∫ ρ N_a N_b det(J), [KED, eqs. (9)(11)] [kg]."""
     return on.assembled(skfem.BilinearForm(lambda u, v, _: density * u * v), basis)
 
 
@@ -160,14 +151,7 @@ def link_faces(basis: skfem.Basis, mesh: SolidMesh) -> tuple[LinkFace, ...]:
 
 
 def solid_link(name: str, mesh: SolidMesh, material: Material, axes: Float[np.ndarray, "3 3"]) -> Link:
-    """The record of a solid link.
-
-    Parameters
-    ----------
-    name : key of the link in the scene
-    mesh : hexahedra or tetrahedra in the reference position
-    axes : (3, 3) columns are the link axes
-    """
+    """The record of a solid link; columns of `axes` are the link axes."""
     basis = solid_basis(mesh)
     return meshed_link(
         name, basis, basis.doflocs.T, material, material.lame(), kind="solid", axes=axes, cells=vtk_cells(basis),

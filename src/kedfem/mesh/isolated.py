@@ -139,16 +139,12 @@ def apart(where: str, words: tuple[str, str], seconds: float, work: Callable[...
 
 
 def limited(folder: str, seconds: float, work: Callable[..., T], *given: Any) -> T:
-    """What a function returns, in silence; the process is ended if that takes more processor time than so much.
+    """What a function returns, in silence, in a folder; the process is ended after so much processor time.
 
     A MemoryError says that it would hold more than MOST_MEMORY.
-
-    Parameters
-    ----------
-    folder : that paths are relative to; the process may have begun in another
     """
     end_with_parent()
-    os.chdir(folder)
+    os.chdir(folder)  # the process may have begun in another
     with bounded(seconds, MOST_MEMORY), silent():
         return work(*given)
 

@@ -22,13 +22,7 @@ BINS = 20  # of the histogram, from 0 to 1
 
 
 def render(npz: str, png: str, count: str) -> None:
-    """Draw meshes.
-
-    Parameters
-    ----------
-    npz, png : what to draw, and where to
-    count : how many meshes there are
-    """
+    """Draw so many meshes of a file of arrays."""
     import matplotlib as mpl
 
     mpl.use("Agg")

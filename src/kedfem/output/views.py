@@ -66,9 +66,8 @@ def picture_axes(
 
     Parameters
     ----------
-    direction : (3,) [-], towards the eye
-    upwards : (3,) [-], about upwards where gravity does not determine it
-    gravity : (3,) [m/s²]
+    direction : towards the eye
+    upwards : about so where gravity does not determine it
     """
     if np.linalg.norm(np.cross(gravity, direction)) > 0.5 * np.linalg.norm(gravity) > 0:
         upwards = -gravity
@@ -88,16 +87,7 @@ def sides(direction: Float[np.ndarray, " 3"]) -> list[Float[np.ndarray, " 3"]]:
 
 
 def sight(extents: Float[np.ndarray, " 3"]) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
-    """From where a linkage is seen best, and what is up: flat ones slightly tilted from their flat side.
-
-    Parameters
-    ----------
-    extents : (3,) along x, y and z [m]
-
-    Returns
-    -------
-    direction, up: unit vectors, the first towards the eye
-    """
+    """Unit vectors to the eye that sees a linkage best, and upwards: flat ones slightly tilted from their flat side."""
     x, y, z = np.eye(3)
     least, second, most = np.sort(extents)
     thin = extents <= max(1.01 * least, FLAT * second if second < FLAT * most else 0.0)

@@ -66,14 +66,7 @@ def write_points(
 def write_cells(
     path: Path, parts: Sequence[tuple[Points, Cells]], name: str, values: Sequence[np.ndarray]
 ) -> None:
-    """Elements in the reference position with one value each.
-
-    Parameters
-    ----------
-    parts : points and elements of each
-    name : of the values
-    values : (e,) of each part
-    """
+    """Elements in the reference position, points and cells of each part, with one value each, called `name`."""
     with replacing(path) as part:
         write_vtu(part, *_together(parts), cell_data={name: list(values)})
 

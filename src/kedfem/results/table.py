@@ -27,11 +27,6 @@ def write_csv(results: Results, path: Path) -> None:
 
     The header names every column with its unit, e.g. ``probes/rocker_mid/stress von_mises [Pa]``;
     numbers have nine significant digits. A table of an unfinished run begins with a line that says so.
-
-    Parameters
-    ----------
-    results : what was read
-    path : the file; an older one is replaced when the new one is whole
     """
     with text_file(Path(path)) as file:
         if results.status != "complete":

@@ -84,18 +84,9 @@ def line_pairs(cells: Int[np.ndarray, "e m"]) -> Int[np.ndarray, "p 2"]:
 
 
 def strain_rows(x: Float[np.ndarray, "m 2"], r: float) -> tuple[Float[np.ndarray, "3 k"], float]:
-    """Rows of axial strain ε, shear strain γ and curvature κ over the element's (u, v, ψ), and det J.
+    """Rows of axial strain ε, shear strain γ and curvature κ over the element's (u, v, ψ), and det J [m].
 
     ε = t·u_s, γ = n·u_s − ψ, κ = ψ_s with s the arc length, det J = √(x_r² + y_r²), [KED, eq. (22)].
-
-    Parameters
-    ----------
-    x : (m, 2) node positions [m]
-    r : parent coordinate in [-1, 1]
-
-    Returns
-    -------
-    (3, 3m) and det J [m]
     """
     N, dN = shape_functions(r, len(x))
     tangent = dN @ x
@@ -155,18 +146,7 @@ def planar_rigidities(section: Section, material: Material) -> Float[np.ndarray,
 def beam_mesh(
     points: Float[np.ndarray, "p 3"], elements: int, nodes: int
 ) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e m"]]:
-    """Nodes and elements along a polyline, the same number of elements on each of its segments.
-
-    Parameters
-    ----------
-    points : (p, 3) corners [m]
-    elements : per segment
-    nodes : per element
-
-    Returns
-    -------
-    (n, 3) and (e, nodes), ends first
-    """
+    """Nodes and elements along a polyline, ends first; as many elements, of so many nodes, on each of its segments."""
     s = spaced((len(points) - 1) * elements, nodes) / elements
     X = np.stack([np.interp(s, np.arange(len(points)), points[:, k]) for k in range(3)], axis=1)
     return X, line_cells(np.arange(0, len(X) - 1, nodes - 1), nodes)

@@ -74,16 +74,7 @@ def beam_element(
 
 
 def strains_of(element: BeamElement, y: Vectors) -> Column:
-    """Strains at a position: ε, γ1, γ2, κ1, κ2, τ at each Gauss point, then those within sections.
-
-    Parameters
-    ----------
-    y : (…, n, 3)
-
-    Returns
-    -------
-    (…, s)
-    """
+    """Strains at a position: ε, γ1, γ2, κ1, κ2, τ at each Gauss point, then those within sections."""
     g, x = element.gradients @ y, element.tangents @ y
     d1, d2, s1, s2 = _interpolated(element, _directors(element, node_rotations(element, g)))
     b1, b2, b3, b4 = element.bend.T

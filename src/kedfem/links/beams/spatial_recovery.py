@@ -58,12 +58,7 @@ def nearest_on_axis(
 
 
 def drawn(link: Link) -> tuple[sp.csr_array, tuple[sp.csr_array, ...], Int[np.ndarray, "c 8"]]:
-    """The beam as a body: its section's points at every station, and hexahedra between them.
-
-    Returns
-    -------
-    (p, n) values, three (p, 3n) stresses σ_xx, σ_xy, σ_zx, and the hexahedra
-    """
+    """The beam as a body: values of its section's points at all stations, stresses σ_xx, σ_xy, σ_zx, hexahedra."""
     points, quads = outline(section_of(link))
     stations = link.cells.max() + 1
     count = np.bincount(link.cells.ravel(), minlength=stations)

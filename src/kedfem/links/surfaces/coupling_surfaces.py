@@ -153,13 +153,7 @@ def same_face(link: Link, surface: CouplingSurface) -> CouplingSurface | None:
 
 
 def surface_weights(link: Link, surface: CouplingSurface) -> Float[np.ndarray, " n"]:
-    """Area integrals ∫ N_a dΓ of a coupling surface's surface, [KED, eqs. (15)(16)]: a force φ per area gives weights ⊗
-    φ.
-
-    Returns
-    -------
-    (n,) [m²]
-    """
+    """Area integrals ∫ N_a dΓ, [KED, eqs. (15)(16)]: a force φ per area gives weights ⊗ φ [m²]."""
     if surface.facets is None:
         return np.zeros(link.n)
     if link.full is not None and link.Q is not None:
@@ -170,13 +164,7 @@ def surface_weights(link: Link, surface: CouplingSurface) -> Float[np.ndarray, "
 
 
 def face_normals(link: Link, surface: CouplingSurface) -> Float[np.ndarray, "n d"]:
-    """Area integrals ∫ N_a n dΓ of a coupling surface's surface, n its outward normal: a pressure p gives forces −p times
-    them.
-
-    Returns
-    -------
-    (n, d) [m²]
-    """
+    """Area integrals ∫ N_a n dΓ [m²], n the outward normal: a pressure p gives forces −p times them."""
     if surface.facets is None:
         return np.zeros((link.n, link.d))
     if link.full is not None and link.Q is not None:

@@ -87,17 +87,7 @@ class SolidMesh:
 def rectangle_quads(
     length: float, width: float, along: int, across: int
 ) -> tuple[Float[np.ndarray, "n 2"], Int[np.ndarray, "e 9"]]:
-    """Nodes and quad9 cells of the rectangle 0 ≤ x ≤ length, |y| ≤ width/2, in equal elements.
-
-    Parameters
-    ----------
-    length, width : sides along x and y [m]
-    along, across : numbers of elements along x and y
-
-    Returns
-    -------
-    (n, 2) [m] and (e, 9): plane nodes; cells in VTK order
-    """
+    """Nodes and quad9 cells of the rectangle 0 ≤ x ≤ length, |y| ≤ width/2 [m], in so many equal elements each way."""
     x, y = np.linspace(0, length, 2 * along + 1), np.linspace(-width / 2, width / 2, 2 * across + 1)
     points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     i, j = np.meshgrid(2 * np.arange(along) + 1, 2 * np.arange(across) + 1, indexing="ij")
@@ -108,16 +98,9 @@ def rectangle_quads(
 def extruded(
     points: Float[np.ndarray, "n 2"], quads: Int[np.ndarray, "e 9"], thickness: float, layers: int
 ) -> SolidMesh:
-    """hex27 mesh of a plate: plane quad9 cells swept over -thickness/2 ≤ z ≤ thickness/2.
+    """hex27 mesh of a plate: plane quad9 cells, counter-clockwise, swept over -thickness/2 ≤ z ≤ thickness/2 [m].
 
     Nodes level by level from below.
-
-    Parameters
-    ----------
-    points : (n, 2) plane nodes, all used [m]
-    quads : (e, 9) cells in VTK order, counter-clockwise
-    thickness : extent along z [m]
-    layers : elements through the thickness
     """
     heights = np.linspace(-thickness / 2, thickness / 2, 2 * layers + 1)
     return stacked(points, heights, np.tile(quads, (layers, 1)), np.repeat(np.arange(layers), len(quads)))

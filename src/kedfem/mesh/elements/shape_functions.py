@@ -69,16 +69,12 @@ def node_numbers(nodes: Places, at: Places) -> list[int]:
 
 
 def shape_functions(nodes: Places, at: Float[np.ndarray, "q d"]) -> Float[np.ndarray, "q k"]:
-    """N_a of an element: tensor-product Lagrange, serendipity for HEX20, quadratic on a simplex.
+    """N_a of an element [-]: tensor-product Lagrange, serendipity for HEX20, quadratic on a simplex.
 
     Parameters
     ----------
     nodes : (k, d) reference coordinates of the element's nodes (HEX27, HEX20, HEX8, QUAD9, TET10, TRI6)
     at : (q, d) where the values are wanted, reference coordinates [-]
-
-    Returns
-    -------
-    (q, k) [-]: one value per place and function
     """
     x = np.asarray(at, dtype=float)
     if len(nodes) in {len(TET10), len(TRI6)}:
@@ -88,12 +84,7 @@ def shape_functions(nodes: Places, at: Float[np.ndarray, "q d"]) -> Float[np.nda
 
 
 def shape_gradients(nodes: Places, at: Float[np.ndarray, "q d"]) -> Float[np.ndarray, "q k d"]:
-    """∂N_a/∂ξ_j of the functions of :func:`shape_functions`.
-
-    Returns
-    -------
-    (q, k, d) [-]: one gradient per place and shape function
-    """
+    """∂N_a/∂ξ_j of the functions of :func:`shape_functions` [-]."""
     x = np.asarray(at, dtype=float)
     if len(nodes) in {len(TET10), len(TRI6)}:
         return simplex_gradients(x)

@@ -44,19 +44,15 @@ def cusps(plan: Plan) -> list[Cusp]:
 
 
 def without_cusps(plan: Plan, size: float) -> tuple[Plan, float]:
-    """The plan with the tips of cusps given to the neighbours where that changes the solid least.
+    """The plan with the tips of cusps given to the neighbours where that changes the solid least; their share of it.
 
-    A boss whose circle touches the sides of the web gains a sliver beside each point of contact.
+    A boss whose circle touches the sides of the web gains a sliver beside each point of contact. Cusps are left whose
+    tips are too large for the volume.
 
     Parameters
     ----------
     plan : within its context
     size : length of the elements, by the solid's extent [-]
-
-    Returns
-    -------
-    Some cusps may be left: those with tips too large for the volume
-    Volume of all tips by that of the solid
     """
     lost, left = 0.0, len(cusps(plan))
     share = _LOST / max(left, 1)

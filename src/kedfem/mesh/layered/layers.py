@@ -165,15 +165,9 @@ def _way_in_words(direction: Float[np.ndarray, "3"], flat: PlanMesh, plan: Plan,
 
 
 def swept(flat: PlanMesh, plan: Plan, layers: Int[np.ndarray, " slabs"]) -> SolidMesh:
-    """hex27 mesh: each cell of the plan through the slabs in which its region has material.
+    """hex27 mesh: each cell of the plan through the slabs where its region has material, so many elements through each.
 
     A node's number is made of its place in the plan and of its level, so slabs share the nodes between them.
-
-    Parameters
-    ----------
-    flat : quadrilaterals that share their nodes across regions
-    plan : where the slabs are, and the way back into the solid's place
-    layers : (slabs,) elements through each slab
     """
     points, quads = flat.points, flat.cells
     heights = _levels(plan.heights, layers)

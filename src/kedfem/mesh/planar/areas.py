@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float, Int
 
+# nodes [m]; quad9 cells in VTK order, anticlockwise
 Quads = tuple[Float[np.ndarray, "_ 2"], Int[np.ndarray, "_ 9"]]
 
 

@@ -89,10 +89,6 @@ def relaxed(mesh: PlaneQuads, iterations: int) -> Quads:
     ----------
     mesh : may hold inverted cells
     iterations : at most so many steps of the minimiser (L-BFGS)
-
-    Returns
-    -------
-    (m, 2) [m] and (e, 9): plane nodes; cells in VTK order
     """
     start = quadratic_quads(mesh)
     if len(start.free) == 0:

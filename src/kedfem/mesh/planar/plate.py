@@ -55,16 +55,12 @@ class PlateSizes:
 
 
 def plate_quads(sizes: PlateSizes, size: float) -> Quads:
-    """quad9 mesh of a plate link with its bores at (0, 0) and (length, 0).
+    """quad9 mesh of a plate link with its bores at (0, 0) and (length, 0), nodes of round sides on their circles.
 
     Parameters
     ----------
     sizes : the eyes at least as wide as the waist; wider ones do not meet
     size : edge length of the elements [m]; those of the waist may be half as long again
-
-    Returns
-    -------
-    (n, 2) [m] and (e, 9): plane nodes, those of bores, eyes and fillets exactly on their circles; cells in VTK order
     """
     across = max(1, round(sizes.width / size))
     slope = _section_slope(sizes)
@@ -152,16 +148,12 @@ def _count(length: float, turn: float, size: float) -> int:
 
 
 def ring_quads(inside: Float[np.ndarray, "m 2"], outside: Float[np.ndarray, "m 2"], layers: int) -> Quads:
-    """quad9 mesh between two closed curves of as many nodes, along straight rays from node to node.
+    """quad9 mesh between two closed curves of as many nodes, ring by ring from inside, along straight rays.
 
     Parameters
     ----------
-    inside, outside : (m, 2) nodes round the curves, anticlockwise, corners and middles of elements in turn [m]
+    inside, outside : nodes round the curves, anticlockwise, corners and middles of elements in turn [m]
     layers : elements along each ray
-
-    Returns
-    -------
-    (n, 2) [m] and (e, 9): plane nodes, ring by ring from inside; cells in VTK order
     """
     rays = np.linspace(inside, outside, 2 * layers + 1)
     m = len(inside)

@@ -27,15 +27,8 @@ class Abscissa:
 def abscissa(time: Float[np.ndarray, " n"], angle: Float[np.ndarray, " n"]) -> Abscissa:
     """The drive angle in degrees when it keeps on in one direction, else time.
 
-    Parameters
-    ----------
-    time : (n,) [s]
-    angle : (n,) [rad]
-
-    Returns
-    -------
-    The drive is taken to keep on when it never turns back and stands still (a thousandth of its greatest
-    speed) for less than a tenth of the steps.
+    It keeps on when it never turns back and stands still (a thousandth of its greatest speed) for less than a tenth
+    of the steps.
     """
     degrees = np.degrees(angle)
     steps = np.diff(degrees) * (np.sign(degrees[-1] - degrees[0]) or 1.0)
