@@ -44,11 +44,6 @@ def write_record(record: Any, path: Path, name: str) -> None:
 def read_record(path: Path, kind: type[Record], name: str, what: str) -> Record:
     """A record that :func:`write_record` wrote.
 
-    Parameters
-    ----------
-    name : of the format
-    what : it is, for the message
-
     Raises
     ------
     OutputError

@@ -164,7 +164,6 @@ def part_frequencies(
 
     Parameters
     ----------
-    count : of vibrations
     shapes : lowest mode shapes that are drawn
     """
     if count < 1:

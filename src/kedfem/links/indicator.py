@@ -44,12 +44,7 @@ class Indicator:
 
 
 def indicator(link: Link, g: Float[np.ndarray, "n d"]) -> Indicator:
-    """The indicator of a meshed link, of a reduced one on the mesh that it was made from.
-
-    Parameters
-    ----------
-    g : (n, d) state in the link frame [m]
-    """
+    """The indicator of a meshed link in a state of its own frame, of a reduced one on the mesh that it was made from."""
     g, link = nodal_state(link, g), link.full or link
     d, basis = link.d, skfem.Basis(link.basis.mesh, link.basis.elem, intorder=4)
     H = np.stack([G @ g for G in nodal_gradients(link)], axis=2)  # (n, i, j)

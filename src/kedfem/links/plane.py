@@ -16,12 +16,7 @@ QUADRATURE_ORDER = 5  # 3² Gauss points: the area of a distorted element is exa
 
 
 def plane_basis(mesh: QuadMesh) -> skfem.Basis:
-    """Isoparametric function space of a quadrilateral mesh, [KED, eqs. (4a)(4b)], in x and y alone.
-
-    Parameters
-    ----------
-    mesh : 9-node quadrilaterals [m]
-    """
+    """Isoparametric function space of a quadrilateral mesh, [KED, eqs. (4a)(4b)], in x and y alone."""
     fem_mesh = skfem.MeshQuad2(np.ascontiguousarray(mesh.points[:, :2].T), np.ascontiguousarray(mesh.cells.T))
     return skfem.Basis(fem_mesh, skfem.ElementQuad2(), intorder=QUADRATURE_ORDER)
 

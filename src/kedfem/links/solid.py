@@ -41,12 +41,7 @@ def vtk_order(nodes: int) -> list[int]:
 
 
 def solid_basis(mesh: SolidMesh) -> skfem.Basis:
-    """Isoparametric function space of a mesh, [KED, eqs. (4a)(4b)].
-
-    Parameters
-    ----------
-    mesh : 8-, 20- or 27-node hexahedra, or 10-node tetrahedra [m]
-    """
+    """Isoparametric function space of a mesh, [KED, eqs. (4a)(4b)]."""
     nodes = mesh.cells.shape[1]
     order = np.argsort(vtk_order(nodes))
     fem_mesh = MESHES[nodes](np.ascontiguousarray(mesh.points.T), np.ascontiguousarray(mesh.cells.T[order]))

@@ -57,7 +57,6 @@ def stations(
 
     Parameters
     ----------
-    where : how messages name the joint
     origin, axis : of the line, in the reference position; axis a unit vector
     travel : least and greatest place of the slider along the line [m]
 

@@ -46,8 +46,6 @@ def link_mesh(name: str, link: LinkScene, folder: Path, kept_whole: KeptWhole = 
 
     Parameters
     ----------
-    name : the link's name, for messages
-    link : a solid link of a validated scene
     folder : the folder that the names of part and mesh files refer to
     kept_whole : where joints, loads and probes sit, and the faces that they name: a part from CAD keeps its blends
         there, and `mesh.fillet_angle` is not of bores around them

@@ -60,7 +60,6 @@ def cad_mesh(
 
     Parameters
     ----------
-    keys : for messages
     name : the link's name, that of its solid in an assembly
     folder : what the file's name is relative to
     kept_whole : places and faces of the part where no blend is left out
@@ -181,7 +180,6 @@ def best_mesh(
     Parameters
     ----------
     form : what becomes of hexahedra, whose quality counts: of 20 nodes they may be worse than of 27
-    methods : to be tried in turn
     """
     found: list[tuple[float, SolidMesh]] = []
     reasons: list[str] = []

@@ -44,14 +44,7 @@ class AnimationWriter:
         return next((path for _, _, name in self.entries if not (path := self.folder / name).is_file()), None)
 
     def add(self, time: float, fields: Sequence[Block], angle: float = 0.0) -> list[Path]:
-        """Write the next frame; its VTU files.
-
-        Parameters
-        ----------
-        time : [s]
-        fields : the links in this frame, and what joints exert
-        angle : of the drive [rad], or travel [m]
-        """
+        """Write the next frame, at a time and a position of the drive; its VTU files."""
         if not self.count:
             remove_animation(self.folder, self.stem)
         now = {"TimeValue": float(time)} | ({self.drive: float(angle)} if self.drive else {})

@@ -211,7 +211,6 @@ def joint_field(scene: Scene, linked: Linkage, motion: RigidMotion, rows: Rows, 
     Parameters
     ----------
     rows : of all channels over the times of the motion
-    k : number of the time point
     """
     names = [name for name in scene.joints if f"joints/{name}/force" in rows]
     if not names:

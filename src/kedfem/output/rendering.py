@@ -28,12 +28,7 @@ FLAT_CELLS = {QUADRILATERAL, *LINES}
 
 
 def render(vtu: str, png: str, title: str, deformation_scale: str = "1", *gravity: str) -> None:
-    """Draw a frame.
-
-    Parameters
-    ----------
-    vtu, png, title, deformation_scale, gravity : as in :func:`kedfem.output.picture.write_picture`
-    """
+    """Draw a frame, as :func:`kedfem.output.picture.write_picture` is asked to."""
     import pyvista
 
     grid: Any = pyvista.read(vtu)

@@ -49,12 +49,7 @@ def _rigid(link: Link) -> Float[np.ndarray, "c 6"]:
 def write_deck(
     path: Path, link: Link, material: Material, cases: Sequence[LoadCase], comments: Iterable[str]
 ) -> None:
-    """The deck.
-
-    Parameters
-    ----------
-    comments : lines of comment for its head
-    """
+    """The deck, with lines of comment at its head."""
     held = supports(link)
     with text_file(path) as file:
         file.writelines(f"** {line}\n" for line in comments)
@@ -116,12 +111,7 @@ def resultants(
 def write_resultants(
     path: Path, X: Forces, cases: Sequence[LoadCase], about: Mapping[str, Float[np.ndarray, "3"]], drive: str
 ) -> None:
-    """Force and moment of each kind at each instant as CSV.
-
-    Parameters
-    ----------
-    drive : heading of the drive's position
-    """
+    """Force and moment of each kind at each instant as CSV."""
     columns = [
         f"{what} {c} [{unit}]"
         for what, unit in (("point", "m"), ("force", "N"), ("moment", "N m"))

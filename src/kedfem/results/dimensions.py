@@ -36,12 +36,7 @@ def cf_units(unit: str) -> str:
 
 
 def lay_dimensions(file: Any, drive: Channel, channels: Sequence[Channel]) -> None:
-    """Name rows and columns of all channels, which are there, with units and what they mean.
-
-    Parameters
-    ----------
-    drive : position of the drive, a coordinate beside time
-    """
+    """Name rows and columns of all channels, which are there, with units and what they mean."""
     import h5py
 
     write_facts(file, {"Conventions": CONVENTIONS, "coordinates": drive.name})

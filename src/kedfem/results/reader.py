@@ -28,10 +28,6 @@ def read_results(path: Path) -> Results:
 
     All channels; `status` shows whether the run came to its end.
 
-    Parameters
-    ----------
-    path : a file that a run wrote
-
     Raises
     ------
     OutputError

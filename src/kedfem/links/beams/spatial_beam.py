@@ -134,7 +134,6 @@ def spatial_beam_link(
 
     Parameters
     ----------
-    axis : stations of its axis in the reference position
     hubs_stiff : of E A L |sym G|²
     """
     X, one, triples = functions(axis)

@@ -54,7 +54,6 @@ def chosen_surface(
     Parameters
     ----------
     near : the point of the choice, of one without the joint's, to list surfaces by [m]
-    offered : the link's surfaces
 
     Raises
     ------

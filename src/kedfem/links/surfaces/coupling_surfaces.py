@@ -181,10 +181,6 @@ def surface_couples(link: Link, surface: CouplingSurface, where: str) -> Float[n
 
     The turn in the plane of two principal directions i, j is ½ (∂_i u_j − ∂_j u_i), or where the fit does not know ∂_j
     (j across a flat coupling surface) ∂_i u_j.
-
-    Parameters
-    ----------
-    where : how messages name the load
     """
     D, known = surface.directions, surface.spread > 0
     if link.d == 2:

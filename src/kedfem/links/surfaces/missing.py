@@ -24,7 +24,6 @@ def not_touching(link: Link, where: str, point: Vector, axis: Vector | None = No
 
     Parameters
     ----------
-    where : how messages name the joint
     axis : of the bore that was looked for
     """
     point = in_its_plane(link, point)

@@ -37,8 +37,6 @@ def solid_model(keys: CadKeys, path: Path, name: str, shape: Cad) -> Iterator[tu
 
     Parameters
     ----------
-    keys : of the scene, for messages
-    path : the file
     name : the link's name: of an assembly the solid of that name is taken, if `shape.solid` says no other
     shape : its `solid` and `scale`; where it is placed is for the caller
 

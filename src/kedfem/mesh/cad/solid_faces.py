@@ -48,8 +48,6 @@ def cad_faces(
 
     Parameters
     ----------
-    gmsh : with the solid in its model, in metres
-    where : for messages
     solid, extent : the solid's tag; the length of its box's diagonal [m]
     names : names of faces that have one; others are called "face" and their tag
 

@@ -41,7 +41,6 @@ def one_kind(
 
     Parameters
     ----------
-    points : (n, 3) [m]
     blocks : cells in VTK's order by their number of corners
 
     Returns

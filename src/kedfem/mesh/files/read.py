@@ -138,7 +138,6 @@ def named_faces(
 
     Parameters
     ----------
-    raw : as it was read
     points : (n, 3) all nodes, the file's first [m]
     cells : (e, 8), (e, 20), (e, 27), (e, 4) or (e, 10) the elements; their corners have the file's numbers
     """
@@ -158,8 +157,6 @@ def group_face(name: str, points: Float[np.ndarray, "n 3"], sides: Int[np.ndarra
 
     Parameters
     ----------
-    name : of the group
-    points : (n, 3) nodes [m]
     sides : (f, 4), (f, 8), (f, 9), (f, 3) or (f, 6) nodes of the sides, in the order of quad9 or tri6, seen from
         outside
     """

@@ -74,8 +74,6 @@ def outline_quads(where: str, outline: Outline, sizing: Sizing) -> tuple[Quads, 
 
     Parameters
     ----------
-    where : of the link, for messages
-    outline : a checked one
     sizing : as for parts from CAD, see :func:`~kedfem.mesh.layered.division.plan_size`
 
     Returns

@@ -49,7 +49,6 @@ def sized(solid: Solid, sizing: Sizing, mesh_of: Callable[[float], SolidMesh]) -
 
     Parameters
     ----------
-    solid, sizing : what is meshed, and how fine
     mesh_of : the mesh with elements of a share of that size
     """
     least, mesh = first_good(mesh_of, lambda each: mesh_quality(each).least)

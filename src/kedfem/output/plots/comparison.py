@@ -25,7 +25,6 @@ def write_comparison(
 
     Parameters
     ----------
-    names : of the runs
     along : (T,) [s], or [rad], [m] of the drive
     """
     remove_plots(ready_folder(folder))

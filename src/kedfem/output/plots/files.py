@@ -31,9 +31,8 @@ FORCE = "/force"
 def write_plots(results: Results, folder: Path, each: bool = False) -> list[Path]:
     """Plot all channels on one page, ``overview.png``, several pages where there are many.
 
-    Returns the files written.
-    What the table of a run calls ≈ 0 is left out.
-    What there is of rigid links too is drawn with it, dashed. Angles are in degrees.
+    Returns the files written; none without rows. What the table of a run calls ≈ 0 is left out. What there is of rigid
+    links too is drawn with it, dashed. Angles are in degrees.
 
     Curves are over the drive angle in degrees; where the drive stands still or turns back they are over time,
     with the drive angle below; over time alone where the drive slides, or there are several. Plots that an earlier run
@@ -41,8 +40,6 @@ def write_plots(results: Results, folder: Path, each: bool = False) -> list[Path
 
     Parameters
     ----------
-    results : what was read; without rows nothing is drawn
-    folder : made where missing
     each : whether every channel is also plotted on its own: ``probes-rocker_mid-stress.png``, …, ``energies.png``, and
         ``joint_forces.png`` for all joints
     """

@@ -72,12 +72,7 @@ def require_fatigue(where: str) -> None:
 
 
 def strength_of(data: FatigueData, youngs_modulus: float) -> Strength:
-    """The curve of a material's data.
-
-    Parameters
-    ----------
-    youngs_modulus : of the material [Pa]
-    """
+    """The curve of a material's data."""
     if data.strain_life is not None:
         return _of_strains(data, data.strain_life, youngs_modulus)
     slope = data.slope or SLOPE

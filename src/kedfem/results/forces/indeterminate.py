@@ -12,12 +12,7 @@ from kedfem.scene import GROUND, Scene
 
 
 def undetermined(scene: Scene, model: Model, channels: Collection[str]) -> dict[str, str]:
-    """The channels of joints and drives that a run does not have, each with the reason.
-
-    Parameters
-    ----------
-    channels : names of those that it has
-    """
+    """The channels of joints and drives that a run does not have, each with the reason."""
     out = {}
     for name in scene.joints:
         for what in ("force", "moment"):

@@ -73,12 +73,7 @@ class Modes:
         self.gain = 0.0  # highest stress of a mode, so far
 
     def coordinates(self, G: Float[np.ndarray, "T k"], highest: float) -> Float[np.ndarray, "T r"]:
-        """Of steps G (T, dn); new modes are made for the residual, until its stress is nothing.
-
-        Parameters
-        ----------
-        highest : stress so far [Pa]
-        """
+        """Of steps G (T, dn); new modes are made until the residual stress is nothing beside the highest so far."""
         floor = NOTHING * _largest(G)
         G = G - (G @ self.rigid.T) @ self.rigid
         C = np.zeros((len(G), 0))

@@ -67,9 +67,7 @@ def hot_spots(
 
     Parameters
     ----------
-    found : per link or segment
-    when : time and drive at every step
-    near : per link or segment what each point is near to, in words; empty where stress is what it seems
+    found, when, near : as of :func:`peaks`
     most : how many of each link
     """
     names = dict.fromkeys(each.link for each in found if not np.isnan(each.stress).all())
