@@ -14,7 +14,8 @@ from geometry.make import empty_model
 from geometry.step_files import write_step
 
 from kedfem.cli import USER_ERROR
-from kedfem.mesh.cad.assembly import AssemblySolid, RoundFace, assembly_solids, meetings
+from kedfem.mesh.cad.assembly import AssemblySolid, assembly_solids, meetings
+from kedfem.mesh.cad.solids import CadFace
 from kedfem.scene import GROUND, read_scene
 from kedfem.tables.draft import link_names, scene_text
 
@@ -163,16 +164,16 @@ def test_names_of_links_are_those_of_a_scene() -> None:
 
 def cylinder(
     r: float, low: float, high: float, inward: bool, at: tuple[float, float] = (0.0, 0.0)
-) -> RoundFace:
+) -> CadFace:
     middle = np.array([*at, (low + high) / 2])
-    return RoundFace("cylinder", middle, np.eye(3)[2], r, high - low, inward)
+    return CadFace(0, "", "cylinder", middle, np.eye(3)[2], r, inward, np.nan, high - low)
 
 
-def ball(r: float, at: float, inward: bool) -> RoundFace:
-    return RoundFace("sphere", np.array([at, 0.0, 0.0]), np.full(3, np.nan), r, np.nan, inward)
+def ball(r: float, at: float, inward: bool) -> CadFace:
+    return CadFace(0, "", "sphere", np.array([at, 0.0, 0.0]), np.full(3, np.nan), r, inward, np.nan, np.nan)
 
 
-def found(*rounds: tuple[RoundFace, ...]) -> list[Any]:
+def found(*rounds: tuple[CadFace, ...]) -> list[Any]:
     return meetings([AssemblySolid(f"s{i}", 0.1, each) for i, each in enumerate(rounds)])
 
 
@@ -211,7 +212,7 @@ BORE = cylinder(5 * MM, 0, 20 * MM, True)
     (cylinder(5 * MM, 26 * MM, 30 * MM, True), False),  # too far from it
     (cylinder(4.9 * MM, 20 * MM, 30 * MM, True), False),  # of another pin
 ])  # fmt: skip
-def test_bores_meet_what_fits_them(other: RoundFace, met: bool) -> None:
+def test_bores_meet_what_fits_them(other: CadFace, met: bool) -> None:
     assert len(found((BORE,), (other,))) == len(found((other,), (BORE,))) == met
 
 
@@ -252,8 +253,8 @@ def grounds(solids: list[AssemblySolid]) -> tuple[bool, list[list[str]]]:
 
 def test_a_frame_is_suggested_where_there_is_reason_to() -> None:
     """One of that name, else the largest in a closed loop: of an open chain none."""
-    pins: Callable[[int], RoundFace] = lambda i: cylinder(5 * MM, 0, 9 * MM, False, (i * pi * MM * 10, 0))  # noqa: E731
-    holes: Callable[[int], RoundFace] = lambda i: cylinder(5 * MM, 0, 9 * MM, True, (i * pi * MM * 10, 0))  # noqa: E731
+    pins: Callable[[int], CadFace] = lambda i: cylinder(5 * MM, 0, 9 * MM, False, (i * pi * MM * 10, 0))  # noqa: E731
+    holes: Callable[[int], CadFace] = lambda i: cylinder(5 * MM, 0, 9 * MM, True, (i * pi * MM * 10, 0))  # noqa: E731
     chain = [AssemblySolid("a", 0.1, (holes(1),)), AssemblySolid("b", 0.3, (pins(1), holes(2))),
              AssemblySolid("c", 0.2, (pins(2),))]  # fmt: skip
     assert grounds(chain) == (False, [["a", "b"], ["b", "c"]])

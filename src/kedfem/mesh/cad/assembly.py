@@ -1,11 +1,10 @@
 """The solids of an assembly, and where they meet as joints: a pin in a bore, two bores in a line, a ball in its seat."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
 from types import ModuleType
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -30,30 +29,12 @@ SAME = 1e-3  # of the radius: such bores have the same
 
 
 @dataclass(frozen=True, slots=True)
-class RoundFace:
-    """A closed cylinder or a ball of a solid, in the file's frame; of a ball direction and length are nan.
-
-    centre : (3,) of a cylinder on its axis half way, [m]
-    direction : (3,) unit vector along the axis
-    radius, length : [m]
-    inward : whether it is a hole: a bore or a ball seat
-    """
-
-    kind: Literal["cylinder", "sphere"]
-    centre: Float[np.ndarray, "3"]
-    direction: Float[np.ndarray, "3"]
-    radius: float
-    length: float
-    inward: bool
-
-
-@dataclass(frozen=True, slots=True)
 class AssemblySolid:
-    """A solid of an assembly: its name, the diagonal of its box [m], its round faces."""
+    """A solid of an assembly: its name, the diagonal of its box [m], its closed cylinders and balls."""
 
     name: str
     extent: float
-    rounds: tuple[RoundFace, ...]
+    rounds: tuple[CadFace, ...]
 
 
 def assembly_solids(path: Path, scale: float | None) -> list[AssemblySolid]:
@@ -81,29 +62,25 @@ def _read(path: Path, scale: float | None) -> list[AssemblySolid]:
         ]
 
 
-def round_faces(gmsh: ModuleType, solid: Solid) -> list[RoundFace]:
+def round_faces(gmsh: ModuleType, solid: Solid) -> list[CadFace]:
     """The closed cylinders and the balls of a solid; CAD files divide them along seams."""
     groups = [[solid.faces[i] for i in group] for group in one_surface(gmsh, solid)]
     found = [_round_face(group) for group in groups if group[0].kind in ("cylinder", "sphere")]
     return [each for each in found if each is not None]
 
 
-def _round_face(parts: list[CadFace]) -> RoundFace | None:
+def _round_face(parts: list[CadFace]) -> CadFace | None:
     """What faces of one cylinder or ball are together; None if it is but a part of one, as a fillet is."""
     first, area = parts[0], sum(face.area for face in parts)
     if first.kind == "sphere":
-        whole = area >= BALL * 4 * np.pi * first.radius**2
-        nowhere = np.full(3, np.nan)
-        return (
-            RoundFace("sphere", first.centre, nowhere, first.radius, np.nan, first.inward) if whole else None
-        )
+        return first if area >= BALL * 4 * np.pi * first.radius**2 else None
     along = np.array([(face.centre - first.centre) @ first.direction for face in parts])
     half = np.array([face.length for face in parts]) / 2
     low, high = float((along - half).min()), float((along + half).max())
     if area < CLOSED * 2 * np.pi * first.radius * (high - low):
         return None
     centre = first.centre + (low + high) / 2 * first.direction
-    return RoundFace("cylinder", centre, first.direction, first.radius, high - low, first.inward)
+    return replace(first, centre=centre, length=high - low, area=area)
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +95,7 @@ class Meeting:
     """
 
     solids: tuple[int, int]
-    faces: tuple[RoundFace, RoundFace]
+    faces: tuple[CadFace, CadFace]
     at: Float[np.ndarray, "3"]
     share: float
     hidden: tuple[bool, bool]
@@ -163,7 +140,7 @@ def _of_two(solids: Sequence[AssemblySolid], pair: tuple[int, int]) -> list[Meet
 
 
 def _meeting(
-    solids: Sequence[AssemblySolid], pair: tuple[int, int], faces: tuple[RoundFace, RoundFace]
+    solids: Sequence[AssemblySolid], pair: tuple[int, int], faces: tuple[CadFace, CadFace]
 ) -> Meeting | None:
     """Two round faces, the first a hole, as a meeting; None if they do not meet."""
     hole, pin = faces
@@ -181,7 +158,7 @@ def _meeting(
     return Meeting(pair, faces, hole.centre + middle * hole.direction, share, (False, hidden))
 
 
-def _fits(hole: RoundFace, pin: RoundFace) -> bool:
+def _fits(hole: CadFace, pin: CadFace) -> bool:
     """Whether a pin or ball is of a hole's size; two bores have to be of the same."""
     least, most = (1 - SAME, 1 + SAME) if pin.inward else (1 - PLAY, 1 + PRESS)
     return hole.kind == pin.kind and least * hole.radius <= pin.radius <= most * hole.radius
@@ -200,10 +177,10 @@ def _together(group: list[Meeting]) -> Meeting:
     ]
     middle = (min(low for low, _ in ends) + max(high for _, high in ends)) / 2
     at = hole.centre + middle * hole.direction
-    return Meeting(longest.solids, longest.faces, at, longest.share, longest.hidden)
+    return replace(longest, at=at)
 
 
-def _same_axis(a: RoundFace, b: RoundFace) -> bool:
+def _same_axis(a: CadFace, b: CadFace) -> bool:
     """Whether two cylinders have one axis, or two balls one centre."""
     if a.kind != b.kind:
         return False
@@ -213,16 +190,16 @@ def _same_axis(a: RoundFace, b: RoundFace) -> bool:
     return _parallel(a, b) and _beside(a, b) <= near
 
 
-def _parallel(a: RoundFace, b: RoundFace) -> bool:
+def _parallel(a: CadFace, b: CadFace) -> bool:
     return bool(np.linalg.norm(np.cross(a.direction, b.direction)) <= SKEW)
 
 
-def _beside(a: RoundFace, b: RoundFace) -> float:
+def _beside(a: CadFace, b: CadFace) -> float:
     """How far the middle of one cylinder is from the axis of another [m]."""
     return float(np.linalg.norm(np.cross(b.centre - a.centre, a.direction)))
 
 
-def _overlap(a: RoundFace, b: RoundFace) -> tuple[float, float]:
+def _overlap(a: CadFace, b: CadFace) -> tuple[float, float]:
     """Length that two cylinders on one axis share, negative by their gap, and its middle from a's centre [m]."""
     x = float((b.centre - a.centre) @ a.direction)
     low, high = max(-a.length, 2 * x - b.length) / 2, min(a.length, 2 * x + b.length) / 2

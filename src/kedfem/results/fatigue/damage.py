@@ -13,7 +13,7 @@ from kedfem.dynamics.model import Model
 from kedfem.errors import SceneError
 from kedfem.motion.period import repeats_after
 from kedfem.results.fatigue.strength import Strength, strength_of, verdict
-from kedfem.results.fatigue.surface import CRITERIA, FINDLEY, LinkFatigue, Look, Period, Stressed
+from kedfem.results.fatigue.surface import CRITERIA, FINDLEY, LinkFatigue, Look, Period
 from kedfem.results.records import Fatigue, FatigueSpot
 from kedfem.results.stresses.envelope import Envelope
 from kedfem.results.stresses.peaks import drawn_points, places_apart
@@ -51,7 +51,7 @@ def fatigue_of(
     period = Period(length, float(times[-1]), bool(times[-1] - 2 * length > times[0] - some))
     strengths = link_strengths(scene, asked)
     looks = {
-        k: Look(_stressed(model, envelope, near, k), strengths[link.name], asked, period)
+        k: Look(envelope.recoveries[k], envelope.kept(k), near[k], strengths[link.name], asked, period)
         for k, link in enumerate(model.links)
         if link.name in strengths and not link.rigid
     }
@@ -78,14 +78,6 @@ def link_strengths(scene: Scene, asked: Asked) -> dict[str, Strength]:
         if data is not None and link.material is not None and link.model != "rigid":
             out[name] = strength_of(data, scene.materials[link.material].youngs_modulus)
     return out
-
-
-def _stressed(model: Model, envelope: Envelope, near: Sequence[Sequence[str]], k: int) -> Stressed:
-    """A link or segment with its history."""
-    kept = envelope.kept(k)
-    if kept is None:
-        raise TypeError(f"{model.links[k].name}: has no history")
-    return Stressed(envelope.recoveries[k], kept, near[k])
 
 
 def _doubt(scene: Scene, period: Period, repeats: float) -> str:

@@ -89,34 +89,28 @@ class Period:
         return C, C[-len(times) :] - np.reshape(earlier, (-1, len(times))).T
 
 
-@dataclass(frozen=True, slots=True)
-class Stressed:
-    """A link or segment with the history of its stress.
-
-    near : what each of its points is near to, in words
-    """
-
-    recovery: StressRecovery
-    kept: Kept
-    near: Sequence[str]
-
-
 class Look:
     """At one link or segment: its surface, and the history of its stress.
 
+    near : what each of its points is near to, in words
     highest : stress over the period, of all that is examined [Pa]
     repeats : by how much it differs from the period before, of the highest
     left_out : points that are near to something
     """
 
-    def __init__(self, of: Stressed, strength: Strength, asked: Asked, period: Period) -> None:
-        self.strength, self.asked = strength, asked
-        self.recovery, self.near, self.parts = of.recovery, of.near, of.kept.parts
-        self.name = of.recovery.link.name
-        self.C, self.gone = period.of(of.kept)
+    def __init__(
+        self, recovery: StressRecovery, kept: Kept | None, near: Sequence[str], strength: Strength, asked: Asked,
+        period: Period,
+    ) -> None:  # fmt: skip
+        self.recovery, self.strength, self.asked, self.near = recovery, strength, asked, near
+        self.name = recovery.link.name
+        if kept is None:
+            raise TypeError(f"{self.name}: has no history")
+        self.parts = kept.parts
+        self.C, self.gone = period.of(kept)
         self.moments, self.mean = self.C.T @ self.C / len(self.C), self.C.mean(axis=0)
-        whole = free_surface(of.recovery)
-        words = np.array([bool(word) for word in of.near])[whole.places % self.recovery.points]
+        whole = free_surface(recovery)
+        words = np.array([bool(word) for word in near])[whole.places % self.recovery.points]
         out = words & (not asked.near_joints)
         self.left_out = int(out.sum())
         self.surface = FreeSurface(whole.places[~out], whole.axes[~out])
