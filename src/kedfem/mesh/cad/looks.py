@@ -18,6 +18,14 @@ Axis = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]
 
 
 @dataclass(frozen=True, slots=True)
+class Frame:
+    """A point [m] and, as rows, three directions square to each other, right-handed."""
+
+    origin: Float[np.ndarray, "3"]
+    axes: Float[np.ndarray, "3 3"]
+
+
+@dataclass(frozen=True, slots=True)
 class Looks:
     """Places (q, 3) and unit normals (q, 3) on a face, lengths in sizes of the solid, from its middle."""
 

@@ -8,7 +8,7 @@ from types import ModuleType
 import numpy as np
 from jaxtyping import Float
 
-from kedfem.mesh.cad.looks import OFF, Looks, common_axes, looks
+from kedfem.mesh.cad.looks import OFF, Frame, Looks, common_axes, looks
 from kedfem.mesh.cad.solids import CadFace, OtherMethodError, Sizing, Solid
 from kedfem.mesh.elements.hexahedra import SolidMesh, stacked, without_spare_nodes
 from kedfem.mesh.layered.division import plan_size
@@ -25,18 +25,10 @@ _LONG = 2.5  # an element's length along the path by its size in the section, wh
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
-    """Where the section is: its centre [m], and rows: two directions in it, and that along the path."""
-
-    origin: Float[np.ndarray, "3"]
-    axes: Float[np.ndarray, "3 3"]
-
-
-@dataclass(frozen=True, slots=True)
 class Leg:
     """A line, or an arc about an axis, of a path.
 
-    start
+    start : of the section: its centre, two directions in it and that along the path
     arm : (3,) of an arc from its axis to where it starts [m]; of a line 0
     travel : length of a line [m], angle of an arc [rad]
     """

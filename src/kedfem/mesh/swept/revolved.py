@@ -8,7 +8,7 @@ from types import ModuleType
 import numpy as np
 from jaxtyping import Bool, Float
 
-from kedfem.mesh.cad.looks import Axis, Looks, common_axes, looks
+from kedfem.mesh.cad.looks import Axis, Frame, Looks, common_axes, looks
 from kedfem.mesh.cad.solids import OtherMethodError, Sizing, Solid
 from kedfem.mesh.cad.words import direction_in_words, face_in_words
 from kedfem.mesh.elements.hexahedra import SolidMesh, stacked, without_spare_nodes
@@ -24,18 +24,6 @@ from kedfem.mesh.swept.core import NEAR, core_mesh, core_radius
 _ASIDE = 0.7  # [rad] from the start of a full turn to the section: seams of faces are at right angles, mostly
 _FEWEST, _MOST = 12, 20  # elements around a full turn where no size is asked for
 _RING = 20  # that a ring needs: with 16 its first frequency is 0.6 % too high, with 20 0.2 %
-
-
-@dataclass(frozen=True, slots=True)
-class Revolution:
-    """The axis of a solid of revolution.
-
-    origin : (3,) a point of the axis [m]
-    axes : (3, 3) rows: the axis, and two directions square to it, right-handed [-]
-    """
-
-    origin: Float[np.ndarray, "3"]
-    axes: Float[np.ndarray, "3 3"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,8 +48,11 @@ def revolved_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
     return sized(solid, sizing, lambda share: _mesh_about(gmsh, solid, turn, sizing, share))
 
 
-def revolution(gmsh: ModuleType, solid: Solid) -> Revolution:
-    """The axis of a solid whose faces all turn about it; OtherMethodError with what is in the way."""
+def revolution(gmsh: ModuleType, solid: Solid) -> Frame:
+    """A frame on the axis of a solid whose faces all turn about it, which is its first direction.
+
+    An OtherMethodError says what is in the way.
+    """
     every = list(looks(gmsh, solid).values())
     obstacles: list[tuple[float, str]] = []
     for axis in common_axes(solid, every):
@@ -75,8 +66,8 @@ def revolution(gmsh: ModuleType, solid: Solid) -> Revolution:
     raise OtherMethodError(f"{solid.name}: no solid of revolution, as {reason}")
 
 
-def _framed(gmsh: ModuleType, solid: Solid, every: list[Looks], axis: Axis) -> Revolution:
-    """The record: the axis runs to where more of the volume is, so that it turns with the part."""
+def _framed(gmsh: ModuleType, solid: Solid, every: list[Looks], axis: Axis) -> Frame:
+    """The frame: its axis runs to where more of the volume is, so that it turns with the part."""
     point, along = axis
     reach = np.concatenate([look.places for look in every]) @ along
     centre = (np.asarray(gmsh.model.occ.getCenterOfMass(3, solid.tag)) - solid.middle) / solid.extent
@@ -84,10 +75,10 @@ def _framed(gmsh: ModuleType, solid: Solid, every: list[Looks], axis: Axis) -> R
     first = np.eye(3)[int(np.argmin(abs(along)))]
     radial = first - (first @ along) * along
     radial /= np.linalg.norm(radial)
-    return Revolution(solid.middle + solid.extent * point, np.stack([along, radial, np.cross(along, radial)]))
+    return Frame(solid.middle + solid.extent * point, np.stack([along, radial, np.cross(along, radial)]))
 
 
-def _mesh_about(gmsh: ModuleType, solid: Solid, turn: Revolution, sizing: Sizing, share: float) -> SolidMesh:
+def _mesh_about(gmsh: ModuleType, solid: Solid, turn: Frame, sizing: Sizing, share: float) -> SolidMesh:
     """The mesh swept about the axis, in the solid's place."""
     with _meridian(gmsh, solid, turn, sizing, share) as meridian:
         flat = plan_mesh(solid.name, meridian.outside, meridian.size, sizing)
@@ -105,7 +96,7 @@ def _mesh_about(gmsh: ModuleType, solid: Solid, turn: Revolution, sizing: Sizing
 
 @contextmanager
 def _meridian(
-    gmsh: ModuleType, solid: Solid, turn: Revolution, sizing: Sizing, share: float
+    gmsh: ModuleType, solid: Solid, turn: Frame, sizing: Sizing, share: float
 ) -> Iterator[_Meridian]:
     """The meridian section in a copy of the model: x along the axis, y from it, in sizes of the solid."""
     radial = np.array([0, np.cos(_ASIDE), np.sin(_ASIDE)]) @ turn.axes
@@ -125,7 +116,7 @@ def _meridian(
 
 
 def _section(
-    gmsh: ModuleType, solid: Solid, turn: Revolution, axes: Float[np.ndarray, "3 3"]
+    gmsh: ModuleType, solid: Solid, turn: Frame, axes: Float[np.ndarray, "3 3"]
 ) -> list[tuple[int, int]]:
     """The faces in which half a plane through the axis cuts the solid, moved with the axis' point to the origin."""
     [(_, tag)] = gmsh.model.getEntities(3)
@@ -153,7 +144,7 @@ def _cut(
 def _plan(
     gmsh: ModuleType,
     solid: Solid,
-    turn: Revolution,
+    turn: Frame,
     axes: Float[np.ndarray, "3 3"],
     faces: list[tuple[int, int]],
 ) -> Plan:
