@@ -105,6 +105,32 @@ def test_a_solid_slider_is_a_rigid_one_but_for_its_softness() -> None:
     assert np.abs(a["joints/guide/force"][:, 0]).max() < 1e-9 * np.abs(a["joints/guide/force"]).max()
 
 
+@pytest.mark.parametrize("force", [(900, 0, 0), (0, 900, 0), (0, 0, 900), (300, -500, 700)])
+def test_what_bears_a_slider_crank_balances_the_load_on_its_slider(force: tuple[float, float, float]) -> None:
+    """Forces and moments of bearing and guide, the crank beside the rod's plane and the load off the pin; six balances."""
+    raw = solid_slider_crank({"model": "rigid", "mass": 1.0})
+    raw["links"]["crank"]["shape"] = raw["links"]["crank"]["shape"] | {"offset": 0.03}
+    c = float(np.sqrt(0.3**2 - 0.08**2))
+    raw["gravity"] = [0, 0, 0]
+    raw["joints"]["guide"]["at"] = [c - 0.05, 0.02, 0.01]
+    at = [c + 0.04, -0.03, 0.06]
+    raw["loads"] = {"push": {"kind": "force", "link": "piston", "at": at, "vector": list(force)}}
+    raw["analysis"] = {"kind": "static", "steps_per_revolution": 8, "revolutions": 0.5}
+    found = histories(raw)
+    phi = np.pi / 2 + np.linspace(0, np.pi, len(found["joints/A/force"]))
+    y = 0.08 * np.sin(phi)
+    moved = np.outer(0.08 * np.cos(phi) + np.sqrt(0.3**2 - y**2) - c, [1, 0, 0])
+    A, guide = (
+        (found["joints/A/force"], found["joints/A/moment"]),
+        (found["joints/guide/force"], found["joints/guide/moment"]),
+    )
+    assert_allclose(A[0] + guide[0] + force, 0 * moved, atol=1e-6 * 900)
+    arms = moved + raw["joints"]["guide"]["at"]
+    balance = A[1] + guide[1] + np.cross(arms, guide[0]) + np.cross(moved + at, force)
+    assert_allclose(balance, 0 * moved, atol=1e-4 * 900 * 0.3)
+    assert np.abs(guide[1]).max() > 10
+
+
 @pytest.mark.parametrize("kind", ["beam", "bar"])
 def test_turning_the_whole_scene_turns_the_answer(kind: str) -> None:
     raw, turned = four_bar(kind, revolutions=0.2), four_bar(kind, revolutions=0.2)

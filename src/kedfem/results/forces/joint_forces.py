@@ -9,6 +9,7 @@ from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.constraint_joints import ordered
 from kedfem.dynamics.model import Model, PrescribedBody, Slider
 from kedfem.links.record import in_space
+from kedfem.motion.constraints import cross
 from kedfem.results.forces.constraint_forces import known
 from kedfem.results.forces.hub_forces import constrained_joints, hub_wrench, partner
 from kedfem.results.forces.port_forces import Forces, determinate, holder, loose, negligible, port_wrench
@@ -23,7 +24,7 @@ def joint_channels(scene: Scene, model: Model, name: str, forces: Forces) -> lis
     if any(row.name == name for row in model.rows) and slider is None:
         return _row_joint(scene, model, name, forces)
     if slider is not None:
-        return _slider_force(scene, model, slider, name, forces)
+        return _slider(scene, model, slider, name, forces)
     hub = next((x for x in model.prescribed if x.hub == name), None)
     if hub is not None:
         return _hub(scene, model, hub, forces)
@@ -81,35 +82,44 @@ def _hub(scene: Scene, model: Model, prescribed: PrescribedBody, forces: Forces)
     return _channels(prescribed.hub, label, wrench, determined)
 
 
-def _slider_force(scene: Scene, model: Model, slider: Slider, name: str, forces: Forces) -> list[Recorded]:
-    """Guide: on the slider from the ground. Joint: on the carrier link from the slider, whose inertia rides on it."""
-    pins = [name] if name != slider.guide else [
-        j for j, joint in scene.joints.items() if slider.name in joint.links and j != name
-    ]  # fmt: skip
-    zero = np.zeros(3)
-    pairs = [(k, j) for k, x in enumerate(model.joints) for j in pins if j in x.joints]
-    if not all(determinate(model, k, j, zero)[0] for k, j in pairs):
-        return []
-    wrenches = [port_wrench(model, k, j, zero, forces) for k, j in pairs]
-    if name == slider.guide:
-        description = f"force of joint {name} on slider {slider.name} from ground"
+def _slider(scene: Scene, model: Model, slider: Slider, name: str, forces: Forces) -> list[Recorded]:
+    """Guide: on the slider from the ground. Joint: on the carrier link from the slider, whose inertia rides on it.
 
-        def guide(block: Block) -> Rows:
-            return np.asarray(np.sum([wrench(block)[0] for wrench in wrenches], axis=0))
+    The slider does not rotate and its mass is at the joint, so that moments pass through it to the guide.
+    """
+    guided = name == slider.guide
+    joints = [j for j, x in scene.joints.items() if slider.name in x.links] if guided else [name]
+    pairs = [(k, j) for k, x in enumerate(model.joints) for j in joints if j in x.joints]
+    points = {j: np.asarray(scene.joints[j].at) for j in {*joints, name}}
+    known = [determinate(model, k, j, points[j]) for k, j in pairs]
+    borne = [(points[j] - points[name], port_wrench(model, k, j, points[j], forces)) for k, j in pairs]
 
-        return [Recorded(Channel(f"joints/{name}/force", XYZ, "N", "world", description), guide)]
-    carrier = model.links[slider.carrier]
-    description = f"force of joint {name} on link {carrier.name} from slider {slider.name}"
-    gravity = np.asarray(scene.gravity)
+    def wrench(block: Block) -> tuple[Rows, Rows]:
+        force, moment = np.zeros((2, len(block), 3))
+        for arm, of in borne:
+            f, m = of(block)
+            force, moment = force + f, moment + m + cross(arm, f)
+        own_force, own_moment = _on_slider(scene, model, slider, forces, block)
+        return (force, moment - own_moment) if guided else (force + own_force, moment)
 
-    def pin(block: Block) -> Rows:
-        motion, body = block.motion, model.bodies[slider.carrier]
-        rigid = motion.p2[:, body] + motion.R2[:, body] @ (slider.weights @ carrier.X)
-        elastic = np.tensordot(block.links[slider.carrier].a, slider.weights, (1, 0))
-        a = rigid + in_space(carrier, elastic)
-        force = wrenches[0](block)[0] - slider.mass * (a - gravity)
-        for x in slider.loads:
-            force += np.outer(x.factor(motion.t, motion.phi), in_space(carrier, carrier.one @ x.forces))
-        return np.asarray(force + forces.force_elements.on(slider.name, block, np.zeros((len(block), 3)))[0])
+    on = f"slider {slider.name} from ground"
+    if not guided:
+        on = f"link {model.links[slider.carrier].name} from slider {slider.name}"
+    determined = [all(x[which] for x in known) for which in (0, 1)]
+    return _channels(name, f"of joint {name} on {on}", wrench, determined)
 
-    return [Recorded(Channel(f"joints/{name}/force", XYZ, "N", "world", description), pin)]
+
+def _on_slider(
+    scene: Scene, model: Model, slider: Slider, forces: Forces, block: Block
+) -> tuple[Rows, Rows]:
+    """Weight, inertia, loads and force elements of a slider, whose forces ride on its carrier; about its joint."""
+    carrier, motion, body = model.links[slider.carrier], block.motion, model.bodies[slider.carrier]
+    X = slider.weights @ carrier.X
+    elastic = np.tensordot(block.links[slider.carrier].a, slider.weights, (1, 0))
+    a = motion.p2[:, body] + motion.R2[:, body] @ X + in_space(carrier, elastic)
+    force, moment = slider.mass * (np.asarray(scene.gravity) - a), np.zeros((len(block), 3))
+    for x in slider.loads:
+        f = np.outer(x.factor(motion.t, motion.phi), in_space(carrier, carrier.one @ x.forces))
+        force, moment = force + f, moment + cross(np.asarray(scene.loads[x.load].at) - X, f)
+    f, m = forces.force_elements.on(slider.name, block, motion.p[:, body] + motion.R[:, body] @ X)
+    return force + f, moment + m
