@@ -32,6 +32,20 @@ def test_no_example_and_no_template_is_doubted(path: Path) -> None:
     assert seen(read_scene(path))[1] == ()
 
 
+def test_a_rigid_link_without_a_shape_has_no_material_to_doubt() -> None:
+    """However heavy it is: 40 t on a line of 0.3 m made one stiffer than diamond."""
+    raw = four_bar()
+    raw["links"]["coupler"] = {
+        "model": "rigid",
+        "mass": 4e4,
+        "centre": [0.2, 0.2],
+        "inertia": [1, 1, 1, 0, 0, 0],
+    }
+    line, warnings = seen(scene_from(raw))
+    assert "E 210 GPa;" in line
+    assert warnings == ()
+
+
 def four_bar(factor: float = 1.0, **change: Any) -> dict[str, Any]:
     """All lengths times a factor; keys a__b replaced."""
     a, width, thickness = 0.1 * factor, 0.02 * factor, 0.01 * factor

@@ -7,6 +7,7 @@ import numpy as np
 
 from kedfem.dynamics.model import Model
 from kedfem.scene import ConstantSpeed, Ramp, Scene
+from kedfem.scene.records.materials import LINE
 from kedfem.scene.records.units import RPM
 
 LENGTHS = 1e-4, 30.0  # m, of a link: watches, booms of cranes
@@ -36,7 +37,7 @@ class Sizes:
 
     overall : largest extent of the linkage in the reference position [m]
     lengths, masses : of each link by name [m, kg]; sliders without a shape have no length
-    moduli : Young's modulus of each material in use [Pa]
+    moduli : Young's modulus of each material that elastic links are made of [Pa]
     turns, speeds : of drives at a constant (final) speed [rpm, m/s]
     """
 
@@ -59,7 +60,7 @@ def sizes(scene: Scene, model: Model) -> Sizes:
     joints = np.array([joint.at for joint in scene.joints.values()]).reshape(-1, 3)
     moduli = {
         name: scene.materials[name].youngs_modulus
-        for name in dict.fromkeys(link.material for link in scene.links.values())
+        for name in dict.fromkeys(link.material for link in scene.links.values() if link.model != "rigid")
         if name is not None
     }
     final = {
@@ -112,7 +113,8 @@ def _length_doubts(scene: Scene, found: Sizes) -> Iterator[str]:
 
 
 def _material_doubts(scene: Scene) -> Iterator[str]:
-    used = {link.material for link in scene.links.values()}
+    every = {link.material for link in scene.links.values()}
+    used = {name for name in every if name and not name.startswith(LINE)}
     for name, material in scene.materials.items():
         for key, unit, (low, high), below, above, meant in DOUBTED if name in used else ():
             value, where = getattr(material, key), f"materials.{name}.{key}"

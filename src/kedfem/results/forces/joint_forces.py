@@ -109,9 +109,7 @@ def _slider(scene: Scene, model: Model, slider: Slider, name: str, forces: Force
     return _channels(name, f"of joint {name} on {on}", wrench, determined)
 
 
-def _on_slider(
-    scene: Scene, model: Model, slider: Slider, forces: Forces, block: Block
-) -> tuple[Rows, Rows]:
+def _on_slider(scene: Scene, model: Model, slider: Slider, forces: Forces, block: Block) -> tuple[Rows, Rows]:
     """Weight, inertia, loads and force elements of a slider, whose forces ride on its carrier; about its joint."""
     carrier, motion, body = model.links[slider.carrier], block.motion, model.bodies[slider.carrier]
     X = slider.weights @ carrier.X

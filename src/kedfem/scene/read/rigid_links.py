@@ -13,6 +13,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from kedfem.scene.records.base import plain
 from kedfem.scene.records.loads import RigidBody, inertia_faults, inertia_tensor, moments_of_inertia
+from kedfem.scene.records.materials import LINE
 from kedfem.scene.records.points import XYZ, Apart, JointPoint
 
 LIGHT = 1e-4  # of the mass: that of the line, whose own modes are made as stiff as they are heavy (1e-9: forces 10 % off)
@@ -62,7 +63,7 @@ def _carry(out: Tables, name: str, body: RigidBody) -> None:
     width = SLENDER * max(math.dist(P, Q) for P, Q in combinations(points, 2))
     volume = width**2 * sum(math.dist(P, Q) for P, Q in pairwise(points))
     bodies, materials = dict(out.get("bodies", {})), dict(out.get("materials", {}))
-    material = _unused(f"line of {name}"[:40], materials)
+    material = _unused(f"{LINE}{name}"[:40], materials)
     materials[material] = {
         "density": LIGHT * body.mass / volume,
         "youngs_modulus": body.mass / volume * SOUND**2,

@@ -11,6 +11,7 @@ from kedfem.errors import Fault
 from kedfem.scene.records.base import Record, refuse
 from kedfem.scene.records.units import PositivePressure, Quantity, fault
 
+LINE = "line of "  # how the name begins of what a rigid link without a shape is made of
 Ratio = Annotated[float, Quantity("1", least=0.0, below=1.0)]
 Frequency = Annotated[float, Quantity("Hz", above=0.0)]
 
