@@ -107,7 +107,7 @@ def test_a_solid_slider_is_a_rigid_one_but_for_its_softness() -> None:
 
 @pytest.mark.parametrize("force", [(900, 0, 0), (0, 900, 0), (0, 0, 900), (300, -500, 700)])
 def test_what_bears_a_slider_crank_balances_the_load_on_its_slider(force: tuple[float, float, float]) -> None:
-    """Forces and moments of bearing and guide, the crank beside the rod's plane and the load off the pin; six balances."""
+    """Forces and moments of bearing and guide; crank beside the rod, load off the pin: six balances."""
     raw = solid_slider_crank({"model": "rigid", "mass": 1.0})
     raw["links"]["crank"]["shape"] = raw["links"]["crank"]["shape"] | {"offset": 0.03}
     c = float(np.sqrt(0.3**2 - 0.08**2))
