@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import cast
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from kedfem.results.forces.hub_forces import constrained_joints, hub_wrench, par
 from kedfem.results.forces.port_forces import Forces, determinate, holder, loose, negligible, port_wrench
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import XYZ, Channel
-from kedfem.scene import GROUND, Scene
+from kedfem.scene import GROUND, ForceLoad, Scene
 
 
 def joint_channels(scene: Scene, model: Model, name: str, forces: Forces) -> list[Recorded]:
@@ -118,6 +119,6 @@ def _on_slider(scene: Scene, model: Model, slider: Slider, forces: Forces, block
     force, moment = slider.mass * (np.asarray(scene.gravity) - a), np.zeros((len(block), 3))
     for x in slider.loads:
         f = np.outer(x.factor(motion.t, motion.phi), in_space(carrier, carrier.one @ x.forces))
-        force, moment = force + f, moment + cross(np.asarray(scene.loads[x.load].at) - X, f)
+        force, moment = force + f, moment + cross(np.asarray(cast(ForceLoad, scene.loads[x.load]).at) - X, f)
     f, m = forces.force_elements.on(slider.name, block, motion.p[:, body] + motion.R[:, body] @ X)
     return force + f, moment + m
