@@ -3,15 +3,36 @@
 docs/performance.md says why this library.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 import scipy.sparse as sp
 from cvxopt import cholmod, matrix, sparse, spmatrix
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from kedfem.errors import SolveError
 
 MANY = 32  # right-hand sides solved at once
 LARGE = 5000  # unknowns from which right-hand sides go in fours
+PERMUTED = 7  # of CHOLMOD's systems: P b
+
+
+@dataclass(frozen=True, slots=True)
+class Triangle:
+    """A factor L of P A Pᵀ = L Lᵀ, column by column, as `triangle_kernel` takes it.
+
+    first : (blocks + 1,) first columns of blocks, whose columns have the same rows below the block
+    below_at, below : (blocks + 1,), rows below each block
+    at, L : (N + 1,), columns of the lower triangle, of which the first number, the diagonal's, is inverted
+    place : (N,) which unknown each of the factor's is
+    """
+
+    first: Int[np.ndarray, " _"]
+    below_at: Int[np.ndarray, " _"]
+    below: Int[np.ndarray, " _"]
+    at: Int[np.ndarray, " _"]
+    L: Float[np.ndarray, " _"]
+    place: Int[np.ndarray, " N"]
 
 
 class Cholesky:
@@ -63,3 +84,22 @@ class Cholesky:
                 cholmod.solve(self._factor, block)
             out[:, k : k + MANY] = np.asarray(block)
         return out
+
+    def taken(self) -> Triangle:
+        """The factor itself, with which compiled code solves; what it was taken from solves no more."""
+        place = matrix(np.arange(len(self._view), dtype=float))
+        cholmod.solve(self._factor, place, sys=PERMUTED)
+        at, rows, L = (np.array(x).ravel() for x in cholmod.getfactor(self._factor).CCS)
+        counts = np.diff(at)
+        # a column's rows are among those of the column that its first row below the diagonal names
+        follows = (counts[1:] == counts[:-1] - 1) & (
+            rows[np.minimum(at[:-2] + 1, len(rows) - 1)] == np.arange(1, len(counts))
+        )
+        first = np.append(np.flatnonzero(np.append(True, ~follows)), len(counts))
+        last = first[1:] - 1
+        sizes = counts[last] - 1
+        below = np.concatenate([np.zeros(0, int), *(rows[at[k] + 1 : at[k + 1]] for k in last)])
+        L[at[:-1]] = 1 / L[at[:-1]]
+        return Triangle(
+            first, np.append(0, np.cumsum(sizes)), below, at, L, np.array(place).ravel().astype(int)
+        )

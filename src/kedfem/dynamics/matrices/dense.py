@@ -111,7 +111,7 @@ def work_over_time(part: Coordinates, rows: Float[np.ndarray, "T n d"]) -> Float
 def rows_of(link: Link, part: Coordinates, x: Float[np.ndarray, "T D n"]) -> Float[np.ndarray, "T _ d"]:
     """States of x over time."""
     if part.unit:
-        return np.array(x[:, : link.d, : link.n].transpose(0, 2, 1), order="C")
+        return np.stack([x[:, c, : link.n] for c in range(link.d)], axis=2)
     return np.stack([x[:, c, : link.n] @ part.T[c].T for c in range(link.d)], axis=2)
 
 

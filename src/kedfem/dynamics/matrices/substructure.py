@@ -5,7 +5,7 @@ Exact block elimination of the coupled system, because T M Tᵀ = M and K = T K0
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
@@ -39,6 +39,7 @@ class Substructure:
     Y : (dn, q + e) Ã⁻¹ C
     S : (q + e, q + e)
     anchors : (e,) components of the state
+    factor : what solves, if it is one sparse factor
     """
 
     solve: Callable[[Nodal], Nodal]
@@ -47,6 +48,7 @@ class Substructure:
     Y: Float[np.ndarray, "k c"]
     S: Float[np.ndarray, "c c"]
     anchors: Int[np.ndarray, " e"]
+    factor: Cholesky | None = None
 
     def seen(self, y: Nodal) -> Float[np.ndarray, " c"]:
         """Cᵀ y: values at ports and anchors."""
@@ -167,7 +169,7 @@ def factored(link: Link, joint: Attachment, c_M: float, c_K: float) -> Substruct
     springs = sp.coo_array((kappa, (anchors, anchors)), shape=link.K0.shape)
     factor = Cholesky(sp.csr_array(effective_matrix(link, c_M, c_K) + springs), f"links.{link.name}")
     with _condensing(link):
-        return substructure(
+        made = substructure(
             joint,
             link.n,
             lambda r: factor.solve(r.ravel()).reshape(r.shape),
@@ -175,6 +177,7 @@ def factored(link: Link, joint: Attachment, c_M: float, c_K: float) -> Substruct
             anchors,
             kappa,
         )
+    return replace(made, factor=factor)
 
 
 @contextmanager

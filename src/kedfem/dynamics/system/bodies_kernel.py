@@ -26,9 +26,9 @@ def right_hand_side(c, bodies, i, R, F, state, out, room):  # type: ignore[no-un
     if not bodies.dense[i]:
         momentum = state.momentum[3 * first : 3 * last]
         u, v, a = momentum[:N], momentum[N : 2 * N], momentum[2 * N :]
-    F0, F1, f0 = state.F[first:last], F[first:last], state.f[first:last]
+    F0, F1, f0, alpha_f = state.F[first:last], F[first:last], state.f[first:last], c.alpha_f
     for x in range(N):
-        room[x] = n0 * u[x] + n1 * v[x] + n2 * a[x] + c_f * F1[x] + c.alpha_f * (F0[x] - f0[x])
+        room[x] = n0 * u[x] + n1 * v[x] + n2 * a[x] + c_f * F1[x] + alpha_f * (F0[x] - f0[x])
     turned_back(R, d, room[:N], out[first:last])
     if c.alpha != 0.0 or c.beta != 0.0:
         for m in range(3):
@@ -38,60 +38,52 @@ def right_hand_side(c, bodies, i, R, F, state, out, room):  # type: ignore[no-un
 
 
 @inlined
-def rigid_frame_end(c, bodies, i, R, F, g, Kg, state, history, t, room, Mg):  # type: ignore[no-untyped-def]
-    """End of the step of a body with the rigid-body frame, from g and its balance K g = r + Wᵀ λ = A g."""
+def rigid_frame_end(c, bodies, i, R, F, g, Ag, state, history, t, work):  # type: ignore[no-untyped-def]
+    """End of the step of a body with the rigid-body frame, from g and its balance A g = r + Wᵀ λ."""
     first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
     N = last - first
-    n0, n1, n2 = c.acceleration
-    energy, damped = 0.0, c.alpha != 0.0 or c.beta != 0.0
+    u, Mg, c_M, c_K = work.room[:N], work.strained[:N], c.c_M, c.c_K
+    turned(R, d, g, u)
+    moved_to(c, first, last, u, F, state, history, t)
+    copied(g, history.g[t, first:last])
     if bodies.dense[i]:
-        copied(g[:N], Mg[:N])
+        copied(g, Mg)
     else:
-        turned(R, d, g[:N], room[:N])
-        mass_times(bodies, i, room, Mg)
+        mass_times(bodies, i, u, Mg, work.rows)
         momentum = state.momentum[3 * first : 3 * last]
         carried_on(c, Mg, momentum)
         copied(momentum[N : 2 * N], history.Mv[t, first:last])
-        turned_back(R, d, Mg[:N], room[:N])
-        copied(room[:N], Mg[:N])
+        turned_back(R, d, Mg, u)
+        copied(u, Mg)
+    energy, Kg = 0.0, history.Kg[t, first:last]
     for x in range(N):
-        Kg[x] = (Kg[x] - c.c_M * Mg[x]) / c.c_K
-        energy += g[x] * Kg[x]
-        room[x] = history.Kg[t, first + x] = Kg[x]
-        if damped:
-            of = 3 * first + x
-            y, y0, y1, y2 = (
-                c.alpha * Mg[x] + c.beta * Kg[x],
-                state.damped[of],
-                state.damped[of + N],
-                state.damped[of + 2 * N],
-            )
-            second = n0 * (y - y0) - n1 * y1 - n2 * y2
-            state.damped[of], state.damped[of + N], state.damped[of + 2 * N] = (
-                y,
-                y1 + c.late * second + c.early * y2,
-                second,
-            )
-            room[x] += state.damped[of + N]
-            if not bodies.dense[i]:
-                history.Cg[t, first + x] = y
-    turned(R, d, room[:N], state.f[first:last])
-    turned(R, d, g[:N], room[:N])
-    moved_to(c, first, last, room, F, state, history, t)
+        y = (Ag[x] - c_M * Mg[x]) / c_K
+        energy += g[x] * y
+        Ag[x] = Kg[x] = y
     history.energy[t, i] = 0.5 * energy
+    if c.alpha != 0.0 or c.beta != 0.0:
+        damped = state.damped[3 * first : 3 * last]
+        for x in range(N):
+            u[x] = c.alpha * Mg[x] + c.beta * Ag[x]
+        carried_on(c, u, damped)
+        if not bodies.dense[i]:
+            copied(u, history.Cg[t, first:last])
+        for x in range(N):
+            Ag[x] += damped[N + x]
+    turned(R, d, Ag, state.f[first:last])
     frame_copied(R, history.R[t, i])
-    copied(g[:N], history.g[t, first:last])
 
 
 @inner
 def carried_on(c, x, state):  # type: ignore[no-untyped-def]
     """Newmark's formulas for any quantity from x at the end of the step; state (3N,) has it and its rates."""
     n0, n1, n2 = c.acceleration
-    N = len(state) // 3
+    N, late, early = len(x), c.late, c.early
+    own, rates, seconds = state[:N], state[N : 2 * N], state[2 * N :]
     for m in range(N):
-        before, rate = state[m + 2 * N], state[m + N]
-        second = n0 * (x[m] - state[m]) - n1 * rate - n2 * before
-        state[m], state[m + N], state[m + 2 * N] = x[m], rate + c.late * second + c.early * before, second
+        second = n0 * (x[m] - own[m]) - n1 * rates[m] - n2 * seconds[m]
+        rates[m] += late * second + early * seconds[m]
+        own[m], seconds[m] = x[m], second
 
 
 @inner
@@ -100,12 +92,12 @@ def moved_to(c, first, last, u, F, state, history, t):  # type: ignore[no-untype
     n0, n1, n2 = c.acceleration
     u0, v0, a0, F0 = state.u[first:last], state.v[first:last], state.a[first:last], state.F[first:last]
     us, vs, as_ = history.u[t, first:last], history.v[t, first:last], history.a[t, first:last]
-    F1, Fs, late, early = F[first:last], history.F[t, first:last], c.late, c.early
+    F1, late, early = F[first:last], c.late, c.early
     for x in range(last - first):
         a = n0 * (u[x] - u0[x]) - n1 * v0[x] - n2 * a0[x]
         v0[x] += late * a + early * a0[x]
         u0[x], a0[x], F0[x] = u[x], a, F1[x]
-        us[x], vs[x], as_[x], Fs[x] = u0[x], v0[x], a, F1[x]
+        us[x], vs[x], as_[x] = u0[x], v0[x], a
 
 
 @inner
@@ -168,7 +160,7 @@ def mass_damped(c, bodies, i, R, u, state, trial, work):  # type: ignore[no-unty
     if bodies.dense[i]:
         turned_back(R, d, u[first:last], work.y[:N])
     else:
-        mass_times(bodies, i, u[first:last], work.turned)
+        mass_times(bodies, i, u[first:last], work.turned, work.rows)
         turned_back(R, d, work.turned[:N], work.y[:N])
     for x in range(N):
         of = 3 * first + x
@@ -217,12 +209,13 @@ def beam_rotation(bodies, i, R, u, Q):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def residual(c, bodies, i, R, F, u, state, trial, out, room):  # type: ignore[no-untyped-def]
+def residual(c, bodies, i, R, F, u, state, trial, out, work):  # type: ignore[no-untyped-def]
     """out becomes what is missing to balance at the end of the step, without interface forces, in the frame R."""
     first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
     n0, n1, n2 = c.acceleration
     u0, v0, a0, F0, f0, f1 = state.u, state.v, state.a, state.F, state.f, trial.f
     c_m, c_f, alpha_m, alpha_f = 1 - c.alpha_m, 1 - c.alpha_f, c.alpha_m, c.alpha_f
+    room = work.room
     if bodies.dense[i]:
         for x in range(first, last):
             a = n0 * (u[x] - u0[x]) - n1 * v0[x] - n2 * a0[x]
@@ -230,7 +223,7 @@ def residual(c, bodies, i, R, F, u, state, trial, out, room):  # type: ignore[no
             room[x - first] = r + alpha_f * (F0[x] - f0[x]) - alpha_m * a0[x]
     else:
         N, momentum = last - first, state.momentum[3 * first : 3 * last]
-        mass_times(bodies, i, u[first:last], out[first:last])
+        mass_times(bodies, i, u[first:last], out[first:last], work.rows)
         for x in range(N):
             later = n0 * (out[first + x] - momentum[x]) - n1 * momentum[x + N] - n2 * momentum[x + 2 * N]
             r = c_f * (F[first + x] - f1[first + x]) - c_m * later
@@ -245,8 +238,8 @@ def own_end(c, bodies, i, R, F, u, state, trial, history, t, work):  # type: ign
     N = last - first
     moved_to(c, first, last, u[first:last], F, state, history, t)
     if not bodies.dense[i]:
-        mass_times(bodies, i, u[first:last], work.y)
-        carried_on(c, work.y, state.momentum[3 * first : 3 * last])
+        mass_times(bodies, i, u[first:last], work.y, work.rows)
+        carried_on(c, work.y[:N], state.momentum[3 * first : 3 * last])
     copied(trial.f[first:last], state.f[first:last])
     if c.alpha != 0.0:
         copied(trial.damped[3 * first : 3 * last], state.damped[3 * first : 3 * last])

@@ -44,6 +44,7 @@ from kedfem.dynamics.system.record import (
 from kedfem.dynamics.system.sparse import (
     Part,
     SparsePart,
+    address_tables,
     mass_of,
     mass_tables,
     sparse_part,
@@ -136,7 +137,7 @@ def body_arrays(
     return Bodies(
         at=at, functions=np.array([x.n for x in links]), components=np.array([x.d for x in links]),
         motion=np.array(numbers), frame=np.array(frames), kind=np.array([KINDS[x.kind] for x in links]),
-        dense=dense, passed=passed, port_at=ends_of(ports),
+        dense=dense, arrays=address_tables(parts), passed=passed, port_at=ends_of(ports),
         component=_flat([joint.keep % joint.components for joint in joints], int), group=_groups(joints),
         G_at=ends_of([x.G.size for x in parts]), Y_at=ends_of([q * n for q, n in zip(ports, sizes, strict=True)]),
         S_at=ends_of([q * q for q in ports]), B_at=ends_of([q * len(c) for q, c in zip(ports, columns, strict=True)]),

@@ -1,4 +1,4 @@
-"""Records of arrays handed on by address: what a compiled function calls gets one pointer instead of all arrays.
+"""Records handed on by address: what a compiled function calls gets one pointer instead of all arrays. Arrays, too.
 
 numba takes a named tuple apart into its arrays, and each array into seven numbers, at every call: with all records of
 a system 1,100 arguments, which cost more to compile and to call than what is done with them. `reference(record)` keeps
@@ -17,6 +17,7 @@ from numba.core.datamodel.models import PrimitiveModel
 from numba.core.imputils import impl_ret_borrowed
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, register_model
+from numba.np.arrayobj import populate_array
 
 
 class Reference(types.Type):
@@ -65,3 +66,22 @@ def _kept(_: Any, record: Any) -> Any:
 
 reference: Any = intrinsic(_kept)
 """Called in compiled code with a record: where it is kept."""
+
+
+def _array_at(number: Any) -> Any:
+    kind, size = types.Array(number, 1, "C"), number.bitwidth // 8
+
+    def typed(_: Any, address: Any, length: Any) -> Any:
+        def made(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            array = context.make_array(kind)(context, builder)
+            place = builder.inttoptr(arguments[0], array.data.type)
+            populate_array(array, place, [arguments[1]], [context.get_constant(types.intp, size)], size, None)
+            return array._getvalue()
+
+        return kind(address, length), made
+
+    return intrinsic(typed)
+
+
+integers_at, reals_at = _array_at(types.int64), _array_at(types.float64)
+"""Called in compiled code with an array's address and its length: the array, which must be kept elsewhere."""

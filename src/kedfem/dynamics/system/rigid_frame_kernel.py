@@ -12,6 +12,7 @@ from kedfem.dynamics.system.bodies_kernel import right_hand_side, rigid_frame_en
 from kedfem.dynamics.system.constraints_kernel import coordinate
 from kedfem.dynamics.system.ends_kernel import placed
 from kedfem.dynamics.system.interface_kernel import newmark_rate
+from kedfem.dynamics.system.products_kernel import sparse_held
 
 
 @inner
@@ -21,7 +22,7 @@ def rigid_frame_begin(c, bodies, i, R, F, state, trial, work, solved):  # type: 
     frame_copied(R, trial.Rp[i])
     right_hand_side(c, bodies, i, trial.Rp[i], F, state, trial.r, work.room)
     if not bodies.dense[i]:
-        solved(i)
+        sparse_held(bodies, i, trial, solved)
         return
     q = bodies.port_at[i + 1] - of_ports
     reaction = trial.reaction[of_ports : of_ports + q]
@@ -40,9 +41,7 @@ def rigid_frame_finish(c, bodies, i, F, trial, state, history, t, work):  # type
     add_transposed(bodies.Y, bodies.Y_at[i], q, N, trial.w[of_ports:], work.y)
     copied(trial.r[first:last], work.turned[:N])
     add_transposed(bodies.W, bodies.Y_at[i], q, N, trial.force[of_ports:], work.turned)
-    rigid_frame_end(
-        c, bodies, i, trial.Rp[i], F, work.y, work.turned, state, history, t, work.room, work.strained
-    )
+    rigid_frame_end(c, bodies, i, trial.Rp[i], F, work.y[:N], work.turned[:N], state, history, t, work)
 
 
 @inner

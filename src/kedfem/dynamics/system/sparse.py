@@ -1,7 +1,8 @@
 """Large bodies of a system: a sparse factor seen from interface points, solved between what is compiled of a step.
 
-Their coordinates are nodal rows, component first, so that their mass is not one. What a compiled step asks of them is one
-call a step, or a pass of those with frames of their own: G r and Yᵀ r of its right-hand side.
+Their coordinates are nodal rows, component first, so that their mass is not one. What a compiled step asks of them, once
+a step or a pass of those with frames of their own, is G r and Yᵀ r of its right-hand side: by compiled triangular solves,
+or by a call out of compiled code where the factor is too large to be taken out of CHOLMOD.
 """
 
 import ctypes
@@ -16,6 +17,7 @@ from jaxtyping import Float, Int
 
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.ports import port_columns
+from kedfem.dynamics.matrices.cholesky import Cholesky
 from kedfem.dynamics.matrices.dense import DensePart
 from kedfem.dynamics.matrices.held import held_substructure
 from kedfem.dynamics.matrices.substructure import Substructure, mass_matrix
@@ -25,6 +27,8 @@ from kedfem.dynamics.system.state import Trial
 from kedfem.links.record import Link
 from kedfem.processes import caught_in
 
+TAKEN = 30_000  # unknowns up to which a factor is: for a moment that takes four times its memory
+ARRAYS = 13  # that such a factor is used with
 SHIFT = 1e-9  # of the mean eigenvalue: what makes the stiffness of a free link definite
 Held = Callable[[Nodal], tuple[Nodal, Float[np.ndarray, " q"]]]
 
@@ -36,6 +40,7 @@ class SparsePart:
     components : d; held : r (n, d) → G r (n, d), Yᵀ r (q,)
     Y : (N, q); S : (q, q); W : (q, N)
     T : none: coordinates are nodal rows; G : none
+    arrays : of a factor that was taken out of CHOLMOD, see `compiled_arrays`; none of others
     """
 
     components: int
@@ -46,15 +51,70 @@ class SparsePart:
     T: tuple[np.ndarray, ...] = ()
     unit: bool = True
     G: Float[np.ndarray, "_ _"] = field(default_factory=lambda: np.zeros((0, 0)))
+    arrays: tuple[np.ndarray, ...] = ()
 
 
 Part = DensePart | SparsePart
 
 
 def sparse_part(link: Link, joint: Attachment, of: Substructure) -> SparsePart:
-    """A link whose matrix is factored and condensed onto its interface points, seen from these."""
+    """A link whose matrix is factored and condensed onto its interface points, seen from these.
+
+    A sparse factor that is not too large is taken from the substructure, which solves no more.
+    """
     seen, order = held_substructure(of), component_order(link)
-    return SparsePart(link.d, seen.held, seen.Y[order], seen.S, port_columns(joint, link.n)[order].T)
+    W = port_columns(joint, link.n)[order].T
+    arrays = compiled_arrays(of, of.factor, order, W) if of.factor and link.unknowns <= TAKEN else ()
+    held = compiled_held(arrays, link.d, len(W)) if arrays else seen.held
+    return SparsePart(link.d, held, seen.Y[order], seen.S, W, arrays=arrays)
+
+
+def compiled_arrays(
+    of: Substructure, factor: Cholesky, order: Int[np.ndarray, " N"], W: Float[np.ndarray, "q N"]
+) -> tuple[np.ndarray, ...]:
+    """What `products_kernel.held` works with: the triangle's arrays, C row by row, S, Y, and room for two vectors.
+
+    Parameters
+    ----------
+    order : of `component_order`
+    """
+    x, place = factor.taken(), np.empty(len(order), int)
+    place[order] = np.arange(len(order))
+    E = np.zeros((len(of.anchors), len(order)))
+    E[np.arange(len(E)), place[of.anchors]] = 1.0
+    C = sp.csr_array(np.concatenate([W, E]))
+    made = (
+        *(x.first, x.below_at, x.below, x.at, x.L, place[x.place]), C.indptr.astype(int), C.indices.astype(int), C.data,
+        of.S.ravel(), of.Y[order].T.ravel(), *np.zeros((2, max(C.shape))),
+    )  # fmt: skip
+    return tuple(np.ascontiguousarray(each) for each in made)
+
+
+def compiled_held(arrays: tuple[np.ndarray, ...], d: int, q: int) -> Held:
+    """`SparsePart.held` by compiled code."""
+
+    def held(r: Nodal) -> tuple[Nodal, Float[np.ndarray, " q"]]:
+        from kedfem.dynamics.system.products_kernel import held_alone
+
+        g, reaction = np.empty(r.size), np.empty(q)
+        held_alone(addresses(arrays), np.ascontiguousarray(r.T, float).ravel(), g, reaction)
+        return g.reshape(d, -1).T, reaction
+
+    return held
+
+
+def addresses(arrays: Sequence[np.ndarray]) -> Int[np.ndarray, "a 2"]:
+    """Where arrays are, and how many numbers each has."""
+    return np.array([(x.ctypes.data, x.size) for x in arrays], int).reshape(-1, 2)
+
+
+def address_tables(parts: Sequence[Part]) -> Int[np.ndarray, "i a 2"]:
+    """Addresses of all bodies' arrays, zero of those without; these must be kept as long as they are used."""
+    out = np.zeros((len(parts), ARRAYS, 2), int)
+    for row, part in zip(out, parts, strict=True):
+        if isinstance(part, SparsePart) and part.arrays:
+            row[:] = addresses(part.arrays)
+    return out
 
 
 def component_order(link: Link) -> Int[np.ndarray, " N"]:
@@ -103,7 +163,9 @@ def _row_by_row(of: Int[np.ndarray, "L 3"], every: Sequence[Any]) -> Masses:
         of,
         ends_of([m.shape[0] + 1 for m in every]),
         np.concatenate([none, *(m.indptr + end for m, end in zip(every, ends, strict=False))])[1:],
-        np.concatenate([none, *(m.indices for m in every)])[1:],
+        np.concatenate([none, *(m.indices for m in every)])[1:].astype(
+            np.uint32
+        ),  # not asked whether it is negative
         np.concatenate([np.zeros(1), *(m.data for m in every)])[1:],
     )
 
@@ -113,6 +175,8 @@ def solver(
 ) -> Any:
     """What a compiled step calls with the number of a sparse body: trial.held and trial.reaction from trial.r.
 
+    Called of those whose factor stays where it is.
+
     It must be kept as long as the step runs.
     """
     from numba.core import types
@@ -120,7 +184,7 @@ def solver(
 
     every = {
         k: (part, slice(at[k], at[k + 1]), slice(ports[k], ports[k + 1]))
-        for k, part in enumerate(parts) if isinstance(part, SparsePart)
+        for k, part in enumerate(parts) if isinstance(part, SparsePart) and not part.arrays
     }  # fmt: skip
 
     failed: list[BaseException] = []

@@ -164,8 +164,9 @@ class Trial(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Room for one body or end at a time."""
+    """Room for one body or end at a time; rows : (n, 4) of a body's functions."""
 
+    rows: Any
     y: Any
     turned: Any
     strained: Any

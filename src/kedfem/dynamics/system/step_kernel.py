@@ -28,6 +28,7 @@ from kedfem.dynamics.system.interface_kernel import (
     offset,
     pushed,
 )
+from kedfem.dynamics.system.products_kernel import sparse_held
 from kedfem.dynamics.system.record import NOMINAL, RIGID_BODY, STRESSED
 from kedfem.dynamics.system.reference import reference
 from kedfem.dynamics.system.rigid_frame_kernel import (
@@ -151,7 +152,7 @@ def asked(c, bodies, ends, of, driving, t, iteration, state, trial, work, solved
         first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
         q, N, own = bodies.port_at[i + 1] - bodies.port_at[i], last - first, bodies.frame[i] > RIGID_BODY
         if own:
-            residual(c, bodies, i, trial.Rp[i], driving.F[t], trial.u, state, trial, trial.r, work.room)
+            residual(c, bodies, i, trial.Rp[i], driving.F[t], trial.u, state, trial, trial.r, work)
         elif bodies.frame[i] == STRESSED:
             stressed_side(c, bodies, i, trial, work)
         if bodies.frame[i] != NOMINAL:
@@ -159,7 +160,7 @@ def asked(c, bodies, ends, of, driving, t, iteration, state, trial, work, solved
                 reaction = trial.reaction[bodies.port_at[i] : bodies.port_at[i + 1]]
                 product(bodies.Y, bodies.Y_at[i], q, N, trial.r[first:last], reaction)
             else:
-                solved(i)
+                sparse_held(bodies, i, trial, solved)
         if own:
             turned_back(trial.Rp[i], d, trial.u[first:last], work.y[:N])
         offset(bodies, i, work.y, trial, own)

@@ -193,14 +193,13 @@ class SystemSteps:
 
     def handed_on(self, found: History, forcing: Sequence[Forcing], motion: RigidMotion) -> list[LinkHistory]:
         """All links, with what force elements exert on them."""
-        acting = [np.zeros_like(each.F) for each in forcing]
-        bodies, out = self.ready.bodies, []
+        acting, bodies, out = [each.F for each in forcing], self.ready.bodies, []
         at_ports = [
             _turned_back(joint, found.port_force[:, bodies.port_at[k] : bodies.port_at[k + 1]], each.R)
             for k, (joint, each) in enumerate(zip(self.ready.system.model.joints, forcing, strict=True))
         ]
         if self._bearings:
-            seen = supports(self.ready, found, motion)
+            seen, acting = supports(self.ready, found, motion), [each.F.copy() for each in forcing]
             at_ports = [force @ to.T for force, to in zip(at_ports, self._to_ports, strict=True)]
         for one in self._bearings:
             R, c = forcing[one.k].R, one.bears
@@ -211,7 +210,7 @@ class SystemSteps:
         for k, (each, F) in enumerate(zip(forcing, acting, strict=True)):
             u, v, a, g = (displacements(self.ready, k, x) for x in (found.u, found.v, found.a, found.g))
             out.append(
-                LinkHistory(u, v, a, g, each.R, each.F + F, at_ports[k], found.energy[:, k].copy(),
+                LinkHistory(u, v, a, g, each.R, F, at_ports[k], found.energy[:, k].copy(),
                             self._products(found, k, v))
             )  # fmt: skip
         return out
