@@ -116,7 +116,7 @@ def test_shown_lines_are_looked_for_in_the_output() -> None:
 @pytest.mark.usefixtures("wide")
 @pytest.mark.parametrize(
     ("page", "lines"),
-    [("tutorial/first-linkage.md", 12), ("tutorial/own-part.md", 7)],
+    [("tutorial/first-linkage.md", 11), ("tutorial/own-part.md", 7)],
     ids=str,
 )
 def test_a_lesson_does_what_it_says(

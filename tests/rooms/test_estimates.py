@@ -203,3 +203,13 @@ def test_the_indicator_is_between_half_and_twice_the_error_of_parts(name: str, t
     found = judged(name, tmp_path)
     assert 0.02 < found.true < 0.12
     assert 0.5 < found.effectivity < 2.0
+
+
+def test_a_long_run_of_a_small_model_is_judged_as_a_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A press is idle for most of its turn: its beginning shows nothing of the stroke."""
+    ready = meshed(scene_from(example("four_bar_beams", 60, revolutions=200.0)))
+    steps = time_grid(ready.scene).steps
+    assert steps > estimates.SPAN
+    assert time_grid(estimates.spanned(ready.scene, ready.model)).steps == steps
+    monkeypatch.setattr(estimates, "CHEAP", 7000.0 * ready.model.unknowns)
+    assert time_grid(estimates.spanned(ready.scene, ready.model)).steps == 7000

@@ -6,13 +6,16 @@ import pytest
 
 from kedfem.accuracy import choices
 from kedfem.accuracy.choices import chosen_step, with_beams
+from kedfem.accuracy.error_budget import percent
 from kedfem.accuracy.histories import histories, relative_errors, worst
 from kedfem.accuracy.plan import STEP, plan_for
 from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.trials import Trials
 from kedfem.accuracy.variants import with_analysis
 from kedfem.scene import Scene, corotational, scene_from, time_grid
+from tests import scenes
 from tests.planned_steps import ASKED, Planned, four_bar, judged
+from tests.scenes import bar, constant_speed
 
 ALLOWED = STEP * ASKED
 BEAMS = {"element": "beam5", "mesh": {"elements": 1}}
@@ -40,6 +43,38 @@ def test_at_speed_levels_do_with_less_work_than_order_2() -> None:
 def test_vibration_that_is_hardly_in_step_is_left_to_short_steps() -> None:
     """At 60 rpm the channels hold vibration of 0.3 % whose order a trial does not show."""
     held(judged(four_bar(60, BEAMS)))
+
+
+def struck(**analysis: Any) -> Scene:
+    """A cantilever, 2 % damped, turned once a second; a force on its tip is let go within a thousandth of one."""
+    raw = scenes.arm(
+        bar(model="beam", mesh={"elements": 2}, element="beam5"),
+        constant_speed("60 rpm"),
+        damping={"ratio": 0.02, "frequencies": [50, 2000]},
+        loads={"P": {
+            "kind": "force", "link": "arm", "at": [0.5, 0], "vector": [0, -100], "frame": "link",
+            "factor": {"time": [0, 0.5, 0.501, 1], "value": [1, 1, 0, 0]},
+        }},
+        analysis={"end_time": 1.0, "initial": "quasi-static", "frames": "rigid-body", **analysis},
+    )  # fmt: skip
+    return scene_from(raw)
+
+
+def test_vibration_that_short_steps_resolve_is_followed_where_that_costs_seconds(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The trials that are usual end before; where steps would be dear they are told, with the longer step taken."""
+    scene, error, notes = chosen(struck())
+    assert error <= ALLOWED
+    assert not notes
+    fine = with_analysis(scene, step=time_grid(scene).step / 4)
+    assert worst(relative_errors(histories(meshed(scene)), histories(meshed(fine)))) < 1.5 * ALLOWED
+    monkeypatch.setattr(choices, "CHEAP", 1e5)
+    longer, worse, (note,) = chosen(struck())
+    assert time_grid(longer).steps < time_grid(scene).steps / 4
+    assert worse > 3 * ALLOWED
+    assert "or a shorter analysis.step of your own" in note
+    assert f"stays at {percent(worse)} with " in note
 
 
 @pytest.mark.long

@@ -9,7 +9,14 @@ from kedfem.accuracy.free_step import free_step
 from kedfem.accuracy.geometric import GeometricError
 from kedfem.accuracy.histories import histories, relative_errors, worst
 from kedfem.accuracy.resolution import fewest_steps
-from kedfem.accuracy.step_estimate import IN_STEP, LEAST_ORDER, StepEstimate, cheapest, single_level
+from kedfem.accuracy.step_estimate import (
+    IN_STEP,
+    LEAST_ORDER,
+    StepChoice,
+    StepEstimate,
+    cheapest,
+    single_level,
+)
 from kedfem.accuracy.trials import Trials
 from kedfem.accuracy.variants import TRIAL_STEPS, shortened, with_analysis, with_links, with_steps
 from kedfem.dynamics.stepping.levels import most_levels
@@ -37,6 +44,7 @@ TRIED, COARSER = (
 LEAST = 12  # steps of the coarsest level of a trial
 MOST_STEPS = 200_000  # of the analysis
 TRIES = 5  # steps tried
+CHEAP = 2e7  # steps times unknowns that take seconds
 SHORTER, PATIENCE = 2.0, 2  # by which steps are made shorter that do not resolve what vibrates, and how often
 LEAP = 4  # times the steps of a trial, the next one has at most: what a coarse one foretells is not believed further
 CLOSE = 0.15  # of the steps: as many more are not worth another trial
@@ -156,7 +164,8 @@ def chosen_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, fl
 
     One trial in several levels shows what they differ by, and where the error would be allowed; the next is made there.
     Channels whose differences do not fall with the step hold vibration that is not resolved: they are given PATIENCE
-    shorter steps; then they are reported, and the others choose. What the scene states of step and levels stays.
+    shorter steps; then the others choose, unless steps that resolve it cost seconds; else it is reported, with the steps
+    that it would take. What the scene states of step and levels stays.
     """
     if without_vibration(scene):
         return scene, 0.0
@@ -175,6 +184,7 @@ def chosen_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, fl
     longest, levels = span / max(_fewest_rows(trial), least), _possible_levels(search, scene)
     steps, patience = max(math.ceil(time_grid(trial).steps / COARSER), least), PATIENCE
     slow: set[str] = set()
+    tried = steps
     for _ in range(TRIES):
         found, channels = search.step(with_analysis(with_steps(trial, steps), extrapolation_levels=TRIED))
         slow = {name for name in channels if _slow(found, name, allowed)}
@@ -190,13 +200,51 @@ def chosen_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, fl
         if wanted == steps:
             break
         steps = wanted
+        tried = max(tried, steps)
+    words = ""
+    if slow:
+        resolving, words = _resolving(search, scene, tried, allowed, levels, longest)
+        slow, choice = (set(), resolving) if resolving else (slow, choice)
     left = {name: min(1.0, found.differences[name][0]) for name in slow}
     error = max([choice.error, *left.values()])
     if error > allowed:
         names = sorted(left, key=left.__getitem__, reverse=True) or _over(found, allowed)
-        search.notes.append(_unresolved(math.ceil(whole / choice.h), error, names))
+        search.notes.append(_unresolved(math.ceil(whole / choice.h), error, names, words))
     keys = {"step": choice.h, "steps_per_revolution": None, "extrapolation_levels": choice.levels}
     return with_analysis(scene, **keys), error
+
+
+def _resolving(
+    search: Trials, scene: Scene, steps: int, allowed: float, levels: range, longest: float
+) -> tuple[StepChoice | None, str]:
+    """The step in which all that vibrates is followed, if a run in it costs seconds; else what it would be, in words.
+
+    Parameters
+    ----------
+    steps : of the coarsest level, already tried
+    """
+    trial = shortened(scene)
+    span, whole = time_grid(trial).end, time_grid(scene).end
+    unknowns, words = search.ready(trial).model.unknowns, ""
+    most = int(min(CHEAP / max(unknowns, 1), MOST_STEPS * span / whole)) // COARSER
+    full = {n for n, x in scene.links.items() if "reduction" in x.model_fields_set and not x.reduced}
+    run = sum((x.full or x if x.name in full else x).unknowns for x in search.ready(trial).model.links)
+    wanted = LEAP * steps
+    while steps < min(wanted, most):
+        steps = min(wanted, LEAP * steps, most)
+        found, channels = search.step(with_analysis(with_steps(trial, steps), extrapolation_levels=TRIED))
+        left = max((found.errors.get(name, 0.0) for name in channels), default=0.0)
+        words = f"; steps of {found.h / COARSER:.2g} s, the shortest that are tried, leave {percent(min(1.0, left))}"
+        if any(_slow(found, name, allowed) for name in channels):
+            wanted = LEAP * steps
+            continue
+        choice = cheapest(found, allowed, channels, levels, longest)
+        if whole * choice.work * run > CHEAP:
+            return None, f"; {percent(allowed)} would take steps of about {choice.h:.1g} s"
+        wanted = math.ceil(span / choice.h * 2 ** (choice.levels - 1) / COARSER)
+        if wanted <= SHORTER * steps:
+            return choice, ""
+    return None, words
 
 
 def _fewest_rows(trial: Scene) -> int:
@@ -237,10 +285,10 @@ def _stated_error(search: Trials, trial: Scene) -> float:
     return max((D * single_level(q)[1] for D, q in left), default=0.0)
 
 
-def _unresolved(steps: int, error: float, channels: Sequence[str]) -> str:
+def _unresolved(steps: int, error: float, channels: Sequence[str], words: str) -> str:
     names = ", ".join(channels[:3]) + (" and others" if len(channels) > 3 else "")
     return (
-        f"the error of the time step stays at {percent(error)} with {steps} steps in {names}: the motion excites "
+        f"the error of the time step stays at {percent(error)} with {steps} steps in {names}{words}: the motion excites "
         "vibration beyond them (a start from rest at full speed, a load put on at once?); a smoother start or damping "
-        "would help"
+        "would help, or a shorter analysis.step of your own"
     )

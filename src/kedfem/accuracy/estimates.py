@@ -40,6 +40,7 @@ LARGE = (
     100_000  # unknowns of a model for which no companion is made: its modes cost as much as hundreds of steps
 )
 SPAN = 6000  # steps of a companion's run, at most: longer analyses are judged by their beginning
+CHEAP = 2e7  # steps times unknowns that take seconds: of small models more than SPAN
 SLOW = 1000  # the same where no compiled loop runs them
 
 
@@ -165,7 +166,7 @@ def spanned(scene: Scene, model: Model) -> Scene:
     grid = time_grid(scene)
     elements = scene.springs or scene.limits
     compiled = all(link.unknowns <= SMALL for link in model.links) and not model.rows and not elements
-    most = SPAN if compiled else SLOW
+    most = max(SPAN, int(CHEAP / max(model.unknowns, 1))) if compiled else SLOW
     if grid.steps <= most:
         return scene
     return with_analysis(
