@@ -130,7 +130,7 @@ def _advice(budget: Budget, share: Share, chosen: bool) -> str:
     if budget.worst > MEANINGLESS and len(alike) > 1:
         parts = " and ".join(f"{x.source} {percent(x.errors[kind])}" for x in alike)
         return (
-            f"no part of it can be told from the others ({kind}: {parts}): the motion is another one with every change, "
+            f"no part of it can be singled out ({kind}: {parts}): the motion is another one with every change, "
             "so that finer elements alone do not help; look at the animation and at the other warnings, then take a "
             "step ten times shorter, and if the motion stays as it is, look for a link or a joint that gives way"
         )

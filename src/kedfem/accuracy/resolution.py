@@ -179,7 +179,7 @@ def step_error(ready: Prepared) -> StepError:
 def resolution_warnings(found: Resolution | None, error: float | None = None) -> list[str]:
     """What a user should know about the step and the drive's speed.
 
-    Few steps in a period are told where the error of the step shows that something vibrates: others follow what moves.
+    Few steps in a period are said where the error of the step shows that something vibrates: others follow what moves.
 
     Parameters
     ----------
