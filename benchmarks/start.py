@@ -23,6 +23,7 @@ analyse(ten_turns(sys.argv[1]))
 EXAMPLES = ("four_bar_beams", "four_bar_corotational", "four_bar_solids")
 ROWS = """
 import gc, sys
+gc.set_threshold(10_000)  # as the command line does
 from kedfem.analysis import analyse
 from kedfem.scene import read_scene
 scene = read_scene(sys.argv[1])

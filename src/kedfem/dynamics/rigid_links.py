@@ -16,9 +16,9 @@ from kedfem.scene import AngleLimit, Scene, TorsionSpring, pieces, time_grid, wi
 LIGHT = 1e-3  # second moment of a planar beam's mass beside inertia of its sections, below which this is spread over it
 COMPACT = 1e-7  # of mass times length²: second moments, below which forces would be off by more than 1e-4
 LAMINA = 1e-8  # of second moments of mass: a sheet of a millimetre by a metre has 1e-6
-# ω h of rigid links with co-rotational frames: they deform by (turn in a step / 30)²; from 100 on iterations
-# fail
-RESOLVED = 30.0
+# ω h of rigid links with co-rotational frames. Their stress loses digits by its square: at ten times as much a motor's
+# steps did not converge. Where ρ∞ is above DAMPED, stiff vibration is not damped, and grows as links turn: less then
+FIRM, UNDAMPED, DAMPED = 3e3, 3e2, 0.99
 MOUNTED = (
     3e3  # times the frequency on the mounts: a link's own strain is 1e-7 of deflections, rounding up to 4e-7
 )
@@ -27,8 +27,6 @@ MOUNTED = (
 def made_rigid(scene: Scene, links: Mapping[str, Link], thicken: bool = False) -> dict[str, Link]:
     """Links with the rigid ones made so: stiff beside the elastic ones, whatever they are made of themselves.
 
-    Those with co-rotational frames are no stiffer than what bends them less by far in a step than the step's own error;
-    positions without vibration have no such error, however far apart they are.
     Where no link is elastic they are stiff beside their mounts: of a block on soft ones rounding would leave few digits.
 
     Parameters
@@ -38,6 +36,7 @@ def made_rigid(scene: Scene, links: Mapping[str, Link], thicken: bool = False) -
     made = {key for key, link in links.items() if scene.links[link.name].model == "rigid"}
     elastic = [link for key, link in links.items() if key not in made]
     out, soft = dict(links), _mounts(scene)
+    firm = (FIRM if scene.analysis.rho_inf <= DAMPED else UNDAMPED) / time_grid(scene).step
     for key in made:
         link = _spread(_thickened(links[key]) if thicken else links[key])
         _with_extent(link)
@@ -45,7 +44,7 @@ def made_rigid(scene: Scene, links: Mapping[str, Link], thicken: bool = False) -
         if not elastic and any(soft):
             highest = min(highest, MOUNTED * _mounted(link, *soft))
         corotational = link.fit is not None and not without_vibration(scene)
-        out[key] = rigid(link, min(highest, RESOLVED / time_grid(scene).step) if corotational else highest)
+        out[key] = rigid(link, min(highest, firm) if corotational else highest)
     return out
 
 

@@ -43,6 +43,7 @@ def empty_trial(bodies: Bodies, ends: Ends, of: Constraints, like: State) -> Tri
         m=np.zeros(r), left=np.zeros(r), right=np.zeros(k), dz=np.zeros(k), part=np.zeros(k),
         change=np.zeros(like.last.shape[1]), mixing=np.zeros((DEPTH + 1, DEPTH)),
         fixed=place, moving=tuple(x.copy() for x in place), stress=np.zeros(int(bodies.stresses.at[-1])),
+        response=np.zeros(len(like.u)), foreseen=np.zeros(len(like.u)),
     )  # fmt: skip
 
 

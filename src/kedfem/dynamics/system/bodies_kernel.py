@@ -101,10 +101,14 @@ def moved_to(c, first, last, u, F, state, history, t):  # type: ignore[no-untype
 
 
 @inner
-def internal_forces(c, bodies, R, amounts, state, trial, work):  # type: ignore[no-untyped-def]
+def internal_forces(c, bodies, R, amounts, state, trial, work, first):  # type: ignore[no-untyped-def]
     """trial.f becomes the internal force of all bodies with frames of their own at trial.u, world components.
 
     Loads that turn with them are taken from it, their amounts being given.
+
+    Parameters
+    ----------
+    first : whether no pass has foreseen what rigid bodies resist
     """
     f, beams = trial.f, bodies.beams
     for i in range(len(bodies.motion)):
@@ -116,7 +120,7 @@ def internal_forces(c, bodies, R, amounts, state, trial, work):  # type: ignore[
              trial.strained, f, work.points)  # fmt: skip
     for i in range(len(bodies.motion)):
         if bodies.frame[i] == COROTATIONAL:
-            corotational_force(c, bodies, i, R, state, trial, work)
+            corotational_force(c, bodies, i, R, state, trial, work, first)
         if bodies.frame[i] > RIGID_BODY and c.alpha != 0.0:
             mass_damped(c, bodies, i, R[bodies.motion[i]], trial.u, state, trial, work)
     turned_loads(bodies, R, amounts, trial.u, f, work.frame)
@@ -130,7 +134,7 @@ def newmark(c):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def corotational_force(c, bodies, i, R, state, trial, work):  # type: ignore[no-untyped-def]
+def corotational_force(c, bodies, i, R, state, trial, work, first_pass):  # type: ignore[no-untyped-def]
     """Add the internal force of a body with one frame, and keep what that sees."""
     first, last, d, n = bodies.at[i], bodies.at[i + 1], bodies.components[i], bodies.functions[i]
     N, body = last - first, bodies.motion[i]
@@ -149,7 +153,40 @@ def corotational_force(c, bodies, i, R, state, trial, work):  # type: ignore[no-
     strained(newmark(c), 0, bodies.kind[i], (X, one), fit, R[body : body + 1], moved, before, now, trial.Q[i : i + 1],
              trial.angle[i : i + 1], work.strained, rooms)  # fmt: skip
     stiffness_times(bodies, i, work.strained, work.turned)
+    if bodies.rigid[i]:
+        copied(work.turned[:N], trial.response[first:last])
+        if first_pass:
+            copied(work.turned[:N], trial.foreseen[first:last])
+        copied(trial.foreseen[first:last], work.turned[:N])
+        unforeseen(bodies, i, trial, work)
+        for x in range(N):
+            trial.f[first + x] += work.room[x]
     balanced(0, bodies.kind[i], fit, R[body : body + 1], now, trial.Q[i : i + 1], f, rooms)
+
+
+@inlined
+def unforeseen(bodies, i, trial, work):  # type: ignore[no-untyped-def]
+    """work.room becomes what a rigid body resists more than foreseen, world components by the frame of its factor.
+
+    The factor takes just that back, however stiff the body is. In its new frame, K of an error of the second order in
+    the pass's rotation would push along other directions than the factor resists, and passes would diverge.
+    """
+    first, last = bodies.at[i], bodies.at[i + 1]
+    N = last - first
+    for x in range(N):
+        work.strained[x] = trial.response[first + x] - trial.foreseen[first + x]
+    turned(trial.Rp[i], bodies.components[i], work.strained[:N], work.room[:N])
+
+
+@inlined
+def foresee(c, bodies, i, change, trial, work):  # type: ignore[no-untyped-def]
+    """What a rigid body will resist once displaced by what a pass asks for (N,), in the frame of its factor."""
+    first, last = bodies.at[i], bodies.at[i + 1]
+    N = last - first
+    stiffness_times(bodies, i, change[:N], work.turned[:N])
+    late = 1 + c.beta * c.late * c.acceleration[0]
+    for x in range(N):
+        trial.foreseen[first + x] = trial.response[first + x] + late * work.turned[x]
 
 
 @inlined
@@ -241,6 +278,10 @@ def own_end(c, bodies, i, R, F, u, state, trial, history, t, work):  # type: ign
         mass_times(bodies, i, u[first:last], work.y, work.rows)
         carried_on(c, work.y[:N], state.momentum[3 * first : 3 * last])
     copied(trial.f[first:last], state.f[first:last])
+    if bodies.rigid[i]:
+        unforeseen(bodies, i, trial, work)
+        for x in range(N):
+            state.f[first + x] -= work.room[x]  # rounding, times K
     if c.alpha != 0.0:
         copied(trial.damped[3 * first : 3 * last], state.damped[3 * first : 3 * last])
     if bodies.frame[i] == COROTATIONAL:

@@ -155,6 +155,7 @@ def body_arrays(
         turning=turning_loads(links, parts, model.loads),
         stiffness=stiffness_tables(links, parts, [frame == COROTATIONAL for frame in frames]),
         size=np.array([1.0 if whole else mass_of(link) for link, whole in zip(links, dense, strict=True)]),
+        rigid=np.array([link.rigid and frame == COROTATIONAL for link, frame in zip(links, frames, strict=True)], bool),
         stresses=stress_tables(stiffening, parts),
     )  # fmt: skip
 

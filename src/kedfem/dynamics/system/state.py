@@ -120,6 +120,7 @@ class Trial(NamedTuple):
     fixed, moving : places of all ends in the rigid-body motion, and at z
     base, resisted, strained : of planar beams, see `beams_kernel`
     stress : entries of the stress stiffness of all bodies
+    response, foreseen : (N,) K (g + β g') of rigid bodies, as it is and as the pass before foresaw it, in their frames
     """
 
     u: Any
@@ -161,6 +162,8 @@ class Trial(NamedTuple):
     fixed: Any
     moving: Any
     stress: Any
+    response: Any
+    foreseen: Any
 
 
 class Work(NamedTuple):

@@ -19,7 +19,14 @@ from kedfem.dynamics.system.algebra_kernel import (
     turned,
     turned_back,
 )
-from kedfem.dynamics.system.bodies_kernel import internal_forces, newmark, orientation, own_end, residual
+from kedfem.dynamics.system.bodies_kernel import (
+    foresee,
+    internal_forces,
+    newmark,
+    orientation,
+    own_end,
+    residual,
+)
 from kedfem.dynamics.system.ends_kernel import on_lines, placed
 from kedfem.dynamics.system.interface_kernel import (
     evaluated,
@@ -104,7 +111,7 @@ def begin(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type:
         frame_copied(state.Q[i], trial.Q[i])
         trial.angle[i] = state.angle[i]
     begun(newmark(c), bodies.beams, R, state.strain, state.direction, trial.base, trial.resisted)
-    internal_forces(c, bodies, R, driving.amounts[t], state, trial, work)
+    internal_forces(c, bodies, R, driving.amounts[t], state, trial, work, True)
     for i in range(len(bodies.motion)):
         if bodies.frame[i] > RIGID_BODY:
             orientation(bodies, i, R, trial.u, trial, trial.Rp[i])
@@ -131,7 +138,7 @@ def passes(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type
         taken(c, bodies, trial)
         if not np.isfinite(size) or size > 1e30:
             break
-        internal_forces(c, bodies, R, driving.amounts[t], state, trial, work)
+        internal_forces(c, bodies, R, driving.amounts[t], state, trial, work, False)
         if settled:
             state.passes[0] += count
             state.passes[1] += 1 if iteration >= PATIENCE else 0
@@ -183,6 +190,8 @@ def asked(c, bodies, ends, of, driving, t, iteration, state, trial, work, solved
             for x in range(N):
                 before = trial.u[first + x] if bodies.frame[i] == STRESSED else 0.0
                 trial.change[to + x] = bodies.size[i] * (trial.change[to + x] - before)
+            if bodies.rigid[i]:
+                foresee(c, bodies, i, work.y, trial, work)
     k = len(trial.z)
     for m in range(k):
         trial.change[len(trial.change) - k + m] = c.weight * trial.dz[m]

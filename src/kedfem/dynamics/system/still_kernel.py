@@ -26,7 +26,7 @@ def still_forces(c, bodies, R, amounts, state, trial, work):  # type: ignore[no-
     )
     if len(bodies.beams.segment):
         begun(newmark(c), bodies.beams, R, state.strain, state.direction, trial.base, trial.resisted)
-    internal_forces(c, bodies, R, amounts, state, trial, work)
+    internal_forces(c, bodies, R, amounts, state, trial, work, True)
     for i in range(len(bodies.motion)):
         if bodies.frame[i] > RIGID_BODY:
             orientation(bodies, i, R, trial.u, trial, trial.Rp[i])
