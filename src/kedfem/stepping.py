@@ -109,6 +109,8 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
     )
     with written.of_run(keeper.run, keeper.rows) if keeper else written as writer, closing(shown):
         table = _Table(writer, channels, folder)
+        if not (keeper and keeper.rows):
+            watch("start", 0, 0)
         try:
             for block in leveled(scene, ready.linkage, ready.path, model, solvers, marks):
                 if block.fine or not block.levels:

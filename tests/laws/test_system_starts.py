@@ -10,7 +10,7 @@ from kedfem.dynamics.stepping.first_state import first_states
 from kedfem.dynamics.system.march import displacements, march
 from kedfem.dynamics.system.starts.deflected import plucked, quasi_static, static
 from kedfem.dynamics.system.starts.instant import Instant
-from kedfem.dynamics.system.starts.rates import coordinates, gradients, places
+from kedfem.dynamics.system.starts.rates import coordinates, places
 from kedfem.dynamics.system.starts.start import rest
 from kedfem.errors import SolveError
 from tests.laws.test_system import HINGE, KINDS, elements, four_bar
@@ -54,7 +54,7 @@ def test_rates_of_coordinates_are_those_of_their_values(kind: str, frames: str) 
     assert_allclose(found[2], second @ e, atol=1e-6 * np.abs(found[2]).max())
     x = rng.standard_normal(k)
     moved = (value(t0, z[0] + 1e-5 * x) - value(t0, z[0] - 1e-5 * x)) / 2e-5
-    C = gradients(system, places(of.motion(np.array([t0]))), z[0])
+    C = Instant(of.ready, of.motion, t0).gradients(z[0])
     assert_allclose(C @ x, moved, atol=1e-5 * np.abs(moved).max())
 
 

@@ -376,7 +376,10 @@ def test_ctrl_c_before_the_first_step_leaves_an_earlier_run_alone(
 
     monkeypatch.setattr("kedfem.analysis.prepared", interrupted)
     said = run_kedfem("run", arm)
-    assert (said.code, said.err.splitlines()[-1]) == (INTERRUPTED, "interrupted; nothing was written")
+    nothing = (
+        "interrupted; nothing was computed yet, as the first step had not begun, and nothing was written"
+    )
+    assert (said.code, said.err.splitlines()[-1]) == (INTERRUPTED, nothing)
     assert file.read_bytes() == before
 
 

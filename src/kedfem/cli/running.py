@@ -27,6 +27,8 @@ FILES = {
     "report.html": PAGE,
 }
 
+NOTHING = "nothing was computed yet, as the first step had not begun, and nothing was written"
+
 
 def run(
     scene: ScenePath,
@@ -57,7 +59,7 @@ def run(
         begun = _version(file) != before
         readable = f"what was computed is readable in {file} (status: {run_status(file)})" if begun else ""
         going_on = "; kedfem run --resume goes on with it" * has_state(file.parent)
-        return (readable or "nothing was written") + going_on
+        return (readable or NOTHING) + going_on
 
     with interruptible(kept), progress() as watch:
         done = analyse(loaded, watch, resume, states)

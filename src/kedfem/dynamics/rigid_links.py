@@ -1,6 +1,6 @@
 """Rigid links of a model: in the span of {1, x, y, z}, and so stiff there that they do not deform beside what does."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import scipy.sparse as sp
@@ -43,9 +43,23 @@ def made_rigid(scene: Scene, links: Mapping[str, Link], thicken: bool = False) -
         highest = RIGID * max(map(wave_frequency, elastic or [links[key]]))
         if not elastic and any(soft):
             highest = min(highest, MOUNTED * _mounted(link, *soft))
-        corotational = link.fit is not None and not without_vibration(scene)
-        out[key] = rigid(link, min(highest, firm) if corotational else highest)
+        if link.fit is not None:
+            highest = min(highest, _beside(link, elastic) if without_vibration(scene) else firm)
+        out[key] = rigid(link, highest)
     return out
+
+
+def _beside(link: Link, elastic: Sequence[Link]) -> float:
+    """The frequency at which a link is RIGID² times as stiff as elastic ones, however heavy it is beside them [rad/s].
+
+    A heavy one at RIGID times their frequency would be stiffer by its mass: rounding of its strain would move it on soft
+    mounts.
+    """
+    if not elastic:
+        return np.inf
+    stiffest = max(wave_frequency(each) ** 2 * float(each.one @ each.m1[:, 0]) for each in elastic)
+    lightest = min(float(link.one @ link.m1[:, 0]), float(_second_moments(link)[0]) / reach(link) ** 2)
+    return float(RIGID * np.sqrt(stiffest / lightest))
 
 
 def _thickened(link: Link) -> Link:

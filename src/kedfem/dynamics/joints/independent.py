@@ -1,17 +1,20 @@
 """Joints that share port points: which of their conditions are independent, and the port forces that follow."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 import scipy.linalg
+import scipy.sparse as sp
 from jaxtyping import Bool, Float, Int
+from scipy.sparse.csgraph import connected_components
 
 from kedfem.dynamics.joints.attachments import Attachment
 
 DEPENDENT = (
     1e-9  # relative: ports of one coupling surface repeat each other to rounding, others differ by far more
 )
+ROUNDING = 1e-13  # entries of relations of order one that couple nothing
 
 
 def independent(
@@ -92,16 +95,37 @@ def _port_forces(
     """
     determined = np.setdiff1d(np.arange(B.shape[1]), riding)  # what holds a slider is left open
     G = np.vstack([L.T, B.T[determined]])
-    inverse = np.linalg.pinv(G, rcond=DEPENDENT)
+    inverse = np.zeros(G.T.shape)
+    for rows, columns in _blocks(G):
+        inverse[np.ix_(columns, rows)] = np.linalg.pinv(G[np.ix_(rows, columns)], rcond=DEPENDENT)
     inverse[np.abs(inverse) < DEPENDENT] = 0.0  # rounding
     q = L.shape[1]
     return inverse[:, :q], inverse[:, q + np.searchsorted(determined, np.asarray(own, int))], _null_space(G)
 
 
 def _null_space(A: Float[np.ndarray, "m n"]) -> Float[np.ndarray, "n r"]:
-    """Orthonormal basis of A x = 0, A of order one."""
-    _, s, Vt = np.linalg.svd(A)
-    return np.asarray(Vt[int((s > DEPENDENT).sum()) :].T)
+    """Orthonormal basis of A x = 0, A of order one: each of its vectors within one block, so that few bodies share it."""
+    columns, parts = np.arange(A.shape[1]), list[np.ndarray]()
+    for rows, own in _blocks(A):
+        _, s, Vt = np.linalg.svd(A[np.ix_(rows, own)])
+        part = np.zeros((A.shape[1], len(own) - int((s > DEPENDENT).sum())))
+        part[own] = Vt[len(own) - part.shape[1] :].T
+        parts.append(part)
+        columns = np.setdiff1d(columns, own)
+    every = np.concatenate([np.eye(A.shape[1])[:, columns], *parts], axis=1)
+    first = np.abs(every).argmax(axis=0)
+    return np.asarray(every[:, np.argsort(first, kind="stable")])
+
+
+def _blocks(A: Float[np.ndarray, "m n"]) -> Iterator[tuple[Int[np.ndarray, " _"], Int[np.ndarray, " _"]]]:
+    """Rows and columns of each part of a matrix that shares none with the others; columns of zeros are left out."""
+    m, (rows, columns) = len(A), np.nonzero(np.abs(A) > ROUNDING)
+    count = m + A.shape[1]
+    graph = sp.coo_array((np.ones(len(rows)), (rows, m + columns)), (count, count))
+    label = connected_components(graph, directed=False)[1]
+    used = np.unique(columns)
+    for part in np.unique(label[m + used]):
+        yield np.flatnonzero(label[:m] == part), used[label[m + used] == part]
 
 
 def _placed(each: Attachment, rows: Float[np.ndarray, "h c"]) -> Float[np.ndarray, "m c"]:

@@ -142,8 +142,8 @@ def _positions(
                 state = static(of, motion_at, t, near=state, like=shared)
             else:
                 state = deflection_in_motion(of, motion_at, time=t, near=state, like=shared)
-        except NoBalanceError:
-            raise SolveError(_unbalanced(scene, motion)) from None
+        except NoBalanceError as failed:
+            raise SolveError(_unbalanced(scene, motion, failed.moves)) from None
         if isinstance(solver, CorotationalSteps):
             links, exerted = solver.first(state, forcing, motion_at, shared)
         else:
@@ -151,7 +151,7 @@ def _positions(
         yield from _finite(Block(k, motion, links, exerted=exerted))
 
 
-def _unbalanced(scene: Scene, motion: RigidMotion) -> str:
+def _unbalanced(scene: Scene, motion: RigidMotion, moves: str) -> str:
     """What to do about a position without a balance of forces."""
     kind = scene.analysis.kind
     advice = (
@@ -164,7 +164,7 @@ def _unbalanced(scene: Scene, motion: RigidMotion) -> str:
     )
     return (
         f"analysis.kind: all forces must balance at each position of a {kind} analysis, got no balance at "
-        f"t = {motion.t[0]:.6g} s, drive angle {np.degrees(motion.phi[0]):.6g} deg; {advice}"
+        f"t = {motion.t[0]:.6g} s, drive angle {np.degrees(motion.phi[0]):.6g} deg; {moves}{'; ' * bool(moves)}{advice}"
     )
 
 

@@ -1,8 +1,11 @@
-"""Internal forces of bodies that do not move in their frames, compiled by numba: those of a step, without rates."""
+"""What balances of deflections ask for, compiled by numba: internal forces of bodies that do not move in their frames,
+and gradients of coordinates. They are those of a step, without rates."""
 
 from kedfem.compiled import compiled
 from kedfem.dynamics.beams_kernel import begun
 from kedfem.dynamics.system.bodies_kernel import internal_forces, newmark, orientation
+from kedfem.dynamics.system.constraints_kernel import coordinate
+from kedfem.dynamics.system.ends_kernel import on_lines, placed
 from kedfem.dynamics.system.record import RIGID_BODY
 from kedfem.dynamics.system.reference import reference
 
@@ -30,3 +33,23 @@ def still_forces(c, bodies, R, amounts, state, trial, work):  # type: ignore[no-
     for i in range(len(bodies.motion)):
         if bodies.frame[i] > RIGID_BODY:
             orientation(bodies, i, R, trial.u, trial, trial.Rp[i])
+
+
+@compiled
+def still_gradients(ends, of, rigid_motion, p, stations, z, trial, work):  # type: ignore[no-untyped-def]
+    """trial.C becomes the gradients of all coordinates on z: of those that are linear, and do not change, at z = 0.
+
+    Parameters
+    ----------
+    rigid_motion, p : R (M, 3, 3), v and ω (M, 3), and origins (M, 3) of all bodies of the linkage
+    stations : weights of ends on lines
+    """
+    ends, of, trial, work = reference(ends), reference(of), reference(trial), reference(work)
+    on_lines(ends, stations)
+    trial.part[:] = 0.0
+    placed(ends, rigid_motion[0], p, trial.part, trial.fixed, work.end, work.vectors)
+    placed(ends, rigid_motion[0], p, z, trial.moving, work.end, work.vectors)
+    for a in range(len(of.law)):
+        trial.C[a] = 0.0
+        place = trial.fixed if of.linear[a] else trial.moving
+        coordinate(ends, of, a, rigid_motion, place, trial.turned, trial.C[a], work.end, work.vectors)

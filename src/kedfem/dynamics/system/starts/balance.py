@@ -162,7 +162,9 @@ class Balance:
                 "joints: bodies must be held by joints or springs, got some that move freely"
             ) from error
 
-    def solved(self, r: Flat, moved: Flat | None = None, more: Flat | float = 0.0) -> Solved:
+    def solved(
+        self, r: Flat, moved: Flat | None = None, more: Flat | float = 0.0, alone: bool = False
+    ) -> Solved:
         """All bodies under given right-hand sides.
 
         Parameters
@@ -170,9 +172,11 @@ class Balance:
         r : (N,) world components
         moved : (N,) what closes the joints together with x
         more : (k,) forces on the interface beside those that are known
+        alone : whether these right-hand sides act alone, without what is asked: what they change
         """
         at, ports = self.of.bodies.at, self.of.bodies.port_at
-        k, f, local, offset = self.of.system.unknowns, self.asked.known + more, [], []
+        k, local, offset = self.of.system.unknowns, [], []
+        f = more + (0.0 * self.asked.known if alone else self.asked.known)
         for i, (each, RB) in enumerate(zip(self.held, self.RB, strict=True)):
             here = slice(int(at[i]), int(at[i + 1]))
             local.append(self.turned(i, r[here], back=True))
@@ -180,7 +184,8 @@ class Balance:
                 np.zeros(len(each.W)) if moved is None else each.W @ self.turned(i, moved[here], back=True)
             )
             f[self.columns[i]] += RB.T @ (each.left.T @ local[i] + each.S @ offset[i])
-        right = np.concatenate([f, self.scale * self.asked.target[self.kept]])
+        target = (0.0 if alone else self.scale) * self.asked.target[self.kept]
+        right = np.concatenate([f, target])
         found = right
         if len(right):
             found = self.factor.solve(right)

@@ -18,6 +18,7 @@ from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.record import RATE, Spring, Stop, curve_of
 from kedfem.dynamics.system.starts.accelerations import accelerations, own_spin
 from kedfem.dynamics.system.starts.balance import Asked, Balance
+from kedfem.dynamics.system.starts.equilibrium import Equilibrium, equilibrium
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
 from kedfem.dynamics.system.starts.internal import own, rows, turned_rate
 from kedfem.dynamics.system.starts.start import as_coordinates, begun
@@ -35,6 +36,7 @@ LEAST = 1 / 64  # of loads, that an increment of theirs is
 ROUNDING, LINEAR = 1e-8, 1e-3  # of the deflection: changes below it that do not fall are rounding
 STALLED, IN_A_ROW = 1e-5, 3  # the same of so many changes that do not fall, by matrices without mass
 FREE = 1e-3  # as ROUNDING where nothing drives the links: rounding moves them, held by next to nothing, as rigid ones
+DIVERGED = 1e3  # times the first change: iterations that Newton's method takes over
 LATER = np.array([
     [-25, 48, -36, 16, -3], [-3, -10, 18, -6, 1], [1, -8, 0, 8, -1], [-1, 6, -18, 10, 3], [3, -16, 36, -48, 25],
 ]) / 12  # rates at five instants, of fourth order  # fmt: skip
@@ -45,7 +47,19 @@ Rows = Sequence[Float[np.ndarray, "_ _"]]
 
 
 class NoBalanceError(SolveError):
-    """No deflection is found at which all forces balance."""
+    """No deflection is found at which all forces balance.
+
+    moves : what changed most where the search ended, in words; empty if that is not known
+    """
+
+    def __init__(self, moves: str = "") -> None:
+        seen = f"; {moves}" * bool(moves)
+        super().__init__(
+            "analysis.initial: the start must be a deflection that can be found, got none: links that nothing holds but "
+            "their weight, springs whose preload is far from what they bear there, or a drive at a natural frequency"
+            f'{seen}; take initial = "rest", a slower drive or stiffer links'
+        )
+        self.moves = moves
 
 
 def quasi_static(
@@ -156,6 +170,7 @@ def _moving(first: Instant, motion_at: Motion) -> tuple[Flat, Flat]:
             if again == 0 and k:  # joints are closed in all before, and so in what these go on to
                 guess = AHEAD[k] @ u[:k]
                 now.near = turned(instants[k - 1], instants[k - 1].interface(u[k - 1]))
+            now.slow = now.slow or instants[k - 1].slow
             z1 = now.interface(v[k]) if again else None
             u[k] = _balanced(now, guess, _constant(np.zeros_like(guess)), _spins(now), z1)
         v, last, change = LATER @ u / h, change, float(np.linalg.norm(u[0] - before[0]))
@@ -217,8 +232,8 @@ def _balanced(
     rounding : of the deflection, below which changes that do not fall are taken for rounding
     """
     of, mixing, bodies, settled, last = now.of, Mixing(), TurningBodies(now, spins), False, np.inf
-    linear, slow = of.c.single, 0
-    exact = linear and any(bodies.sparse)
+    linear, slow, start, first = of.c.single, 0, u, 0.0
+    exact = now.slow or (linear and any(bodies.sparse))
     for n in range(ITERATIONS):
         exact = exact or (linear and n >= DIRECT)
         f, R = bodies.still.forces(now.motion.R[0], u, now.amounts)
@@ -234,18 +249,31 @@ def _balanced(
             return np.asarray(u + change)
         u = u + (change if linear else mixing.step(change))
         size, reached = float(np.linalg.norm(change)), float(np.linalg.norm(u))
+        first = first or size
+        if size > DIVERGED * first and not linear:
+            break
         stalls = size > last / 2 and size <= (LINEAR if linear else rounding) * reached
         stalls = stalls and (n > DIRECT or not linear)
-        if n >= DIRECT and size > last / 2 and spins is not None and not exact:
+        if n >= DIRECT and size > last / 2 and rounding != FREE and not exact:
             exact, mixing, last = True, Mixing(), np.inf  # it may be the mass in the matrices that slows it
+            now.slow = True
             continue
         slow = slow + 1 if exact and size > last / 2 and size <= STALLED * reached else 0
         stalls = stalls or slow >= IN_A_ROW
         settled, last = stalls or size <= CONVERGED * reached + of.c.floor, size
-    raise NoBalanceError(
-        "analysis.initial: the start must be a deflection that can be found, got none: links that nothing holds but "
-        'their weight, or a drive at a natural frequency; take initial = "rest", a slower drive or stiffer links'
-    )
+    if linear or rounding == FREE:  # what nothing drives has rigid motions without stiffness
+        raise NoBalanceError()
+    return _by_newton(now, start, more, spins, z1)
+
+
+def _by_newton(
+    now: Instant, u: Flat, more: Callable[[Flat, Flat], Flat], spins: Spins | None, z1: Flat | None
+) -> Flat:
+    """The same by Newton's method with all that rotates with bodies, which costs more an iteration."""
+    found = equilibrium(Equilibrium(now, more, spins, z1), u)
+    if found.moves:
+        raise NoBalanceError(found.moves)
+    return found.u
 
 
 def _asked(now: Instant, u: Flat, z1: Flat | None) -> Asked:

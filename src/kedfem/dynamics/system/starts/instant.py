@@ -30,7 +30,7 @@ from kedfem.dynamics.system.record import (
 from kedfem.dynamics.system.sparse import SparsePart, softening
 from kedfem.dynamics.system.starts.balance import HeldBody, mass_body, sparse_body
 from kedfem.dynamics.system.starts.internal import Inside, Still, inside, own, rows
-from kedfem.dynamics.system.starts.rates import coordinates, gradients, places, term_values, travels
+from kedfem.dynamics.system.starts.rates import coordinates, places, term_values, travels
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.rigid import RigidMotion
 
@@ -83,11 +83,12 @@ class Instant:
         self.of, self.time, self.motion = of, time, motion
         along = driving(replace(of, stressed=None), motion)  # `stress` has these as forces
         self.F, self.amounts, self.at = along.F[0], along.amounts[0], places(motion)
+        self._stations = along.stations[0]
+        self.slow = False  # whether the mass that makes matrices of bodies definite slows iterations
         self.R, self.omega = motion.R[0][of.bodies.motion], motion.omega[0][of.bodies.motion]
         self.travels = travels(of.system, self.at)
         self.always: Always = always(of) if like is None else like.always
         self._turnings = None if of.stressed is None else of.stressed.turnings(of.system.model, motion)
-        self._gradients: Float[np.ndarray, "r k"] | None = None  # as they were found last
 
     def stress(self, u: Flat) -> Flat:
         """Forces by the stresses of the rigid-body motion, R (k g P), at a displacement; none without stiffening."""
@@ -147,8 +148,10 @@ class Instant:
 
     def gradients(self, z: Flat) -> Float[np.ndarray, "r k"]:
         """Of all coordinates by z."""
-        self._gradients = gradients(self.of.system, self.at, z, self._gradients)
-        return self._gradients.copy()
+        always, known = self.always, np.zeros(self.of.system.unknowns)
+        known[always.number] = z
+        C = always.still.gradients(self.motion, self._stations, known)
+        return np.asarray(C[:, always.number])
 
     def forces(self, e: Float[np.ndarray, "3 r"]) -> Float[np.ndarray, "r 3"]:
         """Of all laws: force along the coordinate, and how it falls with it and its rate; zero of constraints."""

@@ -19,6 +19,7 @@ from kedfem.dynamics.system.sparse import SparsePart, component_order, momentum
 from kedfem.dynamics.system.state import State
 from kedfem.links.record import Link, mass_times
 from kedfem.links.reduced import rigid_modes
+from kedfem.motion.rigid import RigidMotion
 
 Flat = Float[np.ndarray, " N"]
 
@@ -68,6 +69,23 @@ class Still:
                 here = own(self.of, k)
                 f[here] = self.sprung(k, mean[k], u[here])
         return f, mean
+
+    def gradients(
+        self, motion: RigidMotion, stations: Float[np.ndarray, " w"], z: Float[np.ndarray, " k"]
+    ) -> Float[np.ndarray, "r k"]:
+        """Of all coordinates by the interface unknowns z, these in the order of a state.
+
+        Parameters
+        ----------
+        motion : rigid-body motion at one time; stations : weights of ends on lines there
+        """
+        from kedfem.dynamics.system.still_kernel import still_gradients
+
+        turning = motion.R[0], motion.v[0], motion.omega[0]
+        still_gradients(
+            self.of.ends, self.of.constraints, turning, motion.p[0], stations, z, self._trial, self._work
+        )
+        return np.array(self._trial.C)
 
     def sprung(self, k: int, R: Float[np.ndarray, "3 3"], u: Flat) -> Flat:
         """R K0 Rᵀ u of the displacement u (N,) of body k, world components.

@@ -92,42 +92,6 @@ def term_values(system: System, at: Places, z: Float[np.ndarray, " k"]) -> Float
     ])  # fmt: skip
 
 
-def gradients(
-    system: System, at: Places, z: Float[np.ndarray, " k"], known: Float[np.ndarray, "r k"] | None = None
-) -> Float[np.ndarray, "r k"]:
-    """How all coordinates change with z, at rest in their places of the rigid-body motion where they are linear in it.
-
-    Parameters
-    ----------
-    known : the same at another z, where those that are linear are as here
-    """
-    C = np.zeros((len(system.constraints), system.unknowns))
-    still = at.at_rest()
-    moving: dict[tuple[int, int, bool], tuple[Series, Series]] = {}
-
-    def moved(n: int, column: int, linear: bool) -> tuple[Series, Series]:
-        key = (n, column, linear)
-        if key not in moving:
-            along = np.zeros((3, len(z)))
-            along[0], along[1, column] = 0.0 if linear else z, 1.0
-            moving[key] = pose(system.ends[n], still, along)
-        return moving[key]
-
-    for a, each in enumerate(system.constraints):
-        if each.linear and known is not None:
-            C[a] = known[a]
-            continue
-        rest = _Poses(system, still, np.stack([0.0 * z if each.linear else z, 0.0 * z, 0.0 * z]))
-        for term in each.terms:
-            for c in moved_by(system, [term]):
-                i, j = (
-                    moved(n, c, each.linear) if system.ends[n].onto[:, :, c].any() else rest(n)
-                    for n in (term.i, term.j)
-                )
-                C[a, c] += term.factor * value(system, term, i, j)[1]
-    return C
-
-
 def moved_by(system: System, terms: Sequence[Term]) -> set[int]:
     """Interface unknowns that move the ends of terms."""
     ends = (system.ends[n] for n in {n for term in terms for n in (term.i, term.j)})

@@ -50,10 +50,9 @@ class TurningBodies:
         direct = balance.solved(r).x
         if not any(self.sparse) and not exact and self.now.of.stressed is None:
             return direct
-        none = balance.solved(0 * r).x
 
         def applied(x: Flat) -> Flat:
-            return np.asarray(x + balance.solved(self.left_out(x, exact)).x - none)
+            return np.asarray(x + balance.solved(self.left_out(x, exact), alone=True).x)
 
         whole = LinearOperator((len(r),) * 2, applied, dtype=float)
         return np.asarray(gmres(whole, direct, rtol=LEFT, restart=KRYLOV, maxiter=4)[0])

@@ -1,0 +1,258 @@
+"""Newton's method for a deflection at which all forces balance, however far bodies move to it.
+
+With A the stiffness of bodies in their mean frames, and all forces on bodies and interface at u as right-hand sides,
+
+    A Δ = r − (J − A) Δ + Wᵀ λ,   C Δz + Δm / κ = target,   Σ Bᵀ R λ = Cᵀ (m + Δm) + (∂C/∂z Δz)ᵀ m
+
+J Δ is a difference of forces along Δ, ∂C/∂z Δz one of gradients, so that what rotates with bodies counts: forces of
+springs and joints, axial forces of beams, preloads. GMRES solves for it, A its preconditioner. Rigid bodies then rotate
+by a whole rotation, not by its linear part, which would strain them: what opens their joints by that closes with the next
+Δ. A step is as long as what is left falls, seen through the factor that it was found with (Deuflhard's monotonicity
+test).
+"""
+
+from collections.abc import Callable
+from copy import copy
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.sparse.linalg import LinearOperator, gmres
+
+from kedfem.dynamics.matrices.dense import coordinates
+from kedfem.dynamics.segment import mean_orientation
+from kedfem.dynamics.system.record import COROTATIONAL
+from kedfem.dynamics.system.sparse import momentum
+from kedfem.dynamics.system.starts.balance import Asked, Balance
+from kedfem.dynamics.system.starts.instant import Flat, Instant
+from kedfem.dynamics.system.starts.internal import drawn, own, rows
+from kedfem.dynamics.system.starts.turning_bodies import CONVERGED, Spins, TurningBodies
+from kedfem.errors import SolveError
+from kedfem.links.reduced import reach
+
+ITERATIONS = 40
+SHORTEST, IN_A_ROW = 1 / 64, 4  # of a step; so many of them end a search
+FALLS = 0.25  # of a step's length: share by which what is left has to fall
+KRYLOV = 40
+LEFT = 1e-3  # of a residual by GMRES: an iteration leaves about as much of the error
+ROUNDING = 1e-8  # of the deflection: changes below it that do not fall
+DIFFERENCE = 1e-9  # of the size of bodies: displacements along which forces are differenced
+
+Frames = Float[np.ndarray, "L 3 3"]
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """All forces at a deflection.
+
+    f, r, R : internal forces and all that act on bodies, world components, and their mean frames
+    z, C, e : interface unknowns, gradients and values of coordinates
+    laws, slopes : (r,) force along each coordinate, and how it falls with it
+    hard : which coordinates are constraints
+    moved : (N,) what closes joints together with u
+    """
+
+    u: Flat
+    f: Flat
+    r: Flat
+    R: Frames
+    z: Flat
+    C: Float[np.ndarray, "r k"]
+    e: Flat
+    laws: Flat
+    slopes: Flat
+    hard: Bool[np.ndarray, " r"]
+    moved: Flat
+
+
+class Equilibrium:
+    """The balance of all forces at one instant.
+
+    Parameters
+    ----------
+    more : forces beside applied and internal ones, at a deflection u with the internal force f
+    spins : of the inertia that the deflection has as it turns, if any
+    z1 : rates of the interface unknowns
+    """
+
+    def __init__(
+        self, now: Instant, more: Callable[[Flat, Flat], Flat], spins: Spins | None, z1: Flat | None
+    ) -> None:
+        self.now, self.more, self.z1 = now, more, z1
+        self.inertia = TurningBodies(now, spins)
+        self.bodies = TurningBodies(now, None)
+        self.W = [part.W for part in now.of.parts]
+        self.right = [np.linalg.pinv(W) for W in self.W]
+        links = now.of.system.model.links
+        mass = sum(float(link.one @ link.m1[:, 0]) for link in links)
+        self.size = DIFFERENCE * np.sqrt(mass) * max(reach(link) for link in links)
+
+    def forces(self, u: Flat) -> tuple[Flat, Flat, Frames]:
+        """Internal ones, all on bodies, and their mean frames."""
+        now = self.now
+        f, R = self.bodies.still.forces(now.motion.R[0], u, now.amounts)
+        return f, now.F - f + self.more(u, f) - self.inertia.inertia(u) - now.stress(u), R
+
+    def at(self, u: Flat) -> Point:
+        """All forces at a deflection."""
+        now, of = self.now, self.now.of
+        f, r, R = self.forces(u)
+        z = now.interface(u)
+        C = now.gradients(z)
+        e = now.coordinates(np.stack([z, 0 * z if self.z1 is None else self.z1, 0 * z]))
+        laws = now.forces(e)
+        moved = np.zeros_like(u)
+        for k, joint in enumerate(of.system.model.joints):
+            open_ = self.W[k] @ u[own(of, k)] - joint.B @ z
+            moved[own(of, k)] = self.right[k] @ open_
+        return Point(u, f, r, R, z, C, e[0], laws[:, 0], laws[:, 1], now.hard(C), moved)
+
+    def asked(self, at: Point, m: Flat) -> Asked:
+        """What constraints and laws ask of a change, with forces m of constraints in it."""
+        soft = at.slopes > 0.0
+        every = at.hard | soft
+        compliance = np.where(soft, 1 / np.where(soft, at.slopes, 1.0), 0.0)
+        target = np.where(at.hard, -at.e, 0.0)
+        return Asked(at.C[every], target[every], compliance[every], at.C.T @ self.exerted(at, m))
+
+    def exerted(self, at: Point, m: Flat) -> Flat:
+        """Forces along all coordinates."""
+        return np.asarray(np.where(at.hard, m, at.laws))
+
+    def change(self, at: Point, m: Flat, balance: Balance, direct: Flat) -> Flat:
+        """The change that brings all forces into balance, to first order."""
+        push = self.exerted(at, m)
+
+        def applied(x: Flat) -> Flat:
+            long = float(np.linalg.norm(x))
+            if long == 0.0:
+                return x
+            part = self.size / long
+            _, r, _ = self.forces(at.u + part * x)
+            turned = self.now.gradients(self.now.interface(at.u + part * x)).T @ push - at.C.T @ push
+            left = (at.r - r) / part - self.stiff(at, x)
+            return np.asarray(x + balance.solved(left, more=-turned / part, alone=True).x)
+
+        whole = LinearOperator((len(direct),) * 2, applied, dtype=float)
+        return np.asarray(gmres(whole, direct, rtol=LEFT, restart=KRYLOV, maxiter=1)[0])
+
+    def stiff(self, at: Point, x: Flat) -> Flat:
+        """A x of all bodies."""
+        out, of, always = np.zeros_like(x), self.now.of, self.now.always
+        links = of.system.model.links
+        for k, K in enumerate(always.still.K):
+            here = own(of, k)
+            d = int(of.bodies.components[k])
+            R = at.R[k][:d, :d]
+            local = (R.T @ x[here].reshape(d, -1)).ravel()
+            mass = momentum(links[k], local) if self.bodies.sparse[k] else local
+            f = K @ local + always.least(k) * mass
+            out[here] = (R @ f.reshape(d, -1)).ravel()
+        return out
+
+    def left(self, at: Point, m: Flat, balance: Balance) -> Flat:
+        """The change that a balance of another deflection asks for here."""
+        asked = self.asked(at, m)
+        if len(asked.target) != len(balance.asked.target):
+            return np.full_like(at.u, np.inf)
+        other = copy(balance)
+        other.asked = replace(balance.asked, target=asked.target, known=asked.known)
+        return other.solved(at.r, at.moved).x
+
+    def reactions(self, at: Point, m: Flat, more: Flat) -> Flat:
+        """Forces of constraints with what a solution adds to them."""
+        added = np.zeros(len(m))
+        added[at.hard | (at.slopes > 0.0)] = more
+        return np.asarray(np.where(at.hard, m + added, 0.0))
+
+    def stepped(
+        self, at: Point, m: Flat, balance: Balance, change: Flat, before: float, tiny: bool
+    ) -> tuple[Point, float]:
+        """All forces after a step along a change, and the part of it that is taken.
+
+        Parameters
+        ----------
+        before : what is left at the point, seen through the balance there
+        tiny : whether the change is rounding, and is taken as it is
+        """
+        part = 1.0
+        while True:
+            new = self.at(self.taken(at, part * change))
+            left = float(np.linalg.norm(self.left(new, m, balance)))
+            if left <= (1 - FALLS * part) * before or tiny or part <= SHORTEST:
+                return new, part
+            part /= 2
+
+    def moves(self, at: Point, new: Point, change: Flat) -> str:
+        """What moves most along a change, and whose force changes most between two points."""
+        of = self.now.of
+        far = [float(np.abs(rows(of, k, change[own(of, k)])).max(initial=0.0)) for k in range(len(of.parts))]
+        words = (
+            f"link '{of.system.model.links[int(np.argmax(far))].name}' moves most from iteration to iteration"
+        )
+        forces = np.abs(new.laws - at.laws)
+        if forces.any():
+            words += f", and the force of {of.system.constraints[int(np.argmax(forces))].name} changes most"
+        return words
+
+    def taken(self, at: Point, change: Flat) -> Flat:
+        """The deflection after a change, rigid bodies rotated by whole rotations."""
+        of, u = self.now.of, at.u + change
+        for k, link in enumerate(of.system.model.links):
+            if not link.rigid or of.bodies.frame[k] != COROTATIONAL:
+                continue
+            here, d = own(of, k), link.d
+            R0, R = self.now.R[k][:d, :d], at.R[k][:d, :d]
+            base = drawn(link) @ R0.T
+            before, after = base + rows(of, k, at.u[here]), base + rows(of, k, u[here])
+            turned = mean_orientation(link, rows(of, k, u[here]), R0)
+            share = link.m1[:, 0] / (link.one @ link.m1[:, 0])
+            B = self.now.always.still.rigid[k]
+            strain = (R.T @ change[here].reshape(d, -1)).ravel()
+            strain = strain - B @ (B.T @ strain)
+            strain = rows(of, k, strain)
+            shape = (
+                (before - np.outer(link.one, share @ before)) @ R
+                + strain
+                - np.outer(link.one, share @ strain)
+            )
+            placed = np.outer(link.one, share @ after) + shape @ turned.T
+            u[here] += coordinates(link, of.parts[k], placed - after).ravel()
+        return np.asarray(u)
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A deflection; moves : what changed most where the search ended without a balance, in words."""
+
+    u: Flat
+    moves: str = ""
+
+
+def equilibrium(problem: Equilibrium, u: Flat) -> Found:
+    """The deflection at which all forces balance, from a guess."""
+    now, bodies, last, settled, short = problem.now, problem.bodies, np.inf, False, 0
+    at = problem.at(u)
+    m, change, new = np.zeros(len(at.e)), np.zeros_like(u), at
+    for _ in range(ITERATIONS):
+        try:
+            balance = Balance(now.of, bodies.held(at.R), at.R, problem.asked(at, m))
+            first = balance.solved(at.r, at.moved)
+            m = problem.reactions(at, m, first.m)
+            change = problem.change(at, m, balance, first.x)
+        except (SolveError, np.linalg.LinAlgError):
+            break
+        if not np.isfinite(change).all():
+            break
+        size, reached = float(np.linalg.norm(change)), float(np.linalg.norm(at.u))
+        tiny = size <= ROUNDING * reached
+        new, part = problem.stepped(at, m, balance, change, float(np.linalg.norm(first.x)), tiny)
+        if settled:
+            return Found(new.u)
+        stalls = size > last / 2 and tiny
+        settled = stalls or (part == 1.0 and size <= CONVERGED * reached + now.of.c.floor)
+        short = short + 1 if part <= SHORTEST else 0
+        if short == IN_A_ROW:
+            break
+        at, last = new, size
+    return Found(at.u, problem.moves(at, new, change))

@@ -1,0 +1,165 @@
+"""Starts and positions of mechanisms whose drive moves a road alone: bodies on springs find their own place."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+
+from kedfem.accuracy.prepared import meshed
+from kedfem.dynamics.stepping.first_state import motion_of
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.system.corotational import CorotationalSteps
+from kedfem.dynamics.system.march import Motion, march
+from kedfem.dynamics.system.starts.deflected import NoBalanceError, static
+from kedfem.dynamics.system.starts.instant import Instant
+from kedfem.dynamics.system.starts.internal import own, rows
+from kedfem.scene import scene_from
+
+Raw = dict[str, Any]
+ASKEW = Rotation.from_rotvec([0.5, -0.8, 0.3]).as_matrix()
+POINTS = {
+    "L": [0, 0.35, 0.25], "LB": [0, 0.72, 0.23], "U": [0, 0.42, 0.5], "UB": [0, 0.69, 0.52], "W": [0, 0.78, 0.31],
+    "P": [0, 0.78, 0], "T": [0, 0.46, 0.72], "S": [0, 0.535, 0.24], "B": [0, 0.3, 0.55],
+}  # fmt: skip
+
+
+def corner(R: np.ndarray, strut: float = 6300.0, damping: float = 3e3, **analysis: Any) -> Raw:
+    """One corner of a car with a double wishbone: a body on a slide, two arms of beams, an upright, a road that moves.
+
+    Parameters
+    ----------
+    R : how the whole is turned
+    strut : its preload [N]
+    """
+    x, z = R[:, 0].tolist(), R[:, 2].tolist()
+    rubber = {"stiffness": ["16 kN/mm"] * 3, "damping": "2 kN*s/m"}
+
+    def arm(a: str, b: str) -> Raw:
+        section = {"kind": "tube", "diameter": 0.038, "wall": 0.004}
+        shape = {"kind": "polyline", "points": [a, "S", b] if a == "L" else [a, b], "section": section}
+        return {"model": "beam", "material": "steel", "shape": shape, "mesh": {"elements": 1}}
+
+    def hinge(a: str, b: str, at: str, **more: Any) -> Raw:
+        return {"kind": "revolute", "links": [a, b], "at": at, "axis": x, **more}
+
+    def body(mass: float, at: str) -> Raw:
+        return {"model": "rigid", "mass": mass, "centre": at, "inertia": [mass / 20] * 3 + [0] * 3}
+
+    return {
+        "gravity": (-9.81 * R[:, 2]).tolist(),
+        "points": {name: (R @ at).tolist() for name, at in POINTS.items()},
+        "links": {
+            "body": body(350, "B"), "upright": body(35, "W"), "road": {"model": "rigid"},
+            "lower": arm("L", "LB"), "upper": arm("U", "UB"),
+        },
+        "joints": {
+            "heave": {"kind": "prismatic", "links": ["body", "ground"], "at": "B", "axis": z},
+            "bump": {"kind": "prismatic", "links": ["road", "ground"], "at": "P", "axis": z},
+            "lower_inner": hinge("lower", "body", "L", bushing=rubber),
+            "upper_inner": hinge("upper", "body", "U", bushing=rubber),
+            "lower_ball": hinge("lower", "upright", "LB"),
+            "upper_ball": {"kind": "spherical", "links": ["upper", "upright"], "at": "UB"},
+        },
+        "springs": {
+            "strut": {
+                "kind": "spring", "between": [{"link": "lower", "at": "S"}, {"link": "body", "at": "T"}],
+                "stiffness": 45e3, "damping": damping, "preload": -strut,
+            },
+            "tyre": {
+                "kind": "spring", "between": [{"link": "road", "at": "P"}, {"link": "upright", "at": "W"}],
+                "stiffness": 2e5, "damping": damping, "preload": -3823.0,
+            },
+        },
+        "drive": {
+            "joint": "bump",
+            "motion": {"kind": "cycloidal", "travel": 0.05, "rise": 1e5, "return_time": 1e5, "dwell_after": 1.0},
+        },
+        "analysis": {
+            "end_time": 1.0, "step": 2e-3, "accuracy": "quick", "frames": "co-rotational", **analysis,
+        },
+    }  # fmt: skip
+
+
+def made(raw: Raw) -> tuple[CorotationalSteps, Motion]:
+    scene = scene_from(raw)
+    ready = meshed(scene)
+    solver = steps_of(scene, ready.model)
+    assert isinstance(solver, CorotationalSteps)
+    return solver, motion_of(scene, ready.linkage, ready.path)
+
+
+def travel(solver: CorotationalSteps, u: np.ndarray, name: str) -> np.ndarray:
+    """Displacement of a body's centre of mass."""
+    for k, link in enumerate(solver.ready.system.model.links):
+        if link.name == name:
+            moved = rows(solver.ready, k, u[own(solver.ready, k)])
+            return np.asarray(link.m1[:, 0] @ moved / (link.one @ link.m1[:, 0]))
+    raise KeyError(name)
+
+
+@pytest.fixture(scope="module")
+def start() -> tuple[CorotationalSteps, Motion, np.ndarray]:
+    solver, motion = made(corner(np.eye(3), initial="quasi-static"))
+    return solver, motion, solver.begin(motion).u
+
+
+def test_a_start_is_where_a_damped_march_from_rest_settles() -> None:
+    """Of all bodies, 1e-4 of the largest displacement; dampers near critical damping leave e^-16 after three seconds."""
+    raw = corner(np.eye(3), damping=1.5e4, initial="quasi-static", step=5e-3)
+    solver, motion = made(raw)
+    wanted = solver.begin(motion).u
+    at_rest, _ = made({**raw, "analysis": {**raw["analysis"], "initial": "rest"}})
+    times = at_rest.ready.c.h * np.arange(1, 601)
+    last, _ = march(at_rest.ready, at_rest.begin(motion), motion(times), motion)
+    assert_allclose(last.u, wanted, atol=1e-4 * np.abs(wanted).max())
+
+
+def test_the_tyre_bears_all_weight(start: tuple[CorotationalSteps, Motion, np.ndarray]) -> None:
+    """Its force along its line, and the weight: equilibrium along the slides that nothing drives, to 1e-6."""
+    solver, _, u = start
+    line = np.array([0, 0, 0.31]) + travel(solver, u, "upright")
+    force = 3823.0 - 2e5 * (np.linalg.norm(line) - 0.31)
+    weight = 9.81 * sum(float(link.one @ link.m1[:, 0]) for link in solver.ready.system.model.links)
+    road = sum(float(x.one @ x.m1[:, 0]) for x in solver.ready.system.model.links if x.name == "road")
+    assert force * line[2] / np.linalg.norm(line) == pytest.approx(weight - 9.81 * road, rel=1e-6)
+
+
+def test_a_start_turns_with_the_scene(start: tuple[CorotationalSteps, Motion, np.ndarray]) -> None:
+    """Axes of beams' sections and of hinges are found from the scene: 1e-6, what iterations leave."""
+    solver, _, u = start
+    askew, motion = made(corner(ASKEW, initial="quasi-static"))
+    found = askew.begin(motion).u
+    for name in ("body", "upright", "upper"):
+        there = travel(solver, u, name)
+        assert_allclose(ASKEW.T @ travel(askew, found, name), there, atol=1e-6 * np.abs(u).max())
+
+
+def test_positions_of_a_static_analysis_are_its_starts(
+    start: tuple[CorotationalSteps, Motion, np.ndarray],
+) -> None:
+    """Rigid links of steps and of positions differ in stiffness: 1e-4 of what they move by."""
+    solver, _, u = start
+    still, motion = made(corner(np.eye(3), kind="static", step=0.5))
+    found = static(still.ready, motion).u
+    for name in ("body", "upright"):
+        there = travel(solver, u, name)
+        assert_allclose(travel(still, found, name), there, atol=1e-4 * np.abs(there).max())
+
+
+def test_a_start_that_is_not_found_is_refused_in_words_and_soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A strut that bears nothing where it is drawn: arms fold. At most 60 and 40 iterations with a few gradients each."""
+    counted, gradients = [0], Instant.gradients
+
+    def counting(now: Instant, z: np.ndarray) -> np.ndarray:
+        counted[0] += 1
+        return gradients(now, z)
+
+    monkeypatch.setattr(Instant, "gradients", counting)
+    solver, motion = made(corner(np.eye(3), strut=-5e4, initial="quasi-static"))
+    with pytest.raises(
+        NoBalanceError, match=r"link '\w+' moves most from iteration to iteration.*take initial"
+    ):
+        solver.begin(motion)
+    assert counted[0] < 60 + 40 * 50
