@@ -30,7 +30,7 @@ from kedfem.dynamics.system.starts.turning_bodies import CONVERGED, Spins, Turni
 from kedfem.errors import SolveError
 from kedfem.links.reduced import reach
 
-ITERATIONS = 40
+ITERATIONS = 120
 SHORTEST, IN_A_ROW = 1 / 64, 4  # of a step; so many of them end a search
 FALLS = 0.25  # of a step's length: share by which what is left has to fall
 KRYLOV = 40
