@@ -168,6 +168,8 @@ def test_a_run_with_errors_over_its_results_is_doubtful_in_its_file(
     assert stored.status == run.results.status == "doubtful"
     assert stored.reason == "estimated error of joint forces over 100 %"
     assert meaningless(lost(mesh=0.6, step=0.39), None, 0.0) == ""
+    assert meaningless(lost(mesh=0.02, step=2.0), None, 0.0) == ""  # a phase
+    assert meaningless(lost(mesh=0.02, step=3.1), None, 0.0) != ""
 
 
 def test_a_step_that_the_accuracy_chose_is_not_told_to_be_left_out() -> None:

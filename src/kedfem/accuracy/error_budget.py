@@ -9,8 +9,8 @@ KINDS = ("displacement", "stress", "joint forces", "drive")
 SOURCES = ("mesh", "step", "reduction", "frames", "rounding")
 WARNED = 0.05  # an error that no run leaves without a warning
 TWICE = 2.0  # of the accuracy asked for: estimates are no better than that
-MEANINGLESS = 1.0  # an error as large as the result
-ALIKE = 3.0  # estimates are right within this factor: of parts that differ by less none is the larger one for certain
+WHOLE = 1.0  # an error as large as the result
+FACTOR = 3.0  # estimates are right within it: an error of so many results is certain, of parts within it none is larger
 UNACCOUNTED = 0.5  # of energy
 UNKNOWNS = 60_000  # of a model, beyond which no mesh is made finer unasked
 LEAST = 0.005  # what no run warns of
@@ -126,8 +126,8 @@ def budget_warning(budget: Budget, asked: float | None = None, chosen: bool = Fa
 def _advice(budget: Budget, share: Share, chosen: bool) -> str:
     """What would lower the error, of which a share is the largest; beyond all scale no part is blamed before others."""
     kind = max(budget.together, key=lambda kind: budget.together[kind])
-    alike = [x for x in budget.shares if x.errors.get(kind, 0.0) * ALIKE > share.errors[kind]]
-    if budget.worst > MEANINGLESS and len(alike) > 1:
+    alike = _alike(budget, kind)
+    if budget.worst > WHOLE and len(alike) > 1:
         parts = " and ".join(f"{x.source} {percent(x.errors[kind])}" for x in alike)
         return (
             f"no part of it can be singled out ({kind}: {parts}): the motion is another one with every change, "
@@ -136,6 +136,12 @@ def _advice(budget: Budget, share: Share, chosen: bool) -> str:
         )
     usual = CHOSEN_STEP if share.source == "step" and chosen else REMEDIES[share.source]
     return f"most of it from the {share.source}: {share.remedy or usual}"
+
+
+def _alike(budget: Budget, kind: str) -> list[Share]:
+    """The parts of an error that may be its largest."""
+    most = max(x.errors.get(kind, 0.0) for x in budget.shares)
+    return [x for x in budget.shares if x.errors.get(kind, 0.0) * FACTOR > most]
 
 
 def meaningless(budget: Budget, balance: Balance | None, unworked: float, stiffened: bool = False) -> str:
@@ -147,10 +153,14 @@ def meaningless(budget: Budget, balance: Balance | None, unworked: float, stiffe
     unworked : work of the drives that the account of energy does not have, of the energy exchanged [-]
     stiffened : the run has geometric stiffening, whose work is in the energy's residual too
     """
-    worst = {f"estimated error of {kind}": error for kind, error in budget.together.items()}
+    # one part alone may be the phase of a vibration, whose size is right; several are another motion altogether
+    lost = {
+        f"estimated error of {kind}": error for kind, error in budget.together.items()
+        if error >= FACTOR * WHOLE or (error > WHOLE and len(_alike(budget, kind)) > 1)
+    }  # fmt: skip
     energy = {"energy": balance.energy} if balance and not stiffened else {}
     left = {"the drive's work": unworked} | energy
-    message = [f"{what} {percent(error)}" for what, error in worst.items() if error > MEANINGLESS]
+    message = [f"{what} {percent(error)}" for what, error in lost.items()]
     message += [
         f"{percent(share)} of {what} unaccounted for" for what, share in left.items() if share >= UNACCOUNTED
     ]
