@@ -184,8 +184,9 @@ def test_relative_errors_are_of_the_peak_and_interpolate() -> None:
     assert relative_errors(half, reference)[names[0]] == pytest.approx(0.1 / 5)
 
 
-def test_a_signal_as_a_large_link_begins_to_be_solved_ends_the_march() -> None:
+def test_a_signal_as_a_large_link_begins_to_be_solved_ends_the_march(monkeypatch: pytest.MonkeyPatch) -> None:
     """Before the first instruction of the function that compiled steps call back, where no `try` of its own helps."""
+    monkeypatch.setattr("kedfem.dynamics.system.sparse.TAKEN", 0)  # else compiled steps solve by themselves
     ready = meshed(scene_from(four_bar("plate", revolutions=0.1, steps_per_revolution=40)))
     solver: Any = steps_of(ready.scene, ready.model)
     start = started(ready.scene, ready.linkage, ready.path, ready.model, solver)
@@ -211,8 +212,9 @@ def test_a_signal_as_a_large_link_begins_to_be_solved_ends_the_march() -> None:
     assert after is signal.default_int_handler
 
 
-def test_an_interruption_while_a_large_link_is_solved_ends_the_march() -> None:
+def test_an_interruption_while_a_large_link_is_solved_ends_the_march(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compiled steps call back for sparse factors: what is raised there must not be printed and forgotten."""
+    monkeypatch.setattr("kedfem.dynamics.system.sparse.TAKEN", 0)  # else compiled steps solve by themselves
     ready = meshed(scene_from(four_bar("plate", revolutions=0.1, steps_per_revolution=40)))
     solver: Any = steps_of(ready.scene, ready.model)
 

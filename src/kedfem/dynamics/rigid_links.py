@@ -36,7 +36,6 @@ def made_rigid(scene: Scene, links: Mapping[str, Link], thicken: bool = False) -
     made = {key for key, link in links.items() if scene.links[link.name].model == "rigid"}
     elastic = [link for key, link in links.items() if key not in made]
     out, soft = dict(links), _mounts(scene)
-    firm = (FIRM if scene.analysis.rho_inf <= DAMPED else UNDAMPED) / time_grid(scene).step
     for key in made:
         link = _spread(_thickened(links[key]) if thicken else links[key])
         _with_extent(link)
@@ -44,9 +43,14 @@ def made_rigid(scene: Scene, links: Mapping[str, Link], thicken: bool = False) -
         if not elastic and any(soft):
             highest = min(highest, MOUNTED * _mounted(link, *soft))
         if link.fit is not None:
-            highest = min(highest, _beside(link, elastic) if without_vibration(scene) else firm)
+            highest = min(highest, _beside(link, elastic) if without_vibration(scene) else _firm(scene))
         out[key] = rigid(link, highest)
     return out
+
+
+def _firm(scene: Scene) -> float:
+    """The highest frequency that a scene's steps bear of rigid links with frames of their own [rad/s]."""
+    return (FIRM if scene.analysis.rho_inf <= DAMPED else UNDAMPED) / time_grid(scene).step
 
 
 def _beside(link: Link, elastic: Sequence[Link]) -> float:

@@ -164,7 +164,7 @@ def corotational_force(c, bodies, i, R, state, trial, work, first_pass):  # type
     balanced(0, bodies.kind[i], fit, R[body : body + 1], now, trial.Q[i : i + 1], f, rooms)
 
 
-@inlined
+@inner
 def unforeseen(bodies, i, trial, work):  # type: ignore[no-untyped-def]
     """work.room becomes what a rigid body resists more than foreseen, world components by the frame of its factor.
 
