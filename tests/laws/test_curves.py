@@ -136,7 +136,7 @@ def test_a_rod_turns_past_a_torque_that_repeats_itself_as_its_equation_says(axis
 )  # fmt: skip
 def test_both_solvers_find_the_same_with_a_smooth_motor(curve: Raw, frames: str) -> None:
     analysis = {"rho_inf": 0.8, "initial": "rest"}
-    raw = four_bar(frames, steps=720, motors={"m": {"joint": "C", "torque": curve}}, analysis=analysis)
+    raw = four_bar(frames, steps=1440, motors={"m": {"joint": "C", "torque": curve}}, analysis=analysis)
     of = begun(raw, frames=frames)
     assert against_oracle(of, 8) < 1e-7
 
