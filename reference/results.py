@@ -72,7 +72,8 @@ CHANNELS: dict[str, tuple[Told, ...]] = {
              "What the joint exerts on the link that the description names first, not on the other. rigid_: were all links rigid, in "
              "scenes whose drives move all of them; it may lack components that statics leave open."),
         Told("joints/NAME/moment|rigid_moment", XYZ, "N m", "world",
-             "On the same link, about the joint's point as it moves with the rigid-body motion, of a slot about the pin."),
+             "On the same link, about the joint's point as it moves with the rigid-body motion, of a slot about the pin. "
+             "The torque of a drive on a hinge is in it, as the force of one on a slide is in the joint's force."),
         Told("joints/NAME/angle|angle_about_NAME", ("angle",), "rad", "",
              "Of the link named first against the other, from the reference position, by the right hand about the joint's axis, of "
              "a universal joint about the axis in the link named; counted on over turns."),
