@@ -29,6 +29,7 @@ NEGLIGIBLE = 1e-9  # a component below this part of the channel's peak is named 
 COMPRESSION = 3  # of PNGs: files a fifth larger than with the usual 6, written in a third of the time
 # what a PNG of this room says of itself, so that stale ones are distinguished from a user's own
 MARK = "kedfem plot"
+DARKER = 0.5  # what is left of a color in the curve of rigid links
 
 
 def _largest(values: Float[np.ndarray, "..."]) -> float:
@@ -103,6 +104,8 @@ def draw_panels(figure: Any, along: Abscissa, panels: list[Panel]) -> Any:
 
 def draw_curves(ax: Any, along: Abscissa, curves: Curves, quantity: str, unit: str) -> None:
     """Curves of one unit, with a legend where there is more than one."""
+    from matplotlib.colors import to_rgb
+
     peaks = {name: float(np.max(np.abs(y), where=np.isfinite(y), initial=0.0)) for name, y in curves.items()}
     largest = max(peaks.values(), default=0.0)
     divisor, label = prefixed(largest, unit)
@@ -110,6 +113,9 @@ def draw_curves(ax: Any, along: Abscissa, curves: Curves, quantity: str, unit: s
     styles = ("-", ":") if any(name.endswith(STIFF) for name in curves) else ("-", "--", ":")
     every = cycle([(f"C{c}", style) for style in styles for c in range(10) if c != 7])
     looks = dict(zip(dict.fromkeys(name.removesuffix(STIFF) for name in curves), every, strict=False))
+    beside = (
+        "magnitude" if f"magnitude{STIFF}" not in curves else ""
+    )  # what stands back behind its components
     marker = "o" if len(along.values) == 1 else ""
     for name, y in curves.items():
         color, style = looks[name.removesuffix(STIFF)]
@@ -118,9 +124,11 @@ def draw_curves(ax: Any, along: Abscissa, curves: Curves, quantity: str, unit: s
             continue
         kept = envelope(y)
         width = 1.3 if len(kept) == len(y) else 0.7
-        look = ("0.15", "-", 0.7 * width) if name == "magnitude" else (color, style, width)
+        look = ("0.15", "-", 0.7 * width) if name == beside else (color, style, width)
         (line,) = ax.plot(along.values[kept], y[kept] / divisor, marker=marker, label=_plain(name))
-        line.set(color=look[0], linestyle=look[1], linewidth=look[2], zorder=2 + (name != "magnitude"))
+        line.set(color=look[0], linestyle=look[1], linewidth=look[2], zorder=2 + (name != beside))
+        if name.endswith(STIFF):  # often along the elastic one: darker, and above it
+            line.set(color=[DARKER * c for c in to_rgb(color)], linewidth=0.8 * width, zorder=4)
     if zero:
         ax.plot([], [], " ", label=_plain(textwrap.fill(", ".join(zero), 18) + "  ≈ 0"))
     if len(curves) > 1:

@@ -97,7 +97,9 @@ def _single(channel: Channel, values: Float[np.ndarray, "n c"]) -> list[Panel]:
     curves = dict(zip(channel.columns, values.T, strict=True))
     quantity = channel.name.rsplit("/", 1)[-1].replace("_", " ")
     if channel.columns == XYZ:
-        return [readable(quantity, channel.unit, curves | {"magnitude": np.linalg.norm(values, axis=1)})]
+        if quantity != "position":  # how far off the origin means nothing
+            curves["magnitude"] = np.linalg.norm(values, axis=1)
+        return [readable(quantity, channel.unit, curves)]
     if "von_mises" in curves:
         equivalent = {"von Mises": curves.pop("von_mises")}
         return [(quantity, channel.unit, curves), ("von Mises stress", channel.unit, equivalent)]
@@ -113,8 +115,9 @@ def _paired(
     both |= {f"{name}{STIFF}": y for name, y in zip(rigid.columns, there.T, strict=True)}
     if channel.columns != XYZ:
         return [(quantity, channel.unit, both)]
-    sizes = {"size": np.linalg.norm(values, axis=1), "size" + STIFF: np.linalg.norm(there, axis=1)}
-    return [(quantity, channel.unit, sizes), (quantity, channel.unit, both)]
+    sizes = (np.linalg.norm(x, axis=1) for x in (values, there))
+    of_both = dict(zip(("magnitude", f"magnitude{STIFF}"), sizes, strict=True))
+    return [(quantity, channel.unit, of_both), (quantity, channel.unit, both)]
 
 
 def _energies(results: Results) -> Curves:
