@@ -101,7 +101,7 @@ def elastic_model(
     for slider in sliders:
         key = list(links)[slider.carrier]
         links[key] = with_point_mass(links[key], slider.weights, slider.mass)
-    links = made_rigid(scene, links, thicken=elements)
+    links = made_rigid(scene, links, linkage, along, thicken=elements)
     sliders = tuple(slider_on(slider, list(links.values())[slider.carrier]) for slider in sliders)
     cuts = [shared for name, link in cut.items() for shared in _shared(name, link)]
     layout = LinkageLayout(

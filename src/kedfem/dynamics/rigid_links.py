@@ -11,31 +11,49 @@ from kedfem.links.bodies import with_body, with_mass
 from kedfem.links.record import Link
 from kedfem.links.reduced import RIGID, reach, rigid, rigid_functions, wave_frequency
 from kedfem.links.surfaces.coupling_surfaces import rigid_link_surface
-from kedfem.scene import AngleLimit, Scene, TorsionSpring, pieces, time_grid, without_vibration
+from kedfem.motion.linkage import Linkage
+from kedfem.motion.path import Path
+from kedfem.motion.rigid import rigid_motion
+from kedfem.scene import (
+    AngleLimit,
+    Scene,
+    TorsionSpring,
+    path_parameter,
+    pieces,
+    time_grid,
+    without_vibration,
+)
 
 LIGHT = 1e-3  # second moment of a planar beam's mass beside inertia of its sections, below which this is spread over it
 COMPACT = 1e-7  # of mass times length²: second moments, below which forces would be off by more than 1e-4
 LAMINA = 1e-8  # of second moments of mass: a sheet of a millimetre by a metre has 1e-6
-# ω h of rigid links with co-rotational frames. Their stress loses digits by its square: at ten times as much a motor's
-# steps did not converge. Where ρ∞ is above DAMPED, stiff vibration is not damped, and grows as links turn: less then
-FIRM, UNDAMPED, DAMPED = 3e3, 3e2, 0.99
+# ω h of rigid links with co-rotational frames: of those that turn far in a step, and of those that do not. Vibration
+# that is far stiffer than a step grows with rotation, and numerical damping takes away no more than it has
+RESOLVED, FIRM = 30.0, 3e3
+BORNE = 0.5  # of 1 − ρ∞: rotation in a step [rad] at which none was seen to grow
+INSTANTS = 400  # at which rotations are looked up
 MOUNTED = (
     3e3  # times the frequency on the mounts: a link's own strain is 1e-7 of deflections, rounding up to 4e-7
 )
 
 
-def made_rigid(scene: Scene, links: Mapping[str, Link], thicken: bool = False) -> dict[str, Link]:
+def made_rigid(
+    scene: Scene, links: Mapping[str, Link], linkage: Linkage, along: Path | None, thicken: bool = False
+) -> dict[str, Link]:
     """Links with the rigid ones made so: stiff beside the elastic ones, whatever they are made of themselves.
 
     Where no link is elastic they are stiff beside their mounts: of a block on soft ones rounding would leave few digits.
 
     Parameters
     ----------
+    along : the linkage's path over the drive's range; without it links with co-rotational frames may turn far in a step
     thicken : whether a mass that lies in a plane gets next to no thickness, which bars between points need no more of
     """
     made = {key for key, link in links.items() if scene.links[link.name].model == "rigid"}
     elastic = [link for key, link in links.items() if key not in made]
     out, soft = dict(links), _mounts(scene)
+    in_steps = not without_vibration(scene) and any(links[key].fit is not None for key in made)
+    little = _little_turned(scene, linkage, along) if in_steps else frozenset()
     for key in made:
         link = _spread(_thickened(links[key]) if thicken else links[key])
         _with_extent(link)
@@ -43,14 +61,23 @@ def made_rigid(scene: Scene, links: Mapping[str, Link], thicken: bool = False) -
         if not elastic and any(soft):
             highest = min(highest, MOUNTED * _mounted(link, *soft))
         if link.fit is not None:
-            highest = min(highest, _beside(link, elastic) if without_vibration(scene) else _firm(scene))
+            stiff = FIRM if link.name in little else RESOLVED
+            highest = min(highest, stiff / time_grid(scene).step if in_steps else _beside(link, elastic))
         out[key] = rigid(link, highest)
     return out
 
 
-def _firm(scene: Scene) -> float:
-    """The highest frequency that a scene's steps bear of rigid links with frames of their own [rad/s]."""
-    return (FIRM if scene.analysis.rho_inf <= DAMPED else UNDAMPED) / time_grid(scene).step
+def _little_turned(scene: Scene, linkage: Linkage, along: Path | None) -> frozenset[str]:
+    """Links that drives move, and turn so little in a step that numerical damping holds stiff vibration down."""
+    if along is None or linkage.drive is None:
+        return frozenset()
+    grid = time_grid(scene)
+    t = np.linspace(0.0, grid.end, INSTANTS)
+    motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
+    turned = grid.step * np.linalg.norm(motion.omega, axis=2).max(axis=0)
+    moved = np.linalg.norm(motion.v, axis=2).max(axis=0) + turned > 0.0
+    little = moved & (turned <= BORNE * (1 - scene.analysis.rho_inf))
+    return frozenset(name for name, each in zip(linkage.bodies, little, strict=True) if each)
 
 
 def _beside(link: Link, elastic: Sequence[Link]) -> float:
