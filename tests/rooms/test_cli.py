@@ -374,7 +374,7 @@ def test_ctrl_c_before_the_first_step_leaves_an_earlier_run_alone(
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("kedfem.analysis.prepared", interrupted)
+    monkeypatch.setattr("kedfem.analysis.ready_to_step", interrupted)
     said = run_kedfem("run", arm)
     nothing = (
         "interrupted; nothing was computed yet, as the first step had not begun, and nothing was written"

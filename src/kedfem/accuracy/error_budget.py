@@ -10,7 +10,7 @@ SOURCES = ("mesh", "step", "reduction", "frames", "rounding")
 WARNED = 0.05  # an error that no run leaves without a warning
 TWICE = 2.0  # of the accuracy asked for: estimates are no better than that
 WHOLE = 1.0  # an error as large as the result
-FACTOR = 3.0  # estimates are right within it: an error of so many results is certain, of parts within it none is larger
+FACTOR = 3.0  # estimates are right within it: of so many results an error is as large as one for certain
 UNACCOUNTED = 0.5  # of energy
 UNKNOWNS = 60_000  # of a model, beyond which no mesh is made finer unasked
 LEAST = 0.005  # what no run warns of
@@ -126,9 +126,9 @@ def budget_warning(budget: Budget, asked: float | None = None, chosen: bool = Fa
 def _advice(budget: Budget, share: Share, chosen: bool) -> str:
     """What would lower the error, of which a share is the largest; beyond all scale no part is blamed before others."""
     kind = max(budget.together, key=lambda kind: budget.together[kind])
-    alike = _alike(budget, kind)
-    if budget.worst > WHOLE and len(alike) > 1:
-        parts = " and ".join(f"{x.source} {percent(x.errors[kind])}" for x in alike)
+    beyond = _beyond(budget, kind)
+    if len(beyond) > 1:
+        parts = " and ".join(f"{x.source} {percent(x.errors[kind])}" for x in beyond)
         return (
             f"no part of it can be singled out ({kind}: {parts}): the motion is another one with every change, "
             "so that finer elements alone do not help; look at the animation and at the other warnings, then take a "
@@ -138,10 +138,9 @@ def _advice(budget: Budget, share: Share, chosen: bool) -> str:
     return f"most of it from the {share.source}: {share.remedy or usual}"
 
 
-def _alike(budget: Budget, kind: str) -> list[Share]:
-    """The parts of an error that may be its largest."""
-    most = max(x.errors.get(kind, 0.0) for x in budget.shares)
-    return [x for x in budget.shares if x.errors.get(kind, 0.0) * FACTOR > most]
+def _beyond(budget: Budget, kind: str) -> list[Share]:
+    """The parts of an error that are larger than the result."""
+    return [x for x in budget.shares if x.errors.get(kind, 0.0) > WHOLE]
 
 
 def meaningless(budget: Budget, balance: Balance | None, unworked: float, stiffened: bool = False) -> str:
@@ -156,7 +155,7 @@ def meaningless(budget: Budget, balance: Balance | None, unworked: float, stiffe
     # one part alone may be the phase of a vibration, whose size is right; several are another motion altogether
     lost = {
         f"estimated error of {kind}": error for kind, error in budget.together.items()
-        if error >= FACTOR * WHOLE or (error > WHOLE and len(_alike(budget, kind)) > 1)
+        if error >= FACTOR * WHOLE or len(_beyond(budget, kind)) > 1
     }  # fmt: skip
     energy = {"energy": balance.energy} if balance and not stiffened else {}
     left = {"the drive's work": unworked} | energy
