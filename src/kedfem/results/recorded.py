@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from jaxtyping import Float
@@ -11,6 +12,7 @@ from kedfem.results.records import ANGLE, TRAVEL, Channel
 from kedfem.scene import Scene
 
 Rows = Float[np.ndarray, "T c"]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +21,19 @@ class Recorded:
 
     channel: Channel
     rows: Callable[[Block], Rows]
+
+
+def once(of: Callable[[Block], T]) -> Callable[[Block], T]:
+    """What is made of a block, once though several channels show parts of it."""
+    last: tuple[Block, T] | None = None
+
+    def made(block: Block) -> T:
+        nonlocal last
+        if last is None or last[0] is not block:
+            last = block, of(block)
+        return last[1]
+
+    return made
 
 
 def drive_prefix(scene: Scene, driven: str) -> str:

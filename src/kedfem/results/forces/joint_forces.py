@@ -14,7 +14,7 @@ from kedfem.motion.constraints import cross
 from kedfem.results.forces.constraint_forces import known
 from kedfem.results.forces.hub_forces import constrained_joints, hub_wrench, partner
 from kedfem.results.forces.port_forces import Forces, determinate, holder, loose, negligible, port_wrench
-from kedfem.results.recorded import Recorded, Rows
+from kedfem.results.recorded import Recorded, Rows, once
 from kedfem.results.records import XYZ, Channel
 from kedfem.scene import GROUND, ForceLoad, Scene
 
@@ -67,8 +67,10 @@ def _channels(
         Channel(f"joints/{joint}/moment", XYZ, "N m", "world", about),
     )
 
+    both = once(wrench)
+
     def rows(which: int) -> Callable[[Block], Rows]:
-        return lambda block: sign * wrench(block)[which]
+        return lambda block: sign * both(block)[which]
 
     return [Recorded(channel, rows(k)) for k, channel in enumerate(every) if determined[k]]
 
@@ -89,7 +91,9 @@ def _slider(scene: Scene, model: Model, slider: Slider, name: str, forces: Force
     The slider does not rotate and its mass is at the joint, so that moments pass through it to the guide.
     """
     guided = name == slider.guide
-    joints = [j for j, x in scene.joints.items() if slider.name in x.links] if guided else [name]
+    joints = (
+        [j for j, x in scene.joints.items() if slider.name in x.links and j != name] if guided else [name]
+    )
     pairs = [(k, j) for k, x in enumerate(model.joints) for j in joints if j in x.joints]
     points = {j: np.asarray(scene.joints[j].at) for j in {*joints, name}}
     known = [determinate(model, k, j, points[j]) for k, j in pairs]
