@@ -24,15 +24,8 @@ MESH_ORDER = 2.0  # at which the error of a mesh falls; at edges that point inwa
 FACTOR, LITTLE = 2.0, 1.2  # by which elements are made smaller in one go: at most, and at least
 FINER = (1.0, 1.5, 2.0, 3.0, 4.0)  # meshes tried of links whose model is open
 FILLETS, FINEST_FILLET = ((0.1, 45.0), (0.05, 22.5)), 15.0  # degrees an element turns, by accuracy
-COUNTS = (
-    3,
-    4,
-    6,
-    8,
-    12,
-    16,
-    24,
-)  # of segments, tried: their error falls alike, as what bends within one is not seen
+# segments tried: their error falls with the square of their number too, as what bends within one is not seen
+COUNTS = (3, 4, 6, 8, 12, 16, 24)
 LARGE, DEAR = 4_000, 2e7  # unknowns, and their product with steps (5 s), from which links are reduced unasked
 
 

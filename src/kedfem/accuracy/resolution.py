@@ -35,7 +35,7 @@ UNFOLLOWED = 0.01  # error of a step below which what vibrates unresolved is no 
 HARMONICS = 5  # of the drive
 NEAR = 0.03  # of a frequency
 MARGIN = (
-    0.8  # of the turn 1 − ρ∞ [rad] in a step, at which unresolved vibration neither grows nor dies (measured)
+    0.8  # of the turn 1 − ρ∞ [rad] in a step, where unresolved vibration neither grows nor dies (measured)
 )
 
 

@@ -28,9 +28,9 @@ LIGHT = 1e-3  # second moment of a planar beam's mass beside inertia of its sect
 COMPACT = 1e-7  # of mass times length²: second moments, below which forces would be off by more than 1e-4
 LAMINA = 1e-8  # of second moments of mass: a sheet of a millimetre by a metre has 1e-6
 # ω h of rigid links with co-rotational frames: of those that turn far in a step, and of those that do not. Vibration
-# that is far stiffer than a step grows with rotation, and numerical damping takes away no more than it has
+# that no step resolves grows in links that turn by about 1 − ρ∞ in one (docs/theory/errors.md)
 RESOLVED, FIRM = 30.0, 3e3
-BORNE = 0.5  # of 1 − ρ∞: rotation in a step [rad] at which none was seen to grow
+BORNE = 0.5  # of 1 − ρ∞: rotation in a step [rad] of a link that may be FIRM
 INSTANTS = 400  # at which rotations are looked up
 MOUNTED = (
     3e3  # times the frequency on the mounts: a link's own strain is 1e-7 of deflections, rounding up to 4e-7

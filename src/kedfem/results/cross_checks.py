@@ -26,10 +26,8 @@ CONTRADICTION = 0.5
 SWING = 1.0  # and by this part of what swings beside it, whose share in c and mean falls with the length of the run
 AMPLIFIED = 3.0  # times as much as rigid links: near a resonance elastic links bear more, in phase
 SMALL = 0.01  # of the largest effort of its unit: what is smaller is not compared
-MISSING = (
-    0.02  # of it: that a part of an effort is missing; less is what steps leave that do not converge quite
-)
 UNWORKED = 1e-3  # of the energy exchanged: trapezoidal sums of one and the same step agree to rounding
+MISSING = 0.02  # of it, from which on a part of an effort is missing; steps that hardly converge leave less
 
 
 @dataclass

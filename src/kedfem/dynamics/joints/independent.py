@@ -15,6 +15,8 @@ DEPENDENT = (
     1e-9  # relative: ports of one coupling surface repeat each other to rounding, others differ by far more
 )
 ROUNDING = 1e-13  # entries of relations of order one that couple nothing
+Block = tuple[Int[np.ndarray, " _"], Int[np.ndarray, " _"]]
+"""Rows and columns of a matrix."""
 
 
 def independent(
@@ -41,7 +43,8 @@ def independent(
     if not all(kept.all() for kept, _ in relations):
         L = scipy.linalg.block_diag(*(L for _, L in relations))
         kept = np.concatenate([kept for kept, _ in relations])
-        Z = _null_space(B - L @ B[kept])
+        left = B - L @ B[kept]
+        Z = _null_space(left, list(_blocks(left)))
         shares, from_rows, loose = _port_forces(L, B, own, riding)
     ends = np.cumsum([len(each.keep) for each in every])[:-1]
     columns = np.cumsum([kept.sum() for kept, _ in relations])[:-1]
@@ -95,29 +98,33 @@ def _port_forces(
     """
     determined = np.setdiff1d(np.arange(B.shape[1]), riding)  # what holds a slider is left open
     G = np.vstack([L.T, B.T[determined]])
-    inverse = np.zeros(G.T.shape)
-    for rows, columns in _blocks(G):
+    inverse, blocks = np.zeros(G.T.shape), list(_blocks(G))
+    for rows, columns in blocks:
         inverse[np.ix_(columns, rows)] = np.linalg.pinv(G[np.ix_(rows, columns)], rcond=DEPENDENT)
     inverse[np.abs(inverse) < DEPENDENT] = 0.0  # rounding
     q = L.shape[1]
-    return inverse[:, :q], inverse[:, q + np.searchsorted(determined, np.asarray(own, int))], _null_space(G)
+    return (
+        inverse[:, :q],
+        inverse[:, q + np.searchsorted(determined, np.asarray(own, int))],
+        _null_space(G, blocks),
+    )
 
 
-def _null_space(A: Float[np.ndarray, "m n"]) -> Float[np.ndarray, "n r"]:
+def _null_space(A: Float[np.ndarray, "m n"], blocks: Sequence[Block]) -> Float[np.ndarray, "n r"]:
     """Orthonormal basis of A x = 0, A of order one: each of its vectors within one block, so that few bodies share it."""
-    columns, parts = np.arange(A.shape[1]), list[np.ndarray]()
-    for rows, own in _blocks(A):
+    alone, parts = np.ones(A.shape[1], bool), list[np.ndarray]()
+    for rows, own in blocks:
         _, s, Vt = np.linalg.svd(A[np.ix_(rows, own)])
         part = np.zeros((A.shape[1], len(own) - int((s > DEPENDENT).sum())))
         part[own] = Vt[len(own) - part.shape[1] :].T
         parts.append(part)
-        columns = np.setdiff1d(columns, own)
-    every = np.concatenate([np.eye(A.shape[1])[:, columns], *parts], axis=1)
+        alone[own] = False
+    every = np.concatenate([np.eye(A.shape[1])[:, alone], *parts], axis=1)
     first = np.abs(every).argmax(axis=0)
     return np.asarray(every[:, np.argsort(first, kind="stable")])
 
 
-def _blocks(A: Float[np.ndarray, "m n"]) -> Iterator[tuple[Int[np.ndarray, " _"], Int[np.ndarray, " _"]]]:
+def _blocks(A: Float[np.ndarray, "m n"]) -> Iterator[Block]:
     """Rows and columns of each part of a matrix that shares none with the others; columns of zeros are left out."""
     m, (rows, columns) = len(A), np.nonzero(np.abs(A) > ROUNDING)
     count = m + A.shape[1]

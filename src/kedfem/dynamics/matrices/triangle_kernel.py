@@ -8,16 +8,25 @@ from kedfem.compiled import inner
 
 
 @inner
+def block_of(triangle, block, x, room):  # type: ignore[no-untyped-def]
+    """A block's first column, part of x and rows below; the room of all its rows, with x in it, and of those below."""
+    first, below_at, below, _, _, _ = triangle
+    c, rows = first[block], below[below_at[block] : below_at[block + 1]]
+    w = first[block + 1] - c
+    h = w + len(rows)
+    own, all_rows = x[c : c + w], room[:h]
+    for j in range(w):
+        all_rows[j] = own[j]
+    return c, own, rows, all_rows, room[w:h]
+
+
+@inner
 def forward(triangle, x, room):  # type: ignore[no-untyped-def]
     """x becomes L⁻¹ x, in the factor's order."""
-    first, below_at, below, at, L, _ = triangle
+    first, _, _, at, L, _ = triangle
     for block in range(len(first) - 1):
-        c, rows = first[block], below[below_at[block] : below_at[block + 1]]
-        w = first[block + 1] - c
-        h = w + len(rows)
-        own, all_rows, rest = x[c : c + w], room[:h], room[w:h]
-        for j in range(w):
-            all_rows[j] = own[j]
+        c, own, rows, all_rows, rest = block_of(triangle, block, x, room)
+        w, h = len(own), len(all_rows)
         for j in range(len(rest)):
             rest[j] = 0.0
         k = 0
@@ -50,14 +59,10 @@ def forward(triangle, x, room):  # type: ignore[no-untyped-def]
 @inner
 def backward(triangle, x, room):  # type: ignore[no-untyped-def]
     """x becomes L⁻ᵀ x, in the factor's order."""
-    first, below_at, below, at, L, _ = triangle
+    first, _, _, at, L, _ = triangle
     for block in range(len(first) - 2, -1, -1):
-        c, rows = first[block], below[below_at[block] : below_at[block + 1]]
-        w = first[block + 1] - c
-        h = w + len(rows)
-        own, all_rows, rest = x[c : c + w], room[:h], room[w:h]
-        for j in range(w):
-            all_rows[j] = own[j]
+        c, own, rows, all_rows, rest = block_of(triangle, block, x, room)
+        w, h = len(own), len(all_rows)
         for j in range(len(rest)):
             rest[j] = x[rows[j]]
         k = w

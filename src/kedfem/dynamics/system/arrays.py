@@ -124,7 +124,7 @@ class Bodies(NamedTuple):
     turning : loads that turn with bodies
     stiffness : K0 of sparse co-rotational bodies, row by row, the number of its matrix first in `of`
     size : √ of the mass that a coordinate of a body counts with where passes are judged: one of dense ones [kg^½]
-    rigid : whether it is so stiff that passes foresee K of its strain, see `internal_force_of_rigid`
+    rigid : whether it is so stiff that passes foresee K of its strain, see `unforeseen`
     """
 
     at: Any

@@ -1,6 +1,7 @@
 """Empty states, trials, histories and working room for a system's arrays."""
 
 import numpy as np
+from jaxtyping import Float
 
 from kedfem.dynamics.anderson import DEPTH
 from kedfem.dynamics.metric import room_for
@@ -59,13 +60,16 @@ def room(bodies: Bodies) -> Work:
     )  # fmt: skip
 
 
-def empty_history(T: int, bodies: Bodies, of: Constraints) -> History:
-    """Room for T time points."""
+def empty_history(
+    T: int, bodies: Bodies, of: Constraints, F: Float[np.ndarray, "T N"] | None = None
+) -> History:
+    """Room for T time points; of applied forces that are known beforehand none."""
     N, L, k, r = int(bodies.at[-1]), len(bodies.motion), len(bodies.first), len(of.law)
     b, _, E = bodies.beams.tangent.shape
-    u, v, a, F, g, Kg = np.zeros((6, T, N))
+    u, v, a, g, Kg = np.zeros((5, T, N))
+    forces = np.zeros((T, N)) if F is None else F
     Mv, Cg = np.zeros((2, 0 if bodies.dense.all() else T, N))
     return History(
-        u, v, a, F, g, np.zeros((T, b, 3, E)), np.zeros((T, L, 3, 3)), np.zeros((T, int(bodies.port_at[-1]))),
+        u, v, a, forces, g, np.zeros((T, b, 3, E)), np.zeros((T, L, 3, 3)), np.zeros((T, int(bodies.port_at[-1]))),
         np.zeros((T, L)), np.zeros((T, k)), np.zeros((T, r)), np.zeros((T, r)), np.zeros((T, r)), Kg, Mv, Cg,
     )  # fmt: skip

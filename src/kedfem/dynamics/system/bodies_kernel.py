@@ -200,18 +200,11 @@ def mass_damped(c, bodies, i, R, u, state, trial, work):  # type: ignore[no-unty
         mass_times(bodies, i, u[first:last], work.turned, work.rows)
         turned_back(R, d, work.turned[:N], work.y[:N])
     for x in range(N):
-        of = 3 * first + x
-        y = c.alpha * work.y[x]
-        trial.damped[of] = y
-        second = (
-            c.acceleration[0] * (y - state.damped[of])
-            - c.acceleration[1] * state.damped[of + N]
-            - c.acceleration[2] * state.damped[of + 2 * N]
-        )
-        trial.damped[of + N] = state.damped[of + N] + c.late * second + c.early * state.damped[of + 2 * N]
-        trial.damped[of + 2 * N] = second
-        work.y[x] = trial.damped[of + N]
-    turned(R, d, work.y[:N], work.turned[:N])
+        work.y[x] *= c.alpha
+    damped = trial.damped[3 * first : 3 * last]
+    copied(state.damped[3 * first : 3 * last], damped)
+    carried_on(c, work.y[:N], damped)
+    turned(R, d, damped[N : 2 * N], work.turned[:N])
     for x in range(N):
         trial.f[first + x] += work.turned[x]
 

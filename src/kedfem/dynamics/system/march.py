@@ -143,7 +143,7 @@ def march(
         constraints = constraints._replace(jumps=np.zeros_like(constraints.jumps))
     arrays = of.bodies, of.ends, constraints
     state, along, T, done = copied(state), driving(of, motion, loads), len(motion.t), 0
-    history = empty_history(T, of.bodies, of.constraints)._replace(F=along.F)
+    history = empty_history(T, of.bodies, of.constraints, along.F)
     trial, work = empty_trial(*arrays, state), room(of.bodies)
     solved, marched = solver(of.parts, of.bodies.at, of.bodies.port_at, trial), compiled_steps(of)
     while done < T:

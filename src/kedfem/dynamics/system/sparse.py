@@ -165,7 +165,7 @@ def _row_by_row(of: Int[np.ndarray, "L 3"], every: Sequence[Any]) -> Masses:
         np.concatenate([none, *(m.indptr + end for m, end in zip(every, ends, strict=False))])[1:],
         np.concatenate([none, *(m.indices for m in every)])[1:].astype(
             np.uint32
-        ),  # not asked whether it is negative
+        ),  # else asked whether it is negative
         np.concatenate([np.zeros(1), *(m.data for m in every)])[1:],
     )
 
