@@ -312,10 +312,10 @@ def test_every_channel_has_a_plot(tmp_path: Path) -> None:
     assert page.name == "overview.png"
     assert [path.name for path in written] == [
         "probes-mid-stress.png",
+        "joint_forces.png",
         "joints-A-force.png",
         "joints-B-force.png",
         "drive-torque.png",
-        "joint_forces.png",
     ]
     for path in written:
         assert pixels(path).shape == (744, 1320, 3)  # 11 by 6.2 inches at 120 dots
@@ -352,9 +352,9 @@ def test_many_curves_go_onto_several_pages(tmp_path: Path) -> None:
     for path in written:
         assert_shows_something(path)
     pages = {x.name: x for x in pictures(replace(made, channels=probes | joints))}
-    title, (_, _, curves) = shown(pages["joint_forces"])
+    title, panel = shown(pages["joint_forces"])
     assert title.endswith("the largest 9 of 12")
-    assert list(curves) == [str(k) for k in range(3, 12)]
+    assert list(panel.curves) == [str(k) for k in range(3, 12)]
 
 
 def test_results_that_are_not_finite_are_plotted(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ GROUPS = {
 """What the first part of a channel's name means to a reader, in the order of the page."""
 
 # pictures of several channels: to which group they belong, and that they come before the others there
-FIRST = {"joint_forces": "joints", "joint_angles": "joints", "joint_travels": "joints", "energies": "energy"}
+FIRST = {"joint_angles": "joints", "joint_travels": "joints", "energies": "energy"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,14 +43,14 @@ def curve_groups(results: Results) -> dict[str, list[Curve]]:
     along = drawn_over(results)
     found: dict[str, list[Curve]] = {title: [] for title in GROUPS.values()}
     for picture in worth_drawing(results):
-        where = FIRST.get(picture.name) or picture.name.split("-")[0]
+        where, first = FIRST.get(picture.name, picture.group), picture.name in FIRST or picture.together
         title = heading(picture.title, picture.channel, results)
 
         svg, axes = figure_svg(title, partial(draw_panels, along=along, panels=picture.panels))
         boxes = [each.get_position() for each in axes]
         box = boxes[0].x0, boxes[0].x1, 1 - boxes[0].y1, 1 - boxes[-1].y0
         group = found.setdefault(GROUPS.get(where, "Others"), [])
-        group.insert(0 if picture.name in FIRST else len(group), Curve(picture.title, _alone(svg), box))
+        group.insert(0 if first else len(group), Curve(picture.title, _alone(svg), box))
     return {name: curves for name, curves in found.items() if curves}
 
 

@@ -1,5 +1,6 @@
 """What a results file holds: channels of columns over time and drive angle."""
 
+import json
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -29,6 +30,7 @@ class Channel:
     description: str
 
 
+NOTHING = 1e-9  # of the largest value of the same unit: rounding
 XYZ = ("x", "y", "z")
 STRESS = ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises")  # columns of vectors and of stresses
 TIME = Channel("time", (), "s", "", "time")
@@ -36,11 +38,21 @@ ANGLE = Channel("drive_angle", (), "rad", "", "drive angle from the reference po
 TRAVEL = Channel("drive_travel", (), "m", "", "drive travel from the reference position")
 
 
-def largest_by_unit(channels: Iterable[tuple[Channel, Float[np.ndarray, "T c"]]]) -> dict[str, float]:
-    """Unit → the largest magnitude of all channels that have it: what is nothing beside that is rounding."""
+def largest_by_unit(
+    channels: Iterable[tuple[Channel, Float[np.ndarray, "T c"]]], size: float = 0.0
+) -> dict[str, float]:
+    """Unit → the largest magnitude of all channels that have it: what is nothing beside that is rounding.
+
+    Parameters
+    ----------
+    size : arm at which the largest force is a moment, too [m]
+    """
     out: dict[str, float] = {}
     for channel, values in channels:
-        out[channel.unit] = max(out.get(channel.unit, 0.0), float(np.abs(values).max()))
+        finite = float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
+        out[channel.unit] = max(out.get(channel.unit, 0.0), finite)
+    if "N m" in out:
+        out["N m"] = max(out["N m"], size * out.get("N", 0.0))
     return out
 
 
@@ -200,3 +212,13 @@ class Results:
         from kedfem.results.table import as_data_frame
 
         return as_data_frame(self)
+
+
+def rounding(results: Results) -> dict[str, float]:
+    """Unit → what is rounding beside the largest value that has it; of moments, beside forces where joints are, too."""
+    places = [
+        each["at"] for each in json.loads(results.scene_json).get("joints", {}).values() if each.get("at")
+    ]
+    size = float(np.linalg.norm(np.ptp(places, axis=0))) if places else 0.0
+    highest = largest_by_unit(results.channels.values(), size)
+    return {unit: NOTHING * value for unit, value in highest.items()}

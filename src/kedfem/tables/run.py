@@ -12,12 +12,12 @@ from kedfem.accuracy.plan import Plan
 from kedfem.accuracy.reduction import Reduction
 from kedfem.accuracy.steady import Steady
 from kedfem.analysis import Run
-from kedfem.output.words import NOTHING, clock, moment, place_of, with_prefix
+from kedfem.output.words import clock, moment, place_of, with_prefix
 from kedfem.report.facts import peak_rows
 from kedfem.report.fatigue_facts import ENDLESS, fatigue_notes
 from kedfem.results import Fatigue, Peak
 from kedfem.results.balance import Balance
-from kedfem.results.records import largest_by_unit
+from kedfem.results.records import rounding
 from kedfem.scene import LinkScene, Scene, time_grid, without_vibration
 from kedfem.tables.layout import facts, left, listed, right
 from kedfem.tables.mechanism import seconds_table
@@ -96,10 +96,10 @@ def channel_table(scene: Scene, done: Run) -> Table:
     """The largest value of every channel, and when it is."""
     columns = [*left("channel", "component"), *right("largest", clock(scene), no_wrap=True)]
     table = listed(Text(scene.title or "Largest values"), columns)
-    highest = largest_by_unit(done.results.channels.values())
+    least = rounding(done.results)
     for channel, values in done.results.channels.values():
         k, c = np.unravel_index(np.abs(values).argmax(), values.shape)
-        if abs(value := float(values[k, c])) <= NOTHING * highest[channel.unit]:
+        if abs(value := float(values[k, c])) <= least[channel.unit]:
             table.add_row(channel.name, "", "≈ 0", "")
             continue
         at = moment(scene, float(done.results.time[k]), float(done.results.angle[k]))

@@ -1,10 +1,12 @@
 """How curves over the drive angle are drawn; `groups` says which pictures there are."""
 
 import io
+import re
 import textwrap
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import cycle
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -13,9 +15,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.output.plots.abscissa import Abscissa, abscissa, draw_abscissa
-from kedfem.output.plots.groups import STIFF, Curves, Panel, Picture, pictures
+from kedfem.output.plots.groups import FAINT, STIFF, Panel, Picture, largest, pictures
 from kedfem.output.words import prefixed
 from kedfem.results import Channel, Results, replacing
+from kedfem.results.records import rounding
 
 T = TypeVar("T")
 
@@ -25,27 +28,74 @@ DPI = 120
 
 # groups of points in a long curve, about one per pixel; each keeps its smallest and largest value
 BINS = 1500
-NEGLIGIBLE = 1e-9  # a component below this part of the channel's peak is named in the legend instead of drawn
+COMPARABLE = 0.1  # of the widest scale of a quantity: panels that span as much share it
+NAMED = 48  # letters that name curves too small to be drawn; where they are more, these are counted
+LETTERS = 16  # in a line of a legend
 COMPRESSION = 3  # of PNGs: files a fifth larger than with the usual 6, written in a third of the time
 # what a PNG of this room says of itself, so that stale ones are distinguished from a user's own
 MARK = "kedfem plot"
 DARKER = 0.5  # what is left of a color in the curve of rigid links
 
 
-def _largest(values: Float[np.ndarray, "..."]) -> float:
-    return float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
+def worth_drawing(results: Results) -> list[Picture]:
+    """All pictures but those of rounding, which the table of a run reports as ≈ 0; nothing at all is drawn, once.
+
+    Of what stands side by side in one picture, what is faint there has none of its own. Panels of one quantity have
+    one scale.
+    """
+    least, every = rounding(results), list(pictures(results))
+    beside = {path: each for each in every for path in each.together}
+    faint: dict[tuple[str, str], float] = {}
+    for each in every:
+        for panel in each.panels if each.together else ():
+            key = each.group, panel.quantity
+            faint[key] = max(faint.get(key, 0.0), FAINT * _peak(panel))
+    drawn = []
+    for each in every:
+        floor = least.get(each.channel.unit, 0.0) if each.channel else 0.0
+        if each.channel and each.channel.name in beside:
+            floor = max(floor, faint[each.group, each.panels[0].quantity])
+        if not floor or max(map(_peak, each.panels), default=0.0) > floor:
+            drawn.append(each)
+    return _on_one_scale(drawn)
 
 
-def worth_drawing(results: Results) -> Iterator[Picture]:
-    """All pictures but those of rounding only, which the table of a run reports as ≈ 0; nothing at all is drawn, once."""
-    highest: dict[str, float] = {}
-    for channel, values in results.channels.values():
-        highest[channel.unit] = max(highest.get(channel.unit, 0.0), _largest(values))
-    for picture in pictures(results):
-        above = highest.get(picture.channel.unit, 0.0) if picture.channel else 0.0
-        largest = max((_largest(y) for _, _, curves in picture.panels for y in curves.values()), default=0.0)
-        if not above or largest > NEGLIGIBLE * above:
-            yield picture
+def _peak(panel: Panel) -> float:
+    return max(map(largest, panel.curves.values()), default=0.0)
+
+
+def _on_one_scale(every: Sequence[Picture]) -> list[Picture]:
+    """Pictures whose panels of one quantity have common limits, but for those that would be hard to read there."""
+    spans: dict[tuple[str, str, str, int], list[tuple[float, float]]] = {}
+    for key, panel in ((key, panel) for each in every for key, panel in _keyed(each)):
+        spans.setdefault(key, []).append(_span(panel))
+    common, widest = {}, {}
+    for key, found in spans.items():
+        low, high = np.array(found).T
+        widest[key] = np.max(high - low)
+        wide = high - low >= COMPARABLE * widest[key]
+        ends = float(low[wide].min()), float(high[wide].max())
+        if wide.sum() > 1 and ends[1] > ends[0]:
+            common[key] = ends
+    out = []
+    for each in every:
+        panels = []
+        for key, panel in _keyed(each):
+            shared = key in common and np.ptp(_span(panel)) >= COMPARABLE * widest[key]
+            panels.append(panel._replace(limits=common[key]) if shared else panel)
+        out.append(replace(each, panels=panels))
+    return out
+
+
+def _keyed(picture: Picture) -> Iterator[tuple[tuple[str, str, str, int], Panel]]:
+    for k, panel in enumerate(picture.panels):
+        yield (picture.group + "/" * bool(picture.together), panel.quantity, panel.unit, k), panel
+
+
+def _span(panel: Panel) -> tuple[float, float]:
+    """Lowest and highest value, zero among them."""
+    finite = [y[np.isfinite(y)] for y in panel.curves.values()]
+    return min(y.min(initial=0.0) for y in finite), max(y.max(initial=0.0) for y in finite)
 
 
 def drawn_over(results: Results) -> Abscissa:
@@ -92,8 +142,9 @@ def draw_panels(figure: Any, along: Abscissa, panels: list[Panel]) -> Any:
     strip = 0 if along.degrees is None else 1
     ratios = [3, 2, 2][: len(panels)] + [1] * strip
     axes = figure.subplots(len(ratios), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
-    for ax, (quantity, unit, curves) in zip(axes, panels, strict=False):
-        draw_curves(ax, along, curves, quantity if len(panels) < 3 else quantity.replace(" ", "\n"), unit)
+    for ax, panel in zip(axes, panels, strict=False):
+        quantity = panel.quantity if len(panels) < 3 else panel.quantity.replace(" ", "\n")
+        draw_curves(ax, along, panel._replace(quantity=quantity))
     if along.degrees is not None:
         axes[-1].plot(along.values, along.degrees, color="0.35", linewidth=1.2)
         axes[-1].set_ylabel("drive (°)")
@@ -102,41 +153,59 @@ def draw_panels(figure: Any, along: Abscissa, panels: list[Panel]) -> Any:
     return axes
 
 
-def draw_curves(ax: Any, along: Abscissa, curves: Curves, quantity: str, unit: str) -> None:
+def draw_curves(ax: Any, along: Abscissa, panel: Panel) -> None:
     """Curves of one unit, with a legend where there is more than one."""
     from matplotlib.colors import to_rgb
 
-    peaks = {name: float(np.max(np.abs(y), where=np.isfinite(y), initial=0.0)) for name, y in curves.items()}
-    largest = max(peaks.values(), default=0.0)
-    divisor, label = prefixed(largest, unit)
-    zero = [name for name in curves if peaks[name] <= NEGLIGIBLE * largest] if len(curves) > 1 else []
-    styles = ("-", ":") if any(name.endswith(STIFF) for name in curves) else ("-", "--", ":")
+    curves = panel.curves
+    peaks = {name: largest(y) for name, y in curves.items()}
+    highest = max(peaks.values(), default=0.0)
+    divisor, label = prefixed(max(map(abs, panel.limits or (highest,))), panel.unit)
+    faint = [name for name in curves if peaks[name] <= FAINT * highest] if len(curves) > 1 else []
+    stiff = any(name.endswith(STIFF) and name not in faint for name in curves)
+    styles = ("-", ":") if stiff else ("-", "--", ":")
     every = cycle([(f"C{c}", style) for style in styles for c in range(10) if c != 7])
     looks = dict(zip(dict.fromkeys(name.removesuffix(STIFF) for name in curves), every, strict=False))
-    beside = (
-        "magnitude" if f"magnitude{STIFF}" not in curves else ""
-    )  # what stands back behind its components
+    # what stands back behind its components
+    beside = "magnitude" if f"magnitude{STIFF}" not in curves else ""
     marker = "o" if len(along.values) == 1 else ""
     for name, y in curves.items():
-        color, style = looks[name.removesuffix(STIFF)]
-        style = "--" if name.endswith(STIFF) else style
-        if name in zero:
+        if name in faint:
             continue
+        rigid = name.endswith(STIFF)
+        color, style = looks[name.removesuffix(STIFF)]
         kept = envelope(y)
         width = 1.3 if len(kept) == len(y) else 0.7
-        look = ("0.15", "-", 0.7 * width) if name == beside else (color, style, width)
-        (line,) = ax.plot(along.values[kept], y[kept] / divisor, marker=marker, label=_plain(name))
+        look = ("0.15", "-", 0.7 * width) if name == beside else (color, "--" if rigid else style, width)
+        words = None if rigid and name.removesuffix(STIFF) in curves else _lines(name)
+        (line,) = ax.plot(along.values[kept], y[kept] / divisor, marker=marker, label=words)
         line.set(color=look[0], linestyle=look[1], linewidth=look[2], zorder=2 + (name != beside))
-        if name.endswith(STIFF):  # often along the elastic one: darker, and above it
+        if rigid:  # often along the elastic one: darker, and above it
             line.set(color=[DARKER * c for c in to_rgb(color)], linewidth=0.8 * width, zorder=4)
-    if zero:
-        ax.plot([], [], " ", label=_plain(textwrap.fill(", ".join(zero), 18) + "  ≈ 0"))
+    if stiff:
+        ax.plot([], [], color="0.2", linestyle="--", label="rigid links")
+    if names := [name for name in faint if not (name.endswith(STIFF) and name.removesuffix(STIFF) in faint)]:
+        words = ", ".join(names)
+        words = words if len(words) <= NAMED else f"{len(names)} others"
+        ax.plot([], [], " ", label=_lines(f"{words}: < {100 * FAINT:g} %"))
     if len(curves) > 1:
-        ax.legend(loc="upper left", bbox_to_anchor=(1.005, 1.02), frameon=False, ncols=1 + (len(curves) > 18))
+        columns = 1 + (len(ax.get_legend_handles_labels()[0]) > 18)
+        ax.legend(loc="upper left", bbox_to_anchor=(1.005, 1.02), frameon=False, ncols=columns)
     ax.axhline(0.0, color="0.5", linewidth=0.6, zorder=1)
-    ax.set_ylabel(f"{quantity} ({label})" if label else quantity)
+    if panel.limits:
+        margin = 0.05 * np.ptp(panel.limits)
+        ax.set_ylim((panel.limits[0] - margin) / divisor, (panel.limits[1] + margin) / divisor)
+    ax.set_ylabel(f"{panel.quantity} ({label})" if label else panel.quantity)
     ax.ticklabel_format(useOffset=False)
     ax.grid(alpha=0.3)
+
+
+def _lines(name: str) -> str:
+    """Text in lines that a legend has room for, broken after underscores where one word is too long."""
+    whole = name.replace(" %", "\1%").replace("< ", "<\1")
+    words = re.sub(rf"\S{{{LETTERS + 1},}}", lambda word: word[0].replace("_", "_\0 "), whole)
+    broken = "\n".join(textwrap.wrap(words, LETTERS + 1, break_on_hyphens=False)) or name
+    return _plain(broken.replace("\0 ", "").replace("\0", "").replace("\1", " "))
 
 
 def heading(text: str, channel: Channel | None, results: Results) -> str:

@@ -1,10 +1,9 @@
 """The plots of a run as PNG files: all curves on one page, every picture on its own."""
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from kedfem.output.plots.abscissa import Abscissa, draw_abscissa
 from kedfem.output.plots.drawing import (
@@ -16,16 +15,14 @@ from kedfem.output.plots.drawing import (
     heading,
     worth_drawing,
 )
-from kedfem.output.plots.groups import Panel, Picture
+from kedfem.output.plots.groups import CURVES, FAINT, STIFF, Panel, Picture, largest
 from kedfem.results import Results, ready_folder
 
 COLUMNS, MOST = 2, 14  # of panels on a page, and how many it takes
 WIDTH, HEIGHT = 7.2, 2.0  # inches of a panel with all that belongs to it
 # inches beside the axes of a panel (labels, legend), above the first, between two, below the last
 LEFT, RIGHT, ABOVE, BETWEEN, BELOW = 0.85, 1.45, 0.85, 0.42, 0.5
-CURVES = 9  # in one panel: so many its legend has room for
 FONT = 7.5  # points of the small print
-FORCE = "/force"
 
 
 def write_plots(results: Results, folder: Path, each: bool = False) -> list[Path]:
@@ -73,12 +70,14 @@ def remove_plots(folder: Path) -> None:
 def _overview(results: Results, along: Abscissa, pictures: Sequence[Picture], folder: Path) -> list[Path]:
     """Pages ``overview.png``, ``overview-2.png``, …: the first panels of these pictures, in two columns on one abscissa.
 
-    Forces of single joints are left out where one picture has all of them.
+    What one picture has side by side, as forces of joints, is left out of others.
     """
     from matplotlib import rc_context
 
-    together = any(each.name == "joint_forces" for each in pictures)
-    chosen = [x for x in pictures if not (together and x.channel and _of_joint(x.channel.name))]
+    title = json.loads(results.scene_json).get("title") or ""
+    name = f"{title}: " if title else ""
+    together = {path for each in pictures for path in each.together}
+    chosen = [x for x in pictures if not (x.channel and x.channel.name in together)]
     most = MOST - (along.degrees is not None)
     pages = [chosen[k : k + most] for k in range(0, len(chosen), most)]
     written = []
@@ -89,15 +88,11 @@ def _overview(results: Results, along: Abscissa, pictures: Sequence[Picture], fo
         size = (COLUMNS * WIDTH, ABOVE + rows * HEIGHT + BELOW)
         with (
             rc_context({"font.size": FONT}),
-            figure_saved(path, heading(f"All curves{of}", None, results), size, None) as figure,
+            figure_saved(path, heading(f"{name}all curves{of}", None, results), size, None) as figure,
         ):
             _draw_page(figure, along, page, rows)
         written.append(path)
     return written
-
-
-def _of_joint(name: str) -> bool:
-    return name.startswith("joints/") and name.endswith(FORCE)
 
 
 def _draw_page(figure: Any, along: Abscissa, page: Sequence[Picture], rows: int) -> None:
@@ -129,19 +124,18 @@ def _draw_panel(ax: Any, along: Abscissa, title: str, panel: Panel | None) -> No
         ax.set_ylabel("drive (°)")
         ax.grid(alpha=0.3)
     else:
-        quantity, unit, curves = panel
-        draw_curves(ax, along, curves, quantity, unit)
+        draw_curves(ax, along, panel)
     ax.set_title(title, loc="left", fontsize=FONT + 1, pad=3)
 
 
 def shown(picture: Picture) -> tuple[str, Panel]:
     """What a panel is of, as short as results name it, and its curves: no more than have a place in its legend."""
     title = picture.channel.name if picture.channel else picture.title
-    quantity, unit, curves = picture.panels[0]
-    if len(curves) <= CURVES:
-        return title, (quantity, unit, curves)
-    largest = sorted(
-        curves, key=lambda name: -np.abs(curves[name]).max(where=np.isfinite(curves[name]), initial=0.0)
-    )
-    kept = {name: y for name, y in curves.items() if name in largest[:CURVES]}
-    return f"{title}: the largest {CURVES} of {len(curves)}", (quantity, unit, kept)
+    panel = picture.panels[0]
+    every = {name: largest(y) for name, y in panel.curves.items() if not name.endswith(STIFF)}
+    peaks = {name: peak for name, peak in every.items() if peak > FAINT * max(every.values())}
+    if len(peaks) <= CURVES:
+        return title, panel
+    chosen = sorted(peaks, key=lambda name: -peaks[name])[:CURVES]
+    kept = {name: y for name, y in panel.curves.items() if name.removesuffix(STIFF) in chosen}
+    return f"{title}: the largest {CURVES} of {len(peaks)}", panel._replace(curves=kept)

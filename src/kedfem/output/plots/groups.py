@@ -1,16 +1,20 @@
 """Which channels are drawn in one picture, and as which curves."""
 
+import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
 from kedfem.results import Channel, Results
-from kedfem.results.records import XYZ
+from kedfem.results.records import XYZ, rounding
 
 Curves = Mapping[str, Float[np.ndarray, " n"]]
-Panel = tuple[str, str, Curves]  # quantity, unit, curves
+SEVERAL = ("drive", "joints", "motors", "springs", "limits", "gears")  # how names of things of one kind begin
+CURVES = 9  # in one panel: so many its legend has room for
+FAINT = 1e-4  # of the largest of their kind: curves that are named in a legend instead of drawn
 ENERGY = "energy/"
 RIGID = "rigid_"  # how the name of a channel begins that has the same of rigid links
 # what is added to the name of a curve of rigid links; it is drawn dashed, in the colour of the elastic one
@@ -24,14 +28,39 @@ MOTIONS = {
 COORDINATES = {"angle": "Turns of the joints", "travel": "Travels of the joints"}
 
 
+class Panel(NamedTuple):
+    """Curves on one pair of axes.
+
+    limits : ends of the scale, where it is that of other panels too; else as the curves ask
+    """
+
+    quantity: str
+    unit: str
+    curves: Curves
+    limits: tuple[float, float] | None = None
+
+
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """One picture: name of its file, title, its channel if there is one, panels from top to bottom."""
+    """One picture.
+
+    name : of its file
+    channel : if it is of one
+    panels : from top to bottom
+    together : channels of several things that it has side by side; each has a picture of its own too
+    """
 
     name: str
     title: str
     channel: Channel | None
     panels: list[Panel]
+    together: tuple[str, ...] = ()
+
+    @property
+    def group(self) -> str:
+        """How the names of its channels begin."""
+        name = self.channel.name if self.channel else self.name.replace("-", "/")
+        return (self.together or (name,))[0].split("/")[0]
 
 
 def pictures(results: Results) -> Iterator[Picture]:
@@ -51,8 +80,10 @@ def pictures(results: Results) -> Iterator[Picture]:
             grouped |= {f"joints/{name}/{kind}" for name in curves}
             unit = channels[f"joints/{next(iter(curves))}/{kind}"][0].unit
             yield Picture(f"joint_{kind}s", title, None, [readable(kind, unit, curves)])
+    beside = _side_by_side(results, grouped)
     energies = _energies(results)
     for name, (channel, values) in channels.items():
+        yield from beside.get(name, ())
         if name in grouped or (energies and name.startswith(ENERGY)):
             continue
         prefix, _, what = name.rpartition("/")
@@ -64,18 +95,65 @@ def pictures(results: Results) -> Iterator[Picture]:
         yield Picture(_file(name), channel.description or name, channel, panels)
     if energies:
         title = "Energies of all links, and the residual"
-        yield Picture("energies", title, None, [("energy", "J", energies)])
-    forces = _joint_forces(results)
-    if len(forces) > 1:
-        rigid = "" if _values(results, "/force") else " were all links rigid"
-        yield Picture("joint_forces", f"Magnitude of the joint forces{rigid}", None, [("force", "N", forces)])
+        yield Picture("energies", title, None, [Panel("energy", "J", energies)])
+
+
+def _side_by_side(results: Results, others: set[str]) -> dict[str, list[Picture]]:
+    """First channel → pictures of one quantity of several joints, drives, ...: of vectors the magnitudes.
+
+    More than CURVES joints are in one picture for each kind of joint; faint ones are named in the first.
+    """
+    kinds = {name: each["kind"] for name, each in json.loads(results.scene_json).get("joints", {}).items()}
+    least, families = rounding(results), dict[tuple[str, str, str], dict[str, list[str]]]()
+    for path, (channel, _) in results.channels.items():
+        first, *name, what = path.split("/")
+        if first in SEVERAL and name and path not in others:
+            family = families.setdefault((first, what.removeprefix(RIGID), channel.unit), {})
+            family.setdefault("/".join(name), []).append(path)
+    out: dict[str, list[Picture]] = {}
+    for (first, what, unit), family in families.items():
+        every = {name: max(largest(results.channels[x][1]) for x in paths) for name, paths in family.items()}
+        peaks = {name: peak for name, peak in every.items() if peak > least[unit]}
+        seen = [name for name in peaks if peaks[name] > FAINT * max(peaks.values())]
+        sets = {"": seen}
+        if first == "joints" and len(seen) > CURVES and len({kinds.get(x) for x in seen}) > 1:
+            sets = {kind: [x for x in seen if kinds[x] == kind] for kind in map(kinds.__getitem__, seen)}
+        for k, (kind, names) in enumerate(sets.items()):
+            shown = [*names, *(x for x in peaks if k == 0 and x not in seen)]
+            if len(shown) > 1:
+                made = _beside(results, (first, what, unit, kind), {name: family[name] for name in shown})
+                out.setdefault(next(iter(family.values()))[0], []).append(made)
+    return out
+
+
+def _beside(results: Results, key: tuple[str, str, str, str], family: Mapping[str, list[str]]) -> Picture:
+    first, what, unit, kind = key
+    paths = tuple(path for every in family.values() for path in every)
+    vector = any(results.channels[path][1].shape[1] > 1 for path in paths)
+    stiff = all(path.rsplit("/", 1)[-1].startswith(RIGID) for path in paths)
+    curves = {}
+    for name, path in ((name, path) for name, every in family.items() for path in every):
+        values = results.channels[path][1]
+        rigid = path.rsplit("/", 1)[-1].startswith(RIGID) and not stiff
+        curves[f"{name}{STIFF * rigid}"] = np.linalg.norm(values, axis=1) if vector else values[:, 0]
+    of, words = first.removesuffix("s"), what.replace("_", " ")
+    several = f"{of} {words.removesuffix('y')}{'ies' if words.endswith('y') else 's'}"
+    title = f"magnitude of the {several}" if vector else several
+    title = f"{title[0].upper()}{title[1:]}{' were all links rigid' * stiff}{f': {kind}' if kind else ''}"
+    file = several.replace(" ", "_") + (f"-{kind}" if kind else "")
+    return Picture(file, title, None, [readable(words, unit, curves)], paths)
+
+
+def largest(values: Float[np.ndarray, "..."]) -> float:
+    """Of all magnitudes that are finite."""
+    return float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
 
 
 def readable(quantity: str, unit: str, curves: Curves) -> Panel:
     """A panel with angles in degrees."""
     if unit != "rad":
-        return quantity, unit, curves
-    return quantity, "°", {name: np.degrees(y) for name, y in curves.items()}
+        return Panel(quantity, unit, curves)
+    return Panel(quantity, "°", {name: np.degrees(y) for name, y in curves.items()})
 
 
 def _file(name: str) -> str:
@@ -102,7 +180,7 @@ def _single(channel: Channel, values: Float[np.ndarray, "n c"]) -> list[Panel]:
         return [readable(quantity, channel.unit, curves)]
     if "von_mises" in curves:
         equivalent = {"von Mises": curves.pop("von_mises")}
-        return [(quantity, channel.unit, curves), ("von Mises stress", channel.unit, equivalent)]
+        return [Panel(quantity, channel.unit, curves), Panel("von Mises stress", channel.unit, equivalent)]
     return [readable(quantity, channel.unit, curves)]
 
 
@@ -114,10 +192,10 @@ def _paired(
     both = dict(zip(channel.columns, values.T, strict=True))
     both |= {f"{name}{STIFF}": y for name, y in zip(rigid.columns, there.T, strict=True)}
     if channel.columns != XYZ:
-        return [(quantity, channel.unit, both)]
+        return [Panel(quantity, channel.unit, both)]
     sizes = (np.linalg.norm(x, axis=1) for x in (values, there))
     of_both = dict(zip(("magnitude", f"magnitude{STIFF}"), sizes, strict=True))
-    return [(quantity, channel.unit, of_both), (quantity, channel.unit, both)]
+    return [Panel(quantity, channel.unit, of_both), Panel(quantity, channel.unit, both)]
 
 
 def _energies(results: Results) -> Curves:
@@ -128,17 +206,6 @@ def _energies(results: Results) -> Curves:
         for column, curve in zip(channel.columns, values.T, strict=True)
     }  # fmt: skip
     return found if len(found) > 1 else {}
-
-
-def _joint_forces(results: Results) -> Curves:
-    """Joint → magnitude of its force [N], elastic and rigid."""
-    if not _values(results, "/force"):
-        return {x: np.linalg.norm(y, axis=1) for x, y in _values(results, f"/{RIGID}force").items()}
-    return {
-        f"{name}{added}": np.linalg.norm(values, axis=1)
-        for ending, added in (("/force", ""), (f"/{RIGID}force", STIFF))
-        for name, values in _values(results, ending).items()
-    }
 
 
 def _of_joints(results: Results, ending: str) -> Curves:

@@ -1,0 +1,85 @@
+"""Which curves are in one picture, and on which scale."""
+
+import json
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from kedfem.output.plots.abscissa import Abscissa
+from kedfem.output.plots.drawing import draw_curves, worth_drawing
+from kedfem.output.plots.files import shown
+from kedfem.output.plots.groups import STIFF, Picture
+from kedfem.results import Channel, Results
+
+LIMBS = {"foot": "universal", "slide": "prismatic", "head": "spherical"}
+
+
+def test_a_joint_counts_once_whatever_it_has_of_rigid_links() -> None:
+    """Twelve joints of one kind with their rigid counterparts: nine of twelve, each with both curves."""
+    time = np.linspace(0.0, 1.0, 5)
+    names = [f"joints/{k}/{rigid}force" for k in range(12) for rigid in ("", "rigid_")]
+    channels = {
+        name: (Channel(name, ("x", "y", "z"), "N", "world", "force"), np.full((5, 3), 1.0 + k // 2))
+        for k, name in enumerate(names)
+    }
+    pages = {x.name: x for x in worth_drawing(Results(time, time, channels, "complete", "{}"))}
+    title, panel = shown(pages["joint_forces"])
+    assert title == "Magnitude of the joint forces: the largest 9 of 12"
+    assert list(panel.curves) == [f"{k}{rigid}" for k in range(3, 12) for rigid in ("", STIFF)]
+
+
+def test_efforts_of_several_drives_are_in_one_panel_and_limbs_in_one_for_each_kind() -> None:
+    """Six legs as of a Stewart platform: their drives beside each other, feet, slides and heads on one scale."""
+    time = np.linspace(0.0, 1.0, 5)
+    kinds = {f"{what}_{k}": kind for what, kind in LIMBS.items() for k in range(6)}
+    scene = json.dumps({"joints": {name: {"kind": kind, "at": [0, 0, 0]} for name, kind in kinds.items()}})
+    values = {f"joints/{name}/force": (k + 10.0) * np.ones((5, 3)) for k, name in enumerate(kinds)}
+    values |= {f"drive/slide_{k}/force": (k + 10.0) * np.ones((5, 1)) for k in range(6)}
+    channels = {
+        name: (Channel(name, ("x", "y", "z")[: y.shape[1]], "N", "world", name), y)
+        for name, y in values.items()
+    }
+    every = worth_drawing(Results(time, time, channels, "complete", scene))
+    pages = {x.name: x.panels[0] for x in every if x.together}
+    assert list(pages) == [*(f"joint_forces-{kind}" for kind in LIMBS.values()), "drive_forces"]
+    assert list(pages["drive_forces"].curves) == [f"slide_{k}" for k in range(6)]
+    assert list(pages["joint_forces-spherical"].curves) == [f"head_{k}" for k in range(6)]
+    (scale,) = {pages[f"joint_forces-{kind}"].limits for kind in LIMBS.values()}
+    assert scale == (0.0, pytest.approx(27.0 * np.sqrt(3.0)))  # the largest force of 18 joints
+
+
+def test_panels_of_one_quantity_share_a_scale_unless_one_would_be_flat_there() -> None:
+    time = np.linspace(0.0, 1.0, 5)
+    sizes = {"a": 1.0, "b": 0.2, "c": 0.01}
+    channels = {
+        f"probes/{x}/speed": (Channel(f"probes/{x}/speed", ("speed",), "m/s", "", ""), np.full((5, 1), size))
+        for x, size in sizes.items()
+    }
+    every = worth_drawing(Results(time, time, channels, "complete", "{}"))
+    assert [x.panels[0].limits for x in every] == [(0.0, 1.0), (0.0, 1.0), None]
+
+
+def test_faint_moments_are_named_but_not_drawn() -> None:
+    """20 µN m beside 1.4 N m, and 1 nN m beside 500 N on arms of 0.5 m."""
+    time = np.linspace(0.0, 1.0, 5)
+    one = {"kind": "revolute", "at": [0.5, 0, 0]}
+    scene = json.dumps({"joints": {"A": one | {"at": [0, 0, 0]}, "B": one, "C": one}})
+
+    def drawn(moments: dict[str, float]) -> dict[str, Picture]:
+        every = {f"joints/{x}/moment": ("N m", size) for x, size in moments.items()}
+        every |= {f"joints/{x}/force": ("N", 500.0) for x in moments}
+        channels = {
+            name: (Channel(name, ("z",), unit, "world", ""), np.full((5, 1), size))
+            for name, (unit, size) in every.items()
+        }
+        return {x.name: x for x in worth_drawing(Results(time, time, channels, "complete", scene))}
+
+    found = drawn({"A": 1.4, "B": 2e-5, "C": 1.0})
+    assert {name for name in found if "moment" in name} == {
+        "joint_moments", "joints-A-moment", "joints-C-moment",
+    }  # fmt: skip
+    ax = Figure().add_subplot()
+    draw_curves(ax, Abscissa(time), found["joint_moments"].panels[0])
+    assert ax.get_legend_handles_labels()[1] == ["A", "C", "B: < 0.01 %"]
+    assert not any("moment" in name for name in drawn({"A": 1e-9, "B": 2e-10}))
