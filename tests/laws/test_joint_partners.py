@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,9 +12,11 @@ from scipy.spatial.transform import Rotation
 from kedfem.errors import KedfemError
 from kedfem.scene import scene_from, spatial_beams
 from kedfem.scene.questions.modelling import SHARED
+from tests.cells import as_a_run
 from tests.laws.test_joint_rows import ROUNDING, assert_the_same, moved
 from tests.moving import channels, ran
 from tests.partners import IN_PLANE, IN_SPACE, PLANAR, SPATIAL, Z, axis_of, chain
+from tests.systems import against_oracle, begun
 
 Cell = tuple[str, tuple[str, str], bool]
 #: a coupling surface at the very end of a bar; a slider with two slides
@@ -40,13 +43,8 @@ def refusal(kind: str, partners: tuple[str, str], driven: bool, plane: bool) -> 
         return r"links\.[\w ]+\.shape: is required for a rigid link that is neither a slider"
     if bare and partners[1] != "ground" and (driven or kind not in SHARED):
         return rf"joints\.J\.links: must join links with a shape by a {kind} joint .* a rigid slider"
-    if kind == "weld" and partners == (
-        "plane",
-        "rigid",
-    ):  # the other way round the drive carries the rigid crank along
-        return r"joints\.J\.kind: must be revolute or spherical between a plane link and a rigid one"
-    if kind in {"weld", "prismatic"} and {"plane", "solid"}.issubset(partners):
-        return r"joints\.J\.kind: must be revolute or spherical between a plane link and a solid"
+    if kind == "prismatic" and {"plane", "solid"}.issubset(partners):
+        return r"joints\.J\.kind: must be revolute, spherical or a weld between a plane link and a solid"
     return None
 
 
@@ -166,9 +164,8 @@ def test_a_planar_beam_and_a_rigid_bar_are_welded_either_way_round() -> None:
 
 
 @pytest.mark.parametrize("other", ["solid", "beam"])
-@pytest.mark.parametrize("kind", ["weld", "prismatic"])
-def test_a_plane_link_and_one_in_space_go_together_by_hinges_only(kind: str, other: str) -> None:
-    raw = chain(kind, ("plane", "planar beam"), plane=True)
+def test_a_plane_link_does_not_slide_on_one_in_space(other: str) -> None:
+    raw = chain("prismatic", ("plane", "planar beam"), plane=True)
     (link,) = (
         raw["links"][name] for name in raw["joints"]["J"]["links"] if raw["links"][name]["model"] == "beam"
     )
@@ -178,7 +175,7 @@ def test_a_plane_link_and_one_in_space_go_together_by_hinges_only(kind: str, oth
     else:
         link["beam"] = "spatial"
     with pytest.raises(
-        KedfemError, match="must be revolute or spherical between a plane link and a solid or beam in"
+        KedfemError, match="must be revolute, spherical or a weld between a plane link and a solid or beam in"
     ):
         ran(raw)
 
@@ -186,7 +183,7 @@ def test_a_plane_link_and_one_in_space_go_together_by_hinges_only(kind: str, oth
 ARM = {"width": 0.02, "thickness": 0.01}  # m
 
 
-def arm(kinds: tuple[str, str], frames: str) -> dict[str, object]:
+def arm(kinds: tuple[str, str], frames: str) -> dict[str, Any]:
     """Two bars in a row, welded, on a hinge that turns them; a force at the end, gravity."""
     ends = {"one": ([0, 0], [0.2, 0]), "two": ([0.2, 0], [0.4, 0])}
     meshes = {"plane": {"elements": [16, 2]}, "beam": {"elements": 4}}
@@ -219,6 +216,67 @@ def test_a_plane_link_and_a_planar_beam_are_welded_as_two_beams_are(
     mixed, beams = (channels(*ran(each)) for each in (scene, arm(("beam", "beam"), frames)))
     assert_allclose(mixed["probes/tip/displacement"], beams["probes/tip/displacement"], atol=1e-4 * 1.6e-3)
     assert_allclose(mixed["joints/W/moment"], beams["joints/W/moment"], atol=1e-6 * 20)
+
+
+@pytest.mark.parametrize("frames", ["rigid-body", "co-rotational"])
+@pytest.mark.parametrize("kinds", [("plane", "solid"), ("solid", "plane")])
+def test_a_plane_link_and_a_solid_are_welded_as_two_plane_links_are(
+    kinds: tuple[str, str], frames: str
+) -> None:
+    """Without contraction a plane link is the solid that moves in its plane."""
+    assert_alike(without_contraction(kinds, frames), without_contraction(("plane", "plane"), frames), 1e-7)
+
+
+@pytest.mark.parametrize("frames", ["rigid-body", "co-rotational"])
+def test_a_plane_link_and_a_rigid_one_are_welded_as_to_a_far_stiffer_plane_link(frames: str) -> None:
+    """Ten thousand times as stiff, it bends so little."""
+    rigid, stiff = (without_contraction(("plane", kind), frames) for kind in ("rigid", "plane"))
+    stiff["materials"]["stiff"] = stiff["materials"]["own"] | {"youngs_modulus": 2.1e15}
+    stiff["links"]["two"]["material"] = "stiff"
+    assert_alike(rigid, stiff, 1e-4)
+
+
+@pytest.mark.parametrize("frames", ["rigid-body", "stiffening", "co-rotational", "no drive"])
+@pytest.mark.parametrize("partners", [("plane", "rigid"), ("solid", "plane")])
+def test_a_weld_of_a_plane_link_and_one_in_space_moves_as_by_the_oracle(
+    partners: tuple[str, str], frames: str
+) -> None:
+    raw = chain("weld", partners, plane=True)
+    raw["analysis"] |= {
+        "initial": "rest",
+        "frames": "co-rotational" if frames in {"co-rotational", "no drive"} else "rigid-body",
+    }
+    if frames == "stiffening":
+        raw["analysis"]["stiffening"] = True
+    if frames == "no drive":
+        del raw["drive"]
+        raw["analysis"]["initial_speeds"] = {"A": 3.0}
+    assert against_oracle(as_a_run(begun(raw)), 3) < 1e-7
+
+
+def assert_alike(one: dict[str, Any], other: dict[str, Any], digits: float) -> None:
+    """Deflections, forces in the plane and moments across it."""
+    got, wanted = (channels(*ran(each)) for each in (one, other))
+    for name in ("probes/tip/displacement", "joints/W/moment", "joints/W/force", "drive/torque"):
+        part = slice(-1, None) if name.endswith("moment") else slice(2)
+        size = float(np.abs(wanted[name]).max())
+        assert_allclose(got[name][:, part], wanted[name][:, part], rtol=0, atol=digits * size, err_msg=name)
+
+
+def without_contraction(kinds: tuple[str, str], frames: str) -> dict[str, Any]:
+    """`arm` of a material with ν = 0, solids of one layer across the plane; seen at the weld, far from the force."""
+    raw = arm(("plane", "plane"), frames)
+    raw["output"]["probes"] = {
+        "tip": {"link": "one", "at": [0.2, 0.01, 0], "quantity": "displacement", "frame": "world"}
+    }
+    raw["materials"] = {"own": {"youngs_modulus": 2.1e11, "poisson_ratio": 0.0, "density": 7850.0}}
+    more = {
+        "solid": {"mesh": {"elements": [16, 2, 1]}, "element": "hex27"},
+        "rigid": {"mesh": {"elements": [1, 1, 1]}},
+    }
+    for link, kind in zip(raw["links"].values(), kinds, strict=True):
+        link |= {"model": kind, "material": "own", **more.get(kind, {})}
+    return raw
 
 
 def test_a_weld_of_two_faces_at_an_angle_is_refused_with_the_reason() -> None:

@@ -195,21 +195,34 @@ def _on(
 
 
 def _mixed(scene: Scene, name: str, held: dict[str, tuple[_Ports, CouplingSurface]], first: int) -> int:
-    """A hinge between a planar link and one in space: the pin of the latter stays upright; two new unknowns."""
-    joint = scene.joints[name]
-    if joint.kind not in {"revolute", "spherical"}:
+    """A joint between a planar link and one in space, which stays upright, as a point of it beside the plane goes with
+    the one in it: a hinge by the ends of its pin, two new unknowns; a weld by two for each point of the planar link.
+    """
+    joint, welds = scene.joints[name], scene.joints[name].kind == "weld"
+    if not welds and joint.kind not in {"revolute", "spherical"}:
         kinds = " and ".join(f"'{link}' ({ports.link.kind})" for link, (ports, _) in held.items())
         raise MeshError(
-            f"joints.{name}: must be a hinge between a planar link and one in space, "
+            f"joints.{name}: must be a hinge or a weld between a planar link and one in space, "
             f"got a {joint.kind} joint of {kinds}"
         )
+    links = {link: ports.link for link, (ports, _) in held.items()}
+    surfaces = {link: held[link][1] for link in sorted(held, key=lambda each: not links[each].planar)}
+    unknowns = 0
     for link, (ports, surface) in held.items():
-        points = port_points(scene, name, joint, {link: surface}, {link: ports.link})
-        for point in points:
-            components = [0, 1] if ports.link.planar else [0, 1, 2]
+        points = port_points(scene, name, joint, surfaces if welds else {link: surface}, links)
+        of_point = 2 * np.arange(len(points)) if welds else np.zeros(len(points), int)
+        unknowns = max(unknowns, 2 + int(of_point.max()))
+        components = [[0, 1] if ports.link.planar else [0, 1, 2]] * len(points)
+        if welds and not ports.link.planar:  # whose thickness may change
+            points, of_point = (
+                np.vstack([points, points[0] + [0.0, 0.0, ports.link.size]]),
+                np.append(of_point, 0),
+            )
+            components.append([0, 1])
+        for point, column, held_ in zip(points, of_point, components, strict=True):
             weights = port_weights(surface, point[None, :])[0]
-            ports.add(weights, point, name, components, first, np.eye(3)[components, :2])
-    return 2
+            ports.add(weights, point, name, held_, first + int(column), np.eye(3)[held_, :2])
+    return unknowns
 
 
 def _components(scene: Scene, name: str, joint: Joint, held: list[Link]) -> list[int]:

@@ -24,7 +24,6 @@ DRIVEN = ("revolute", "prismatic")  # kinds with one motion alone, which a drive
 CONSTRAINED = "constraint equations"  # how a joint is enforced that moves with both of its links
 SHARED = "shared points"  # and one that holds points of its links together for good
 MIXED = "plane link and one in space"  # what a joint joins
-BESIDE = "plane link and a rigid one"  # of which the rigid one moves freely in space
 
 
 def others(*kinds: str) -> tuple[str, ...]:
@@ -77,13 +76,9 @@ REFUSALS = (
         "{where}.bushing.rotational_stiffness", "be given for a joint that constrains rotations",
         "there is none that it could resist", "a {kind} joint, which leaves all free",
         "leave it out, or take another kind of joint"),
-    Refusal("joints", {"joint": ("weld", "prismatic"), "partners": (MIXED,)}, "{where}.kind",
-        "be revolute or spherical between a plane link and a solid or beam in space",
+    Refusal("joints", {"joint": ("prismatic",), "partners": (MIXED,)}, "{where}.kind",
+        "be revolute, spherical or a weld between a plane link and a solid or beam in space",
         "a plane link constrains no rotation out of its plane", "'{kind}' of {names}", "give both the same model"),
-    Refusal("joints", {"joint": ("weld",), "partners": (BESIDE,)}, "{where}.kind",
-        "be revolute or spherical between a plane link and a rigid one that moves freely",
-        "a plane link constrains no rotation out of its plane", "'weld' of {names}",
-        "take a hinge, or two links of one kind"),
     Refusal("drives", {"joint": others(*DRIVEN)}, "{where}.joint", "name a revolute or prismatic joint",
         "a drive prescribes the one motion of a joint", "{name!r}, which is {kind}",
         "drive a hinge or a slide beside it, or take a motor"),

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from kedfem.errors import Fault, Where
-from kedfem.scene.checks.capabilities import BESIDE, CONSTRAINED, MIXED, SHARED, Facts, refusals
+from kedfem.scene.checks.capabilities import CONSTRAINED, MIXED, SHARED, Facts, refusals
 from kedfem.scene.checks.parts import Entry, Parts, category, link_names
 from kedfem.scene.questions.modelling import default_frames, enforced_by_equations
-from kedfem.scene.questions.planes import rigid_in_space, spatial_beams
+from kedfem.scene.questions.planes import spatial_beams
 from kedfem.scene.records.materials import rayleigh
-from kedfem.scene.records.scene import Scene
 from kedfem.scene.records.wording import NOUNS, shown
 
 Told = tuple[str, Facts, Where, Mapping[str, str]]
@@ -56,7 +55,7 @@ def joints(parts: Parts) -> Iterator[Told]:
     spatial = spatial_beams(parts.good) if mixed else frozenset[str]()  # asked for beside plane links only
     for joint in parts.joints.values():
         kind, held = str(joint.word("kind")), [parts.links[x] for x in link_names(joint) if x in parts.links]
-        facts = {"joint": kind, "partners": partners(parts.good, held, spatial)}
+        facts = {"joint": kind, "partners": partners(held, spatial)}
         words = {"kind": kind, "key": "kind", "names": named(held)}
         if joint.record is None:
             yield "joints", facts, joint.where, words
@@ -71,13 +70,10 @@ def joints(parts: Parts) -> Iterator[Told]:
         yield "joints", facts, joint.where, words
 
 
-def partners(good: Scene, held: list[Entry], spatial: frozenset[str]) -> str:
-    """What a joint joins, as far as the table asks for it, of records without a fault; some beams are in space."""
-    if not any(category(link) == "plane" for link in held):
-        return ""
-    if any(category(link) == "solid" or link.name in spatial for link in held):
-        return MIXED
-    return BESIDE if any(link.name in good.links and rigid_in_space(good, link.name) for link in held) else ""
+def partners(held: list[Entry], spatial: frozenset[str]) -> str:
+    """What a joint joins, as far as the table asks for it; some beams are in space."""
+    plane = any(category(link) == "plane" for link in held)
+    return MIXED if plane and any(category(link) == "solid" or link.name in spatial for link in held) else ""
 
 
 def named(held: list[Entry]) -> str:
