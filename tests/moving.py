@@ -180,8 +180,12 @@ def turned(raw: dict[str, Any], R: np.ndarray, shift: Any = (0.0, 0.0, 0.0)) -> 
             return x if "over" in x else {name: moved(each, name) for name, each in x.items()}
         if not isinstance(x, list):
             return x
-        if key == "at":
+        if key in {"at", "centre"}:
             return point(x)
+        if key == "inertia":
+            xx, yy, zz, xy, yz, zx = x
+            of = R @ np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]) @ R.T
+            return [float(of[k]) for k in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))]
         if key in DIRECTIONS:
             return [vector(each) for each in x] if isinstance(x[0], list) else vector(x)
         return [point(e) if key in {"points", "between"} and isinstance(e, list) else moved(e) for e in x]

@@ -8,6 +8,7 @@ from pathlib import Path as FilePath
 from kedfem.accuracy.choices import open_step
 from kedfem.accuracy.error_budget import Budget, attributes, budget_warning, kind_of_name, meaningless
 from kedfem.accuracy.estimates import Strained, budget
+from kedfem.accuracy.given import given_warning
 from kedfem.accuracy.histories import Histories, steady_state
 from kedfem.accuracy.meshes import stubby_warning
 from kedfem.accuracy.plan import Plan, ready_to_step
@@ -181,6 +182,7 @@ def _analysed(
         *undetermined_warning(untold),
         *watched.passes.warnings(),
         *eased_warning(solvers),
+        *given_warning(seen.given, asked),
         *keeper.warnings(),
     ]
     doubts = doubtful(scene, ready.model, recoveries)

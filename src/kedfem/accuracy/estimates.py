@@ -19,6 +19,7 @@ import numpy as np
 
 from kedfem.accuracy.error_budget import Budget, Share, by_kind, joined
 from kedfem.accuracy.geometric import GeometricError, bent, geometric_warning
+from kedfem.accuracy.given import Given
 from kedfem.accuracy.histories import Histories, counted, extent, histories
 from kedfem.accuracy.mesh_estimate import FUNCTIONS, link_errors, mesh_share, plain_mesh_share
 from kedfem.accuracy.prepared import Prepared
@@ -78,9 +79,10 @@ class Seen:
     geometric: GeometricError
     running: StepError
     rounding: Rounding
+    given: Given
     steps: bool = True
     """whether there are time steps, and not positions found each by itself"""
-    REMEMBERED: ClassVar = ("strained", "geometric", "running", "rounding")
+    REMEMBERED: ClassVar = ("strained", "geometric", "running", "rounding", "given")
 
     def add(self, block: Block) -> None:
         """Look at the steps of a block."""
@@ -88,6 +90,7 @@ class Seen:
         self.geometric.add(block)
         if self.steps:
             self.running.add(block)
+            self.given.add(block)
         self.rounding.add(block)
 
 
@@ -98,6 +101,7 @@ def watcher(ready: Prepared, solvers: Sequence[Steps] = ()) -> Seen:
         GeometricError(ready.model, ready.scene.analysis.stiffening),
         step_error(ready),
         Rounding.of(ready.model, solvers),
+        Given(ready.model),
         not without_vibration(ready.scene),
     )
 
@@ -131,6 +135,8 @@ def budget(
     ]  # fmt: skip
     if small is None:
         local = dict.fromkeys(kinds, SINGLE * seen.running.total)
+        if "displacement" in local:
+            local["displacement"] += seen.given.relative
         alone = Share("step", local, "local errors of its steps: no run beside one so large")
         marched = alone if step is None else _step_share(step)
         shares += [marched if seen.steps else None, plain_mesh_share(eta, kinds)]
@@ -188,10 +194,13 @@ def frames_share(geometric: GeometricError, kinds: Sequence[str]) -> Share | Non
 def step_errors(ready: Prepared, base: Histories) -> dict[str, float]:
     """Channel → error of the step of a run in memory, of a single level: what it differs by from another level.
 
-    That one has steps twice as long; where those would grow without bound, half as long.
+    That one has steps twice as long; where those would grow without bound, or rigid links would turn too far in them to
+    stay as stiff beside a step, half as long.
     """
     grid = time_grid(ready.scene)
-    longer = grid.steps // 2 >= max(fewest_steps(ready.scene), 4)
+    firm = [x for x in ready.model.step_limits if x is not None and x.in_steps(grid.step).turns_little]
+    alike = all(x.in_steps(2 * grid.step).turns_little for x in firm)
+    longer = alike and grid.steps // 2 >= max(fewest_steps(ready.scene), 4)
     scene = (
         _beside(ready.scene, 2.0, grid.steps // 2) if longer else _beside(ready.scene, 0.5, 2 * grid.steps)
     )

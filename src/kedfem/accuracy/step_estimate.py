@@ -20,6 +20,7 @@ from kedfem.scene import time_grid
 IN_STEP = 0.3  # largest disagreement about the fastest motion at which orders 4 and 6 show
 ALIKE = 1e-6  # relative difference of work that means nothing
 LEAST_ORDER = 0.7  # at which an error must fall with the step, or no step will do
+SLOW = 1e-3  # |D''|/|D| of a difference without vibration: that of 200 steps to a period
 SURE = 0.7  # of the error asked for, that a step is chosen for
 SINGLE = 2.0  # forces and stresses have more of fast motion, which is less exact, than displacements
 TWO, THREE = 0.8, 1.2  # docs/performance/levels.md has estimates beside the truth
@@ -155,8 +156,13 @@ class _Sizes:
 
     @property
     def fast(self) -> float:
-        """|D''|/|x''| of the finest pair's difference D, at most 1."""
-        return min(1.0, float(self.curved[0] / self.curved[1])) if self.curved[1] else 0.0
+        """|D''|/|x''| of the finest pair's difference D, at most 1.
+
+        Where D itself changes slowly, as what rigid links give under loads that stay, both are rounding: then |D|/|x|.
+        """
+        q = min(1.0, float(self.curved[0] / self.curved[1])) if self.curved[1] else 0.0
+        slow = len(self.differences) and self.curved[0] < SLOW * self.differences[-1]
+        return min(q, float(self.differences[-1]) / self.peak) if slow and self.peak else q
 
     def add(self, values: Rows, levels: Sequence[Rows]) -> None:
         """More time points, as combined and as each level has them."""

@@ -101,7 +101,7 @@ def elastic_model(
     for slider in sliders:
         key = list(links)[slider.carrier]
         links[key] = with_point_mass(links[key], slider.weights, slider.mass)
-    links = made_rigid(scene, links, linkage, along, thicken=elements)
+    links, limits = made_rigid(scene, links, linkage, along, thicken=elements)
     sliders = tuple(slider_on(slider, list(links.values())[slider.carrier]) for slider in sliders)
     cuts = [shared for name, link in cut.items() for shared in _shared(name, link)]
     layout = LinkageLayout(
@@ -115,7 +115,7 @@ def elastic_model(
         links=tuple(links.values()), bodies=tuple(linkage.bodies.index(x.name) for x in links.values()),
         joints=tuple(held.attachments[key] for key in links), loads=tuple(loads[key] for key in links),
         sliders=sliders, damping=Rayleigh(*rayleigh(scene.damping)), prescribed=prescribed,
-        rows=held.rows, cuts=tuple(cuts),
+        rows=held.rows, cuts=tuple(cuts), step_limits=tuple(map(limits.get, links)) if limits else (),
     )  # fmt: skip
 
 

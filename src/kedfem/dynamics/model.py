@@ -12,6 +12,7 @@ from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
 from kedfem.dynamics.joints.places import on_part
 from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.stepping.state import Rayleigh
+from kedfem.dynamics.stepping.step_limit import StepLimit
 from kedfem.links.record import Link
 
 T = TypeVar("T")
@@ -64,6 +65,7 @@ class Model:
     prescribed : rigid links that move with the drive
     rows : joints enforced by constraint equations
     cuts : where segments of a link meet, by `link_keys`
+    step_limits : per link, of rigid ones that a step keeps from being stiffer; none at all where there are none
     """
 
     links: tuple[Link, ...]
@@ -75,6 +77,7 @@ class Model:
     prescribed: tuple[PrescribedBody, ...] = ()
     rows: tuple[ConstraintJoint, ...] = ()
     cuts: tuple[SharedCut, ...] = ()
+    step_limits: tuple[StepLimit | None, ...] = ()
 
     @property
     def unknowns(self) -> int:

@@ -1,11 +1,14 @@
 """Rigid links of a model: in the span of {1, x, y, z}, and so stiff there that they do not deform beside what does."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 from jaxtyping import Float
 
+from kedfem.dynamics.model import Model
+from kedfem.dynamics.stepping.step_limit import StepLimit
 from kedfem.errors import Fault, SceneError
 from kedfem.links.bodies import with_body, with_mass
 from kedfem.links.record import Link
@@ -27,9 +30,6 @@ from kedfem.scene import (
 LIGHT = 1e-3  # second moment of a planar beam's mass beside inertia of its sections, below which this is spread over it
 COMPACT = 1e-7  # of mass times length²: second moments, below which forces would be off by more than 1e-4
 LAMINA = 1e-8  # of second moments of mass: a sheet of a millimetre by a metre has 1e-6
-# ω h of rigid links with co-rotational frames: of those that turn far in a step, and of those that do not. Vibration
-# that no step resolves grows in links that turn by about 1 − ρ∞ in one (docs/theory/errors.md)
-RESOLVED, FIRM = 30.0, 3e3
 BORNE = 0.5  # of 1 − ρ∞: rotation in a step [rad] of a link that may be FIRM
 INSTANTS = 400  # at which rotations are looked up
 MOUNTED = (
@@ -39,8 +39,10 @@ MOUNTED = (
 
 def made_rigid(
     scene: Scene, links: Mapping[str, Link], linkage: Linkage, along: Path | None, thicken: bool = False
-) -> dict[str, Link]:
+) -> tuple[dict[str, Link], dict[str, StepLimit]]:
     """Links with the rigid ones made so: stiff beside the elastic ones, whatever they are made of themselves.
+
+    Also what steps allow of those that they hold back.
 
     Where no link is elastic they are stiff beside their mounts: of a block on soft ones rounding would leave few digits.
 
@@ -51,9 +53,9 @@ def made_rigid(
     """
     made = {key for key, link in links.items() if scene.links[link.name].model == "rigid"}
     elastic = [link for key, link in links.items() if key not in made]
-    out, soft = dict(links), _mounts(scene)
+    out, limits, soft = dict(links), {}, _mounts(scene)
     in_steps = not without_vibration(scene) and any(links[key].fit is not None for key in made)
-    little = _little_turned(scene, linkage, along) if in_steps else frozenset()
+    turning = _turning(scene, linkage, along) if in_steps else {}
     for key in made:
         link = _spread(_thickened(links[key]) if thicken else links[key])
         _with_extent(link)
@@ -61,23 +63,38 @@ def made_rigid(
         if not elastic and any(soft):
             highest = min(highest, MOUNTED * _mounted(link, *soft))
         if link.fit is not None:
-            stiff = FIRM if link.name in little else RESOLVED
-            highest = min(highest, stiff / time_grid(scene).step if in_steps else _beside(link, elastic))
+            if in_steps:
+                borne, h = BORNE * (1 - scene.analysis.rho_inf), time_grid(scene).step
+                limits[key] = StepLimit(highest, turning.get(link.name, np.inf), borne, h, h)
+                highest = limits[key].frequency
+            else:
+                highest = min(highest, _beside(link, elastic))
         out[key] = rigid(link, highest)
-    return out
+    return out, limits
 
 
-def _little_turned(scene: Scene, linkage: Linkage, along: Path | None) -> frozenset[str]:
-    """Links that drives move, and turn so little in a step that numerical damping holds stiff vibration down."""
+def for_steps(model: Model, h: float, longest: float | None = None) -> Model:
+    """The model with its rigid links as stiff as steps of h allow; `longest` as in `StepLimit`."""
+    links, limits = list(model.links), list(model.step_limits)
+    for k, limit in enumerate(limits):
+        if limit is not None:
+            limits[k] = now = limit.in_steps(h, longest)
+            if now.frequency != limit.frequency:
+                links[k] = replace(links[k], K0=links[k].K0 * (now.frequency / limit.frequency) ** 2)
+    if all(link is old for link, old in zip(links, model.links, strict=True)):
+        return model
+    return replace(model, links=tuple(links), step_limits=tuple(limits))
+
+
+def _turning(scene: Scene, linkage: Linkage, along: Path | None) -> dict[str, float]:
+    """How fast links turn that drives move [rad/s], at most."""
     if along is None or linkage.drive is None:
-        return frozenset()
-    grid = time_grid(scene)
-    t = np.linspace(0.0, grid.end, INSTANTS)
+        return {}
+    t = np.linspace(0.0, time_grid(scene).end, INSTANTS)
     motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
-    turned = grid.step * np.linalg.norm(motion.omega, axis=2).max(axis=0)
-    moved = np.linalg.norm(motion.v, axis=2).max(axis=0) + turned > 0.0
-    little = moved & (turned <= BORNE * (1 - scene.analysis.rho_inf))
-    return frozenset(name for name, each in zip(linkage.bodies, little, strict=True) if each)
+    omega = np.linalg.norm(motion.omega, axis=2).max(axis=0)
+    moved = np.linalg.norm(motion.v, axis=2).max(axis=0) + omega > 0.0
+    return {name: float(w) for name, w, each in zip(linkage.bodies, omega, moved, strict=True) if each}
 
 
 def _beside(link: Link, elastic: Sequence[Link]) -> float:

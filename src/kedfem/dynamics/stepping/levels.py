@@ -24,6 +24,7 @@ from jaxtyping import Float
 
 from kedfem.dynamics.history import Block, exerted_together, joined
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.rigid_links import for_steps
 from kedfem.dynamics.stepping.combined import Combination, level_weights
 from kedfem.dynamics.stepping.first_state import started
 from kedfem.dynamics.stepping.marks import Mark, Marks
@@ -89,7 +90,8 @@ def level_steps(scene: Scene, model: Model) -> list[Steps]:
             "has matrices of its own, "
             f"and {levels} sets of them do not fit in {memory() / 1e9:.3g} GB of memory, got {levels}"
         )
-    return [steps_of(each, model) for each in level_scenes(scene)]
+    longest = time_grid(scene).step
+    return [steps_of(each, for_steps(model, time_grid(each).step, longest)) for each in level_scenes(scene)]
 
 
 def leveled(
@@ -120,11 +122,11 @@ def leveled(
     if len(solvers) == 1:
         yield from _single(scene, linkage, along, model, solvers[0], marks)
         return
-    scenes, done = level_scenes(scene), marks.done
+    scenes, done, steady = level_scenes(scene), marks.done, scene.analysis.kind == "steady"
     begins = any(mark.state is None for mark in marks.levels)
     start = started(scenes[-1], linkage, along, model, solvers[-1]) if begins else None
     for mark, own, solver in zip(marks.levels, scenes, solvers, strict=True):
-        apart = begins and scene.analysis.kind == "steady" and solver is not solvers[-1]
+        apart = begins and (steady or any(model.step_limits)) and solver is not solvers[-1]
         mark.start = started(own, linkage, along, model, solver) if apart else start
     schemes = [generalised_alpha(time_grid(each).step, each.analysis.rho_inf) for each in scenes]
     streams = [

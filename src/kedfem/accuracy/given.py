@@ -1,0 +1,90 @@
+"""What rigid links with co-rotational frames give to the forces that they pass on, as no step lets them be stiffer.
+
+It falls with the square of the step, as other errors of the step do, and is part of the error that these make of a
+channel: marches in steps twice as long have such links four times as soft (`dynamics.rigid_links.for_steps`).
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from jaxtyping import Float
+
+from kedfem.accuracy.error_budget import percent
+from kedfem.dynamics.history import Block
+from kedfem.dynamics.joints.attachments import Attachment
+from kedfem.dynamics.model import Model
+from kedfem.links.record import Link, in_space
+
+WARNED = 0.01  # of the largest displacement, where no accuracy is asked for
+INSTANTS = 256  # of a block that are examined
+
+
+@dataclass
+class Given:
+    """The largest that each such link gave so far, and the largest displacement at joints of all links and their ends.
+
+    given : (L,) change of the vector between two of a link's joints or outermost nodes [m]
+    moved : from the reference position [m]
+    """
+
+    model: Model
+    given: Float[np.ndarray, " L"]
+    moved: float = 0.0
+    REMEMBERED: ClassVar = ("given", "moved")
+
+    def __init__(self, model: Model) -> None:
+        self.model, self.given = model, np.zeros(len(model.links))
+        every = zip(model.links, model.joints, model.step_limits, strict=True) if model.step_limits else ()
+        self._places = [
+            (joint.weights, joint.nodes) if limit is None else (ends(link, joint), np.arange(link.n))
+            for link, joint, limit in every
+        ]
+
+    def add(self, block: Block) -> None:
+        """Look at some time points of a block."""
+        some, motion = slice(None, None, max(1, len(block) // INSTANTS)), block.motion
+        for k, (weights, nodes) in enumerate(self._places):
+            link, body, history = self.model.links[k], self.model.bodies[k], block.links[k]
+            if self.model.step_limits[k] is not None:
+                x = in_space(link, weights @ history.g[some])
+                apart = np.linalg.norm(x[:, :, None] - x[:, None], axis=3)
+                self.given[k] = max(self.given[k], float(apart.max(initial=0.0)))
+            X = weights @ link.X[nodes]
+            carried = motion.p[some, body, None] + X @ motion.R[some, body].transpose(0, 2, 1) - X
+            moved = carried + in_space(link, weights @ history.u[some][:, nodes])
+            self.moved = max(self.moved, float(np.linalg.norm(moved, axis=2).max(initial=0.0)))
+
+    @property
+    def relative(self) -> float:
+        """The most that a link gave, of the largest displacement."""
+        most = float(self.given.max(initial=0.0))
+        return most / self.moved if self.moved else 0.0
+
+
+def ends(link: Link, joint: Attachment) -> Float[np.ndarray, "p n"]:
+    """Weights of a rigid link's functions that give displacements at its joints and its outermost nodes."""
+    full, dimensions = link.full or link, 2 if link.planar else 3
+    nodes = full.X[full.one != 0.0]
+    outermost = nodes[np.concatenate([nodes.argmin(axis=0), nodes.argmax(axis=0)])]
+    points = np.concatenate([joint.weights @ link.X[joint.nodes], outermost])[:, :dimensions]
+    known = np.column_stack([link.one, link.X[:, :dimensions]])
+    return np.column_stack([np.ones(len(points)), points]) @ np.linalg.pinv(known)
+
+
+def given_warning(found: Given, asked: float | None = None) -> tuple[str, ...]:
+    """A warning where rigid links give by more than the accuracy that is asked for, of the largest displacement."""
+    allowed = WARNED if asked is None else asked
+    if found.relative <= allowed:
+        return ()
+    k = int(found.given.argmax())
+    limit, name = found.model.step_limits[k], found.model.links[k].name
+    if limit is None:
+        raise ValueError("no link gives")
+    turned, step = np.degrees(limit.turning * limit.step), limit.step * np.sqrt(allowed / found.relative)
+    cause = f"it turns by up to {turned:.2g} deg in a step" if np.isfinite(turned) else "no drive leads it"
+    return (
+        f"rigid link {name} gives by up to {1e3 * found.given[k]:.2g} mm, {percent(found.relative)} of the largest "
+        f"displacement, to the forces that it passes on: {cause}, and steps of {limit.step:.2g} s let it be no stiffer. "
+        f"It gives with the square of the step: take {float(f'{step:.1g}'):g} s or less",
+    )

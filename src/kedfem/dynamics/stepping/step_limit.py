@@ -1,0 +1,40 @@
+"""How stiff a rigid link with a co-rotational frame may be beside a time step: it gives to forces that it passes on."""
+
+from dataclasses import dataclass, replace
+
+# ω h of rigid links with co-rotational frames: of those that turn far in a step, and of those that do not. Vibration
+# that no step resolves grows in links that turn by about 1 − ρ∞ in one (docs/theory/errors.md)
+RESOLVED, FIRM = 30.0, 3e3
+
+
+@dataclass(frozen=True, slots=True)
+class StepLimit:
+    """The frequency of a rigid link's own strain, as a step allows it.
+
+    highest : that it has in steps however short [rad/s]
+    turning : how fast it turns at most [rad/s]; inf where that is not known beforehand
+    borne : rotation in a step at which numerical damping holds stiff vibration down [rad]
+    step : h [s]
+    longest : the longest of several steps whose results are compared: it decides for all of them whether the link turns
+        little, so that what it gives falls with the square of the step [s]
+    """
+
+    highest: float
+    turning: float
+    borne: float
+    step: float
+    longest: float
+
+    @property
+    def turns_little(self) -> bool:
+        """Whether it may be FIRM."""
+        return self.turning * self.longest <= self.borne
+
+    @property
+    def frequency(self) -> float:
+        """ω [rad/s]."""
+        return min(self.highest, (FIRM if self.turns_little else RESOLVED) / self.step)
+
+    def in_steps(self, h: float, longest: float | None = None) -> "StepLimit":
+        """The same in other steps."""
+        return replace(self, step=h, longest=longest or h)
