@@ -1,18 +1,24 @@
 """The terminal: whatever is printed, names from files and scenes send it no commands."""
 
+import os
 import unicodedata
 from collections.abc import Iterator
 
-from rich.console import Console, ConsoleOptions, ConsoleRenderable, RenderHook
+from rich.console import Console, ConsoleDimensions, ConsoleOptions, ConsoleRenderable, RenderHook
 from rich.segment import Segment
 
 TURNING = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
 """Marks that turn the direction of writing."""
 
+WIDE = 10_000  # characters in a line of a pipe or file: tables have their natural width there
+
 
 def terminal(stderr: bool = False) -> Console:
-    """A console that prints no control characters but those of its own colours."""
-    console = Console(stderr=stderr, highlight=False)
+    """A console that prints no control characters but those of its own colours; into pipes and files no line is broken.
+
+    COLUMNS, where it is set, is the width of these too.
+    """
+    console = _Wide(stderr=stderr, highlight=False)
     console.push_render_hook(_Printable())
     return console
 
@@ -24,6 +30,14 @@ def printable(text: str) -> str:
     'a[31mbc'
     """
     return "".join(c for c in text if c in "\n\t" or (unicodedata.category(c) != "Cc" and c not in TURNING))
+
+
+class _Wide(Console):
+    @property  # type: ignore[misc]
+    def size(self) -> ConsoleDimensions:
+        size = super().size
+        whole = not self.is_terminal and "COLUMNS" not in os.environ
+        return ConsoleDimensions(WIDE, size.height) if whole else size
 
 
 class _Printable(RenderHook):

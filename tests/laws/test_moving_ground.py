@@ -255,11 +255,12 @@ def test_grounds_on_grounds_bear_centrifugal_and_coriolis_forces(tmp_path: Path)
         )
 
 
-def test_what_no_drive_moves_alone_is_no_ground() -> None:
+def test_what_no_drive_moves_alone_is_no_ground(tmp_path: Path) -> None:
     """A rigid link without a shape that another joint holds too, or whose joint is no drive's."""
     raw = sprung(AXES["y"], {"kind": "cycloidal", "travel": 0.1, "rise": 1.0}, end_time=1.0, step=0.1)
     held = {**raw["joints"], "other": {"kind": "revolute", "links": ["road", "ground"], "at": [1, 0, 0]}}
     idle = {**raw["joints"], "lift": {"kind": "revolute", "links": ["ground", "road"], "at": [0, 0, 0]}}
     for joints, drive in ((held, raw["drive"]), (idle, {**raw["drive"], "joint": "guide"})):
         with pytest.raises(KedfemError, match=r"links\.road|joints\.lift"):
-            analyse(scene_from({**raw, "joints": joints, "drive": drive, "output": QUIET}))
+            analyse(scene_from({**raw, "joints": joints, "drive": drive, "output": QUIET}, tmp_path))
+    assert not any(tmp_path.iterdir())

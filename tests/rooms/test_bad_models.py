@@ -38,16 +38,19 @@ def test_joint_that_does_not_touch_its_link(model: str) -> None:
     raw = arm(model)
     raw["joints"]["A"]["at"] = [-0.1, 0]
     what = "a bore or a flat face of" if model == "solid" else "a node of"
-    nearest = "(0, 0, -0.01), 0.1 m" if model == "solid" else "(0, 0, 0), 0.1 m"  # hex20: none within the end
-    first, *offered = fault(raw).split("; it has ")
+    nearest = (
+        "(0, 0, -0.01), 0.1005 m" if model == "solid" else "(0, 0, 0), 0.1 m"
+    )  # hex20: none within the end
+    first, *offered, advice = fault(raw).split("; ")
     assert first == (
         f"joints.A: must sit on {what} link 'arm' at (-0.1, 0, 0), got none there (nearest node {nearest} away)"
     )
-    if model == "solid":  # no bore, so its faces, nearest first
-        assert offered[0].startswith("plane face facing (-1, 0, 0) at (0, 0, 0) 0.1 m away, plane face")
-        assert offered[0].count("plane face") == 6
+    if model == "solid":  # no bore, so the nearest face of six
+        assert offered == ["its nearest face is the plane face facing (-1, 0, 0) at (0, 0, 0), 0.1 m away"]
+        assert advice.startswith("move the joint onto the link, or draw the link with a bore")
     else:
         assert offered == []
+        assert advice == "move the joint onto the beam, or give the beam a point there"
 
 
 def test_joint_beside_the_bore_of_a_plate() -> None:

@@ -36,7 +36,7 @@ REFUSED = [
     (bad_cad.wrong_ending, r"links.arm.file: must hold STEP, as its ending says, got another text"),
     (
         bad_cad.no_bore,
-        r"joints.A: must sit on a bore or a flat face of link 'arm' at .*got none there .*it has plane",
+        r"joints.A: must sit on a bore or a flat face of link 'arm' at .*got none there .*its nearest face is the plane",
     ),
     (bad_cad.thousandfold, r"joints.A: must sit on .*other units"),
 ]

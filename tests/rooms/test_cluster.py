@@ -1,5 +1,6 @@
 """`kedfem sweep --cluster`: points on the workers of a Dask scheduler."""
 
+import threading
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +24,11 @@ OVER = "drive.speed=100rpm:300rpm:4"
 def address() -> Iterator[str]:
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as there:
         yield there.scheduler_address
+
+
+def loops() -> set[threading.Thread]:
+    """Threads of clients and clusters."""
+    return {each for each in threading.enumerate() if each.name == "IO loop"}
 
 
 def left(row: Row) -> str:
@@ -61,11 +67,13 @@ def test_what_cannot_run_points_is_refused(
     with pytest.raises(OutputError, match=r"--cluster: its workers must have kedfem 9\.9, got "):
         cluster.cluster(address, tmp_path)
     monkeypatch.setattr(cluster, "PATIENCE", 1)
+    before = loops()
     for wrong in ("tcp://127.0.0.1:1", "nonsense://x"):
         with pytest.raises(
             OutputError, match=r"--cluster: must be the address of a Dask scheduler, .* got " + wrong
         ):
             cluster.cluster(wrong, tmp_path)
+    assert loops() == before
     with (
         LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=":0") as two,
         pytest.raises(OutputError, match=r"--cluster: its workers must have one thread each, got 2 of "),

@@ -1,5 +1,6 @@
 """Commands that run scenes: `kedfem run`, `check`, `kinematics`, `accuracy`, `sweep`."""
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -212,7 +213,7 @@ def sweep(
     kept = f"finished points are in {target}; the same command goes on with the others"
     with interruptible(lambda: kept):
         executor = None if cluster is None else on_cluster(cluster, base.folder)
-        with progress() as watch:
+        with executor or nullcontext(), progress() as watch:
             done = swept_by(base, axes, asked, folder, watch, executor)
     show(*sweep_tables(done))
     say_written(done.folder, dict.fromkeys(("sweep.h5", "sweep.csv", "edges.csv", "sweep.png"), ""))

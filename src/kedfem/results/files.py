@@ -88,6 +88,7 @@ def claimed(folder: Path, within: Sequence[str] = ()) -> Iterator[Path]:
     """
     from filelock import FileLock, Timeout
 
+    new = not folder.exists()
     lock = FileLock(ready_folder(folder) / LOCK, timeout=0.05)
     try:
         lock.acquire()
@@ -108,6 +109,9 @@ def claimed(folder: Path, within: Sequence[str] = ()) -> Iterator[Path]:
                 folder / LOCK
             ).unlink()  # while it is held: who waits for it sees that it is gone, and makes a new one
         lock.release()
+        if new:
+            with suppress(OSError):
+                folder.rmdir()  # of a run that was refused before it wrote anything
 
 
 @contextmanager

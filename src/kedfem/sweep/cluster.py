@@ -32,6 +32,7 @@ class OnCluster(Executor):
 
 def cluster(address: str, folder: FilePath) -> OnCluster:
     """The workers of a scheduler, as ``tcp://host:8786``, that see the files in a scene's folder.
+
     Raises
     ------
     OutputError
@@ -41,8 +42,19 @@ def cluster(address: str, folder: FilePath) -> OnCluster:
         from distributed import Client
     except ImportError:
         raise OutputError("--cluster: needs dask.distributed: pip install 'kedfem[cluster]'") from None
+
+    class Answered(Client):
+        """One that ends its thread where no scheduler answers."""
+
+        def start(self, **how: Any) -> Any:
+            try:
+                return super().start(**how)  # type: ignore[no-untyped-call]
+            except BaseException:
+                self._loop_runner.stop()  # type: ignore[no-untyped-call]
+                raise
+
     try:
-        client = Client(address, timeout=PATIENCE, set_as_default=False)  # type: ignore[no-untyped-call]
+        client = Answered(address, timeout=PATIENCE, set_as_default=False)  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:
         raise OutputError(
             "--cluster: must be the address of a Dask scheduler, such as tcp://host:8786, that answers within "

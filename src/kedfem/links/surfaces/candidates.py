@@ -5,6 +5,7 @@ For messages, and for bores whose axis nobody gives.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 from typing import Literal
 
 import numpy as np
@@ -80,6 +81,30 @@ def candidates(link: Link) -> list[Candidate]:
     link = link.full or link
     planes = link.kind == "solid" and not _with_names(link)
     return [*round_candidates(link), *(_planes(link) if planes else ())]
+
+
+def distance(link: Link, each: Candidate, point: Float[np.ndarray, "3"]) -> float:
+    """From a point to the facets of a surface, taken as flat between their corners [m]."""
+    if not len(each.facets):
+        return float("inf")
+    corners = link.X[link.basis.mesh.facets[:, each.facets]].transpose(1, 0, 2)
+    triangles = [corners[:, list(three)] for three in combinations(range(corners.shape[1]), 3)]
+    return float(_to_triangles(point, np.concatenate(triangles)).min())
+
+
+def _to_triangles(
+    point: Float[np.ndarray, "3"], corners: Float[np.ndarray, "t 3 3"]
+) -> Float[np.ndarray, " t"]:
+    """Distances from a point to triangles: to their planes if it is above them, else to the nearest edge [m]."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    edges = np.roll(corners, -1, axis=1) - corners
+    to = point - corners
+    above = (np.einsum("tek,tk->te", np.cross(edges, to), normal) >= 0).all(axis=1)
+    along = np.einsum("tek,tek->te", to, edges) / np.maximum((edges**2).sum(axis=2), 1e-300)
+    beside = np.linalg.norm(to - np.clip(along, 0, 1)[..., None] * edges, axis=2).min(axis=1)
+    height = np.abs(np.einsum("tk,tk->t", to[:, 0], normal))
+    return np.asarray(np.where(above, height, beside))
 
 
 def surfaces(link: Link) -> list[Candidate]:

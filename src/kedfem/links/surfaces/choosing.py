@@ -2,18 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
 
 import numpy as np
 from jaxtyping import Float
 
 from kedfem.errors import MeshError
 from kedfem.links.record import Link, LinkFace
-from kedfem.links.surfaces.candidates import Candidate, surfaces
-from kedfem.links.surfaces.missing import MOST, length, shown
+from kedfem.links.surfaces.candidates import Candidate, distance, surfaces
+from kedfem.links.surfaces.missing import length, shown
 from kedfem.links.surfaces.surface import PLANE_TOLERANCE
 from kedfem.mesh.elements.hexahedra import Face
 from kedfem.scene import ChosenFace, Scene
+
+MOST = 8  # surfaces in a message
 
 # of the diameter: nodes of mesh files are rounded, and so are dimensions that people write
 SAME_DIAMETER = 5e-3
@@ -113,33 +114,11 @@ def as_choice(link: Link, each: Candidate) -> str:
     return choice.label
 
 
-def distance(link: Link, each: Candidate, point: Vector) -> float:
-    """From a point to the facets of a surface, taken as flat between their corners [m]."""
-    if not len(each.facets):
-        return float("inf")
-    corners = link.X[link.basis.mesh.facets[:, each.facets]].transpose(1, 0, 2)
-    triangles = [corners[:, list(three)] for three in combinations(range(corners.shape[1]), 3)]
-    return float(_to_triangles(point, np.concatenate(triangles)).min())
-
-
 def _on(link: Link, each: Candidate) -> tuple[float, float, float]:
     """A point of a surface, near its middle [m]."""
     middles = link.X[link.basis.mesh.facets[:, each.facets]].mean(axis=0)
     x, y, z = middles[np.linalg.norm(middles - each.centre, axis=1).argmin()]
     return float(x), float(y), float(z)
-
-
-def _to_triangles(point: Vector, corners: Float[np.ndarray, "t 3 3"]) -> Float[np.ndarray, " t"]:
-    """Distances from a point to triangles: to their planes if it is above them, else to the nearest edge [m]."""
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    edges = np.roll(corners, -1, axis=1) - corners
-    to = point - corners
-    above = (np.einsum("tek,tk->te", np.cross(edges, to), normal) >= 0).all(axis=1)
-    along = np.einsum("tek,tek->te", to, edges) / np.maximum((edges**2).sum(axis=2), 1e-300)
-    beside = np.linalg.norm(to - np.clip(along, 0, 1)[..., None] * edges, axis=2).min(axis=1)
-    height = np.abs(np.einsum("tk,tk->t", to[:, 0], normal))
-    return np.asarray(np.where(above, height, beside))
 
 
 def _face(link: Link, choice: ChosenFace, each: Candidate) -> LinkFace:

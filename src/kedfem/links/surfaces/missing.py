@@ -1,15 +1,16 @@
 """What to say where a joint finds nothing on a link, or too much: what is near, in which direction, in which units."""
 
 from collections.abc import Sequence
+from operator import itemgetter
 
 import numpy as np
 from jaxtyping import Float
 
 from kedfem.links.record import Link
-from kedfem.links.surfaces.candidates import Candidate, candidates
+from kedfem.links.surfaces.candidates import Candidate, candidates, distance
 from kedfem.links.surfaces.round_surfaces import Round
 
-MOST = 8  # candidates in a message
+MOST = 3  # bores, journals and balls in a message; of faces the nearest alone
 SMALL = 0.1  # [m]: shorter lengths are reported in millimetres
 STRAIGHT = 0.05  # [deg]: axes within are one direction
 ASKEW = 45.0  # [deg]: axes further off are others
@@ -20,7 +21,7 @@ NEAR = 0.05  # of a link's size: a joint so near a beam's node was meant to be o
 
 
 def not_touching(link: Link, where: str, point: Vector, axis: Vector | None = None) -> str:
-    """The message that a link has nothing at a joint's point, with what it has instead, nearest first.
+    """The message that a link has nothing at a joint's point, with what it has nearest to it, and what to do.
 
     Parameters
     ----------
@@ -32,7 +33,7 @@ def not_touching(link: Link, where: str, point: Vector, axis: Vector | None = No
     what = "a node of" if not link.meshed else "a bore or a flat face of"
     text = (
         f"{where}: must sit on {what} link '{link.name}' at {shown(point)}, "
-        f"got none there (nearest node {shown(nearest)}, {gap:.3g} m away)"
+        f"got none there (nearest node {shown(nearest)}, {length(gap)} away)"
     )
     level = 1e-6 * link.size  # what is as near: the narrowest first
     offered = sorted(candidates(link), key=lambda each: (round(each.distance(point) / level), each.radius))
@@ -43,7 +44,8 @@ def not_touching(link: Link, where: str, point: Vector, axis: Vector | None = No
         apart if not link.meshed else "",
         _units(link, point, axis, gap, offered),
         _beside(point, axis, offered),
-        _listed(offered, point),
+        _listed(link, offered, point),
+        _advice(link, offered),
     ]
     return "; ".join([text, *(hint for hint in hints if hint)])
 
@@ -100,16 +102,27 @@ def _beside(point: Vector, axis: Vector | None, offered: Sequence[Candidate]) ->
     return None
 
 
-def _listed(offered: Sequence[Candidate], point: Vector) -> str | None:
-    """Cylinders and balls, plane faces if there are none, other faces if there are none of these either."""
-    for kinds in ({"bore", "journal", "ball seat", "ball"}, {"plane face"}, {"face"}):
-        if of_kind := [each for each in offered if each.kind in kinds]:
-            text = ", ".join(
-                f"{described(each)} {length(each.distance(point))} away" for each in of_kind[:MOST]
+def _listed(link: Link, offered: Sequence[Candidate], point: Vector) -> str | None:
+    """The nearest cylinders and balls; the nearest plane face if there are none; else another face."""
+    if round_ := [each for each in offered if each.kind not in {"plane face", "face"}]:
+        text = ", ".join(f"{described(each)} {length(each.distance(point))} away" for each in round_[:MOST])
+        more = len(round_) - MOST
+        return f"it has {text}" + (f", and {more} more" if more > 0 else "")
+    for kind in ("plane face", "face"):
+        if faces := [each for each in offered if each.kind == kind]:
+            apart, nearest = min(
+                ((distance(link.full or link, x, point), x) for x in faces), key=itemgetter(0)
             )
-            more = len(of_kind) - MOST
-            return f"it has {text}" + (f", and {more} more" if more > 0 else "")
+            return f"its nearest face is the {described(nearest)}, {length(apart)} away"
     return None
+
+
+def _advice(link: Link, offered: Sequence[Candidate]) -> str:
+    if not link.meshed:
+        return "move the joint onto the beam, or give the beam a point there"
+    if any(each.cylindrical for each in offered):
+        return "move the joint to one of these, or draw the link with a bore there"
+    return "move the joint onto the link, or draw the link with a bore (a hole of its outline) there"
 
 
 def described(each: Candidate) -> str:
