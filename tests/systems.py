@@ -1,7 +1,7 @@
 """Scenes as systems, marched from rest; the same by the oracle."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from kedfem.accuracy.prepared import Prepared, moving
 from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.frames import frames_of
 from kedfem.dynamics.stepping.scheme import generalised_alpha
+from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.start import initial_rates
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.layout import groups, near_diagonal
@@ -67,6 +68,16 @@ def begun(
 
     rates = initial_rates(scene, made.linkage, system.model)
     return Begun(made, of, rest(of, motion, rates), motion)
+
+
+def stiffened(of: Begun) -> Begun:
+    """The same from rest, its links stiffened by the stresses of their motion."""
+    scene, model = of.prepared.scene, of.prepared.model
+    system = replace(of.ready.system, stiffening=steps_of(scene, model).stiffening)
+    made = ready(system, of.ready.scheme)
+    return replace(
+        of, ready=made, state=rest(made, of.motion, initial_rates(scene, of.prepared.linkage, system.model))
+    )
 
 
 def rows(of: Ready, x: np.ndarray) -> np.ndarray:

@@ -18,8 +18,9 @@ from kedfem.dynamics.system.march import march
 from kedfem.dynamics.system.starts import impacts
 from tests.cells import Cell, scene_of
 from tests.moving import bar, beam_in_space
+from tests.partners import chain
 from tests.runs import Ran, ran
-from tests.systems import begun
+from tests.systems import begun, by_oracle, marched, rows, stiffened
 
 Raw = dict[str, Any]
 OBLIQUE = np.array([0.48, -0.6, 0.64])
@@ -412,3 +413,24 @@ def test_a_limit_is_its_curve_of_force_on_all_links(cell: Cell) -> None:
 @pytest.mark.parametrize("cell", [x for x in CHEAP + OTHERS if x.links in TWO], ids=str)
 def test_two_limits_are_one_on_all_links(cell: Cell) -> None:
     as_two(cell)
+
+
+@pytest.mark.parametrize("kind", ["revolute", "prismatic", "screw"])
+def test_stops_are_met_as_by_the_oracle_where_the_motion_stiffens_links(kind: str) -> None:
+    """Pushed on both sides, with stiffening of the forces of the rigid-body motion, to which stops add nothing."""
+    raw = chain(kind, ("beam", "beam"))
+    raw["drive"]["motion"] = {"kind": "constant_speed", "speed": 3.0}
+    raw["analysis"] |= {"stiffening": True}
+    slides = kind == "prismatic"
+    raw["limits"] = {"s": {
+        "kind": "travel" if slides else "angle", "joint": "J", "lower": -1e-5, "upper": 1e-5,
+        "stiffness": 2e5 if slides else 4e3, "damping": 3.0,
+    }}  # fmt: skip
+    of = begun(raw)
+    wanted, plain = (by_oracle(each, 8)[0] for each in (stiffened(of), of))
+    got = rows(of.ready, marched(stiffened(of), 8)[1].u)
+    peak = np.abs(wanted).max()
+    assert_allclose(got, wanted, rtol=0, atol=1e-8 * peak)
+    assert np.abs(plain - wanted).max() > 1e-5 * peak  # what stiffening changes
+    free = begun(raw | {"limits": {}})
+    assert np.abs(rows(free.ready, marched(free, 8)[1].u) - wanted).max() > 0.05 * peak

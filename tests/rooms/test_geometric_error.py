@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from kedfem.accuracy.estimates import watcher
 from kedfem.accuracy.geometric import GeometricError, axial_forces, geometric_warning, slices, slopes
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import prepared
@@ -389,3 +390,42 @@ def test_what_slides_along_a_bent_link_is_off_by_its_rotation(rpm: float) -> Non
         assert "joints.S slides along" in warning
         assert "stiffening" not in warning
     assert off[True] < 0.4 * off[False]
+
+
+def pressed(stiffness: float, **analysis: Any) -> dict[str, Any]:
+    """A slider-crank whose slender rod, bent by a force, presses its slider into a stop."""
+
+    def beam(a: Any, b: Any, along: int, width: float) -> dict[str, Any]:
+        shape = {"kind": "bar", "between": [a, b], "width": width, "thickness": 0.02}
+        return {"model": "beam", "material": "steel", "shape": shape, "mesh": {"elements": along}}
+
+    return {
+        "links": {"crank": beam([0, 0], [0, 0.05], 2, 0.02), "rod": beam([0, 0.05], [0.4, 0.05], 8, 0.004),
+                  "block": {"model": "rigid", "mass": 0.5}},
+        "joints": {
+            "A": {"kind": "revolute", "links": ["ground", "crank"], "at": [0, 0]},
+            "B": {"kind": "revolute", "links": ["crank", "rod"], "at": [0, 0.05]},
+            "C": {"kind": "revolute", "links": ["rod", "block"], "at": [0.4, 0.05]},
+            "D": {"kind": "prismatic", "links": ["block", "ground"], "at": [0.4, 0.05], "axis": "x"},
+        },
+        "drive": {"joint": "A", "motion": {"kind": "cycloidal", "angle": -0.4, "rise": 0.1}},
+        "limits": {"s": {"kind": "travel", "joint": "D", "upper": 0.005, "stiffness": stiffness}},
+        "loads": {"f": {"kind": "force", "link": "rod", "at": [0.2, 0.05], "vector": [0, -30], "frame": "world"}},
+        "output": {"probes": {"m": {"link": "rod", "at": [0.2, 0.05], "quantity": "deflection"}}},
+        "analysis": {"kind": "quasi-static", "end_time": 0.1, "step": 0.01, **analysis},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("stiffness", [2e5, 2e4, 2e3])
+def test_stiffening_does_not_know_how_hard_stops_are_met_and_its_estimate_says_so(stiffness: float) -> None:
+    """At 2.1, 0.21 and 0.02 times the buckling load of the rod."""
+    ready, blocks = ran(pressed(stiffness, frames="co-rotational"))
+    wanted = channels(ready, blocks)["probes/m/deflection"]
+    ready, blocks = ran(pressed(stiffness, stiffening=True))
+    found = watcher(ready).geometric
+    for block in blocks:
+        found.add(block)
+    error = float(
+        np.abs(channels(ready, blocks)["probes/m/deflection"] - wanted).max() / np.abs(wanted).max()
+    )
+    assert 0.8 < found.estimate / error < 3.5

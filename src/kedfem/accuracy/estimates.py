@@ -98,7 +98,7 @@ def watcher(ready: Prepared, solvers: Sequence[Steps] = ()) -> Seen:
     """A watcher of a prepared scene's steps, as its solvers take them; of its links alone without any."""
     return Seen(
         Strained(ready.model),
-        GeometricError(ready.model, ready.scene.analysis.stiffening),
+        GeometricError(ready.model, ready.scene.analysis.stiffening, bool(ready.scene.limits)),
         step_error(ready),
         Rounding.of(ready.model, solvers),
         Given(ready.model),

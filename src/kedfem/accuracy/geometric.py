@@ -13,7 +13,8 @@ Equation (20) turns K with the rigid-body motion, which leaves three things out:
 * **Large turns.** Where N vanishes, as under a force across a cantilever, the error is of second order, c ψ².
 * **Directions of slides.** What slides along an elastic link is held across the link's direction in the rigid-body
   motion, not across the bent link, which is off by ψ: displacements, joint forces and efforts err by ψ, of first order.
-  Stiffening does not know how their forces turn with the bent link, so that what it leaves is not taken for less.
+  Stiffening does not know how their forces turn with the bent link, so that what it leaves is not taken for less; nor
+  is it beside limits of joints, whose forces it does not know.
 
 All links are counted together, because a joint's force on one is the next one's, with the largest sums over time. The
 factor of e is measured, on the four-bar of [KED] (docs/theory/errors.md): 3. One is the change of stiffness itself; the
@@ -114,6 +115,8 @@ def _numbers(s: Float[np.ndarray, " k"]) -> Int[np.ndarray, " k"]:
 class GeometricError:
     """Largest sums over time of a run, examined block by block, over links with rigid-body frames: others do not err so.
 
+    stiffened : whether the motion stiffens links
+    stopped : whether joints have limits
     axial : ∫ N ψ² ds of these links [J]
     strain : their energy [J]
     turn : ψ of any slice [rad]
@@ -122,6 +125,7 @@ class GeometricError:
 
     model: Model
     stiffened: bool = False
+    stopped: bool = False
     axial: float = 0.0
     strain: float = 0.0
     turn: float = 0.0
@@ -165,7 +169,8 @@ class GeometricError:
         """Of the peak stress."""
         share = self.axial / (2 * self.strain) if self.strain else 0.0
         error = AXIAL * share + TURN * self.turn**2
-        return STIFFENED * error if self.stiffened and not self._slides else error
+        known = self.stiffened and not self._slides and not self.stopped
+        return STIFFENED * error if known else error
 
     @property
     def worst(self) -> float:

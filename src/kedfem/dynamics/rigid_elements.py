@@ -91,12 +91,14 @@ def on_rigid_motion(every: Sequence[ForceElement], along: Path) -> RigidElements
 def rigid_elements_of(scene: Scene, model: Model, along: Path) -> RigidElements | None:
     """The motors and springs of a scene on a model's links, without their deflection; None if there are none.
 
+    Not its limits: how hard stops are met depends on what gives, and where stiff ones are it is nothing like this.
+
     Raises
     ------
     MeshError, SceneError
         If a point or joint is not on its link.
     """
-    every = force_elements(scene, model)
+    every = force_elements(scene.model_copy(update={"limits": {}}), model)
     return on_rigid_motion(every, along) if every else None
 
 
