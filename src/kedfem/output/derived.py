@@ -71,7 +71,8 @@ def fields(
 ) -> list[LinkField]:
     """What a frame shows of each link, deformed as the animation exaggerates it."""
     animation = scene.output.animation
-    return link_fields(model, recoveries, snapshot, animation.deformation_scale if animation else 1.0)
+    scale = animation.deformation_scale if animation else 1.0
+    return link_fields(model, recoveries, snapshot, scale, scene.bodies)
 
 
 def refuse_foreign(folder: Path) -> None:

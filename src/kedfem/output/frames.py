@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -21,18 +23,21 @@ from kedfem.links.recovery import (
     von_mises,
 )
 from kedfem.mesh.cad.sides import boundary_sides, side_corners
-from kedfem.mesh.elements.shape_functions import HEX8
+from kedfem.mesh.elements.shape_functions import HEX8, HEX27
 from kedfem.motion.constraints import cross
 from kedfem.motion.joint_equations import joint_axis
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.output.fields import DRIVE_FORCE, DRIVE_TORQUE, FORCE, MOMENT, JointField, LinkField, RigidField
 from kedfem.results.recorded import drive_effort
-from kedfem.scene import Scene
+from kedfem.scene import Body, Scene
 
 Place = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]
 Rows = Mapping[str, Float[np.ndarray, "T c"]]
-BLOCK = 0.08  # width of the block that stands for a slider without a shape, of the longest link
+BLOCK = 1.2  # width of the block that stands for a slider without a shape, of the link that it is joined to
+STOUT = 0.25  # of that link's length: most that its width is taken for
+STEEL = 7850.0  # kg/m³
+BALL = 0.01, 0.03  # least and largest radius of a mass that a link carries, of what is drawn
 
 
 def _joined(fields: Sequence[LinkField]) -> list[LinkField]:
@@ -47,14 +52,18 @@ def _one(parts: Sequence[LinkField]) -> LinkField:
     first = np.cumsum([0, *(len(part.points) for part in parts)])
     cells = np.concatenate([part.cells + n0 for part, n0 in zip(parts, first, strict=False)])
     names = ("points", "displacement", "stress", "von_mises", "principal")
-    whole = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    whole: Any = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
     return LinkField(parts[0].name, parts[0].cell_type, cells, **whole, section=parts[0].section)
 
 
 def link_fields(
-    model: Model, recoveries: Sequence[StressRecovery], snapshot: Snapshot, deformation_scale: float
+    model: Model,
+    recoveries: Sequence[StressRecovery],
+    snapshot: Snapshot,
+    deformation_scale: float,
+    bodies: Mapping[str, Body] = MappingProxyType({}),
 ) -> list[LinkField]:
-    """All links at one time point: R' = R + f, [KED, eqs. (2)(3)], f times the exaggeration.
+    """All links at one time point: R' = R + f, [KED, eqs. (2)(3)], f times the exaggeration; and what they carry.
 
     Parameters
     ----------
@@ -77,7 +86,41 @@ def link_fields(
         fields.append(
             LinkField(name, kind, cells, points, np.zeros_like(X), none, none[:, 0], none[:, :2], section)
         )
-    return _joined(fields) + _blocks(model, snapshot, deformation_scale)
+    balls = _balls(model, recoveries, snapshot, fields, bodies) if bodies else []
+    return _joined(fields) + _blocks(model, snapshot, deformation_scale) + balls
+
+
+def _balls(
+    model: Model, recoveries: Sequence[StressRecovery], snapshot: Snapshot, fields: Sequence[LinkField],
+    bodies: Mapping[str, Body],
+) -> list[LinkField]:  # fmt: skip
+    """Masses that links carry, each where the nearest point of its link takes it."""
+    motion, k, out = snapshot.motion, snapshot.k, []
+    every = [*model.links, *(x.link for x in model.prescribed)]
+    numbers = [*model.bodies, *(x.body for x in model.prescribed)]
+    X = [recovery.at_points((link.full or link).X) for link, recovery in zip(every, recoveries, strict=True)]
+    size = float(np.linalg.norm(np.ptp(np.concatenate([x.points for x in fields]), axis=0)))
+    for name, body in bodies.items():
+        centre = np.asarray(getattr(body, "centre", body.at))
+        on = [i for i, link in enumerate(every) if link.name == body.link]
+        if not on or not body.mass:
+            continue  # on a slider without a shape, which is drawn itself
+        nearest = {i: np.linalg.norm(X[i] - centre, axis=1) for i in on}
+        i = min(on, key={i: x.min() for i, x in nearest.items()}.__getitem__)
+        n = int(nearest[i].argmin())
+        place = fields[i].points[n] + motion.R[k, numbers[i]] @ (centre - X[i][n])
+        points, none = place + _ball(body.mass, size), np.full((27, 6), np.nan)
+        moved = np.tile(fields[i].displacement[n], (27, 1))
+        cell, words = np.arange(27)[None], f"{name}, {body.mass:.4g} kg"
+        kind = "hexahedron27"
+        out.append(LinkField(name, kind, cell, points, moved, none, none[:, 0], none[:, :2], label=words))
+    return out
+
+
+def _ball(mass: float, size: float) -> Float[np.ndarray, "27 3"]:
+    """Nodes of a ball as large as one of steel, unless that is too small or too large beside what is drawn."""
+    radius = np.clip(np.cbrt(0.75 * mass / (np.pi * STEEL)), BALL[0] * size, BALL[1] * size)
+    return np.asarray(radius * HEX27 / np.maximum(np.linalg.norm(HEX27, axis=1, keepdims=True), 1.0))
 
 
 def link_field(
@@ -125,7 +168,6 @@ def _blocks(model: Model, snapshot: Snapshot, deformation_scale: float) -> list[
     if not model.sliders:
         return []
     motion, k, out = snapshot.motion, snapshot.k, []
-    size = BLOCK * max(float(np.ptp(link.X, axis=0).max()) for link in model.links)
     for slider in model.sliders:
         link, body = model.links[slider.carrier], model.bodies[slider.carrier]
         moved = slider.weights @ in_space(link, snapshot.states[slider.carrier].u)
@@ -134,7 +176,7 @@ def _blocks(model: Model, snapshot: Snapshot, deformation_scale: float) -> list[
         x = np.cross(z, np.eye(3)[np.abs(z).argmin()])
         x /= np.linalg.norm(x)
         frame = np.array([1.5 * z, np.cross(z, x), x])  # longer along the guide
-        points = place + size / 2 * HEX8 @ frame
+        points = place + BLOCK * _width(link) / 2 * HEX8 @ frame
         none = np.full((8, 6), np.nan)
         shift = np.tile(moved, (8, 1))
         cell = np.arange(8)[None]
@@ -142,13 +184,23 @@ def _blocks(model: Model, snapshot: Snapshot, deformation_scale: float) -> list[
     return out
 
 
+def _width(link: Link) -> float:
+    """Of a link across its length: of its section, else of all of it [m]."""
+    whole = link.full or link
+    if whole.section is not None:
+        return max(whole.section.height, whole.section.thickness)
+    extents = np.sort(np.ptp(whole.X, axis=0))
+    return float(min(extents[1], STOUT * extents[2]))
+
+
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """What is seen of a link.
+    """What is seen of a link, or of a mass that it carries.
 
     body : its number
     points : (n, 3) in the reference position [m]
     cells : (e, k) and meshio's name of them
+    label : as of :class:`LinkField`
     """
 
     name: str
@@ -156,10 +208,11 @@ class Sight:
     points: Float[np.ndarray, "n 3"]
     cells: Int[np.ndarray, "e k"]
     cell_type: str
+    label: str = ""
 
 
 def sights(scene: Scene, linkage: Linkage, links: Mapping[str, Link]) -> list[Sight]:
-    """Of all links; those without a record are sticks between their joints."""
+    """Of all links and what they carry; links without a record are sticks between their joints."""
     out = []
     for name in scene.links:
         link = links.get(name)
@@ -167,6 +220,12 @@ def sights(scene: Scene, linkage: Linkage, links: Mapping[str, Link]) -> list[Si
         used, numbers = np.unique(cells, return_inverse=True)
         body = linkage.bodies.index(name)
         out.append(Sight(name, body, points[used], numbers.reshape(cells.shape), kind))
+    size = float(np.linalg.norm(np.ptp(np.concatenate([each.points for each in out]), axis=0)))
+    for name, carried in scene.bodies.items():
+        if carried.mass:
+            points = np.asarray(getattr(carried, "centre", carried.at)) + _ball(carried.mass, size)
+            cell, words = np.arange(27)[None], f"{name}, {carried.mass:.4g} kg"
+            out.append(Sight(name, linkage.bodies.index(carried.link), points, cell, "hexahedron27", words))
     return out
 
 
@@ -179,7 +238,8 @@ def rigid_fields(every: Sequence[Sight], motion: RigidMotion, k: int) -> list[Ri
         velocity = motion.v[k, b] + cross(np.broadcast_to(motion.omega[k, b], arms.shape), arms)
         acceleration = motion.p2[k, b] + each.points @ motion.R2[k, b].T
         points = motion.p[k, b] + arms
-        out.append(RigidField(each.name, each.cell_type, each.cells, points, velocity, acceleration))
+        seen = each.cell_type, each.cells, points, velocity, acceleration
+        out.append(RigidField(each.name, *seen, label=each.label))
     return out
 
 

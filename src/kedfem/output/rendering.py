@@ -5,6 +5,7 @@ It is run by its path.
 
 import sys
 import textwrap
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,13 +13,14 @@ from jaxtyping import Float
 
 from kedfem.output.bars import LINES, bars, heights
 from kedfem.output.fields import VON_MISES
-from kedfem.output.views import LIFT, View, view
+from kedfem.output.views import LIFT, View, body_labels, view
 from kedfem.processes import end_with_parent
 
 WIDTHS, HEIGHTS = (1000, 1600), (700, 1100)  # least and most pixels; in between as the linkage asks
 LEFT, RIGHT, TOP, BOTTOM = 60, 260, 130, 60  # pixels kept free: title above, colour bar and axes on the right
 
 
+BALL = "steelblue"
 THROUGH = 0.12  # opacity of what lies before the highest stress where it would be hidden from both sides
 # quadratic faces are halved so many times, unless that makes more triangles than this
 FINEST, TRIANGLES = 4, 200_000
@@ -37,7 +39,10 @@ def render(vtu: str, png: str, title: str, deformation_scale: str = "1", *gravit
     plotter: Any = pyvista.Plotter(off_screen=True, window_size=window(shown.size))
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
-    draw_links(plotter, grid, shown)
+    balls = body_labels(grid)
+    is_ball = np.isin(grid.cell_data["link"], list(balls))
+    draw_links(plotter, grid.extract_cells(~is_ball) if balls else grid, shown)
+    draw_balls(plotter, grid.extract_cells(is_ball), balls)
     draw_words(plotter, title, float(deformation_scale), shown.cut is not None)
     aim(plotter, grid, shown)
     mark(plotter, grid)
@@ -61,6 +66,11 @@ def mark(plotter: Any, grid: Any) -> None:
     for radius, width, colour in ((13, 6, "white"), (13, 3, "black")):
         ring = np.column_stack([x + radius * np.cos(angle), y + radius * np.sin(angle), 0 * angle])
         plotter.add_actor(_flat(pyvista.MultipleLines(ring), width, colour), reset_camera=False)
+    words = plotter.add_text(
+        f"{np.nanmax(stress):.4g} MPa", position=(x + 18, y + 10), font_size=10, color="black"
+    )
+    words.prop.SetBackgroundColor(1.0, 1.0, 1.0)
+    words.prop.SetBackgroundOpacity(0.7)
 
 
 def _flat(lines: Any, width: float, colour: str) -> Any:
@@ -115,6 +125,19 @@ def draw_links(plotter: Any, grid: Any, shown: View) -> None:
     if edges.n_cells:
         plotter.add_mesh(edges, color="black", line_width=2.0, opacity=0.7)
     draw_bar(plotter, links)
+
+
+def draw_balls(plotter: Any, grid: Any, words: Mapping[int, str]) -> None:
+    """Masses that links carry, translucent so that they hide nothing, with their names."""
+    for cell in range(grid.n_cells):
+        ball = grid.extract_cells([cell])
+        look = {"color": BALL, "opacity": 0.5, "smooth_shading": True}
+        plotter.add_mesh(curved_surface(ball), scalars=None, **look)
+        plotter.add_point_labels(
+            [ball.center], [words[int(ball.cell_data["link"][0])]], always_visible=True, font_size=20, show_points=False,
+            text_color="black", shape="rounded_rect", shape_color="white", shape_opacity=0.7, margin=2,
+            justification_vertical="bottom",
+        )  # fmt: skip
 
 
 def lifted(grid: Any) -> Any:

@@ -8,10 +8,11 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.output.bars import LINES, THINNEST, heights
-from kedfem.output.fields import VON_MISES
+from kedfem.output.fields import BODY, VON_MISES
 
 # how far planar links that lie in one plane are drawn apart, as part of the diagonal: each covers those before it
 LIFT = 1e-3
+RAISED = 0.6  # how far up the eye is beside one along a horizontal axis: 27° above the horizon
 FLAT = 0.35  # a linkage whose least extent is below this part of its second is seen from that side
 
 
@@ -32,12 +33,21 @@ class View:
     cut: Float[np.ndarray, " 3"] | None = None
 
 
+def body_labels(grid: Any) -> dict[int, str]:
+    """Numbers of masses that links carry, and what stands beside them."""
+    names = [name for name in grid.field_data.keys() if name.startswith(BODY)]  # noqa: SIM118
+    return {int(grid.field_data[name][0]): name.removeprefix(BODY) for name in names}
+
+
 def hidden(grid: Any, direction: Float[np.ndarray, " 3"]) -> bool:
     """Whether something is in front of the highest stress."""
     stress = grid.point_data[VON_MISES]
     if not np.isfinite(stress).any():
         return False
-    solids = grid.extract_cells(~np.isin(grid.celltypes, list(LINES)))
+    before = ~np.isin(grid.celltypes, list(LINES))
+    if balls := body_labels(grid):  # they are translucent
+        before &= ~np.isin(grid.cell_data["link"], list(balls))
+    solids = grid.extract_cells(before)
     if not solids.n_cells:
         return False
     place = grid.points[int(np.nanargmax(stress))]
@@ -48,8 +58,8 @@ def hidden(grid: Any, direction: Float[np.ndarray, " 3"]) -> bool:
 
 def view(grid: Any, gravity: Float[np.ndarray, " 3"]) -> View:
     """The view of a linkage, all of it in the picture; from another side where only so the highest stress is seen."""
-    direction, upwards = sight(np.ptp(grid.points, axis=0))
-    seen = next((each for each in sides(direction) if not hidden(grid, each)), None)
+    direction, upwards = sight(np.ptp(grid.points, axis=0), gravity)
+    seen = next((each for each in sides(direction, upwards) if not hidden(grid, each)), None)
     cut = grid.points[int(np.nanargmax(grid.point_data[VON_MISES]))] if seen is None else None
     direction = direction if seen is None else seen
     across, up = picture_axes(direction, upwards, gravity)
@@ -76,23 +86,37 @@ def picture_axes(
     return across, np.cross(direction, across)
 
 
-def sides(direction: Float[np.ndarray, " 3"]) -> list[Float[np.ndarray, " 3"]]:
-    """A direction to look from, then that from behind, then those mirrored at other axes."""
+def sides(
+    direction: Float[np.ndarray, " 3"], upwards: Float[np.ndarray, " 3"]
+) -> list[Float[np.ndarray, " 3"]]:
+    """A direction to look from, then that from behind, then those mirrored at other axes, from below last."""
     mirrored = [direction * signs for signs in product((1.0, -1.0), repeat=3)]
     main = int(np.abs(direction).argmax())
     turned = [
-        int(np.sum(each * direction < 0)) - 0.5 * (each[main] * direction[main] < 0) for each in mirrored
+        int(np.sum(each * direction < 0))
+        - 0.5 * (each[main] * direction[main] < 0)
+        + 3.0 * ((each @ upwards) * (direction @ upwards) < 0)
+        for each in mirrored
     ]
     return [mirrored[k] for k in np.argsort(turned, kind="stable")]
 
 
-def sight(extents: Float[np.ndarray, " 3"]) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
-    """Unit vectors to the eye that sees a linkage best, and upwards: flat ones slightly tilted from their flat side."""
+def sight(
+    extents: Float[np.ndarray, " 3"], gravity: Float[np.ndarray, " 3"]
+) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
+    """Unit vectors to the eye that sees a linkage best, and upwards: flat ones slightly tilted from their flat side.
+
+    What is as thick as high is seen from one corner, where gravity is known from not far above.
+    """
     x, y, z = np.eye(3)
     least, second, most = np.sort(extents)
     thin = extents <= max(1.01 * least, FLAT * second if second < FLAT * most else 0.0)
     if least > FLAT * second and second > FLAT * most:
         direction, up = 0.6 * x + 0.5 * y + z, y
+        if (weight := np.linalg.norm(gravity)) > 0:
+            up = -gravity / weight
+            first, other = np.eye(3)[np.argsort(np.abs(up), kind="stable")[:2]]
+            direction = first + 0.6 * other + RAISED * up
     elif thin[2]:
         direction, up = z + 0.3 * y, y
     else:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from kedfem.errors import OutputError
-from kedfem.output.fields import JointField, LinkField
+from kedfem.output.fields import JointField, LinkField, numbered
 from kedfem.results.files import ready_folder, reason, require_space
 
 VERSION = (2, 3)  # of the format: field data over time
@@ -164,8 +164,7 @@ def _laid_out(file: Any, fields: Blocks, arrays: dict[str, np.ndarray], drive: s
 
 def _numbers(fields: Blocks) -> Iterator[tuple[str, int]]:
     """Field data that show which number of the cell data is which link; "/" would begin a group."""
-    names = (field.name if isinstance(field, JointField) else f"link {field.name}" for field in fields)
-    return ((name.replace("/", "_"), k) for k, name in enumerate(names))
+    return ((numbered(field).replace("/", "_"), k) for k, field in enumerate(fields))
 
 
 def _growing(group: Any, name: str, kind: Any, shape: tuple[int, ...] = (), rows: int = 256) -> None:

@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 
 from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.output.bars import SECTION
-from kedfem.output.fields import STRESS, Block, JointField
+from kedfem.output.fields import STRESS, Block, JointField, numbered
 from kedfem.results.files import replacing
 
 STRESS_COMPONENTS = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
@@ -123,7 +123,7 @@ def _field_data(now: Mapping[str, float], fields: Sequence[Block], first: int) -
     numbers = "".join(
         "".join(_number(f"joint {name}", k) for k, name in enumerate(field.names))
         if isinstance(field, JointField)
-        else _number(f"link {field.name}", number)
+        else _number(numbered(field), number)
         for number, field in enumerate(fields, start=first)
     )
     moments = "".join(

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.output.bars import LINES, THINNEST, heights, rims
-from kedfem.output.fields import DISPLACEMENT, VON_MISES
+from kedfem.output.fields import BODY, DISPLACEMENT, VON_MISES
 from kedfem.output.rendering import QUADRILATERAL, SHARP
 from kedfem.output.stress_files import KINDS
 from kedfem.output.views import LIFT
@@ -206,7 +206,7 @@ def _thinned(sources: Sequence[_Source]) -> tuple[str, ...]:
 def links_of(grid: Any) -> Iterator[tuple[str, Int[np.ndarray, " e"]]]:
     """Names of the links in a file, and their elements."""
     for key in grid.field_data.keys():  # noqa: SIM118
-        if key.startswith("link "):
+        if key.startswith(("link ", BODY)):
             cells = np.flatnonzero(grid.cell_data["link"] == int(grid.field_data[key][0]))
             if len(cells):
-                yield key.removeprefix("link "), cells
+                yield key.removeprefix("link ").removeprefix(BODY), cells

@@ -159,7 +159,7 @@ def _listens(
     shown: Animated, taken: Float[np.ndarray, "3"], gravity: Float[np.ndarray, "3"], first: int
 ) -> str:
     """The script with the first view: all links in all frames, gravity downwards if it is known."""
-    towards, up = sight(taken)
+    towards, up = sight(taken, gravity)
     towards = towards if shown.seen_from is None else shown.seen_from
     axes = np.array([*picture_axes(towards, up, gravity), towards])
     low, high = bounds(shown.surfaces, axes)

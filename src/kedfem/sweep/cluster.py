@@ -50,6 +50,7 @@ def cluster(address: str, folder: FilePath) -> OnCluster:
             try:
                 return super().start(**how)  # type: ignore[no-untyped-call]
             except BaseException:
+                self.status = "closed"  # else it closes once more as it is collected
                 self._loop_runner.stop()  # type: ignore[no-untyped-call]
                 raise
 
