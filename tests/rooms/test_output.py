@@ -13,6 +13,7 @@ import pytest
 
 from kedfem.errors import OutputError
 from kedfem.links.recovery import stress_recovery
+from kedfem.output import frames
 from kedfem.output.animation import AnimationWriter, read_collection, remove_animation
 from kedfem.output.bars import SECTION, THINNEST, bars, heights, shape_functions
 from kedfem.output.fields import DISPLACEMENT, LARGEST, SMALLEST, STRESS, VON_MISES, JointField, LinkField
@@ -543,7 +544,15 @@ def test_a_slider_without_a_shape_is_a_block_about_its_pin_along_its_guide(defor
     np.testing.assert_allclose(block.points.mean(axis=0), end[section].mean(axis=0), atol=1e-9)
     assert np.isnan(block.von_mises).all()
     along = np.ptp(block.points, axis=0)
-    np.testing.assert_allclose(along, 1.2 * 0.02 * np.array([1.0, 1.0, 1.5]))  # of the rod's section
+    np.testing.assert_allclose(along, 0.8 * 0.02 * np.array([1.0, 1.0, 1.5]))  # of the rod's section
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.6])
+def test_a_slider_on_a_solid_is_as_wide_as_that_is_across_its_length(turn: float) -> None:
+    """However the link lies in the reference position."""
+    c, s = np.cos(turn), np.sin(turn)
+    sizes = HEX27 / 2 * [0.2, 0.03, 0.01] @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    assert frames._width(SimpleNamespace(full=None, section=None, X=sizes)) == pytest.approx(0.03)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("mass", [2.0, 1e-6, 1e6])

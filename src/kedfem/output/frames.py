@@ -34,7 +34,7 @@ from kedfem.scene import Body, Scene
 
 Place = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]
 Rows = Mapping[str, Float[np.ndarray, "T c"]]
-BLOCK = 1.2  # width of the block that stands for a slider without a shape, of the link that it is joined to
+BLOCK = 0.8  # width of the block that stands for a slider without a shape, of the link that it is joined to
 STOUT = 0.25  # of that link's length: most that its width is taken for
 STEEL = 7850.0  # kg/m³
 BALL = 0.01, 0.03  # least and largest radius of a mass that a link carries, of what is drawn
@@ -189,7 +189,8 @@ def _width(link: Link) -> float:
     whole = link.full or link
     if whole.section is not None:
         return max(whole.section.height, whole.section.thickness)
-    extents = np.sort(np.ptp(whole.X, axis=0))
+    principal = np.linalg.svd(whole.X - whole.X.mean(axis=0), full_matrices=False)[2]
+    extents = np.sort(np.ptp(whole.X @ principal.T, axis=0))
     return float(min(extents[1], STOUT * extents[2]))
 
 

@@ -3,6 +3,7 @@
 It is run by its path.
 """
 
+import re
 import sys
 import textwrap
 from collections.abc import Mapping
@@ -169,7 +170,8 @@ def draw_words(plotter: Any, title: str, deformation_scale: float, cut: bool) ->
 
     font = f"{mpl.get_data_path()}/fonts/ttf/DejaVuSans.ttf"  # VTK's own has no Greek
     letters = int(plotter.window_size[0] / 16)
-    text = "\n".join(textwrap.wrap(title, letters, max_lines=3, placeholder=" …"))
+    whole = re.sub(r"\([^)]*\) m\b|\bt = \S+ s\b", lambda part: part[0].replace(" ", "\xa0"), title)
+    text = "\n".join(textwrap.wrap(whole, letters, max_lines=3, placeholder=" …"))
     words = plotter.add_text(
         text, position=(0.03, 0.97), viewport=True, font_size=13, color="black", font_file=font
     )
