@@ -1,14 +1,18 @@
 """Laws of random mechanisms: monolithic equals fast, a run is a march, a scene turned is the same, momentum stays."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
+from kedfem.accuracy.prepared import moving
 from kedfem.errors import MotionError
 from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import linkage
-from kedfem.scene import scene_from
+from kedfem.motion.rigid import rigid_motion
+from kedfem.scene import path_parameter, scene_from
 from tests.driven_mechanisms import tried
 from tests.mechanisms import as_lists, mechanism, outcome
 from tests.moving import beam_in_space, turned
@@ -139,6 +143,45 @@ def test_a_hinge_in_a_bushing_turns_alike_when_all_of_it_is_turned() -> None:
     what, found = tried("turned", 137, "co-rotational", most=3)
     assert what == "fine", found
     assert max(found.values()) < 0.1
+
+
+def test_what_a_drive_leaves_free_begins_to_move_alike_when_all_of_it_is_turned() -> None:
+    """A link that slides along the line of two planes, beside a drive; once 1900 times what is allowed, as what it rests
+    against at first was an axis of the world."""
+    what, found = tried("turned", 20212, "co-rotational", most=4)
+    assert what == "fine", found
+    assert max(found.values()) < 0.1
+
+
+@pytest.mark.parametrize("turn", [[0.7, -1.1, 0.4], [2.0, 0.5, -0.3]])
+def test_a_rod_between_balls_spins_alike_when_all_of_it_is_turned(turn: list[float]) -> None:
+    """It rests against one of its balls about its own axis, which both change as much."""
+    raw = rod_between_balls()
+    R = Rotation.from_rotvec(turn).as_matrix()
+    found = []
+    for scene in (scene_from(raw), scene_from(turned(raw, R, np.array([0.3, -0.2, 0.5])))):
+        linked, along = moving(scene)
+        times = np.linspace(0.0, 0.3, 4)
+        found.append(rigid_motion(linked, along, times, path_parameter(scene, times)))
+    assert np.linalg.norm(found[0].omega[:, 2], axis=1).min() > 0.5  # rad/s
+    assert_allclose(found[1].omega @ R, found[0].omega, atol=1e-8)
+
+
+def rod_between_balls() -> dict[str, Any]:
+    """A crank, a rod between two balls, a rocker; the rod is free to spin."""
+    at = {"A": [0.0, 0.0, 0.0], "B": [0.05, 0.02, 0.0], "C": [0.2, 0.15, 0.1], "D": [0.25, 0.0, 0.12]}
+    links = {name: beam_in_space(at[name[0]], at[name[1]], 1) for name in ("AB", "BC", "CD")}
+    joints = {
+        "A": {"kind": "revolute", "links": ["ground", "AB"], "at": at["A"], "axis": [-0.02, 0.05, 0.2]},
+        "B": {"kind": "spherical", "links": ["AB", "BC"], "at": at["B"]},
+        "C": {"kind": "spherical", "links": ["BC", "CD"], "at": at["C"]},
+        "D": {"kind": "revolute", "links": ["ground", "CD"], "at": at["D"], "axis": [0.3, 0.1, 0.0]},
+    }
+    return {
+        "links": links, "joints": joints,
+        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 2.0}},
+        "analysis": {"frames": "co-rotational", "end_time": 0.3, "step": 1e-3},
+    }  # fmt: skip
 
 
 @pytest.mark.long

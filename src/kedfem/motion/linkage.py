@@ -5,6 +5,7 @@ reference position while the drive moves the rest; without a drive it rests.
 """
 
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 import scipy.linalg
@@ -13,9 +14,12 @@ from jaxtyping import Float
 from kedfem.errors import MotionError, SceneError
 from kedfem.motion.blocks import Blocks, blocks
 from kedfem.motion.constraints import (
+    GAP,
     ConstraintEquation,
     Rows,
     stacked,
+    travel_row,
+    turn_row,
 )
 from kedfem.motion.drives import Drives, drives
 from kedfem.motion.joint_equations import (
@@ -34,6 +38,9 @@ from kedfem.motion.released_motions import remedy as held_by
 from kedfem.motion.values import Poses, features, jacobian
 from kedfem.scene import Scene, corotational_links
 
+FIRST = (
+    1e-6  # by so much less counts each further joint motion, so that rounding chooses none that is to be held
+)
 MANY = 12  # bodies up to which the rows are solved as one matrix: about as fast then, and in the least squares of QR
 
 
@@ -238,16 +245,40 @@ def _other_drives(scene: Scene, drawn: Drawn) -> list[str]:
 def _holding(
     scene: Scene, J: np.ndarray, bodies: tuple[str, ...], size: float, free: int
 ) -> list[ConstraintEquation]:
-    """Rows that hold as many joint motions as are free in the reference position: those that these change most."""
+    """Rows that hold as many joint motions as are free in the reference position: those that these change most, of equal
+    ones the first.
+    """
     if not free:
         return []
+    motions = scipy.linalg.svd(J)[2][-free:].T
     rows = [
         row
         for name in scene.joints
         if name not in scene.driven_joints
-        for row in joint_free_rows(scene, name, bodies)
+        for row in _free_rows(scene, name, bodies, size, motions)
     ]
-    _, _, Vt = scipy.linalg.svd(J)
-    change = drawn_jacobian(rows, len(bodies), size) @ Vt[-free:].T
-    _, _, order = scipy.linalg.qr(change.T, pivoting=True, mode="economic")
+    change = drawn_jacobian(rows, len(bodies), size) @ motions
+    first = 1 - FIRST * np.arange(len(rows))
+    _, _, order = scipy.linalg.qr((first[:, None] * change).T, pivoting=True, mode="economic")
     return [rows[k] for k in order[:free]]
+
+
+def _free_rows(
+    scene: Scene, name: str, bodies: tuple[str, ...], size: float, motions: np.ndarray
+) -> list[ConstraintEquation]:
+    """Rows of what a joint releases, along and about directions that these motions have, not the axes of the world."""
+    out = []
+    for kind, group in groupby(joint_free_rows(scene, name, bodies), key=lambda row: row.kind):
+        rows = list(group)
+        if len(rows) > 1:
+            change = drawn_jacobian(rows, len(bodies), size) @ motions
+            along = np.array([row.b if kind == GAP else np.cross(row.a, row.b) for row in rows])
+            U = np.linalg.svd(along.T @ change)[0]
+            rows = [
+                travel_row(name, rows[0].i, rows[0].j, rows[0].a, d)
+                if kind == GAP
+                else turn_row(name, rows[0].i, rows[0].j, d)
+                for d in U.T[: len(rows)]
+            ]
+        out += rows
+    return out
