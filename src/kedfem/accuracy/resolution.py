@@ -14,7 +14,7 @@ from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.reduction import frozen_frequencies, static_parts
 from kedfem.dynamics.rigid_body import instants
-from kedfem.dynamics.stepping.scheme import Scheme, generalised_alpha
+from kedfem.dynamics.stepping.scheme import Scheme, borne_rotation, generalised_alpha
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import (
@@ -34,9 +34,6 @@ FEWEST = 10  # steps in a period: the period is then 3 % too long
 UNFOLLOWED = 0.01  # error of a step below which what vibrates unresolved is no matter
 HARMONICS = 5  # of the drive
 NEAR = 0.03  # of a frequency
-MARGIN = (
-    0.8  # of the turn 1 − ρ∞ [rad] in a step, where unresolved vibration neither grows nor dies (measured)
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,12 +219,12 @@ def fewest_steps(scene: Scene) -> float:
         each.motion for name, each in scene.driven_joints.items() if scene.joints[name].kind != "prismatic"
     ]
     fastest = max((float(np.abs(drive_angle(law, t)[1]).max()) for law in turning), default=0.0)
-    return fastest * end / (MARGIN * (1 - rho_inf))
+    return fastest * end / borne_rotation(rho_inf)
 
 
 def _moving(scene: Scene) -> str | None:
-    """A joint enforced by constraint equations, from whose force vibration comes that grows alike (from twice MARGIN on,
-    measured)."""
+    """A joint enforced by constraint equations, from whose force vibration comes that grows alike, from twice
+    `borne_rotation` on (measured)."""
     return next((name for name in scene.joints if enforced_by_equations(scene, name)), None)
 
 

@@ -8,6 +8,7 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.stepping.scheme import borne_rotation
 from kedfem.dynamics.stepping.step_limit import StepLimit
 from kedfem.errors import Fault, SceneError
 from kedfem.links.bodies import with_body, with_mass
@@ -30,8 +31,7 @@ from kedfem.scene import (
 LIGHT = 1e-3  # second moment of a planar beam's mass beside inertia of its sections, below which this is spread over it
 COMPACT = 1e-7  # of mass times length²: second moments, below which forces would be off by more than 1e-4
 LAMINA = 1e-8  # of second moments of mass: a sheet of a millimetre by a metre has 1e-6
-BORNE = 0.5  # of 1 − ρ∞: rotation in a step [rad] of a link that may be FIRM
-INSTANTS = 400  # at which rotations are looked up
+INSTANTS = 400  # at which rotations are looked up: a tenth of what the smallest models take to make
 MOUNTED = (
     3e3  # times the frequency on the mounts: a link's own strain is 1e-7 of deflections, rounding up to 4e-7
 )
@@ -64,7 +64,7 @@ def made_rigid(
             highest = min(highest, MOUNTED * _mounted(link, *soft))
         if link.fit is not None:
             if in_steps:
-                borne, h = BORNE * (1 - scene.analysis.rho_inf), time_grid(scene).step
+                borne, h = borne_rotation(scene.analysis.rho_inf, stiff=True), time_grid(scene).step
                 limits[key] = StepLimit(highest, turning.get(link.name, np.inf), borne, h, h)
                 highest = limits[key].frequency
             else:

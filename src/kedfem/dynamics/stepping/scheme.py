@@ -11,6 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+# of the rotation 1 − ρ∞ in a step, at which vibration that no step resolves neither grows nor dies (measured,
+# docs/theory/errors.md); in space that of a link whose own is 3000/h grows from between 0.7 and 0.8 on
+TURNED, TURNED_STIFF = 0.8, 0.5
+
 
 @dataclass(frozen=True, slots=True)
 class Scheme:
@@ -44,6 +48,16 @@ class Scheme:
     def rate(self) -> Float[np.ndarray, "3"]:
         """δ' at the end of a step = a1 · δ there − rate · (δ, δ', δ'') at its beginning."""
         return np.array([self.a1, self.gamma / self.beta - 1, self.h * (self.gamma / (2 * self.beta) - 1)])
+
+
+def borne_rotation(rho_inf: float, stiff: bool = False) -> float:
+    """The rotation in a step [rad] up to which numerical damping takes vibration from links that no step resolves.
+
+    Parameters
+    ----------
+    stiff : whether it is far above that, as of rigid links
+    """
+    return (TURNED_STIFF if stiff else TURNED) * (1 - rho_inf)
 
 
 def generalised_alpha(h: float, rho_inf: float) -> Scheme:
