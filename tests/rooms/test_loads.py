@@ -14,8 +14,16 @@ from kedfem.analysis import analyse
 from kedfem.errors import OutputError
 from kedfem.kinematics import kinematics
 from kedfem.loads import loads
-from kedfem.results import read_results
-from kedfem.results.forces.loads import BALL, ROLLER, equivalent_load, facing, in_axes
+from kedfem.results import Channel, Results, read_results
+from kedfem.results.forces.loads import (
+    BALL,
+    ROLLER,
+    DriveLoad,
+    drive_summary,
+    equivalent_load,
+    facing,
+    in_axes,
+)
 from kedfem.scene import scene_from
 from kedfem.tables import loads_tables
 from tests.reliability.fuzz import short
@@ -224,6 +232,19 @@ def test_without_a_drive_loads_are_in_the_worlds_axes_and_it_is_said(tmp_path: P
     assert not any("its axes" in name for name in joint)
     assert np.isnan(found.joints["B"]["equivalent, ball bearing [N]"])
     assert not list(found.folder.glob("*.png"))
+
+
+def test_of_several_drives_peaks_are_told_by_their_time() -> None:
+    """Results have the position of the first drive alone."""
+    time = np.linspace(0.0, 1.0, 5)
+    effort = np.array([1.0, 2.0, 5.0, 2.0, 1.0])
+    load, rows = DriveLoad("A", "N", effort, None), np.ones(5, bool)
+    for names, told in (("drive/force",), True), (("drive/A/force", "drive/B/force"), False):
+        channels = {x: (Channel(x, ("force",), "N", "", ""), effort[:, None]) for x in names}
+        results = Results(time, time, channels, "complete", "{}")
+        found = drive_summary(load, results, rows)
+        assert found["time of largest [s]"] == 0.5
+        assert any(name.startswith("drive at") for name in found) is told
 
 
 def test_what_cannot_be_asked_is_refused(tmp_path: Path) -> None:

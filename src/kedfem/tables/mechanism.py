@@ -20,7 +20,8 @@ from kedfem.tables.layout import facts, left, listed, right
 WIDTH, BORDER = 72, 3  # of columns beside the first in a terminal of 80 characters; of each
 MODES = 8  # side by side
 SHORT = {
-    "drive at peak": "at", "largest bearing load": "radial", "largest axial": "axial", "equivalent, ball bearing": "ball",
+    "drive at peak": "at", "time of peak": "at", "time of largest": "at",
+    "largest bearing load": "radial", "largest axial": "axial", "equivalent, ball bearing": "ball",
     "equivalent, roller bearing": "roller", "drive at largest": "at", "largest power": "peak power",
 }  # fmt: skip
 

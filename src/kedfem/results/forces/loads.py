@@ -231,8 +231,7 @@ def summary(load: JointLoad, results: Results, rows: Bool[np.ndarray, " T"]) -> 
     k, none = int(size.argmax()), float("nan")
     bearing, axial = load.bearing, load.axial
     out = {
-        "peak [N]": float(size[k]), "time of peak [s]": float(t[k]),
-        f"drive at peak [{results.drive.unit}]": float(results.angle[rows][k]),
+        "peak [N]": float(size[k]), "time of peak [s]": float(t[k]), **_drive_at("peak", results, rows, k),
         "mean [N]": mean_over(t, size), "rms [N]": rms(t, size),
         "largest bearing load [N]": none if bearing is None else float(bearing[rows].max()),
         "largest axial [N]": none if axial is None else float(np.abs(axial[rows]).max()),
@@ -244,6 +243,13 @@ def summary(load: JointLoad, results: Results, rows: Bool[np.ndarray, " T"]) -> 
     return out
 
 
+def _drive_at(what: str, results: Results, rows: Bool[np.ndarray, " T"], k: int) -> dict[str, float]:
+    """The drive's position at a row; nothing where there are several, of which results have that of the first."""
+    if any(name.startswith("drive/") and name.count("/") > 1 for name in results.channels):
+        return {}
+    return {f"drive at {what} [{results.drive.unit}]": float(results.angle[rows][k])}
+
+
 def drive_summary(load: DriveLoad, results: Results, rows: Bool[np.ndarray, " T"]) -> Mapping[str, float]:
     """Largest effort with its time and drive, rms, mean; largest, mean and rms power."""
     t, effort = results.time[rows], load.effort[rows]
@@ -251,7 +257,7 @@ def drive_summary(load: DriveLoad, results: Results, rows: Bool[np.ndarray, " T"
     power = None if load.power is None else load.power[rows]
     return {
         f"largest [{load.unit}]": float(effort[k]), "time of largest [s]": float(t[k]),
-        f"drive at largest [{results.drive.unit}]": float(results.angle[rows][k]),
+        **_drive_at("largest", results, rows, k),
         f"mean [{load.unit}]": mean_over(t, effort), f"rms [{load.unit}]": rms(t, effort),
         "largest power [W]": none if power is None else float(power[np.abs(power).argmax()]),
         "mean power [W]": none if power is None else mean_over(t, power),
