@@ -16,7 +16,9 @@ from jaxtyping import Float
 from kedfem.accuracy.prepared import Prepared
 from kedfem.dynamics.history import Block
 from kedfem.links.record import in_space
-from kedfem.motion.values import Poses, features, jacobian
+from kedfem.motion.linkage import resting_poses
+from kedfem.motion.parts import Part, parts
+from kedfem.motion.values import Poses
 
 NEAR = 0.05  # of its largest value: singular value that vanishes at a singular position (others: 0.19 and more, measured)
 LOOKED_AT = 32  # of a block's time points at first; all of them around the smallest values
@@ -24,54 +26,71 @@ CLOSER = 0.3  # of the largest value so far, below which all are examined
 
 
 @dataclass
-class SingularPasses:
-    """The smallest singular value of the constraints that a run comes to, block after block.
+class Leverage:
+    """The smallest singular value, of the largest one, of constraints of closed loops that a run comes to.
 
+    part, rank : the loops, and the rank of their constraints in the reference position
     least, when : the value there, and the time [s]
     largest : over the run; the value means nothing by itself
     """
 
-    ready: Prepared
+    part: Part
+    rank: int
     least: float = np.inf
     when: float = 0.0
     largest: float = 0.0
-    _rank: int = field(default=0, repr=False)
-    _of: dict[int, int] = field(default_factory=dict, repr=False)
     REMEMBERED: ClassVar = ("least", "when", "largest")
+
+    @property
+    def of_largest(self) -> float:
+        """The least, of the largest; 1 before anything was examined."""
+        return self.least / self.largest if self.largest else 1.0
+
+    def add(self, values: Float[np.ndarray, " T"], t: Float[np.ndarray, " T"]) -> None:
+        """The values at some times."""
+        k = int(values.argmin())
+        self.largest = max(self.largest, float(values.max()))
+        if values[k] < self.least:
+            self.least, self.when = float(values[k]), float(t[k])
+
+
+@dataclass
+class SingularPasses:
+    """What closed loops of an undriven mechanism come to in a run, block after block."""
+
+    ready: Prepared
+    loops: list[Leverage] = field(default_factory=list, repr=False)
+    _of: dict[int, int] = field(default_factory=dict, repr=False)
+    REMEMBERED: ClassVar = ("loops",)
 
     def __post_init__(self) -> None:
         linkage, model = self.ready.linkage, self.ready.model
         for k, body in enumerate(model.bodies):
             self._of.setdefault(body, k)  # of several segments the first
-        free = not len(linkage.drives) and 0 < linkage.mobility < 6 * (len(linkage.bodies) - 1)
-        if free and set(self._of) == set(range(1, len(linkage.bodies))):
-            self._rank = 6 * (len(linkage.bodies) - 1) - linkage.mobility
+        if not len(linkage.drives) and set(self._of) == set(range(1, len(linkage.bodies))):
+            rest = resting_poses(1, len(linkage.bodies))
+            found = parts(linkage.rows, linkage.joints, len(linkage.bodies))
+            every = ((part, part.rank(rest, linkage.size)) for part in found if part.closed)
+            self.loops = [Leverage(part, rank) for part, rank in every if rank < part.freedoms]
 
     def add(self, block: Block) -> None:
         """The time points of one more block."""
-        if not self._rank:
+        if not self.loops:
             return
         stride = max(1, len(block) // LOOKED_AT)
-        self._look(block, np.arange(0, len(block), stride), stride)
+        which = np.arange(0, len(block), stride)
+        poses = self._poses(block, which)
+        for loop in self.loops:
+            values = self._values(loop, poses)
+            loop.add(values, block.motion.t[which])
+            k = which[values.argmin()]
+            if stride > 1 and values.min() < CLOSER * loop.largest:
+                near = np.arange(max(0, k - stride), min(len(block), k + stride + 1))
+                loop.add(self._values(loop, self._poses(block, near)), block.motion.t[near])
 
-    def _look(self, block: Block, which: np.ndarray, stride: int) -> None:
-        values = self._values(block, which)
-        self.largest = max(self.largest, float(values.max()))
-        k = int(values.argmin())
-        if stride > 1 and values[k] < CLOSER * self.largest:
-            first, last = max(0, which[k] - stride), min(len(block), which[k] + stride + 1)
-            self._look(block, np.arange(first, last), 1)
-        elif values[k] < self.least:
-            self.least, self.when = float(values[k]), float(block.motion.t[which[k]])
-
-    def _values(self, block: Block, which: np.ndarray) -> Float[np.ndarray, " T"]:
-        """The singular value, of the largest one, at some time points."""
-        linkage = self.ready.linkage
-        near = np.zeros((len(which), len(linkage.rows.angles)))
-        f = features(linkage.rows, self._poses(block, which), near)
-        J = jacobian(linkage.rows, f, len(linkage.bodies), linkage.size)
-        s = np.linalg.svd(J, compute_uv=False)
-        return np.asarray(s[:, self._rank - 1] / s[:, 0])
+    def _values(self, loop: Leverage, poses: Poses) -> Float[np.ndarray, " T"]:
+        s = np.linalg.svd(loop.part.jacobian(poses, self.ready.linkage.size), compute_uv=False)
+        return np.asarray(s[:, loop.rank - 1] / s[:, 0])
 
     def _poses(self, block: Block, which: np.ndarray) -> Poses:
         """The mean frames of all bodies; the ground's is in the reference position."""
@@ -88,12 +107,17 @@ class SingularPasses:
             p[:, body] = drawn + moved - R[:, body] @ drawn
         return R, p
 
+    @property
+    def worst(self) -> Leverage | None:
+        """The loops that come nearest to a singular position; None without any."""
+        return min(self.loops, key=lambda loop: loop.of_largest, default=None)
+
     def warnings(self) -> tuple[str, ...]:
         """What a user should know of such a pass."""
-        if not self._rank or self.least > NEAR * self.largest:
+        if self.worst is None or self.worst.of_largest > NEAR:
             return ()
         return (
-            f"at {self.when:.4g} s the mechanism comes near a singular position, from where it could move in more ways "
-            "than one: rigid links, and links that hardly bend, get a kick there whose size depends on the step: little "
-            "decides how they move on; compare with a shorter step, or take damping, or links that bend more",
+            f"at {self.worst.when:.4g} s the mechanism comes near a singular position, from where it could move in more "
+            "ways than one: rigid links, and links that hardly bend, get a kick there whose size depends on the step: "
+            "little decides how they move on; compare with a shorter step, or take damping, or links that bend more",
         )

@@ -32,6 +32,7 @@ from kedfem.motion.joint_equations import (
     rows_of,
     scene_centre,
 )
+from kedfem.motion.parts import parts
 from kedfem.motion.redundancy import LOOSER, Looser, would_move
 from kedfem.motion.released_motions import RANK_TOLERANCE, Drawn, free_motions, listed, rank
 from kedfem.motion.released_motions import remedy as held_by
@@ -109,7 +110,10 @@ def linkage(scene: Scene) -> Linkage:
     several = blocks(every, len(bodies), size) if driven and len(bodies) > MANY else None
     free = 0
     if not driven:
-        free = drawn.J.shape[1] - rank(drawn.J)
+        rest = resting_poses(1, len(bodies))
+        free = drawn.J.shape[1] - sum(
+            x.rank(rest, size) for x in parts(every, [row.joint for row in rows], len(bodies))
+        )
     elif several is None or not _well_driven(every, several, size):
         free = _check_mobility(scene, drawn)
         rows = rows + _holding(scene, drawn.J, bodies, size, free)
