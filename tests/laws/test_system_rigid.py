@@ -119,11 +119,8 @@ def test_a_rigid_link_among_beams_moves_as_by_the_oracle_and_keeps_its_length(
 
 def joint_force(of: Begun, history: History, k: int, joint: str) -> np.ndarray:
     """What a joint of shared interface points exerts on body k over time, world components (T, 3)."""
-    ports, at = of.ready.system.model.joints[k], of.ready.bodies.port_at
-    every = np.zeros((len(history.e), ports.components * len(ports.points)))
-    for j, share in enumerate(ports.shares):
-        if share.any():
-            every += history.port_force[:, at[j] : at[j + 1]] @ share.T
+    ports = of.ready.system.model.joints[k]
+    every = history.port_force @ ports.shares.T
     along = of.motion(of.ready.c.h * np.arange(1, len(every) + 1))
     seen = supports(of.ready, history, along)
     every += seen.on_interface(of.ready.system.model.rows) @ ports.from_rows.T

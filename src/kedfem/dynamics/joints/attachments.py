@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 
@@ -17,7 +18,8 @@ class Attachment:
     keep : (q,) which of the flattened (p, d) components are held; closed under the link's rotation; independent:
         what other ports of the link imply is left out
     B : (q, k) held components, in world axes, from the interface unknowns z
-    shares : per link j (dp, q_j): forces at all ports of this link, world axes, from all links' λ in world axes
+    shares : (dp, Σ q): forces at all ports of this link, world axes, from the λ of all links in world axes; sparse, as
+        the next two
     from_rows : (dp, m): the same from the forces that rows of joints exert on their links' ports, world axes; m all
         components of all these ports, and empty where λ alone shows the forces
     loose : (dp, r) port forces of this link, world axes, that neither determines: statically indeterminate
@@ -30,9 +32,9 @@ class Attachment:
     joints: tuple[str, ...]
     keep: Int[np.ndarray, " q"]
     B: Float[np.ndarray, "q k"]
-    shares: tuple[Float[np.ndarray, "m _"], ...] = ()
-    from_rows: Float[np.ndarray, "m _"] = field(default_factory=lambda: np.zeros((0, 0)))
-    loose: Float[np.ndarray, "m r"] = field(default_factory=lambda: np.zeros((0, 0)))
+    shares: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
+    from_rows: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
+    loose: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
 
 
 @dataclass(frozen=True, slots=True)

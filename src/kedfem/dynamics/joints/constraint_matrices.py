@@ -1,10 +1,12 @@
 """Rows of joints over time: C(t) from the rigid motion, and what one time point needs of it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+import scipy.sparse as sp
+from jaxtyping import Bool, Float, Int
+from scipy.sparse.csgraph import connected_components
 
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side
 from kedfem.motion.constraints import cross
@@ -13,6 +15,7 @@ from kedfem.motion.rigid import RigidMotion
 REPEATED = (
     1e-10  # of a row on ports: what is left on the interface unknowns if other joints hold the same already
 )
+EVERY = slice(None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,13 +64,53 @@ def joint_rows(joints: Sequence[ConstraintJoint], motion: RigidMotion) -> JointR
     )
 
 
-def rows_over(joint: ConstraintJoint, motion: RigidMotion) -> Float[np.ndarray, "T r k"]:
-    """Rows of one joint, gap · (u_i − u_j) + turn · (θ_i − θ_j), on the interface unknowns."""
+def rows_over(
+    joint: ConstraintJoint, motion: RigidMotion, columns: Int[np.ndarray, " c"] | slice = EVERY
+) -> Float[np.ndarray, "T r c"]:
+    """Rows of one joint, gap · (u_i − u_j) + turn · (θ_i − θ_j), on the interface unknowns, or on those given."""
     shares = port_rows(joint, motion)
-    C = np.sum([np.tensordot(on, side.onto, ((2, 3), (0, 1))) for side, on in shares], axis=0)
+    C = np.sum([np.tensordot(on, side.onto[..., columns], ((2, 3), (0, 1))) for side, on in shares], axis=0)
     size = np.sqrt(sum((on**2).sum(axis=(2, 3)) for _, on in shares))
     C[np.linalg.norm(C, axis=2) < REPEATED * size] = 0.0
     return np.asarray(C)
+
+
+@dataclass(frozen=True, slots=True)
+class RowGroup:
+    """Joints whose rows share no interface unknown with those of others.
+
+    joints : numbers; rows, columns : where their rows are among all, and the interface unknowns that these touch
+    """
+
+    joints: tuple[ConstraintJoint, ...]
+    rows: Int[np.ndarray, " r"]
+    columns: Int[np.ndarray, " c"]
+
+    def over(self, motion: RigidMotion) -> Float[np.ndarray, "T r c"]:
+        """Their rows at the times of a motion."""
+        return np.concatenate([rows_over(joint, motion, self.columns) for joint in self.joints], axis=1)
+
+
+def row_groups(joints: Sequence[ConstraintJoint]) -> Iterator[RowGroup]:
+    """All joints, in as many groups as there are."""
+    touched = [_columns(joint) for joint in joints]
+    number = np.repeat(np.arange(len(joints)), [len(x) for x in touched])
+    every = np.concatenate([*touched, np.zeros(0, int)])
+    n, k = len(joints), int(every.max(initial=-1)) + 1
+    graph = sp.coo_array((np.ones(len(every)), (number, n + every)), (n + k, n + k))
+    label = connected_components(graph, directed=False)[1]
+    ends = np.cumsum([0, *(len(joint.gap) for joint in joints)])
+    for group in dict.fromkeys(label[:n].tolist()):
+        here = np.flatnonzero(label[:n] == group)
+        rows = np.concatenate([np.arange(ends[j], ends[j + 1]) for j in here])
+        columns = np.unique(np.concatenate([touched[j] for j in here]))
+        yield RowGroup(tuple(joints[int(j)] for j in here), rows, columns)
+
+
+def _columns(joint: ConstraintJoint) -> Int[np.ndarray, " c"]:
+    """Interface unknowns that a joint's rows touch."""
+    own = [np.flatnonzero(side.onto.any(axis=(0, 1))) for side in joint.sides if side is not None]
+    return np.unique(np.concatenate([*own, *(_columns(other) for _, other in joint.plus), np.zeros(0, int)]))
 
 
 def port_rows(joint: ConstraintJoint, motion: RigidMotion) -> list[tuple[Side, Float[np.ndarray, "T r _ _"]]]:

@@ -37,26 +37,25 @@ def independent(
     attachments on the new unknowns, and Z
     """
     relations = [_relation(each) for each in every]
-    B = np.vstack([each.B for each in every])
-    shares, loose, from_rows = np.eye(len(B)), np.zeros((len(B), 0)), np.zeros((len(B), 0))
-    Z = np.eye(B.shape[1])
+    B = sp.vstack([sp.csr_array(each.B) for each in every], format="csr")
+    h, k = B.shape
+    shares, loose, from_rows = sp.eye_array(h, format="csr"), sp.csr_array((h, 0)), sp.csr_array((h, 0))
+    Z = sp.eye_array(k, format="csr")
     if not all(kept.all() for kept, _ in relations):
-        L = scipy.linalg.block_diag(*(L for _, L in relations))
-        kept = np.concatenate([kept for kept, _ in relations])
-        left = B - L @ B[kept]
+        L = sp.block_diag([L for _, L in relations], format="csr")
+        left = B - L @ B[np.concatenate([kept for kept, _ in relations])]
         Z = _null_space(left, list(_blocks(left)))
         shares, from_rows, loose = _port_forces(L, B, own, riding)
-    ends = np.cumsum([len(each.keep) for each in every])[:-1]
-    columns = np.cumsum([kept.sum() for kept, _ in relations])[:-1]
-    return [
-        replace(
-            each, keep=each.keep[kept], B=each.B[kept] @ Z, loose=_placed(each, theirs),
-            shares=tuple(_placed(each, x) for x in np.split(share, columns, axis=1)), from_rows=_placed(each, rows),
-        )
-        for each, (kept, _), share, theirs, rows in zip(
-            every, relations, np.split(shares, ends), np.split(loose, ends), np.split(from_rows, ends), strict=True
-        )
-    ], Z  # fmt: skip
+    found, first = [], 0
+    for each, (kept, _) in zip(every, relations, strict=True):
+        here = slice(first, first := first + len(each.keep))
+        found.append(
+            replace(
+                each, keep=each.keep[kept], B=each.B[kept] @ Z, shares=_placed(each, shares[here]),
+                from_rows=_placed(each, from_rows[here]), loose=_placed(each, loose[here]),
+            )
+        )  # fmt: skip
+    return found, Z.toarray()
 
 
 def _relation(each: Attachment) -> tuple[Bool[np.ndarray, " h"], Float[np.ndarray, "h q"]]:
@@ -86,8 +85,8 @@ def _independent_rows(W: Float[np.ndarray, "p b"]) -> tuple[Int[np.ndarray, " r"
 
 
 def _port_forces(
-    L: Float[np.ndarray, "h q"], B: Float[np.ndarray, "h k"], own: Sequence[int], riding: Sequence[int]
-) -> tuple[Float[np.ndarray, "h q"], Float[np.ndarray, "h o"], Float[np.ndarray, "h r"]]:
+    L: sp.csr_array, B: sp.csr_array, own: Sequence[int], riding: Sequence[int]
+) -> tuple[sp.csr_array, sp.csr_array, sp.csr_array]:
     """Forces μ at all ports from the λ at the independent ones, Lᵀ μ = λ, every joint in balance, Bᵀ μ = p.
 
     p is zero but for what rows exert on their own unknowns.
@@ -97,11 +96,16 @@ def _port_forces(
     (h, q) μ from λ, (h, o) μ from p of the rows' own unknowns, and (h, r) the μ that neither equation sees
     """
     determined = np.setdiff1d(np.arange(B.shape[1]), riding)  # what holds a slider is left open
-    G = np.vstack([L.T, B.T[determined]])
-    inverse, blocks = np.zeros(G.T.shape), list(_blocks(G))
-    for rows, columns in blocks:
-        inverse[np.ix_(columns, rows)] = np.linalg.pinv(G[np.ix_(rows, columns)], rcond=DEPENDENT)
-    inverse[np.abs(inverse) < DEPENDENT] = 0.0  # rounding
+    G = sp.vstack([L.T, B.T.tocsr()[determined]], format="csr")
+    blocks = list(_blocks(G))
+    parts = [np.linalg.pinv(G[rows][:, columns].toarray(), rcond=DEPENDENT) for rows, columns in blocks]
+    inverse = _assembled(
+        [
+            (columns, rows, np.where(np.abs(part) < DEPENDENT, 0.0, part))  # rounding
+            for (rows, columns), part in zip(blocks, parts, strict=True)
+        ],
+        G.T.shape,
+    )
     q = L.shape[1]
     return (
         inverse[:, :q],
@@ -110,23 +114,39 @@ def _port_forces(
     )
 
 
-def _null_space(A: Float[np.ndarray, "m n"], blocks: Sequence[Block]) -> Float[np.ndarray, "n r"]:
+def _null_space(A: sp.csr_array, blocks: Sequence[Block]) -> sp.csr_array:
     """Orthonormal basis of A x = 0, A of order one: each of its vectors within one block, so that few bodies share it."""
-    alone, parts = np.ones(A.shape[1], bool), list[np.ndarray]()
-    for rows, own in blocks:
-        _, s, Vt = np.linalg.svd(A[np.ix_(rows, own)])
-        part = np.zeros((A.shape[1], len(own) - int((s > DEPENDENT).sum())))
-        part[own] = Vt[len(own) - part.shape[1] :].T
-        parts.append(part)
-        alone[own] = False
-    every = np.concatenate([np.eye(A.shape[1])[:, alone], *parts], axis=1)
-    first = np.abs(every).argmax(axis=0)
-    return np.asarray(every[:, np.argsort(first, kind="stable")])
+    alone, parts, count = np.ones(A.shape[1], bool), [], 0
+    for rows, columns in blocks:
+        _, s, Vt = np.linalg.svd(A[rows][:, columns].toarray())
+        part = Vt[int((s > DEPENDENT).sum()) :].T
+        parts.append((columns, count + np.arange(part.shape[1]), part))
+        count, alone[columns] = count + part.shape[1], False
+    alone = np.flatnonzero(alone)
+    parts.append((alone, count + np.arange(len(alone)), np.eye(len(alone))))
+    every = _assembled(parts, (A.shape[1], count + len(alone)))
+    first = abs(every).argmax(axis=0)
+    return every[:, np.argsort(first, kind="stable")]
 
 
-def _blocks(A: Float[np.ndarray, "m n"]) -> Iterator[Block]:
+def _assembled(
+    parts: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]], shape: tuple[int, int]
+) -> sp.csr_array:
+    """Dense parts at their rows and columns."""
+    rows, columns, values = (
+        np.concatenate([x.ravel() for x in each] or [np.zeros(0)])
+        for each in zip(*((*np.broadcast_arrays(i[:, None], j), x) for i, j, x in parts), strict=True)
+    )
+    out = sp.csr_array((values, (rows.astype(int), columns.astype(int))), shape)
+    out.eliminate_zeros()
+    return out
+
+
+def _blocks(A: sp.csr_array) -> Iterator[Block]:
     """Rows and columns of each part of a matrix that shares none with the others; columns of zeros are left out."""
-    m, (rows, columns) = len(A), np.nonzero(np.abs(A) > ROUNDING)
+    m, entries = A.shape[0], A.tocoo()
+    large = np.abs(entries.data) > ROUNDING
+    rows, columns = entries.row[large], entries.col[large]
     count = m + A.shape[1]
     graph = sp.coo_array((np.ones(len(rows)), (rows, m + columns)), (count, count))
     label = connected_components(graph, directed=False)[1]
@@ -135,8 +155,8 @@ def _blocks(A: Float[np.ndarray, "m n"]) -> Iterator[Block]:
         yield np.flatnonzero(label[:m] == part), used[label[m + used] == part]
 
 
-def _placed(each: Attachment, rows: Float[np.ndarray, "h c"]) -> Float[np.ndarray, "m c"]:
+def _placed(each: Attachment, rows: sp.csr_array) -> sp.csr_array:
     """Rows of held components among those of all components of all ports."""
-    out = np.zeros((each.components * len(each.weights), rows.shape[1]))
-    out[each.keep] = rows
-    return out
+    entries = rows.tocoo()
+    shape = each.components * len(each.weights), rows.shape[1]
+    return sp.csr_array((entries.data, (each.keep[entries.row], entries.col)), shape)

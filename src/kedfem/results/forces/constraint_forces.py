@@ -2,13 +2,21 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, in_plane
-from kedfem.dynamics.joints.constraint_matrices import JointRows, directions, joint_rows, port_rows
+from kedfem.dynamics.joints.constraint_matrices import (
+    JointRows,
+    RowGroup,
+    directions,
+    joint_rows,
+    port_rows,
+    row_groups,
+)
 from kedfem.dynamics.joints.ports import turned_ports
 from kedfem.dynamics.model import Model
 from kedfem.motion.rigid import resting
@@ -18,16 +26,21 @@ DEPENDENT = 1e-9  # singular values of rows of length one: below, one row says w
 
 @dataclass
 class ConstraintForces:
-    """μ of all rows over successive blocks, worked out once for each block."""
+    """μ of all rows over successive blocks, worked out once for each block; rows that share no unknown one by one."""
 
     model: Model
     block: Block | None = None
     mu: Float[np.ndarray, "T r"] = field(default_factory=lambda: np.zeros((0, 0)))
 
+    @cached_property
+    def groups(self) -> tuple[RowGroup, ...]:
+        """Joints by constraint equations that share interface unknowns."""
+        return tuple(row_groups(self.model.rows))
+
     def of(self, block: Block) -> Float[np.ndarray, "T r"]:
         """Force of each row on link i along its gap, moment along its turn [N, N m]; none where no joint has rows."""
         if block is not self.block:
-            self.mu, self.block = _multipliers(self.model, block), block
+            self.mu, self.block = self._multipliers(block), block
         return self.mu
 
     def wrench(
@@ -63,6 +76,47 @@ class ConstraintForces:
                     out.append(np.einsum("tr,trpd->tpd", here, each).reshape(len(here), -1))
         return np.concatenate(out, axis=1)
 
+    def _multipliers(self, block: Block) -> Float[np.ndarray, "T r"]:
+        rows = sum(len(group.rows) for group in self.groups)
+        p = np.zeros((len(block), self.model.joints[0].B.shape[1] if rows else 0))
+        for joint, history in zip(self.model.joints, block.links, strict=True):
+            columns = np.flatnonzero(joint.B.any(axis=0)) if rows else np.zeros(0, int)
+            if len(columns):
+                p[:, columns] += turned_ports(joint, history.R, history.port_forces) @ joint.B[:, columns]
+        mu = np.zeros((len(block), rows))
+        for group in self.groups:
+            C, size = _scaled(group.over(block.motion))
+            inverse = np.linalg.pinv(C.transpose(0, 2, 1), rcond=DEPENDENT)
+            mu[:, group.rows] = np.einsum("trk,tk->tr", inverse, p[:, group.columns]) / size
+        return mu
+
+    def determined(self, name: str) -> tuple[bool, bool]:
+        """Whether statics determine the force and the moment of a joint enforced by constraint equations.
+
+        What a planar link holds of a solid out of the plane, other joints hold already; nothing there loads either.
+        """
+        group = next((x for x in self.groups if any(joint.name == name for joint in x.joints)), None)
+        if group is None:
+            return True, True
+        C, null = _null_space(group)
+        joint, here = of_joint(group.joints, name)
+        loose = np.abs(null[here]).max(axis=1, initial=0.0) > 1e3 * DEPENDENT
+        planar = {body for link, body in zip(self.model.links, self.model.bodies, strict=True) if link.planar}
+        if planar.intersection(joint.bodies):
+            loose &= C[here].any(axis=1) | in_plane(joint.gap, joint.turn)
+        force, moment = joint.gap.any(axis=1), joint.turn.any(axis=1)
+        return not bool((loose & force).any()), not bool((loose & moment).any())
+
+    def shared(self, name: str) -> list[str]:
+        """Joints whose constraints repeat those of a joint, in the reference position."""
+        for group in self.groups:
+            if any(joint.name == name for joint in group.joints):
+                null = np.abs(_null_space(group)[1]) > 1e3 * DEPENDENT
+                columns = null[of_joint(group.joints, name)[1]].any(axis=0)
+                each = ((joint.name, of_joint(group.joints, joint.name)[1]) for joint in group.joints)
+                return [other for other, here in each if null[here][:, columns].any()]
+        return []
+
 
 def of_joint(joints: Sequence[ConstraintJoint], name: str) -> tuple[ConstraintJoint, slice]:
     """A joint enforced by constraint equations, and where its rows are among all."""
@@ -74,56 +128,12 @@ def of_joint(joints: Sequence[ConstraintJoint], name: str) -> tuple[ConstraintJo
     raise KeyError(name)
 
 
-def known(model: Model, name: str) -> tuple[bool, bool]:
-    """Whether statics determine the force and the moment of a joint enforced by constraint equations.
-
-    What a planar link holds of a solid out of the plane, other joints hold already; nothing there loads either.
-    """
-    found = _null_space(model)
-    if found is None:
-        return True, True
-    C, null = found
-    joint, here = of_joint(model.rows, name)
-    loose = np.abs(null[here]).max(axis=1, initial=0.0) > 1e3 * DEPENDENT
-    if any(
-        link.planar and body in joint.bodies for link, body in zip(model.links, model.bodies, strict=True)
-    ):
-        loose &= C[here].any(axis=1) | in_plane(joint.gap, joint.turn)
-    force, moment = joint.gap.any(axis=1), joint.turn.any(axis=1)
-    return not bool((loose & force).any()), not bool((loose & moment).any())
-
-
-def shared_rows(model: Model, name: str) -> list[str]:
-    """Joints whose constraints repeat those of a joint, in the reference position."""
-    found = _null_space(model)
-    if found is None or not any(joint.name == name for joint in model.rows):
-        return []
-    null = found[1]
-    columns = np.abs(null[of_joint(model.rows, name)[1]]).max(axis=0, initial=0.0) > 1e3 * DEPENDENT
-    each = ((joint.name, of_joint(model.rows, joint.name)[1]) for joint in model.rows)
-    return [other for other, here in each if (np.abs(null[here][:, columns]) > 1e3 * DEPENDENT).any()]
-
-
-def _null_space(model: Model) -> tuple[Float[np.ndarray, "r k"], Float[np.ndarray, "r n"]] | None:
-    """Rows of all joints in the reference position, and the combinations of them that say nothing; None without rows."""
-    bodies = 1 + max((b for joint in model.rows for b in joint.bodies), default=0)
-    rows = joint_rows(model.rows, resting(bodies, np.zeros(1)))
-    if rows is None:
-        return None
-    U, s, _ = np.linalg.svd(_scaled(rows.C)[0][0])
-    return rows.C[0], U[:, int((s > DEPENDENT).sum()) :]
-
-
-def _multipliers(model: Model, block: Block) -> Float[np.ndarray, "T r"]:
-    rows = joint_rows(model.rows, block.motion)
-    if rows is None:
-        return np.zeros((len(block), 0))
-    p = np.zeros((len(block), rows.C.shape[2]))
-    for joint, history in zip(model.joints, block.links, strict=True):
-        p += turned_ports(joint, history.R, history.port_forces) @ joint.B
-    C, size = _scaled(rows.C)
-    inverse = np.linalg.pinv(C.transpose(0, 2, 1), rcond=DEPENDENT)
-    return np.asarray(np.einsum("trk,tk->tr", inverse, p) / size)
+def _null_space(group: RowGroup) -> tuple[Float[np.ndarray, "r c"], Float[np.ndarray, "r n"]]:
+    """Rows of joints in the reference position, and the combinations of them that say nothing."""
+    bodies = 1 + max(b for joint in group.joints for b in joint.bodies)
+    C = group.over(resting(bodies, np.zeros(1)))
+    U, s, _ = np.linalg.svd(_scaled(C)[0][0])
+    return C[0], U[:, int((s > DEPENDENT).sum()) :]
 
 
 def _scaled(C: Float[np.ndarray, "T r k"]) -> tuple[Float[np.ndarray, "T r k"], Float[np.ndarray, "T r"]]:

@@ -3,9 +3,11 @@
 from collections.abc import Collection, Iterator
 
 import numpy as np
+from jaxtyping import Float
 
+from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.model import Model
-from kedfem.results.forces.constraint_forces import shared_rows
+from kedfem.results.forces.constraint_forces import ConstraintForces
 from kedfem.results.forces.port_forces import INDETERMINATE, rows_of_joint
 from kedfem.results.recorded import drive_effort
 from kedfem.scene import GROUND, Scene
@@ -43,7 +45,7 @@ def _reason(scene: Scene, model: Model, name: str) -> str:
     links = [link for link in scene.joints[name].links if link != GROUND]
     if not elastic & set(links):
         return f"it joins rigid links alone ({', '.join(links)}), whose constraints are not solved for"
-    others = sorted({*_partners(model, name), *shared_rows(model, name)} - {name, ""})
+    others = sorted({*_partners(model, name), *ConstraintForces(model).shared(name)} - {name, ""})
     if not others:
         return "the balance of forces does not determine it: it bears on what others constrain already"
     return (
@@ -54,15 +56,15 @@ def _reason(scene: Scene, model: Model, name: str) -> str:
 
 def _partners(model: Model, name: str) -> Iterator[str]:
     """Joints whose port forces may change together with those of a joint, in balance."""
-    here = [x.loose[rows_of_joint(x, name)] for x in model.joints if name in x.joints]
+
+    def largest(x: Attachment, joint: str) -> Float[np.ndarray, " r"]:
+        return np.asarray(abs(x.loose[rows_of_joint(x, joint)]).max(axis=0).toarray()).ravel()
+
+    here = [largest(x, name) for x in model.joints if name in x.joints and x.loose.shape[1]]
     if not here:
         return
-    columns = np.abs(np.vstack(here)).max(axis=0, initial=0.0) > INDETERMINATE
+    columns = np.max(here, axis=0) > INDETERMINATE
     for each in model.joints:
         for other in set(each.joints):
-            if (
-                columns.any()
-                and np.abs(each.loose[rows_of_joint(each, other)][:, columns]).max(initial=0.0)
-                > INDETERMINATE
-            ):
+            if columns.any() and largest(each, other)[columns].max() > INDETERMINATE:
                 yield other

@@ -11,7 +11,6 @@ from kedfem.dynamics.joints.constraint_joints import ordered
 from kedfem.dynamics.model import Model, PrescribedBody, Slider
 from kedfem.links.record import in_space
 from kedfem.motion.constraints import cross
-from kedfem.results.forces.constraint_forces import known
 from kedfem.results.forces.hub_forces import constrained_joints, hub_wrench, partner
 from kedfem.results.forces.port_forces import Forces, determinate, holder, loose, negligible, port_wrench
 from kedfem.results.recorded import Recorded, Rows, once
@@ -50,7 +49,7 @@ def _row_joint(scene: Scene, model: Model, name: str, forces: Forces) -> list[Re
     on, other = (second, first) if first == GROUND else (first, second)
     sign = 1.0 if ordered(scene.joints[name])[0] == on else -1.0
     label = f"of joint {name} on link {on} from {other}"
-    return _channels(name, label, partial(forces.rows.wrench, name), known(model, name), sign)
+    return _channels(name, label, partial(forces.rows.wrench, name), forces.rows.determined(name), sign)
 
 
 def _channels(
@@ -79,7 +78,7 @@ def _hub(scene: Scene, model: Model, prescribed: PrescribedBody, forces: Forces)
     """Force and moment that the driven joint exerts on a rigid link that moves with it."""
     wrench, others = hub_wrench(scene, model, prescribed, forces)
     determined = [all(negligible(loose(model, *x)[which]) for x in others) for which in (0, 1)]
-    rows = [known(model, name) for name in constrained_joints(scene, model, prescribed)]
+    rows = [forces.rows.determined(name) for name in constrained_joints(scene, model, prescribed)]
     determined = [determined[which] and all(x[which] and x[0] for x in rows) for which in (0, 1)]
     label = f"of joint {prescribed.hub} on link {prescribed.link.name} from {partner(scene, prescribed)}"
     return _channels(prescribed.hub, label, wrench, determined)

@@ -126,7 +126,7 @@ def load_case(at: Snapshot, k: int, model: Model, full: Model, statics: Statics)
 def _joint_forces(joint: Attachment, n: int, now: LinkMoment) -> dict[str, Forces]:
     """Wᵀ λ of each joint; of all together where several share a coupling surface."""
     at_ports = port_vectors(joint, now.port_forces)
-    apart = not any(np.abs(x).max(initial=0.0) > 0 for x in (joint.loose, joint.from_rows)) and _whole(joint)
+    apart = not (joint.loose.nnz or joint.from_rows.nnz) and _whole(joint)
     names = list(dict.fromkeys(joint.joints))
     out: dict[str, Forces] = {}
     for name in names if apart else ["s"] * bool(names):

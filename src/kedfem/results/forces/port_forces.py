@@ -1,9 +1,10 @@
 """Forces and moments that the ports of a joint exert on a link, block by block."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from kedfem.dynamics.history import Block
@@ -35,7 +36,7 @@ def port_wrench(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"], fo
     attachment, link = model.joints[k], model.links[k]
     rows = rows_of_joint(attachment, joint)
     arms, placed = _arms(attachment, joint, at), _arms_over_time(model, k, joint, at)
-    shares = [(j, attachment.shares[j][rows]) for j in _sharing(attachment, rows)]
+    shares = list(_sharing(model, attachment.shares[rows]))
     from_rows = attachment.from_rows[rows]
 
     def wrench(block: Block) -> tuple[Rows, Rows]:
@@ -43,20 +44,18 @@ def port_wrench(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"], fo
         for j, share in shares:
             history = block.links[j]
             f += turned_ports(model.joints[j], history.R, history.port_forces) @ share.T
-        if from_rows.any():
+        if from_rows.nnz:
             f += forces.rows.on_ports(block) @ from_rows.T
         return resultant(link, placed(block), f.reshape(len(f), len(arms), link.d))
 
     return wrench
 
 
-def _sharing(attachment: Attachment, rows: Int[np.ndarray, " m"]) -> Int[np.ndarray, " l"]:
-    """Links whose port forces show some of a link's."""
-    if not attachment.shares:
-        return np.zeros(0, int)
-    ends = np.cumsum([share.shape[1] for share in attachment.shares])
-    determined = np.concatenate(attachment.shares, axis=1)[rows].any(axis=0)
-    return np.unique(np.searchsorted(ends, np.flatnonzero(determined), side="right"))
+def _sharing(model: Model, shares: sp.csr_array) -> Iterator[tuple[int, Float[np.ndarray, "m q"]]]:
+    """Links whose port forces show some of a link's, and what of each."""
+    ends = np.cumsum([0, *(len(joint.keep) for joint in model.joints)])
+    for j in np.unique(np.searchsorted(ends, np.unique(shares.indices), side="right") - 1):
+        yield int(j), shares[:, ends[j] : ends[j + 1]].toarray()
 
 
 def _arms_over_time(
@@ -104,7 +103,7 @@ def loose(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> tuple
     """Forces and moments of a joint that statics leave open, in the reference position."""
     attachment = model.joints[k]
     arms, link = _arms(attachment, joint, at), model.links[k]
-    loose = attachment.loose[rows_of_joint(attachment, joint)].T
+    loose = attachment.loose[rows_of_joint(attachment, joint)].toarray().T
     return resultant(link, arms[None], loose.reshape(len(loose), len(arms), link.d))
 
 

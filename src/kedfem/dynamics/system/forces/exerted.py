@@ -99,7 +99,7 @@ def at_ends(forces: Supports, each: Constraint, n: int) -> Float[np.ndarray, "T 
 
 def _on_ports(forces: Supports, joints: Sequence[ConstraintJoint]) -> Float[np.ndarray, "T m"]:
     """Forces on the interface points of joints by constraint equations, side by side, if joint forces need them."""
-    if not any(joint.from_rows.any() for joint in forces.of.system.model.joints):
+    if not any(joint.from_rows.nnz for joint in forces.of.system.model.joints):
         return np.zeros((len(forces.z), 0))
     return forces.on_interface(joints)
 
