@@ -86,9 +86,12 @@ def forcing_of(
 
 def instants(model: Model, motion: RigidMotion, stresses: Stiffening | None = None) -> list[Instant]:
     """Orientation, load, spin and, if given, stress stiffness of all links at each time point."""
-    forcing, rows = forcings(model, motion), joint_rows(model.rows, motion)
+    forcing = forcings(model, motion)
     if stresses is not None:
-        forcing = stresses.stressed(forcing, motion, rows)
+        forcing = stresses.over(forcing, motion)
+    ties = (
+        joint_rows(model.rows, motion.part(k, k + 1)) for k in range(len(motion.t))
+    )  # of many links each is large
     W = cross_matrix(motion.omega)
     spin = cross_matrix(motion.alpha) + W @ W
     return [
@@ -96,9 +99,9 @@ def instants(model: Model, motion: RigidMotion, stresses: Stiffening | None = No
             [each.at(k) for each in forcing],
             [spin[k, body, : link.d, : link.d] for link, body in zip(model.links, model.bodies, strict=True)],
             None if stresses is None else stresses.turnings([each.at(k) for each in forcing]),
-            None if rows is None else static_tie(rows, k),
+            None if rows is None else static_tie(rows, 0),
         )
-        for k in range(len(motion.t))
+        for k, rows in enumerate(ties)
     ]
 
 

@@ -5,18 +5,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 from jaxtyping import Float
+from scipy.sparse.linalg import lsqr
 
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.constraint_matrices import JointRows
 from kedfem.dynamics.joints.ports import port_rotation, port_values
-from kedfem.dynamics.matrices.interface import RowState, Tie
+from kedfem.dynamics.matrices.interface import MANY, RowState, Tie
 from kedfem.dynamics.stepping.state import LinkState, NodalOf
 
 # differences of fourth and third order at the first of five instants
 FIRST = np.array([-25, 48, -36, 16, -3]) / 12
 SECOND = np.array([35, -104, 114, -56, 11]) / 12
 INSTANTS = len(FIRST)
+ROUNDING = 1e-15
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +64,9 @@ def first_rows(rows: JointRows, h: float) -> FirstRows:
 def interface_values(joints: Sequence[Attachment], u: Sequence[NodalOf]) -> Float[np.ndarray, " k"]:
     """z from states with joints closed, world components: W u = B z."""
     w = np.concatenate([port_values(joint, x) for joint, x in zip(joints, u, strict=True)])
+    if joints[0].B.shape[1] > MANY:
+        B = sp.vstack([sp.csr_array(joint.B) for joint in joints], format="csr")
+        return np.asarray(lsqr(B, w, atol=ROUNDING, btol=ROUNDING, conlim=0.0)[0])
     return np.asarray(np.linalg.lstsq(np.vstack([joint.B for joint in joints]), w, rcond=None)[0])
 
 

@@ -18,12 +18,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
+import scipy.sparse as sp
 from jaxtyping import Float
 
 from kedfem.dynamics.joints.constraint_matrices import JointRows
+from kedfem.dynamics.matrices.cholesky import Cholesky
 from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.errors import SolveError
 
+MANY = 400  # interface unknowns above which few links share each, and their matrix is sparse
 DEPENDENT = 1e-11  # what is left of a row's own compliance where other rows hold what it holds
 
 
@@ -31,12 +34,12 @@ DEPENDENT = 1e-11  # what is left of a row's own compliance where other rows hol
 class Tie:
     """What rows ask at one solution of the interface system.
 
-    C : (r, k); compliance : (r,) 1/κ, zero of rows that hold
+    C : (r, k), sparse where k is large; compliance : (r,) 1/κ, zero of rows that hold
     target : (r,) C z of rows that hold; zero of springs
     force : (k,) known forces on the interface
     """
 
-    C: Float[np.ndarray, "r k"]
+    C: Float[np.ndarray, "r k"] | sp.csr_array
     compliance: Float[np.ndarray, " r"]
     target: Float[np.ndarray, " r"]
     force: Float[np.ndarray, " k"]
@@ -55,16 +58,18 @@ class RowState:
 
 
 def solved(
-    H: Float[np.ndarray, "k k"], f: Float[np.ndarray, " k"], tie: Tie | None
+    H: Float[np.ndarray, "k k"] | sp.csr_array, f: Float[np.ndarray, " k"], tie: Tie | None
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " r"]]:
-    """Interface unknowns z and the rows' forces m.
+    """Interface unknowns z and the rows' forces m; of a sparse H by a sparse factor.
 
     Raises
     ------
     SolveError
         If H is not positive definite.
     """
-    k = 0.0 if tie is None else _beside(H, tie)
+    if sp.issparse(H):
+        return _solved_sparsely(sp.csr_array(H), f, tie)
+    k = np.zeros(0) if tie is None else _beside(H, tie)
     try:
         if tie is not None:
             H = H + (tie.C.T * k) @ tie.C
@@ -75,23 +80,43 @@ def solved(
         return np.asarray(scipy.linalg.cho_solve(factor, f, check_finite=False)), np.zeros(0)
     Y = scipy.linalg.solve_triangular(factor[0], tie.C.T, lower=True, check_finite=False)
     z = np.asarray(scipy.linalg.cho_solve(factor, f + tie.force, check_finite=False))
-    compliance = tie.compliance / (1 - k * tie.compliance)
-    G = Y.T @ Y + np.diag(compliance)
-    L, kept = semidefinite_factor(G)
+    X = scipy.linalg.solve_triangular(factor[0], Y, lower=True, trans="T", check_finite=False)
+    return _tied(z, X, tie.C, Y.T @ Y, k, tie)
+
+
+def _solved_sparsely(
+    H: sp.csr_array, f: Float[np.ndarray, " k"], tie: Tie | None
+) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " r"]]:
+    """The same by a sparse factor."""
+    if tie is None:
+        return np.array(Cholesky(H, "joints: the joints' common system").solve(f)), np.zeros(0)
+    C, k = sp.csr_array(tie.C), _beside(H, tie)
+    factor = Cholesky(sp.csr_array(H + C.T @ sp.diags_array(k) @ C), "joints: the joints' common system")
+    X, z = factor.solve_many(C.T.toarray()), np.array(factor.solve(f + tie.force))
+    return _tied(z, X, C, C @ X, k, tie)
+
+
+def _tied(
+    z: Float[np.ndarray, " k"], X: Float[np.ndarray, "k r"], C: Float[np.ndarray, "r k"] | sp.csr_array,
+    G: Float[np.ndarray, "r r"], beside: Float[np.ndarray, " r"], tie: Tie,
+) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " r"]]:  # fmt: skip
+    """z and m from z without forces of rows, X = H'⁻¹ Cᵀ and G = C H'⁻¹ Cᵀ."""
+    compliance = tie.compliance / (1 - beside * tie.compliance)
+    L, kept = semidefinite_factor(G + np.diag(compliance))
     m = np.zeros(len(G))
     for _ in range(2):  # the second closes joints to rounding
-        left = tie.target - tie.C @ z - compliance * m
+        left = tie.target - C @ z - compliance * m
         change = np.zeros(len(G))
         change[kept] = scipy.linalg.cho_solve((L, True), left[kept], check_finite=False)
         m += change
-        z += scipy.linalg.solve_triangular(factor[0], Y @ change, lower=True, trans="T", check_finite=False)
-    return z, m - k * (tie.C @ z)
+        z += X @ change
+    return z, m - beside * (C @ z)
 
 
-def _beside(H: Float[np.ndarray, "k k"], tie: Tie) -> Float[np.ndarray, " r"]:
+def _beside(H: Float[np.ndarray, "k k"] | sp.csr_array, tie: Tie) -> Float[np.ndarray, " r"]:
     """σ of each row: about as stiff as the interface is, at most half of a spring."""
-    size = (tie.C**2).sum(axis=1)
-    usual = np.where(size > 0, np.trace(H) / len(H) / np.where(size > 0, size, 1.0), 0.0)
+    size = np.asarray((tie.C * tie.C).sum(axis=1))
+    usual = np.where(size > 0, H.trace() / H.shape[0] / np.where(size > 0, size, 1.0), 0.0)
     return np.asarray(usual / (1 + 2 * usual * tie.compliance))
 
 
@@ -101,9 +126,11 @@ def semidefinite_factor(G: Float[np.ndarray, "r r"]) -> tuple[Float[np.ndarray, 
     kept: list[int] = []
     for i in range(len(G)):
         n = len(kept)
-        row = np.zeros(n)
-        for a, j in enumerate(kept):
-            row[a] = (G[i, j] - row[:a] @ L[a, :a]) / L[a, a]
+        row = (
+            scipy.linalg.solve_triangular(L[:n, :n], G[i, kept], lower=True, check_finite=False)
+            if n
+            else G[i, :0]
+        )
         left = G[i, i] - row @ row
         if left > DEPENDENT * G[i, i]:
             L[n, :n], L[n, n] = row, np.sqrt(left)
@@ -131,5 +158,7 @@ def after_step(tie: Tie, z: np.ndarray, m: np.ndarray, scheme: Scheme, state: Ro
 
 def static_tie(rows: JointRows, at: int) -> Tie:
     """What the rows ask of a linkage at rest."""
-    C = rows.C[at]
-    return Tie(C, 1 / rows.stiffness, np.zeros(len(C)), np.zeros(C.shape[1]))
+    r, k = rows.C[at].shape
+    return Tie(
+        sp.csr_array(rows.C[at]) if k > MANY else rows.C[at], 1 / rows.stiffness, np.zeros(r), np.zeros(k)
+    )

@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.ports import Rotation, port_columns, port_rotation, port_values
 from kedfem.dynamics.matrices.cholesky import Cholesky
-from kedfem.dynamics.matrices.interface import Tie, solved
+from kedfem.dynamics.matrices.interface import MANY, Tie, solved
 from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.dynamics.stepping.state import Nodal, NodalOf, Rayleigh
 from kedfem.errors import SolveError
@@ -142,14 +142,29 @@ def _closed(
     z = np.zeros(parts[0].attachment.B.shape[1])
     if len(z):
         # Σ Bᵀ (R S Rᵀ) B z = Σ Bᵀ R S v
-        H, f = np.zeros((len(z), len(z))), np.zeros(len(z))
+        f = np.zeros(len(z))
         for part, b, c, x in zip(parts, RB, held, v, strict=True):
-            H[np.ix_(c, c)] += b.T @ part.S @ b
             f[c] += b.T @ (part.S @ x)
-        z, _ = solved(H, f, tie)
+        z, _ = solved(
+            _common(held, [b.T @ part.S @ b for part, b in zip(parts, RB, strict=True)], len(z)), f, tie
+        )
     forces = [part.S @ (b @ z[c] - x) for part, b, c, x in zip(parts, RB, held, v, strict=True)]
     g = [x + (part.Y @ force).reshape(x.shape) for part, x, force in zip(parts, y, forces, strict=True)]
     return g, [force[: len(part.attachment.keep)] for part, force in zip(parts, forces, strict=True)]
+
+
+def _common(
+    held: Sequence[Int[np.ndarray, " c"]], own: Sequence[Float[np.ndarray, "c c"]], k: int
+) -> Float[np.ndarray, "k k"] | sp.csr_array:
+    """The links' matrices on the interface unknowns that each has a share in, added up; sparse where there are many."""
+    if k > MANY:
+        columns = [np.broadcast_to(c, (len(c), len(c))) for c in held]
+        at = [np.concatenate([x.ravel() for x in each]) for each in ([c.T for c in columns], columns)]
+        return sp.csr_array(sp.coo_array((np.concatenate([x.ravel() for x in own]), at), (k, k)))
+    H = np.zeros((k, k))
+    for c, x in zip(held, own, strict=True):
+        H[np.ix_(c, c)] += x
+    return H
 
 
 def _interface(part: Substructure, R: Rotation, held: Int[np.ndarray, " c"]) -> Float[np.ndarray, "p c"]:

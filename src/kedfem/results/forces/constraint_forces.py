@@ -1,6 +1,6 @@
 """Joints enforced by constraint equations: their forces, Σ Bᵀ R λ = Cᵀ μ, and the energy of springs in them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -20,6 +20,7 @@ from kedfem.dynamics.joints.constraint_matrices import (
 from kedfem.dynamics.joints.ports import turned_ports
 from kedfem.dynamics.model import Model
 from kedfem.motion.rigid import resting
+from kedfem.results.recorded import once
 
 DEPENDENT = 1e-9  # singular values of rows of length one: below, one row says what others say
 
@@ -65,16 +66,23 @@ class ConstraintForces:
 
     def on_ports(self, block: Block) -> Float[np.ndarray, "T m"]:
         """Forces on the ports of all rows, side by side, world components."""
-        if block.exerted is not None:
-            return block.exerted.ports
-        mu, out, first = self.of(block), [], 0
-        for joint in self.model.rows:
-            here = mu[:, first : first + len(joint.gap)]
-            first += len(joint.gap)
-            for side, each in port_rows(joint, block.motion):
-                if side.shared:
-                    out.append(np.einsum("tr,trpd->tpd", here, each).reshape(len(here), -1))
-        return np.concatenate(out, axis=1)
+        return block.exerted.ports if block.exerted is not None else self._ports(block)
+
+    @cached_property
+    def _ports(self) -> Callable[[Block], Float[np.ndarray, "T m"]]:
+        """The same from the rows' forces, once for all joints that ask."""
+
+        def of(block: Block) -> Float[np.ndarray, "T m"]:
+            mu, out, first = self.of(block), [], 0
+            for joint in self.model.rows:
+                here = mu[:, first : first + len(joint.gap)]
+                first += len(joint.gap)
+                for side, each in port_rows(joint, block.motion):
+                    if side.shared:
+                        out.append(np.einsum("tr,trpd->tpd", here, each).reshape(len(here), -1))
+            return np.concatenate(out, axis=1)
+
+        return once(of)
 
     def _multipliers(self, block: Block) -> Float[np.ndarray, "T r"]:
         rows = sum(len(group.rows) for group in self.groups)
