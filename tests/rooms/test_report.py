@@ -29,9 +29,11 @@ from kedfem.report import surfaces, write_report
 from kedfem.report.animated import Animated, animated
 from kedfem.report.curves import cursor_places, curve_groups
 from kedfem.report.facts import loads_tables, notes_table, steady_table
+from kedfem.report.page import _moment as moment_told
 from kedfem.report.surfaces import placement
-from kedfem.results import read_results
+from kedfem.results import Results, read_results
 from kedfem.results.frequencies import SUMMARY
+from kedfem.results.records import TRAVEL
 from kedfem.scene import read_scene, scene_from
 from tests.browser import Browser, needs_browser
 from tests.frames import frames
@@ -419,3 +421,14 @@ def test_natural_frequencies_are_shown_where_they_are_of_the_same_scene(tmp_path
     for text in ("", "{}", '{"scene": 1}', "[1, 2]", (found.folder / SUMMARY).read_text()[:-9]):
         (found.folder / SUMMARY).write_text(text, encoding="utf-8")
         assert "scene-frequencies" not in told(folder)
+
+
+@pytest.mark.parametrize(("drives", "told"), [(1, "t = 500 ms, drive travel 20 mm"), (2, "t = 500 ms")])
+def test_a_moment_names_the_drives_position_where_there_is_one_drive(drives: int, told: str) -> None:
+    """Of several drives results have the position of the first alone."""
+    drive = {"joint": "A"}
+    scene = (
+        {"drive": drive, "drives": {}} if drives == 1 else {"drive": None, "drives": {"A": drive, "B": drive}}
+    )
+    results = Results(np.zeros(1), np.zeros(1), {}, "complete", "{}", drive=TRAVEL)
+    assert moment_told(scene, results, 0.5, 0.02) == told

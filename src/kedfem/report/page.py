@@ -137,9 +137,9 @@ def _frequencies(results: Results, folder: Path, missing: list[str]) -> dict[str
 
 
 def _moment(scene: Mapping[str, Any], results: Results, time: float, angle: float) -> str:
-    """A time, with the drive's position if there is a drive."""
+    """A time, with the drive's position if there is one drive; of several results have that of the first alone."""
     caption = f"t = {with_prefix(time, 's')}"
-    if not (scene.get("drive") or scene.get("drives")):
+    if bool(scene.get("drive")) + len(scene.get("drives") or ()) != 1:
         return caption
     return f"{caption}, {results.drive.name.replace('_', ' ')} {with_prefix(angle, results.drive.unit)}"
 
