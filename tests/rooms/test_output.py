@@ -560,18 +560,20 @@ def test_masses_that_links_carry_are_balls_where_their_links_take_them(mass: flo
     """As large as balls of steel, r³ = 3 m / 4πρ, but from 1 % to 3 % of all that is drawn; at the tip as it is bent."""
     raw = pushed(driven=False)
     tool = {"kind": "point_mass", "link": "rocker", "at": list(Q), "mass": mass}
-    raw["bodies"] = {"tool": tool, "far": {**tool, "at": list(G)}}
+    wheel = {"kind": "flywheel", "link": "rocker", "at": list(G), "inertia": 0.01}
+    raw["bodies"] = {"tool": tool, "far": {**tool, "at": list(G)}, "wheel": wheel}
     ready, blocks = ran(raw)
     recoveries = [stress_recovery(link) for link in ready.model.links]
     now = blocks[-1].at(len(blocks[-1]) - 1)
     scene = ready.scene
     every = link_fields(ready.model, recoveries, now, 100.0, scene.bodies)
-    assert [(x.name, x.label) for x in every[-2:]] == [(x, f"{x}, {mass:.4g} kg") for x in ("tool", "far")]
+    told = [(x, f"{x}, {mass:.4g} kg") for x in ("tool", "far")]
+    assert [(x.name, x.label) for x in every[-3:]] == [*told, ("wheel", "wheel, 0.01 kg m²")]
     links = [x for x in every if not x.label]
     size = np.linalg.norm(np.ptp(np.concatenate([x.points for x in links[:2]]), axis=0))
     rocker = next(x for x in links if x.name == "rocker").points
     radius = np.clip(np.cbrt(3 * mass / (4 * np.pi * 7850.0)), 0.01 * size, 0.03 * size)
-    for ball in every[-2:]:
+    for ball in every[-3:-1]:
         np.testing.assert_allclose(np.linalg.norm(ball.points[:26] - ball.points[26], axis=1), radius)
         assert np.linalg.norm(rocker - ball.points[26], axis=1).min() < 0.011  # of the section's corners
 

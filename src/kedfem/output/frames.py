@@ -30,7 +30,7 @@ from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.output.fields import DRIVE_FORCE, DRIVE_TORQUE, FORCE, MOMENT, JointField, LinkField, RigidField
 from kedfem.results.recorded import drive_effort
-from kedfem.scene import Body, Scene
+from kedfem.scene import Body, Flywheel, Scene
 
 Place = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]
 Rows = Mapping[str, Float[np.ndarray, "T c"]]
@@ -103,7 +103,7 @@ def _balls(
     for name, body in bodies.items():
         centre = np.asarray(getattr(body, "centre", body.at))
         on = [i for i, link in enumerate(every) if link.name == body.link]
-        if not on or not body.mass:
+        if not on:
             continue  # on a slider without a shape, which is drawn itself
         nearest = {i: np.linalg.norm(X[i] - centre, axis=1) for i in on}
         i = min(on, key={i: x.min() for i, x in nearest.items()}.__getitem__)
@@ -111,10 +111,17 @@ def _balls(
         place = fields[i].points[n] + motion.R[k, numbers[i]] @ (centre - X[i][n])
         points, none = place + _ball(body.mass, size), np.full((27, 6), np.nan)
         moved = np.tile(fields[i].displacement[n], (27, 1))
-        cell, words = np.arange(27)[None], f"{name}, {body.mass:.4g} kg"
+        cell, words = np.arange(27)[None], _words(name, body)
         kind = "hexahedron27"
         out.append(LinkField(name, kind, cell, points, moved, none, none[:, 0], none[:, :2], label=words))
     return out
+
+
+def _words(name: str, body: Body) -> str:
+    """What stands beside a mass; a flywheel may have inertia alone."""
+    if isinstance(body, Flywheel) and not body.mass:
+        return f"{name}, {body.inertia:.4g} kg m²"
+    return f"{name}, {body.mass:.4g} kg"
 
 
 def _ball(mass: float, size: float) -> Float[np.ndarray, "27 3"]:
@@ -223,10 +230,9 @@ def sights(scene: Scene, linkage: Linkage, links: Mapping[str, Link]) -> list[Si
         out.append(Sight(name, body, points[used], numbers.reshape(cells.shape), kind))
     size = float(np.linalg.norm(np.ptp(np.concatenate([each.points for each in out]), axis=0)))
     for name, carried in scene.bodies.items():
-        if carried.mass:
-            points = np.asarray(getattr(carried, "centre", carried.at)) + _ball(carried.mass, size)
-            cell, words = np.arange(27)[None], f"{name}, {carried.mass:.4g} kg"
-            out.append(Sight(name, linkage.bodies.index(carried.link), points, cell, "hexahedron27", words))
+        points = np.asarray(getattr(carried, "centre", carried.at)) + _ball(carried.mass, size)
+        cell, words = np.arange(27)[None], _words(name, carried)
+        out.append(Sight(name, linkage.bodies.index(carried.link), points, cell, "hexahedron27", words))
     return out
 
 
