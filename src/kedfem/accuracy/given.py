@@ -86,5 +86,6 @@ def given_warning(found: Given, asked: float | None = None) -> tuple[str, ...]:
     return (
         f"rigid link {name} gives by up to {1e3 * found.given[k]:.2g} mm, {percent(found.relative)} of the largest "
         f"displacement, to the forces that it passes on: {cause}, and steps of {limit.step:.2g} s let it be no stiffer. "
-        f"It gives with the square of the step: take {float(f'{step:.1g}'):g} s or less",
+        f"It gives with the square of the step: take {float(f'{step:.1g}'):g} s or less, or "
+        "analysis.extrapolation_levels = 2",
     )
