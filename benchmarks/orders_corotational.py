@@ -98,8 +98,8 @@ class Corotational(Mechanism):
     def _solve(self, kind: type) -> float:
         of, state = self.of, self.state
         trial = empty_trial(of.bodies, of.ends, of.constraints, state)
-        trial.Rp[:], trial.H_rows[:], trial.r[:] = np.eye(3), np.eye(len(trial.H)), 1.0
-        names = ("r", "reaction", "w", "force", "SRB", "H_rows", "dz", "right", "held")
+        trial.Rp[:], trial.inverse[:], trial.r[:] = np.eye(3), 1.0, 1.0
+        names = ("r", "reaction", "w", "force", "SRB", "K", "inverse", "x", "dz", "right", "held")
         trial = trial._replace(**{name: getattr(trial, name).astype(kind) for name in names})
         bodies = of.bodies._replace(**{name: getattr(of.bodies, name).astype(kind) for name in "GYS"})
         since = process_time()

@@ -10,9 +10,10 @@ import numpy as np
 from kedfem.compiled import compiled, inner
 from kedfem.dynamics.anderson_kernel import mixed
 from kedfem.dynamics.beams_kernel import begun
+from kedfem.dynamics.matrices.profile_kernel import profile_solved
 from kedfem.dynamics.system.algebra_kernel import add_transposed, frame_copied, product, turned, turned_back
 from kedfem.dynamics.system.bodies_kernel import internal_forces, newmark, orientation
-from kedfem.dynamics.system.interface_kernel import backward, forward, gathered, offset, pushed
+from kedfem.dynamics.system.interface_kernel import gathered, offset, pushed
 from kedfem.dynamics.system.reference import reference
 from kedfem.dynamics.system.rigid_frame_kernel import ported
 from kedfem.dynamics.system.step_kernel import asked, taken
@@ -231,9 +232,11 @@ def solved_often(bodies, count, trial, y):  # type: ignore[no-untyped-def]
             product(bodies.Y, bodies.Y_at[i], p1 - p0, last - first, y[first:last], trial.reaction[p0:p1])
             offset(bodies, i, y[first:last], trial, True)
             pushed(bodies, i, trial)
-        trial.dz[:] = trial.right
-        forward(trial.H_rows, bodies.first, trial.dz)
-        backward(trial.H_rows, bodies.first, trial.dz)
+        for m in range(len(trial.dz)):
+            trial.x[bodies.place[m]] = trial.right[m]
+        profile_solved(trial.K, bodies.first, bodies.row_at, trial.inverse, trial.x)
+        for m in range(len(trial.dz)):
+            trial.dz[m] = trial.x[bodies.place[m]]
         for i in range(len(bodies.motion)):
             first, last, p0, p1 = bodies.at[i], bodies.at[i + 1], bodies.port_at[i], bodies.port_at[i + 1]
             ported(bodies, i, trial)

@@ -13,7 +13,7 @@ from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.start import initial_rates
 from kedfem.dynamics.system.build import system_of
-from kedfem.dynamics.system.layout import groups, near_diagonal
+from kedfem.dynamics.system.layout import profile
 from kedfem.dynamics.system.march import Ready, displacements, march, ready
 from kedfem.dynamics.system.oracle.monolithic import Monolithic, Now
 from kedfem.dynamics.system.oracle.monolithic_steps import nodal_forces
@@ -88,7 +88,7 @@ def rows(of: Ready, x: np.ndarray) -> np.ndarray:
 
 def in_order(of: Ready, z: np.ndarray) -> np.ndarray:
     """Interface unknowns and their rates (3, k) of a state, in the order of the record."""
-    return z[:, near_diagonal(groups(of.system), of.system.unknowns)[0]]
+    return z[:, profile(of.system).number]
 
 
 def by_oracle(of: Begun, count: int, keeps: bool = False) -> tuple[np.ndarray, np.ndarray]:

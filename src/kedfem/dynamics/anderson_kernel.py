@@ -10,7 +10,6 @@ import numpy as np
 
 from kedfem.compiled import inner
 
-DEPENDENT = 1e-11  # what is left of a constraint's own compliance where others constrain the same
 RIDGE = 1e-13  # of a pair's own square: pairs that repeat each other
 
 
@@ -70,49 +69,3 @@ def definite_solved(A, x):  # type: ignore[no-untyped-def]
         for j in range(i + 1, k):
             x[i] -= A[j, i] * x[j]
         x[i] /= A[i, i]
-
-
-@inner
-def factored(H, first):  # type: ignore[no-untyped-def]
-    """Cholesky factor in place, entries of each row from its first column on."""
-    for i in range(len(H)):
-        for j in range(first[i], i + 1):
-            total = H[i, j]
-            for m in range(max(first[i], first[j]), j):
-                total -= H[i, m] * H[j, m]
-            H[i, j] = np.sqrt(total) if i == j else total / H[j, j]
-
-
-@inner
-def partly_factored(G, pivots):  # type: ignore[no-untyped-def]
-    """Cholesky factor in place, of rows whose pivot is not zero; a row that depends on those above gets pivot zero."""
-    for a in range(len(G)):
-        if pivots[a] == 0.0:
-            continue
-        own = G[a, a]
-        for b in range(a):
-            if pivots[b] == 0.0:
-                G[a, b] = 0.0
-                continue
-            for m in range(b):
-                G[a, b] -= G[a, m] * G[b, m]
-            G[a, b] /= G[b, b]
-        for b in range(a):
-            G[a, a] -= G[a, b] ** 2
-        pivots[a] = 1.0 if G[a, a] > DEPENDENT * own else 0.0
-        if pivots[a] != 0.0:
-            G[a, a] = np.sqrt(G[a, a])
-
-
-@inner
-def solved(H, first, x):  # type: ignore[no-untyped-def]
-    """x becomes the solution, by the factor."""
-    k = len(x)
-    for i in range(k):
-        for j in range(first[i], i):
-            x[i] -= H[i, j] * x[j]
-        x[i] /= H[i, i]
-    for i in range(k - 1, -1, -1):
-        x[i] /= H[i, i]
-        for j in range(first[i], i):
-            x[j] -= H[i, j] * x[i]

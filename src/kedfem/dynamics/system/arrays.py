@@ -118,7 +118,8 @@ class Bodies(NamedTuple):
     passed : where its coordinates stand among those that passes change, −1 if none
     port_at : (i + 1,) held components q; component : of each; group_at : (i + 2...) where interface points begin
     G, Y, W : N × N, q × N, q × N of each, in `G_at`, `Y_at`; S, B : q × q and q × c, in `S_at`, `B_at`
-    column_at, columns : interface unknowns that each body knows; first : profile of their common matrix
+    column_at, columns : interface unknowns that each body knows
+    place, first, row_at, multiplier : row of each of these in the matrix of the interface, and its profile, see `Profile`
     X, one, fit : coordinates of position and of unity, and the frames' weights; K : N × N of co-rotational ones
     beams : those that know their strains at points; elements : of beams in space, whose strains need no frame
     turning : loads that turn with bodies
@@ -150,7 +151,10 @@ class Bodies(NamedTuple):
     B: Any
     column_at: Any
     columns: Any
+    place: Any
     first: Any
+    row_at: Any
+    multiplier: Any
     X: Any
     one: Any
     fit: Any
@@ -196,6 +200,7 @@ class Constraints(NamedTuple):
     linear, law : (r,); numbers : (r, 4) of a law; drive : (r,) whose travel is taken from the coordinate, −1: none
     over, curve_at, abscissa, period : of curves; cubics : (c, 4) from each abscissa on, as `Pieces` has them
     jumps : (r,) stops with damping, whose push begins at once: a step in which it does is divided
+    place : (r,) row of each in the matrix of the interface; column_at, columns : interface unknowns that each couples
     """
 
     term_at: Any
@@ -216,3 +221,6 @@ class Constraints(NamedTuple):
     cubics: Any
     period: Any
     jumps: Any
+    place: Any
+    column_at: Any
+    columns: Any

@@ -11,7 +11,7 @@ from kedfem.dynamics.system.state import History, State, Trial, Work
 
 def empty_state(bodies: Bodies, of: Constraints) -> State:
     """A state of zeros, frames in the reference position."""
-    N, L, k, r = int(bodies.at[-1]), len(bodies.motion), len(bodies.first), len(of.law)
+    N, L, k, r = int(bodies.at[-1]), len(bodies.motion), len(bodies.place), len(of.law)
     b, _, E = bodies.beams.tangent.shape
     moving = sum(int(n) for n, at in zip(np.diff(bodies.at), bodies.passed, strict=True) if at >= 0) + k
     direction = np.zeros((b, 2, E))
@@ -29,19 +29,19 @@ def empty_state(bodies: Bodies, of: Constraints) -> State:
 
 def empty_trial(bodies: Bodies, ends: Ends, of: Constraints, like: State) -> Trial:
     """Room for the end of a step."""
-    L, k, r, E = len(bodies.motion), len(bodies.first), len(of.law), len(ends.form)
+    L, k, r, E = len(bodies.motion), len(bodies.place), len(of.law), len(ends.form)
     b, _, points = bodies.beams.tangent.shape
-    q, B = int(bodies.port_at[-1]), int(bodies.B_at[-1])
+    q, B, size = int(bodies.port_at[-1]), int(bodies.B_at[-1]), int(bodies.row_at[-1])
     place = (np.zeros((E, 3)), np.zeros((E, 3, 3)), np.zeros((E, 3, 3)), np.zeros((E, 3, 3)))
     return Trial(
         u=like.u.copy(), f=like.u.copy(), damped=like.damped.copy(), seen=like.seen.copy(), Q=like.Q.copy(),
         angle=like.angle.copy(), base=np.zeros((b, 4, points)), resisted=np.zeros((b, 3, points)),
         strained=np.zeros((b, 6, points)), r=like.u.copy(), held=like.u.copy(),
         reaction=np.zeros(q), w=np.zeros(q), force=np.zeros(q),
-        Rp=np.zeros((L, 3, 3)), RB=np.zeros(B), SRB=np.zeros(B), H=np.zeros((k, k)), H_rows=np.zeros((k, k)),
-        z=np.zeros(k), e=np.zeros(r), turned=like.turned.copy(), C=np.zeros((r, k)), CH=np.zeros((r, k)),
-        G=np.zeros((r, r)), target=np.zeros(r), compliance=np.zeros(r), beside=np.zeros(r), pivots=np.zeros(r),
-        m=np.zeros(r), left=np.zeros(r), right=np.zeros(k), dz=np.zeros(k), part=np.zeros(k),
+        Rp=np.zeros((L, 3, 3)), RB=np.zeros(B), SRB=np.zeros(B), H=np.zeros(size), K=np.zeros(size),
+        inverse=np.zeros(k + r), x=np.zeros(k + r), z=np.zeros(k), e=np.zeros(r), turned=like.turned.copy(),
+        C=np.zeros(len(of.columns)), target=np.zeros(r), compliance=np.zeros(r), beside=np.zeros(r), m=np.zeros(r),
+        right=np.zeros(k), dz=np.zeros(k), row=np.zeros(k),
         change=np.zeros(like.last.shape[1]), mixing=np.zeros((DEPTH + 1, DEPTH)),
         fixed=place, moving=tuple(x.copy() for x in place), stress=np.zeros(int(bodies.stresses.at[-1])),
         response=np.zeros(len(like.u)), foreseen=np.zeros(len(like.u)),
@@ -64,7 +64,7 @@ def empty_history(
     T: int, bodies: Bodies, of: Constraints, F: Float[np.ndarray, "T N"] | None = None
 ) -> History:
     """Room for T time points; of applied forces that are known beforehand none."""
-    N, L, k, r = int(bodies.at[-1]), len(bodies.motion), len(bodies.first), len(of.law)
+    N, L, k, r = int(bodies.at[-1]), len(bodies.motion), len(bodies.place), len(of.law)
     b, _, E = bodies.beams.tangent.shape
     u, v, a, g, Kg = np.zeros((5, T, N))
     forces = np.zeros((T, N)) if F is None else F

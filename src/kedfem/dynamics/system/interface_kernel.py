@@ -3,11 +3,15 @@
     (Σ Bᵀ R S Rᵀ B) Δz = Σ Bᵀ R (Yᵀ Rᵀ r − S w₀) + known + Cᵀ m,   C Δz + m / κ = target
 
 κ is infinite of a constraint; of a force law it is its tangent, so that it is exact however stiff. A part σ < κ of each
-is put into the matrix, as in `dynamics.interface`. Constraints that repeat others get no force.
+is put into the matrix, as in `dynamics.interface`. Both are solved for at once, from one matrix by its profile:
+
+    [H + Σ σ cᵀ c, Cᵀ; C, −1/κ] (Δz, −m) = (right, target)
+
+Constraints that repeat others get no force.
 """
 
 from kedfem.compiled import inlined, inner
-from kedfem.dynamics.anderson_kernel import factored, partly_factored
+from kedfem.dynamics.matrices.profile_kernel import profile_factored, profile_solved
 from kedfem.dynamics.system.algebra_kernel import copied, interface_columns
 from kedfem.dynamics.system.constraints_kernel import coordinate, law
 from kedfem.dynamics.system.ends_kernel import placed
@@ -18,7 +22,7 @@ REPEATED = 1e-10  # [-, 1/m] gradient of a constraint that the interface unknown
 @inner
 def gathered(bodies, trial):  # type: ignore[no-untyped-def]
     """Rᵀ B and S Rᵀ B of all bodies in their frames, and the matrix of z."""
-    H, S = trial.H, bodies.S
+    H, S, place = trial.H, bodies.S, bodies.place
     H[:] = 0.0
     for i in range(len(bodies.motion)):
         q, c = bodies.port_at[i + 1] - bodies.port_at[i], bodies.column_at[i + 1] - bodies.column_at[i]
@@ -33,10 +37,13 @@ def gathered(bodies, trial):  # type: ignore[no-untyped-def]
                     SRB[r * c + m] += s * RB[p * c + m]
         for r in range(q):
             for m in range(c):
-                x, row = RB[r * c + m], columns[m]
+                x, row = RB[r * c + m], place[columns[m]]
                 if x != 0.0:
+                    start = bodies.row_at[row] - bodies.first[row]
                     for o in range(c):
-                        H[row, columns[o]] += x * SRB[r * c + o]
+                        column = place[columns[o]]
+                        if column <= row:
+                            H[start + column] += x * SRB[r * c + o]
 
 
 @inner
@@ -87,44 +94,62 @@ def evaluated(c, ends, of, driving, t, state, trial, work):  # type: ignore[no-u
         placed(ends, driving.R[t], driving.p[t], trial.z, trial.moving, work.end, work.vectors)
     rigid_motion = (driving.R[t], driving.v[t], driving.omega[t])
     for a in range(r):
-        trial.C[a] = 0.0
+        e, rate = differentiated(ends, of, a, rigid_motion, trial, work)
+        columns, row = gradient(of, a, trial)
         if of.linear[a]:
-            coordinate(
-                ends, of, a, rigid_motion, trial.fixed, trial.turned, trial.C[a], work.end, work.vectors
-            )
-            e, moving = 0.0, 0.0
-            for m in range(len(trial.z)):
-                e += trial.C[a, m] * trial.z[m]
-        else:
-            e, moving = coordinate(
-                ends, of, a, rigid_motion, trial.moving, trial.turned, trial.C[a], work.end, work.vectors
-            )
-            if of.drive[a] >= 0:
-                e -= driving.drives[t, of.drive[a]]
+            e = along(row, columns, trial.z)
+        elif of.drive[a] >= 0:
+            e -= driving.drives[t, of.drive[a]]
         trial.e[a] = e
         if of.linear[a] or of.drive[a] >= 0:
             rate = newmark_rate(c, e, state.e[0, a], state.e[1, a], state.e[2, a])
         else:
-            rate = moving
-            for m in range(len(trial.z)):
-                if trial.C[a, m] != 0.0:
-                    rate += trial.C[a, m] * newmark_rate(
-                        c, trial.z[m], state.z[0, m], state.z[1, m], state.z[2, m]
-                    )
+            for m in range(len(columns)):
+                n = columns[m]
+                rate += row[m] * newmark_rate(c, trial.z[n], state.z[0, n], state.z[1, n], state.z[2, n])
         factor = driving.stiffness_factors[t, a]
         held = law(of, a, driving.t[t], factor, e, rate, state.e[0, a], state.multiplier[a], work.law)
         kappa = share * (work.law[1] + c.rate[0] * work.law[2])
         trial.m[a] = 0.0
         if held:
             trial.compliance[a], trial.target[a] = 0.0, -e
-            if not acts(trial.C[a]):
+            if not acts(row):
                 trial.compliance[a] = -1.0
         elif kappa > 0.0:
             trial.compliance[a], trial.target[a] = 1 / kappa, -share * work.law[0] / kappa
         else:
             trial.compliance[a], trial.m[a] = -1.0, -share * work.law[0]
-            for m in range(len(trial.z)):
-                trial.right[m] += trial.m[a] * trial.C[a, m]
+            for m in range(len(columns)):
+                trial.right[columns[m]] += trial.m[a] * row[m]
+
+
+@inner
+def differentiated(ends, of, a, rigid_motion, trial, work):  # type: ignore[no-untyped-def]
+    """Coordinate a and its rate in the rigid-body motion, as `coordinate`; its gradient is put into trial.C."""
+    place = trial.fixed if of.linear[a] else trial.moving
+    found = coordinate(ends, of, a, rigid_motion, place, trial.turned, trial.row, work.end, work.vectors)
+    columns, row = gradient(of, a, trial)
+    for m in range(len(columns)):
+        row[m] = trial.row[columns[m]]
+        trial.row[columns[m]] = 0.0
+    return found
+
+
+@inner
+def gradient(of, a, trial):  # type: ignore[no-untyped-def]
+    """The interface unknowns that a constraint couples, and its gradient on them; not to be called where references
+    are counted."""
+    first, last = of.column_at[a], of.column_at[a + 1]
+    return of.columns[first:last], trial.C[first:last]
+
+
+@inner
+def along(row, columns, z):  # type: ignore[no-untyped-def]
+    """A gradient times z."""
+    total = 0.0
+    for m in range(len(columns)):
+        total += row[m] * z[columns[m]]
+    return total
 
 
 @inner
@@ -142,116 +167,57 @@ def acts(row):  # type: ignore[no-untyped-def]
     return most > REPEATED
 
 
-@inner
-def forward(L, first, x):  # type: ignore[no-untyped-def]
-    """x becomes L⁻¹ x."""
-    for i in range(len(x)):
-        for j in range(first[i], i):
-            x[i] -= L[i, j] * x[j]
-        x[i] /= L[i, i]
-
-
-@inner
-def backward(L, first, x):  # type: ignore[no-untyped-def]
-    """x becomes L⁻ᵀ x."""
-    for i in range(len(x) - 1, -1, -1):
-        x[i] /= L[i, i]
-        for j in range(first[i], i):
-            x[j] -= L[i, j] * x[i]
-
-
 @inlined
-def stiffened(bodies, trial):  # type: ignore[no-untyped-def]
-    """trial.H_rows becomes the factor of H with a part of each constraint and law; compliances are of what is left."""
-    k, r = len(trial.z), len(trial.m)
-    for m in range(k):
-        copied(trial.H[m], trial.H_rows[m])
+def bordered(bodies, of, trial):  # type: ignore[no-untyped-def]
+    """trial.K becomes H with a part of each constraint and law, and with what is left of them; so do compliances."""
+    K, place, first, at = trial.K, bodies.place, bodies.first, bodies.row_at
+    copied(trial.H, K)
     trace = 0.0
-    for m in range(k):
-        trace += trial.H[m, m]
-    for a in range(r):
+    for m in range(len(place)):
+        trace += trial.H[at[place[m] + 1] - 1]
+    for a in range(len(trial.m)):
         trial.beside[a] = 0.0
         if trial.compliance[a] < 0.0:
             continue
+        columns, row = gradient(of, a, trial)
         size = 0.0
-        for m in range(k):
-            size += trial.C[a, m] ** 2
-        usual = trace / k / size if size > 0.0 else 0.0
+        for m in range(len(row)):
+            size += row[m] ** 2
+        usual = trace / len(place) / size if size > 0.0 else 0.0
         sigma = usual / (1.0 + 2.0 * usual * trial.compliance[a])
         left = 1.0 - sigma * trial.compliance[a]
         trial.beside[a] = sigma
         trial.compliance[a], trial.target[a] = trial.compliance[a] / left, trial.target[a] / left
-        for m in range(k):
-            if trial.C[a, m] != 0.0:
-                x = sigma * trial.C[a, m]
-                for o in range(m + 1):
-                    trial.H_rows[m, o] += x * trial.C[a, o]
-    factored(trial.H_rows, bodies.first)
-
-
-@inlined
-def compliances(trial):  # type: ignore[no-untyped-def]
-    """trial.G becomes the factor of C H⁻¹ Cᵀ + compliance; constraints that depend on others have pivot zero."""
-    G, CH = trial.G, trial.CH
-    r, k = CH.shape
-    for a in range(r):
-        trial.pivots[a] = 0.0
-        if trial.compliance[a] < 0.0:
-            continue
-        trial.pivots[a] = 1.0
-        for b in range(a + 1):
-            x = 0.0
-            for m in range(k):
-                x += CH[a, m] * CH[b, m]
-            G[a, b] = x
-        G[a, a] += trial.compliance[a]
-    partly_factored(G, trial.pivots)
+        own = of.place[a]
+        for m in range(len(row)):
+            i, x = place[columns[m]], sigma * row[m]
+            K[at[own] + i - first[own]] = row[m]
+            for o in range(m + 1):
+                K[at[i] + place[columns[o]] - first[i]] += x * row[o]
+        K[at[own + 1] - 1] = -trial.compliance[a]
 
 
 @inner
-def interface_solved(bodies, trial, begins):  # type: ignore[no-untyped-def]
+def interface_solved(bodies, of, trial, begins):  # type: ignore[no-untyped-def]
     """trial.dz and trial.m from the right-hand side; without constraints the step's matrix is factored once."""
-    first, r = bodies.first, len(trial.m)
-    copied(trial.right, trial.dz)
+    k, r, x, inverse = len(trial.z), len(trial.m), trial.x, trial.inverse
     if r > 0 or begins:
-        stiffened(bodies, trial)
-    L = trial.H_rows
-    forward(L, first, trial.dz)
-    for a in range(r):
-        copied(trial.C[a], trial.CH[a])
-        if trial.compliance[a] >= 0.0:
-            forward(L, first, trial.CH[a])
-    backward(L, first, trial.dz)
-    if r == 0:
-        return
-    compliances(trial)
-    G, left, pivots = trial.G, trial.left, trial.pivots
-    for _ in range(2):  # the second closes joints to rounding
+        bordered(bodies, of, trial)
+        profile_factored(trial.K, bodies.first, bodies.row_at, bodies.multiplier, inverse)
+    trial.dz[:] = 0.0
+    for again in range(2 if r > 0 else 1):  # the second closes joints to rounding
+        for m in range(k):
+            x[bodies.place[m]] = trial.right[m] if again == 0 else 0.0
         for a in range(r):
-            left[a] = 0.0
-            if pivots[a] != 0.0:
-                left[a] = trial.target[a] - trial.compliance[a] * trial.m[a]
-                for m in range(len(trial.z)):
-                    left[a] -= trial.C[a, m] * trial.dz[m]
-                for b in range(a):
-                    left[a] -= G[a, b] * left[b]
-                left[a] /= G[a, a]
-        for a in range(r - 1, -1, -1):
-            if pivots[a] != 0.0:
-                for b in range(a + 1, r):
-                    if pivots[b] != 0.0:
-                        left[a] -= G[b, a] * left[b]
-                left[a] /= G[a, a]
-                trial.m[a] += left[a]
-        trial.part[:] = 0.0
+            columns, row = gradient(of, a, trial)
+            left = trial.target[a] - trial.compliance[a] * trial.m[a]
+            x[of.place[a]] = left - along(row, columns, trial.dz)
+        profile_solved(trial.K, bodies.first, bodies.row_at, inverse, x)
+        for m in range(k):
+            trial.dz[m] += x[bodies.place[m]]
         for a in range(r):
-            if left[a] != 0.0:
-                for m in range(len(trial.z)):
-                    trial.part[m] += left[a] * trial.CH[a, m]
-        backward(L, first, trial.part)
-        for m in range(len(trial.z)):
-            trial.dz[m] += trial.part[m]
+            trial.m[a] -= x[of.place[a]]
     for a in range(r):
-        if pivots[a] != 0.0:
-            for m in range(len(trial.z)):
-                trial.m[a] -= trial.beside[a] * trial.C[a, m] * trial.dz[m]
+        if inverse[of.place[a]] != 0.0:
+            columns, row = gradient(of, a, trial)
+            trial.m[a] -= trial.beside[a] * along(row, columns, trial.dz)

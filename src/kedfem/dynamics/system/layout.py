@@ -3,12 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.sparse as sp
 from jaxtyping import Float, Int
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.matrices.dense import SMALL, component_first, coordinates, dense_part, work_on
+from kedfem.dynamics.matrices.profile import Profile, profile_of
 from kedfem.dynamics.matrices.substructure import effective_coefficients
 from kedfem.dynamics.matrices.substructure import factored as condensed
 from kedfem.dynamics.metric import element_tables
@@ -74,27 +73,6 @@ def coefficients(
     )  # fmt: skip
 
 
-def near_diagonal(
-    groups: Sequence[Int[np.ndarray, " c"]], k: int
-) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]:
-    """New number of each interface unknown, so that those of a group stand near each other, and the matrix' profile."""
-    touched = sp.lil_array((max(len(groups), 1), max(k, 1)))
-    for row, group in enumerate(groups):
-        touched[row, group] = 1.0
-    order = (
-        reverse_cuthill_mckee(sp.csr_array(touched.T @ touched), symmetric_mode=True)[:k]
-        if k
-        else np.zeros(0, int)
-    )
-    number = np.empty(k, int)
-    number[order] = np.arange(k)
-    first = np.arange(k)
-    for group in groups:
-        if len(group):
-            first[number[group]] = np.minimum(first[number[group]], number[group].min())
-    return number, first
-
-
 def points_of(link: Link) -> tuple[BeamPoint, ...]:
     """The points of a planar beam at which its strains are known."""
     return tuple(frame.point for frame in link.frames if frame.point)
@@ -107,18 +85,10 @@ def frame_of(link: Link) -> int:
     return TANGENTIAL if points_of(link) else COROTATIONAL
 
 
-def body_arrays(
-    system: System, parts: Sequence[Part], numbering: tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]
-) -> Bodies:
-    """All bodies as flat arrays, their parts factored.
-
-    Parameters
-    ----------
-    numbering : of `near_diagonal`
-    """
+def body_arrays(system: System, parts: Sequence[Part], profile: Profile) -> Bodies:
+    """All bodies as flat arrays, their parts factored."""
     model, stiffening = system.model, system.stiffening
     links, joints, numbers = model.links, model.joints, model.bodies
-    number, first = numbering
     columns = [np.flatnonzero(joint.B.any(axis=0)) for joint in joints]
     frames = [frame_of(link) if stiffening is None else STRESSED for link in links]
     sizes, ports = [link.unknowns for link in links], [len(joint.keep) for joint in joints]
@@ -143,7 +113,8 @@ def body_arrays(
         S_at=ends_of([q * q for q in ports]), B_at=ends_of([q * len(c) for q, c in zip(ports, columns, strict=True)]),
         G=_flat([x.G for x in parts]), Y=_flat([x.Y.T for x in parts]), W=_flat([x.W for x in parts]),
         S=_flat([x.S for x in parts]), B=_flat([joint.B[:, c] for joint, c in zip(joints, columns, strict=True)]),
-        column_at=ends_of([len(c) for c in columns]), columns=_flat([number[c] for c in columns], int), first=first,
+        column_at=ends_of([len(c) for c in columns]), columns=_flat([profile.number[c] for c in columns], int),
+        place=profile.unknown, first=profile.first, row_at=profile.at, multiplier=profile.multiplier,
         X=_flat([x for x, _, _ in fits]), one=_flat([x for _, x, _ in fits]), fit=_flat([x for _, _, x in fits]),
         K=_flat(stiff),
         beams=Beams(
@@ -219,7 +190,7 @@ def end_arrays(ends: Sequence[End], number: Int[np.ndarray, " k"]) -> Ends:
     )  # fmt: skip
 
 
-def constraint_arrays(constraints: Sequence[Constraint]) -> Constraints:
+def constraint_arrays(constraints: Sequence[Constraint], profile: Profile) -> Constraints:
     """All constraints and laws as flat arrays."""
     terms = [term for each in constraints for term in each.terms]
     laws = [_law(each.law) for each in constraints]
@@ -237,6 +208,8 @@ def constraint_arrays(constraints: Sequence[Constraint]) -> Constraints:
         cubics=np.array([c for x in curves for c in x.force.coefficients], float).reshape(-1, 4),
         period=np.array([x.force.period for x in curves], float),
         jumps=np.array([isinstance(x.law, Stop) and x.law.damping > 0 for x in constraints], bool),
+        place=profile.constraint, column_at=ends_of([len(c) for c in profile.columns]),
+        columns=_flat(profile.columns, int),
     )  # fmt: skip
 
 
@@ -283,18 +256,19 @@ def is_large(link: Link) -> bool:
     return link.unknowns > SMALL or hubs
 
 
-def groups(system: System) -> list[Int[np.ndarray, " c"]]:
-    """Interface unknowns that a body, or a constraint, couples with each other."""
-    out = [np.flatnonzero(joint.B.any(axis=0)) for joint in system.model.joints]
-    for each in system.constraints:
-        used = {n for term in each.terms for n in (term.i, term.j)}
-        columns = [np.flatnonzero(system.ends[n].onto.any(axis=(0, 1))) for n in used]
-        out.append(np.unique(np.concatenate(columns)))
-    return out
+def profile(system: System) -> Profile:
+    """The profile of the interface: unknowns that a body, or a constraint, couples with each other."""
+    bodies = [np.flatnonzero(joint.B.any(axis=0)) for joint in system.model.joints]
+    own = [np.flatnonzero(end.onto.any(axis=(0, 1))) for end in system.ends]
+    constraints = [
+        np.unique(np.concatenate([own[n] for term in each.terms for n in (term.i, term.j)]))
+        for each in system.constraints
+    ]
+    return profile_of(bodies, constraints, system.unknowns)
 
 
 def as_arrays(system: System, parts: Sequence[Part]) -> tuple[Bodies, Ends, Constraints]:
     """A system's flat arrays, its bodies factored."""
-    numbering = near_diagonal(groups(system), system.unknowns)
-    bodies = body_arrays(system, parts, numbering)
-    return bodies, end_arrays(system.ends, numbering[0]), constraint_arrays(system.constraints)
+    made = profile(system)
+    bodies = body_arrays(system, parts, made)
+    return bodies, end_arrays(system.ends, made.number), constraint_arrays(system.constraints, made)

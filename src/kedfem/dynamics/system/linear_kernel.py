@@ -59,10 +59,9 @@ def solved_at_once(c, bodies, ends, of, driving, t, state, trial, work):  # type
         pushed(bodies, i, trial)
     if of.linear.any():
         on_lines(ends, driving.stations[t])
-        trial.part[:] = 0.0
-        placed(ends, driving.R[t], driving.p[t], trial.part, trial.fixed, work.end, work.vectors)
+        placed(ends, driving.R[t], driving.p[t], trial.row, trial.fixed, work.end, work.vectors)
     evaluated(c, ends, of, driving, t, state, trial, work)
-    interface_solved(bodies, trial, True)
+    interface_solved(bodies, of, trial, True)
     for i in range(len(bodies.motion)):
         ported(bodies, i, trial)
     copied(trial.dz, trial.z)

@@ -11,7 +11,7 @@ from kedfem.dynamics.system.algebra_kernel import (
 from kedfem.dynamics.system.bodies_kernel import right_hand_side, rigid_frame_end
 from kedfem.dynamics.system.constraints_kernel import coordinate
 from kedfem.dynamics.system.ends_kernel import placed
-from kedfem.dynamics.system.interface_kernel import newmark_rate
+from kedfem.dynamics.system.interface_kernel import along, gradient, newmark_rate
 from kedfem.dynamics.system.products_kernel import sparse_held
 
 
@@ -82,15 +82,14 @@ def constraints_end(c, ends, of, driving, t, state, trial, work, history):  # ty
         placed(ends, driving.R[t], driving.p[t], trial.z, trial.moving, work.end, work.vectors)
     state.bearing[:] = 0.0
     for a in range(len(of.law)):
+        columns, row = gradient(of, a, trial)
         e, rate = 0.0, 0.0
         if of.linear[a]:
-            for m in range(len(trial.z)):
-                e += trial.C[a, m] * trial.z[m]
+            e = along(row, columns, trial.z)
         else:
-            trial.part[:] = 0.0
             rigid_motion = (driving.R[t], driving.v[t], driving.omega[t])
             e, rate = coordinate(
-                ends, of, a, rigid_motion, trial.moving, trial.turned, trial.part, work.end, work.vectors
+                ends, of, a, rigid_motion, trial.moving, trial.turned, trial.row, work.end, work.vectors
             )
             if of.drive[a] >= 0:
                 e -= driving.drives[t, of.drive[a]]
@@ -100,12 +99,13 @@ def constraints_end(c, ends, of, driving, t, state, trial, work, history):  # ty
         history.rate[t, a] = state.e[1, a]
         if not of.linear[a] and of.drive[a] < 0:
             history.rate[t, a] = rate
-            for m in range(len(trial.z)):
-                z0, z1, z2 = state.z[0, m], state.z[1, m], state.z[2, m]
-                history.rate[t, a] += trial.part[m] * newmark_rate(c, trial.z[m], z0, z1, z2)
+            for n in columns:
+                z0, z1, z2 = state.z[0, n], state.z[1, n], state.z[2, n]
+                history.rate[t, a] += trial.row[n] * newmark_rate(c, trial.z[n], z0, z1, z2)
         state.multiplier[a] = trial.m[a] / share
-        for m in range(len(trial.z)):
-            state.bearing[m] += state.multiplier[a] * trial.C[a, m]
+        for m in range(len(columns)):
+            state.bearing[columns[m]] += state.multiplier[a] * row[m]
+            trial.row[columns[m]] = 0.0
         history.e[t, a], history.multiplier[t, a] = e, state.multiplier[a]
     copied(trial.turned, state.turned)
 

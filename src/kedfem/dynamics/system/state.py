@@ -113,10 +113,11 @@ class Trial(NamedTuple):
 
     r : (N,) right-hand sides or residuals in the bodies' frames; held : (N,) G r of sparse bodies
     reaction, w, force : (q,) at their interface points
-    Rp : (bodies, 3, 3) frames of the step's factor; RB, SRB : flat, as B; H : (k, k) their common matrix, then factored
+    Rp : (bodies, 3, 3) frames of the step's factor; RB, SRB : flat, as B; H : their common matrix, by its profile
     mixing : room of `mixing_kernel`
-    C, CH : (r, k) gradients, and these after the first half of a solution with H; G : (r, r); target, compliance, beside,
-        m, left : (r,); right, dz, part : (k,); change : what a pass asks for
+    C : gradients on what each constraint couples, in `columns`; target, compliance, beside, m : (r,); right, dz : (k,)
+    K, inverse, x : H with constraints in it, factored, the inverse of its pivots, and what is solved for
+    row : (k,) room for one gradient, zero between; change : what a pass asks for
     fixed, moving : places of all ends in the rigid-body motion, and at z
     base, resisted, strained : of planar beams, see `beams_kernel`
     stress : entries of the stress stiffness of all bodies
@@ -141,22 +142,20 @@ class Trial(NamedTuple):
     RB: Any
     SRB: Any
     H: Any
-    H_rows: Any
+    K: Any
+    inverse: Any
+    x: Any
     z: Any
     e: Any
     turned: Any
     C: Any
-    CH: Any
-    G: Any
     target: Any
     compliance: Any
     beside: Any
-    pivots: Any
     m: Any
-    left: Any
     right: Any
     dz: Any
-    part: Any
+    row: Any
     change: Any
     mixing: Any
     fixed: Any

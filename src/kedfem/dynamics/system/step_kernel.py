@@ -118,8 +118,7 @@ def begin(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type:
     gathered(bodies, trial)
     if of.linear.any():
         on_lines(ends, driving.stations[t])
-        trial.part[:] = 0.0
-        placed(ends, R, driving.p[t], trial.part, trial.fixed, work.end, work.vectors)
+        placed(ends, R, driving.p[t], trial.row, trial.fixed, work.end, work.vectors)
 
 
 @inlined
@@ -173,7 +172,7 @@ def asked(c, bodies, ends, of, driving, t, iteration, state, trial, work, solved
         offset(bodies, i, work.y, trial, own)
         pushed(bodies, i, trial)
     evaluated(c, ends, of, driving, t, state, trial, work)
-    interface_solved(bodies, trial, iteration == 0)
+    interface_solved(bodies, of, trial, iteration == 0)
     for i in range(len(bodies.motion)):
         ported(bodies, i, trial)
         if bodies.frame[i] != NOMINAL:

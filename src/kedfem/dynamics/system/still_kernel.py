@@ -4,8 +4,8 @@ and gradients of coordinates. They are those of a step, without rates."""
 from kedfem.compiled import compiled
 from kedfem.dynamics.beams_kernel import begun
 from kedfem.dynamics.system.bodies_kernel import internal_forces, newmark, orientation
-from kedfem.dynamics.system.constraints_kernel import coordinate
 from kedfem.dynamics.system.ends_kernel import on_lines, placed
+from kedfem.dynamics.system.interface_kernel import differentiated
 from kedfem.dynamics.system.record import RIGID_BODY
 from kedfem.dynamics.system.reference import reference
 
@@ -46,10 +46,7 @@ def still_gradients(ends, of, rigid_motion, p, stations, z, trial, work):  # typ
     """
     ends, of, trial, work = reference(ends), reference(of), reference(trial), reference(work)
     on_lines(ends, stations)
-    trial.part[:] = 0.0
-    placed(ends, rigid_motion[0], p, trial.part, trial.fixed, work.end, work.vectors)
+    placed(ends, rigid_motion[0], p, trial.row, trial.fixed, work.end, work.vectors)
     placed(ends, rigid_motion[0], p, z, trial.moving, work.end, work.vectors)
     for a in range(len(of.law)):
-        trial.C[a] = 0.0
-        place = trial.fixed if of.linear[a] else trial.moving
-        coordinate(ends, of, a, rigid_motion, place, trial.turned, trial.C[a], work.end, work.vectors)
+        differentiated(ends, of, a, rigid_motion, trial, work)

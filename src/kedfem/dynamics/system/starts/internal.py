@@ -85,7 +85,10 @@ class Still:
         still_gradients(
             self.of.ends, self.of.constraints, turning, motion.p[0], stations, z, self._trial, self._work
         )
-        return np.array(self._trial.C)
+        of = self.of.constraints
+        C = np.zeros((len(of.law), len(z)))
+        C[np.repeat(np.arange(len(C)), np.diff(of.column_at)), of.columns] = self._trial.C
+        return C
 
     def sprung(self, k: int, R: Float[np.ndarray, "3 3"], u: Flat) -> Flat:
         """R K0 Rᵀ u of the displacement u (N,) of body k, world components.
