@@ -95,9 +95,8 @@ def _balls(
     bodies: Mapping[str, Body],
 ) -> list[LinkField]:  # fmt: skip
     """Masses that links carry, each where the nearest point of its link takes it."""
-    motion, k, out = snapshot.motion, snapshot.k, []
-    every = [*model.links, *(x.link for x in model.prescribed)]
-    numbers = [*model.bodies, *(x.body for x in model.prescribed)]
+    motion, k, out, given = snapshot.motion, snapshot.k, [], model.prescribed
+    every, numbers = [*model.links, *(x.link for x in given)], [*model.bodies, *(x.body for x in given)]
     X = [recovery.at_points((link.full or link).X) for link, recovery in zip(every, recoveries, strict=True)]
     size = float(np.linalg.norm(np.ptp(np.concatenate([x.points for x in fields]), axis=0)))
     for name, body in bodies.items():
@@ -112,8 +111,8 @@ def _balls(
         points, none = place + _ball(body.mass, size), np.full((27, 6), np.nan)
         moved = np.tile(fields[i].displacement[n], (27, 1))
         cell, words = np.arange(27)[None], _words(name, body)
-        kind = "hexahedron27"
-        out.append(LinkField(name, kind, cell, points, moved, none, none[:, 0], none[:, :2], label=words))
+        empty = none, none[:, 0], none[:, :2]
+        out.append(LinkField(name, "hexahedron27", cell, points, moved, *empty, label=words))
     return out
 
 
@@ -231,8 +230,8 @@ def sights(scene: Scene, linkage: Linkage, links: Mapping[str, Link]) -> list[Si
     size = float(np.linalg.norm(np.ptp(np.concatenate([each.points for each in out]), axis=0)))
     for name, carried in scene.bodies.items():
         points = np.asarray(getattr(carried, "centre", carried.at)) + _ball(carried.mass, size)
-        cell, words = np.arange(27)[None], _words(name, carried)
-        out.append(Sight(name, linkage.bodies.index(carried.link), points, cell, "hexahedron27", words))
+        on, cell = linkage.bodies.index(carried.link), np.arange(27)[None]
+        out.append(Sight(name, on, points, cell, "hexahedron27", _words(name, carried)))
     return out
 
 
