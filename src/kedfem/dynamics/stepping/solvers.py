@@ -49,9 +49,8 @@ def _stresses(scene: Scene, model: Model) -> Stiffening:
 
 
 def dampers_count(model: Model) -> bool:
-    """Whether quasi-static starts feel dampers of bushings: beside rigid cross-section nodes they would lose digits."""
-    hubs = any(link.kind == "spatial_beam" and link.full is None for link in model.links)
-    return not hubs and any(row.damping.any() for row in model.rows)
+    """Whether quasi-static starts feel dampers of bushings, which starts in nodal rows do not."""
+    return any(row.damping.any() for row in model.rows)
 
 
 def eased_warning(solvers: Sequence[Steps]) -> tuple[str, ...]:
