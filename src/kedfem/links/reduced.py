@@ -136,7 +136,7 @@ def _definite(m: Float[np.ndarray, "n n"], one: Float[np.ndarray, " n"]) -> Floa
 
 def wave_frequency(link: Link) -> float:
     """Of the order of a link's first axial vibration: √(E/ρ)/L, how often a wave passes along it [1/s]."""
-    density = float(link.m1[:, 0].sum() / link.volume.sum())
+    density = float(link.one @ link.m1[:, 0]) / float(link.one @ link.volume)
     return float(np.sqrt(link.E / density) / reach(link))
 
 

@@ -5,8 +5,12 @@ from jaxtyping import Float
 
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.stepping.state import Nodal
+from kedfem.links.record import Link
+from kedfem.links.reduced import rigid_modes
 
 Rotation = Float[np.ndarray, "d d"]
+
+RIGIDLY = 1e-9  # of the largest motion of ports
 
 
 def port_columns(attachment: Attachment, n: int) -> Float[np.ndarray, "k q"]:
@@ -55,3 +59,16 @@ def turned_ports(
 ) -> Float[np.ndarray, "T q"]:
     """R λ over time: port forces of the link frame in world components."""
     return turned_vectors(attachment, R, force).reshape(len(force), -1)[:, attachment.keep]
+
+
+def in_balance(link: Link, joint: Attachment, S: Float[np.ndarray, "c c"]) -> Float[np.ndarray, "c c"]:
+    """Stiffness seen from ports, the first of its rows, that bear nothing where the link moves rigidly.
+
+    Rounding would let those of a stiff link without mass bear more of that than soft mounts do.
+    """
+    N, size, _ = np.linalg.svd(port_columns(joint, link.n).T @ rigid_modes(link), full_matrices=False)
+    N = N[:, size > RIGIDLY * size.max(initial=0.0)]
+    out, ports = S.copy(), len(joint.keep)
+    out[:ports, :ports] -= N @ (N.T @ out[:ports, :ports])
+    out[:ports, :ports] -= (out[:ports, :ports] @ N) @ N.T
+    return out

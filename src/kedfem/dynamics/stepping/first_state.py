@@ -94,7 +94,7 @@ def _begun(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: St
     plain = (solver.ready.c.single or solver.stiffening is not None) and not pulled
     damped = dampers_count(model)
     # nodal rows lose digits of links a million times as stiff as others
-    stiff = bool(model.rows) and any(link.rigid for link in model.links) and solver.stiffening is None
+    stiff = bool(model.rows) and any(link.rigid for link in model.links)
     if plain and (at_rest or not (damped or stiff)) and not scene.analysis.initial_deflection:
         states = first_states(scene, linkage, along, model, solver.stiffening)
         return from_links(Instant(solver.ready, motion_at, 0.0), states)

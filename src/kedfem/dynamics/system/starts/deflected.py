@@ -235,7 +235,8 @@ def _balanced(
     linear, slow, start, first = of.c.single, 0, u, 0.0
     exact = now.slow or (linear and any(bodies.sparse))
     for n in range(ITERATIONS):
-        exact = exact or (linear and n >= DIRECT)
+        sure = exact or rounding == FREE  # its small changes are not those of mass in the matrices
+        exact = exact or (linear and n >= DIRECT) or (settled and not sure)
         f, R = bodies.still.forces(now.motion.R[0], u, now.amounts)
         r = now.F - f + more(u, f) - bodies.inertia(u) - now.stress(u)
         try:
@@ -245,17 +246,25 @@ def _balanced(
             break
         if not np.isfinite(change).all():
             break
-        if settled:  # once more: what is left of stiff hubs would be large accelerations
-            return np.asarray(u + change)
-        u = u + (change if linear else mixing.step(change))
         size, reached = float(np.linalg.norm(change)), float(np.linalg.norm(u))
+        if settled and (sure or size <= ROUNDING * reached + of.c.floor):
+            return np.asarray(u + change)  # what was left of stiff hubs would be large accelerations
+        if settled:  # small changes were those of mass in the matrices
+            mixing, last, first, now.slow = Mixing(), np.inf, size, True
+        u = u + (change if linear else mixing.step(change))
+        reached = float(np.linalg.norm(u))
         first = first or size
         if size > DIVERGED * first and not linear:
             break
         stalls = size > last / 2 and size <= (LINEAR if linear else rounding) * reached
         stalls = stalls and (n > DIRECT or not linear)
         if n >= DIRECT and size > last / 2 and rounding != FREE and not exact:
-            exact, mixing, last = True, Mixing(), np.inf  # it may be the mass in the matrices that slows it
+            exact, mixing, last, first = (
+                True,
+                Mixing(),
+                np.inf,
+                0.0,
+            )  # it may be the mass in the matrices that slows it
             now.slow = True
             continue
         slow = slow + 1 if exact and size > last / 2 and size <= STALLED * reached else 0
