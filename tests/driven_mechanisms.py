@@ -21,7 +21,8 @@ Raw = dict[str, Any]
 Found = tuple[str, dict[str, float]]
 STEPS, STEP = 20, 2e-4
 STIFFER, TEN, LIMIT = 3.0, 10.0, 1e-3
-LEAST, SPEED = 1e-12, 0.1  # m, N, N m; rad/s, m/s of coordinates: what is less is rounding
+LEAST, SPEED = 1e-12, 0.1  # N, N m; rad/s, m/s of coordinates: what is less is rounding
+PLACED = 1e-10  # m: displacements that are all less, as of points on the ground, are that of places, 1e-15 m
 WITHIN = 1e-7  # of the peak: what iterations leave
 ALIKE = 5e-5  # of the largest: what the monolithic step's rounding leaves of stiff hubs' forces, and iterations of laws
 #: drawn at random, some lock, or have a slot too short, or one that turns too far
@@ -185,11 +186,12 @@ def recorded(raw: Raw, finer: int = 1, **analysis: Any) -> dict[str, np.ndarray]
 def differences(got: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> dict[str, float]:
     """How far channels are apart, of the largest of their kind."""
     sizes: dict[str, float] = {}
+    floors = {"speed": SPEED, "displacement": PLACED}
     for name, values in other.items():
         sizes[_kind(name)] = max(sizes.get(_kind(name), 0.0), float(np.abs(values).max(initial=0.0)))
     return {
         name: float(np.abs(values - other[name]).max(initial=0.0))
-        / max(sizes[_kind(name)], SPEED if name.endswith("/speed") else LEAST)
+        / max(sizes[_kind(name)], floors.get(_kind(name), LEAST))
         for name, values in got.items()
     }
 
