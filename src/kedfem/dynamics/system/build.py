@@ -139,7 +139,7 @@ class _Builder:
         side = joint.sides[0]
         if side is None:
             return
-        ground, zero = self._numbered(rigid_end(0, np.zeros(3), self.unknowns)), np.zeros(3)
+        ground, zero = self._numbered(rigid_end(0, np.zeros(3))), np.zeros(3)
         ends = [self._numbered(each) for each in corners(side)]
         for i, j in combinations(range(len(ends)), 2):
             a, b = side.points[i], side.points[j]
@@ -269,7 +269,7 @@ class _Builder:
     def end(self, joint: ConstraintJoint, side: int, at: Vector) -> int:
         """The number of an end of a joint: what it has on one of its links."""
         found = joint.sides[side]
-        end = rigid_end(joint.bodies[side], at, self.unknowns) if found is None else end_of(found, joint)
+        end = rigid_end(joint.bodies[side], at) if found is None else end_of(found, joint)
         return self._numbered(end)
 
     def _numbered(self, end: End) -> int:

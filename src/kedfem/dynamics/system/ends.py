@@ -1,7 +1,7 @@
 """Ends of constraints from what joints have on links: coupling surfaces, points of rigid links, prescribed bodies."""
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side
 from kedfem.dynamics.joints.constraint_matrices import seen_from
@@ -14,31 +14,40 @@ Vector = Float[np.ndarray, "3"]
 
 def corners(side: Side) -> list[End]:
     """The points of a rigid link, each an end."""
-    every = zip(side.points, np.where(np.abs(side.onto) < NOTHING, 0.0, side.onto), strict=True)
-    return [End(side.body, POINT, X, np.eye(3), np.ones(3), 0, onto[None]) for X, onto in every]
+    every = zip(side.points, side.onto, strict=True)
+    return [End(side.body, POINT, X, np.eye(3), np.ones(3), 0, *_selected(onto[None])) for X, onto in every]
 
 
 def same_end(one: End, other: End) -> bool:
     """Whether two ends are one: on the same points of the same body."""
     return one.body == other.body and all(
         x.shape == y.shape and np.array_equal(x, y)
-        for x, y in ((one.origin, other.origin), (one.onto, other.onto))
+        for x, y in ((one.origin, other.origin), (one.columns, other.columns), (one.onto, other.onto))
     )
 
 
-def rigid_end(body: int, at: Vector, k: int) -> End:
+def _selected(
+    onto: Float[np.ndarray, "p d k"],
+) -> tuple[Float[np.ndarray, "p d c"], Int[np.ndarray, " c"]]:
+    """The columns of unknowns that move points of an end, and which these are."""
+    columns = np.flatnonzero((np.abs(onto) >= NOTHING).any(axis=(0, 1)))
+    some = onto[:, :, columns]
+    return np.where(np.abs(some) < NOTHING, 0.0, some), columns
+
+
+def rigid_end(body: int, at: Vector) -> End:
     """An end on the ground or on a prescribed body."""
-    return End(body, RIGID, at, np.eye(3), np.ones(3), 0, np.zeros((1, 3, k)))
+    return End(body, RIGID, at, np.eye(3), np.ones(3), 0, *_selected(np.zeros((1, 3, 0))))
 
 
 def end_of(side: Side, joint: ConstraintJoint) -> End:
     """An end on a body, on a slider that rides on one, or on a line along which the joint's pin slides."""
-    onto = np.where(np.abs(side.onto) < NOTHING, 0.0, side.onto)
+    onto = side.onto
     p, d, _ = onto.shape
     if side.stations is not None:
         line = Line(side.stations, joint.axis, joint.bodies[0], joint.at)
         onto = onto * np.atleast_1d(side.surface[:, :3].any(axis=(0, 1)))[:, None]  # of a planar beam not ψ
-        return End(side.body, LINE, side.points[0], np.eye(3), np.ones(3), 0, onto, line)
+        return End(side.body, LINE, side.points[0], np.eye(3), np.ones(3), 0, *_selected(onto), line)
     directions, lengths, known = np.eye(3), np.ones(3), p - 1
     arms = side.points[1:] - side.points[0]
     if known:
@@ -49,7 +58,7 @@ def end_of(side: Side, joint: ConstraintJoint) -> End:
             directions[2] = [0, 0, 1]
         elif known == 2:
             directions[2] = np.cross(directions[0], directions[1])
-    return End(side.body, _form(side, d, known), side.points[0], directions, lengths, known, onto)
+    return End(side.body, _form(side, d, known), side.points[0], directions, lengths, known, *_selected(onto))
 
 
 def line_weights(end: End, motion: RigidMotion) -> Float[np.ndarray, "T p"]:

@@ -172,8 +172,7 @@ def _flat(arrays: Sequence[np.ndarray], kind: type = float) -> np.ndarray:
 
 def end_arrays(ends: Sequence[End], number: Int[np.ndarray, " k"]) -> Ends:
     """All ends as flat arrays on the renumbered interface unknowns."""
-    columns = [np.flatnonzero(end.onto.any(axis=(0, 1))) for end in ends]
-    every = [end.onto[:, :, c] for end, c in zip(ends, columns, strict=True)]
+    columns, every = [end.columns for end in ends], [end.onto for end in ends]
     lines = [n for n, end in enumerate(ends) if end.form == LINE]
     full = [every[n] for n in lines]
     onto = [x[:1] if n in lines else x for n, x in enumerate(every)]
@@ -259,9 +258,8 @@ def is_large(link: Link) -> bool:
 def profile(system: System) -> Profile:
     """The profile of the interface: unknowns that a body, or a constraint, couples with each other."""
     bodies = [np.flatnonzero(joint.B.any(axis=0)) for joint in system.model.joints]
-    own = [np.flatnonzero(end.onto.any(axis=(0, 1))) for end in system.ends]
     constraints = [
-        np.unique(np.concatenate([own[n] for term in each.terms for n in (term.i, term.j)]))
+        np.unique(np.concatenate([system.ends[n].columns for term in each.terms for n in (term.i, term.j)]))
         for each in system.constraints
     ]
     return profile_of(bodies, constraints, system.unknowns)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from kedfem.dynamics.force_element import OVER, Factor, Times
 from kedfem.links.stations import Stations
@@ -105,7 +105,7 @@ class End:
     origin : (3,) its point in the reference position [m]
     directions : (3, 3) rows e_k in the reference position, of which the first `known` are followed by interface points
     lengths : (3,) how far off the origin these points are [m]
-    onto : (p, d, k) displacements of the interface points, world components, from the interface unknowns z
+    onto : (p, d, c) displacements of the interface points, world components, from the interface unknowns z[columns]
     """
 
     body: int
@@ -114,7 +114,8 @@ class End:
     directions: Float[np.ndarray, "3 3"]
     lengths: Vector
     known: int
-    onto: Float[np.ndarray, "p d k"]
+    onto: Float[np.ndarray, "p d c"]
+    columns: Int[np.ndarray, " c"]
     line: Line | None = None
 
 

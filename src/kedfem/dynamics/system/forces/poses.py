@@ -42,7 +42,7 @@ def poses(
     if end.form == RIGID:
         return x, R
     d = end.onto.shape[1]
-    u = np.einsum("pdk,tk->tpd", end.onto, z)
+    u = np.einsum("pdc,tc->tpd", end.onto, z[:, end.columns])
     if end.line is not None:
         u = np.einsum("tp,tpd->td", line_weights(end, motion), u)[:, None]
     flat = 2 if end.form == PLANAR_BEAM else d
@@ -96,7 +96,7 @@ def point_forces(
         y[:, 0, 2] = moment[:, 2]
     if end.form in (POINT, PLANAR_BEAM):
         return y
-    R, u = motion.R[:, end.body], np.einsum("pdk,tk->tpd", end.onto, z)
+    R, u = motion.R[:, end.body], np.einsum("pdc,tc->tpd", end.onto, z[:, end.columns])
     D = _directions(end, R, u)
     Q = _rotations(D, end)
     U = Q.transpose(0, 2, 1) @ D.transpose(0, 2, 1) @ end.directions

@@ -100,13 +100,14 @@ class Pose:
 
 def placed(end: End, R: Any, p: Any, z: Column) -> Pose:
     """Where an end is: of a surface the rotation nearest to its directions, by singular values."""
-    _, d, k = end.onto.shape
+    (count, d, _), k = end.onto.shape, len(z)
     pin = R[end.line.pin] if end.line is not None else None
     R, x = R[end.body], p[end.body] + R[end.body] @ end.origin
     by_x, by_Q = np.zeros((3, k)), np.zeros((3, k))
     if end.form == RIGID:
         return Pose(x, R, by_x, by_Q)
-    onto = end.onto
+    onto = np.zeros((count, d, k))
+    onto[:, :, end.columns] = end.onto
     if end.line is not None:  # the pin's place in the frame of the line
         from scipy.interpolate import CubicSpline
 
@@ -119,7 +120,7 @@ def placed(end: End, R: Any, p: Any, z: Column) -> Pose:
     by_x[:flat] = onto[0, :flat]
     if end.form == PLANAR_BEAM:
         c, s = np.cos(u[0, 2]), np.sin(u[0, 2])
-        by_Q[2] = end.onto[0, 2]
+        by_Q[2] = onto[0, 2]
         return Pose(x, np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ R, by_x, by_Q)
     if end.form in (POINT, LINE):
         return Pose(x, R, by_x, by_Q)
@@ -127,7 +128,7 @@ def placed(end: End, R: Any, p: Any, z: Column) -> Pose:
     for n in range(end.known):
         D[n] = R @ end.directions[n]
         D[n, :d] += (u[n + 1] - u[0]) / end.lengths[n]
-        by[n, :d] = (end.onto[n + 1] - end.onto[0]) / end.lengths[n]
+        by[n, :d] = (onto[n + 1] - onto[0]) / end.lengths[n]
     if end.form == PLANAR:
         if end.known == 1:
             D[1], by[1] = np.cross([0, 0, 1], D[0]), np.cross([0, 0, 1], by[0], axisb=0, axisc=0)

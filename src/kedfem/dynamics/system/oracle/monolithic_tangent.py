@@ -81,8 +81,10 @@ def _of_pull(of: Monolithic, now: Now, old: Now, at: RigidMotion, m: Column) -> 
 def _felt(of: Monolithic, n: int) -> Bool[np.ndarray, " k"]:
     """Whether interface unknowns move the ends of constraint n."""
     ends = {end for term in of.system.constraints[n].terms for end in (term.i, term.j)}
-    each = [np.any(of.system.ends[end].onto != 0.0, axis=(0, 1)) for end in ends]
-    return np.asarray(np.any(each, axis=0))
+    felt = np.zeros(of.k, bool)
+    for end in ends:
+        felt[of.system.ends[end].columns] = True
+    return felt
 
 
 def inverse(J: Matrix, C: Matrix) -> Inverse:

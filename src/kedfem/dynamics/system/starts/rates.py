@@ -95,7 +95,7 @@ def term_values(system: System, at: Places, z: Float[np.ndarray, " k"]) -> Float
 def moved_by(system: System, terms: Sequence[Term]) -> set[int]:
     """Interface unknowns that move the ends of terms."""
     ends = (system.ends[n] for n in {n for term in terms for n in (term.i, term.j)})
-    return {int(c) for end in ends for c in np.flatnonzero(end.onto.any(axis=(0, 1)))}
+    return {int(c) for end in ends for c in end.columns}
 
 
 def coordinate(system: System, each: Constraint, at: Places, z: Float[np.ndarray, "3 k"]) -> Series:
@@ -130,7 +130,7 @@ def pose(end: End, at: Places, z: Series) -> tuple[Series, Series]:
     R, x = at.R[:, end.body], at.p[:, end.body] + at.R[:, end.body] @ end.origin
     if end.form == RIGID:
         return x, R
-    u = np.einsum("pdk,tk->tpd", end.onto, z)
+    u = np.einsum("pdc,tc->tpd", end.onto, z[:, end.columns])
     if end.line is not None:
         u = _at_pin(end, end.line, at, u)
     flat = 2 if end.form == PLANAR_BEAM else end.onto.shape[1]
