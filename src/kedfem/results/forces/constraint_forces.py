@@ -196,8 +196,9 @@ def _springs(model: Model, block: Block, mu: Float[np.ndarray, "T r"]) -> tuple[
     if block.exerted is not None:
         of = block.exerted
         return (of.spring[:, 0], of.spring[:, 1], of.stiffness, of.damping) if len(of.stiffness) else None
-    rows = joint_rows(model.rows, block.motion)
-    if rows is None or not rows.soft.any():
+    springs = any(np.isfinite(joint.stiffness).any() for joint in model.rows)
+    rows = joint_rows(model.rows, block.motion) if springs else None
+    if rows is None:
         return None
     soft = rows.soft
     return deflections(model, block, rows)[:, soft], mu[:, soft], rows.stiffness[soft], rows.damping[soft]
