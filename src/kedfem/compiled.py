@@ -19,8 +19,9 @@ from typing import Any
 
 import numba
 from numba.core import codegen, event
+from numba.core.runtime.nrt import rtsys
 
-from kedfem.folders import KERNELS, compiled_folder, drop_changed, note
+from kedfem.folders import KERNELS, compiled_folder, drop_changed, note, noted
 
 ROOT = Path(__file__).parent
 RECORDS = ("dynamics/system/arrays.py", "dynamics/system/state.py", "dynamics/metric.py")
@@ -69,9 +70,9 @@ class _Compiling(event.Listener):
             self.report(False)
 
 
-if not os.environ.get("NUMBA_CACHE_DIR"):
-    _FOLDER = kernel_folder(ROOT)
-    drop_changed(_FOLDER)
+_FOLDER = None if os.environ.get("NUMBA_CACHE_DIR") else kernel_folder(ROOT)
+_NOTED = noted(_FOLDER) if _FOLDER else {}
+if _FOLDER:
     atexit.register(note, _FOLDER)
     vars(numba.config)["CACHE_DIR"] = str(_FOLDER)
 
@@ -85,7 +86,8 @@ def _kept(options: dict[str, Any]) -> Callable[[Callable[..., Any]], Any]:
 
     def compiles(function: Callable[..., Any]) -> Any:
         dispatcher = numba.njit(**options)(function)
-        file = dispatcher._cache._cache_file
+        cache = dispatcher._cache
+        file = cache._cache_file
         save, lock = file.save, Path(dispatcher.stats.cache_path, "lock")
 
         def alone(key: object, code: object) -> None:
@@ -94,17 +96,23 @@ def _kept(options: dict[str, Any]) -> Callable[[Callable[..., Any]], Any]:
             with FileLock(lock):
                 save(key, code)
 
-        file.save = alone
+        def loaded(types: object, context: Any) -> Any:
+            if _NOTED:
+                drop_changed(Path(cache.cache_path), _NOTED, cache._impl.filename_base)
+            rtsys.initialize(context)  # all that code needs of numba, which would prepare to compile as well
+            return cache._load_overload(types, context)
+
+        file.save, cache.load_overload = alone, loaded
         begin, part = dispatcher.compile, "no_cpython_wrapper" in options
 
-        def noted(types: object) -> Any:
+        def told(types: object) -> Any:
             outside = _part.set(part)
             try:
                 return begin(types)
             finally:
                 _part.reset(outside)
 
-        dispatcher.compile = noted
+        dispatcher.compile = told
         return dispatcher
 
     return compiles

@@ -99,10 +99,9 @@ def unsealed(sealed_content: bytes) -> bytes | None:
     return content if sha256(content).digest() == digest else None
 
 
-def drop_changed(folder: Path) -> None:
-    """Remove the files of a folder's own folders that are not as `note` found them; those written since stay."""
-    known = _known(folder)
-    for file in _files(folder) if known else ():
+def drop_changed(folder: Path, known: dict[str, str], name: str) -> None:
+    """Remove the files of a function that are not as they were noted; those written since stay."""
+    for file in folder.glob(f"{name}.*nb[ci]"):
         with suppress(OSError):
             if known.get(_name(file), digest := _digest(file)) != digest:
                 file.unlink()
@@ -112,7 +111,7 @@ def note(folder: Path) -> None:
     """Write the digests of all files, if some were written since the last note; nothing where nothing can be written."""
     with suppress(OSError):
         # another process may write a file meanwhile: named before it is read, it has another name by then
-        known, named = _known(folder), {_name(file): file for file in _files(folder)}
+        known, named = noted(folder), {_name(file): file for file in _files(folder)}
         if named.keys() <= known.keys():
             return
         with whole(folder / DIGESTS) as part:
@@ -133,7 +132,8 @@ def _digest(file: Path) -> str:
     return sha256(file.read_bytes()).hexdigest()
 
 
-def _known(folder: Path) -> dict[str, str]:
+def noted(folder: Path) -> dict[str, str]:
+    """The digests in a folder's last note."""
     try:
         known = json.loads((folder / DIGESTS).read_bytes())
     except (OSError, ValueError):

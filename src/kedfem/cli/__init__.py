@@ -83,7 +83,9 @@ for each in (
 
 def main() -> None:
     """Entry point: errors of kedfem become messages and an exit code, never a traceback."""
-    gc.set_threshold(10_000)  # imports and compiling drop little: the default takes a sixth of their time
+    gc.set_threshold(
+        200_000
+    )  # imports drop nothing, but what looks for that takes a sixth of their time; see progress
     end_as_interrupted()
     one_blas_thread()
     try:

@@ -1,5 +1,6 @@
 """What the commands print on: the two streams, tables, warnings, progress bars."""
 
+import gc
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -64,6 +65,8 @@ class progress:  # noqa: N801
     def __enter__(self) -> Callable[[str, int, int], None]:
         from kedfem.compiled import compiling
 
+        gc.freeze()  # what was imported stays
+        gc.set_threshold(10_000)
         self._shown = _Bars() if err.is_terminal else _Lines()
         self._compiling = compiling(self._shown.compiles)
         self._compiling.__enter__()
