@@ -82,7 +82,7 @@ def _on_one_scale(every: Sequence[Picture]) -> list[Picture]:
         panels = []
         for key, panel in _keyed(each):
             shared = key in common and np.ptp(_span(panel)) >= COMPARABLE * widest[key]
-            panels.append(panel._replace(limits=common[key]) if shared else panel)
+            panels.append(replace(panel, limits=common[key]) if shared else panel)
         out.append(replace(each, panels=panels))
     return out
 
@@ -144,7 +144,7 @@ def draw_panels(figure: Any, along: Abscissa, panels: list[Panel]) -> Any:
     axes = figure.subplots(len(ratios), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
     for ax, panel in zip(axes, panels, strict=False):
         quantity = panel.quantity if len(panels) < 3 else panel.quantity.replace(" ", "\n")
-        draw_curves(ax, along, panel._replace(quantity=quantity))
+        draw_curves(ax, along, replace(panel, quantity=quantity))
     if along.degrees is not None:
         axes[-1].plot(along.values, along.degrees, color="0.35", linewidth=1.2)
         axes[-1].set_ylabel("drive (°)")

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -138,4 +139,4 @@ def shown(picture: Picture) -> tuple[str, Panel]:
         return title, panel
     chosen = sorted(peaks, key=lambda name: -peaks[name])[:CURVES]
     kept = {name: y for name, y in panel.curves.items() if name.removesuffix(STIFF) in chosen}
-    return f"{title}: the largest {CURVES} of {len(peaks)}", panel._replace(curves=kept)
+    return f"{title}: the largest {CURVES} of {len(peaks)}", replace(panel, curves=kept)

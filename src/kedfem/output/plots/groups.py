@@ -3,7 +3,6 @@
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -28,7 +27,8 @@ MOTIONS = {
 COORDINATES = {"angle": "Turns of the joints", "travel": "Travels of the joints"}
 
 
-class Panel(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Panel:
     """Curves on one pair of axes.
 
     limits : ends of the scale, where it is that of other panels too; else as the curves ask
