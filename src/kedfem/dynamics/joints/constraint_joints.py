@@ -10,7 +10,7 @@ both linear in the port points, so that the point of the coupling surface's fram
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
@@ -32,7 +32,8 @@ class Side:
     origin : (3,) X₀ of the coupling surface [m]
     surface : (p, 6, d) u₀ and θ from the displacements at its ports
     stations : of the link along which a slot's pin slides; its ports are these
-    onto : (p, d, k) displacements at the ports, world components, from the interface unknowns z
+    onto : (p, d, c) displacements at the ports, world components, from the interface unknowns z[columns]
+    unknowns : k of all z
     shared : whether the ports are the link's; not of a rigid slider, which rides on another link
     points : (p, 3) the ports in the reference position [m]
     """
@@ -40,10 +41,12 @@ class Side:
     body: int
     origin: Float[np.ndarray, "3"]
     surface: Float[np.ndarray, "p 6 d"]
-    onto: Float[np.ndarray, "p d k"]
+    onto: Float[np.ndarray, "p d c"]
     stations: Stations | None = None
     shared: bool = True
     points: Float[np.ndarray, "p 3"] = field(default_factory=lambda: np.zeros((1, 3)))
+    columns: Int[np.ndarray, " c"] = field(default_factory=lambda: np.zeros(0, int))
+    unknowns: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,6 @@ from kedfem.motion.rigid import RigidMotion
 REPEATED = (
     1e-10  # of a row on ports: what is left on the interface unknowns if other joints hold the same already
 )
-EVERY = slice(None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,22 +56,30 @@ def joint_rows(joints: Sequence[ConstraintJoint], motion: RigidMotion) -> JointR
     """Rows of all joints at the times of a motion; None without any."""
     if not joints:
         return None
+    ends = np.cumsum([0, *(len(joint.gap) for joint in joints)])
+    unknowns = max(side.unknowns for joint in joints for side in _sides(joint))
+    C = np.zeros((len(motion.t), ends[-1], unknowns))
+    for joint, first, last in zip(joints, ends, ends[1:], strict=False):
+        columns = _columns(joint)
+        C[:, first:last, columns] = rows_over(joint, motion, columns)
     return JointRows(
-        np.concatenate([rows_over(joint, motion) for joint in joints], axis=1),
+        C,
         np.concatenate([joint.stiffness for joint in joints]),
         np.concatenate([joint.damping for joint in joints]),
     )
 
 
 def rows_over(
-    joint: ConstraintJoint, motion: RigidMotion, columns: Int[np.ndarray, " c"] | slice = EVERY
+    joint: ConstraintJoint, motion: RigidMotion, columns: Int[np.ndarray, " c"]
 ) -> Float[np.ndarray, "T r c"]:
-    """Rows of one joint, gap · (u_i − u_j) + turn · (θ_i − θ_j), on the interface unknowns, or on those given."""
+    """Rows of one joint, gap · (u_i − u_j) + turn · (θ_i − θ_j), on the interface unknowns given: all that it touches."""
+    C = np.zeros((len(motion.t), len(joint.gap), len(columns)))
     shares = port_rows(joint, motion)
-    C = np.sum([np.tensordot(on, side.onto[..., columns], ((2, 3), (0, 1))) for side, on in shares], axis=0)
+    for side, on in shares:
+        C[:, :, np.searchsorted(columns, side.columns)] += np.tensordot(on, side.onto, ((2, 3), (0, 1)))
     size = np.sqrt(sum((on**2).sum(axis=(2, 3)) for _, on in shares))
     C[np.linalg.norm(C, axis=2) < REPEATED * size] = 0.0
-    return np.asarray(C)
+    return C
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,8 +116,14 @@ def row_groups(joints: Sequence[ConstraintJoint]) -> Iterator[RowGroup]:
 
 def _columns(joint: ConstraintJoint) -> Int[np.ndarray, " c"]:
     """Interface unknowns that a joint's rows touch."""
-    own = [np.flatnonzero(side.onto.any(axis=(0, 1))) for side in joint.sides if side is not None]
-    return np.unique(np.concatenate([*own, *(_columns(other) for _, other in joint.plus), np.zeros(0, int)]))
+    return np.unique(np.concatenate([side.columns for side in _sides(joint)]))
+
+
+def _sides(joint: ConstraintJoint) -> list[Side]:
+    """All sides of a joint, and of those that it is combined with."""
+    return [
+        side for x in (joint, *(other for _, other in joint.plus)) for side in x.sides if side is not None
+    ]
 
 
 def port_rows(joint: ConstraintJoint, motion: RigidMotion) -> list[tuple[Side, Float[np.ndarray, "T r _ _"]]]:

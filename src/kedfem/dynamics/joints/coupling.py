@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.dynamics.joints.attachments import Attachment, SharedCut
-from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, needs_rows
+from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side, needs_rows
 from kedfem.dynamics.joints.constraint_ports import (
     LinkageLayout,
     Own,
@@ -182,16 +182,22 @@ def _on(
 
     def on(row: ConstraintJoint, own: Iterator[Own | None]) -> ConstraintJoint:
         sides = [
-            None if side is None or each is None
-            else replace(side, onto=(each.selection @ Z[here]).reshape(*side.onto.shape[:2], -1))
+            None if side is None or each is None else _seeing(side, each.selection @ Z[here])
             for side, each, here in zip(row.sides, own, of_side, strict=False)
-        ]  # fmt: skip
+        ]
         return replace(
             row, sides=(sides[0], sides[1]), plus=tuple((c, on(other, own)) for c, other in row.plus)
         )
 
     for row, own in rows:
         yield on(row, iter(own))
+
+
+def _seeing(side: Side, selection: Float[np.ndarray, "m k"]) -> Side:
+    """A side whose ports know the interface unknowns."""
+    columns = np.flatnonzero(selection.any(axis=0))
+    onto = selection[:, columns].reshape(*side.onto.shape[:2], -1)
+    return replace(side, onto=onto, columns=columns, unknowns=selection.shape[1])
 
 
 def _mixed(scene: Scene, name: str, held: dict[str, tuple[_Ports, CouplingSurface]], first: int) -> int:

@@ -15,8 +15,8 @@ DEPENDENT = (
     1e-9  # relative: ports of one coupling surface repeat each other to rounding, others differ by far more
 )
 ROUNDING = 1e-13  # entries of relations of order one that couple nothing
-Block = tuple[Int[np.ndarray, " _"], Int[np.ndarray, " _"]]
-"""Rows and columns of a matrix."""
+Block = tuple[Int[np.ndarray, " r"], Int[np.ndarray, " c"], Float[np.ndarray, "r c"]]
+"""Rows and columns of a matrix, and what it has there."""
 
 
 def independent(
@@ -98,14 +98,11 @@ def _port_forces(
     determined = np.setdiff1d(np.arange(B.shape[1]), riding)  # what holds a slider is left open
     G = sp.vstack([L.T, B.T.tocsr()[determined]], format="csr")
     blocks = list(_blocks(G))
-    parts = [np.linalg.pinv(G[rows][:, columns].toarray(), rcond=DEPENDENT) for rows, columns in blocks]
-    inverse = _assembled(
-        [
-            (columns, rows, np.where(np.abs(part) < DEPENDENT, 0.0, part))  # rounding
-            for (rows, columns), part in zip(blocks, parts, strict=True)
-        ],
-        G.T.shape,
-    )
+    parts = []
+    for rows, columns, dense in blocks:
+        part = np.linalg.pinv(dense, rcond=DEPENDENT)
+        parts.append((columns, rows, np.where(np.abs(part) < DEPENDENT, 0.0, part)))  # rounding
+    inverse = _assembled(parts, G.T.shape)
     q = L.shape[1]
     return (
         inverse[:, :q],
@@ -117,8 +114,8 @@ def _port_forces(
 def _null_space(A: sp.csr_array, blocks: Sequence[Block]) -> sp.csr_array:
     """Orthonormal basis of A x = 0, A of order one: each of its vectors within one block, so that few bodies share it."""
     alone, parts, count = np.ones(A.shape[1], bool), [], 0
-    for rows, columns in blocks:
-        _, s, Vt = np.linalg.svd(A[rows][:, columns].toarray())
+    for _, columns, dense in blocks:
+        _, s, Vt = np.linalg.svd(dense)
         part = Vt[int((s > DEPENDENT).sum()) :].T
         parts.append((columns, count + np.arange(part.shape[1]), part))
         count, alone[columns] = count + part.shape[1], False
@@ -143,16 +140,20 @@ def _assembled(
 
 
 def _blocks(A: sp.csr_array) -> Iterator[Block]:
-    """Rows and columns of each part of a matrix that shares none with the others; columns of zeros are left out."""
+    """Each part of a matrix that shares neither rows nor columns with the others; columns of zeros are left out."""
     m, entries = A.shape[0], A.tocoo()
     large = np.abs(entries.data) > ROUNDING
-    rows, columns = entries.row[large], entries.col[large]
+    rows, columns, values = entries.row[large], entries.col[large], entries.data[large]
     count = m + A.shape[1]
     graph = sp.coo_array((np.ones(len(rows)), (rows, m + columns)), (count, count))
-    label = connected_components(graph, directed=False)[1]
-    used = np.unique(columns)
-    for part in np.unique(label[m + used]):
-        yield np.flatnonzero(label[:m] == part), used[label[m + used] == part]
+    part = connected_components(graph, directed=False)[1][rows]
+    order = np.argsort(part, kind="stable")
+    for here in np.split(order, np.flatnonzero(np.diff(part[order])) + 1) if len(order) else ():
+        own_rows, i = np.unique(rows[here], return_inverse=True)
+        own_columns, j = np.unique(columns[here], return_inverse=True)
+        dense = np.zeros((len(own_rows), len(own_columns)))
+        dense[i, j] = values[here]
+        yield own_rows, own_columns, dense
 
 
 def _placed(each: Attachment, rows: sp.csr_array) -> sp.csr_array:

@@ -15,7 +15,10 @@ Vector = Float[np.ndarray, "3"]
 def corners(side: Side) -> list[End]:
     """The points of a rigid link, each an end."""
     every = zip(side.points, side.onto, strict=True)
-    return [End(side.body, POINT, X, np.eye(3), np.ones(3), 0, *_selected(onto[None])) for X, onto in every]
+    return [
+        End(side.body, POINT, X, np.eye(3), np.ones(3), 0, *_selected(onto[None], side.columns))
+        for X, onto in every
+    ]
 
 
 def same_end(one: End, other: End) -> bool:
@@ -27,17 +30,17 @@ def same_end(one: End, other: End) -> bool:
 
 
 def _selected(
-    onto: Float[np.ndarray, "p d k"],
-) -> tuple[Float[np.ndarray, "p d c"], Int[np.ndarray, " c"]]:
-    """The columns of unknowns that move points of an end, and which these are."""
-    columns = np.flatnonzero((np.abs(onto) >= NOTHING).any(axis=(0, 1)))
-    some = onto[:, :, columns]
-    return np.where(np.abs(some) < NOTHING, 0.0, some), columns
+    onto: Float[np.ndarray, "p d c"], columns: Int[np.ndarray, " c"]
+) -> tuple[Float[np.ndarray, "p d _"], Int[np.ndarray, " _"]]:
+    """Those of some unknowns that move points of an end."""
+    moving = (np.abs(onto) >= NOTHING).any(axis=(0, 1))
+    some = onto[:, :, moving]
+    return np.where(np.abs(some) < NOTHING, 0.0, some), columns[moving]
 
 
 def rigid_end(body: int, at: Vector) -> End:
     """An end on the ground or on a prescribed body."""
-    return End(body, RIGID, at, np.eye(3), np.ones(3), 0, *_selected(np.zeros((1, 3, 0))))
+    return End(body, RIGID, at, np.eye(3), np.ones(3), 0, np.zeros((1, 3, 0)), np.zeros(0, int))
 
 
 def end_of(side: Side, joint: ConstraintJoint) -> End:
@@ -47,7 +50,9 @@ def end_of(side: Side, joint: ConstraintJoint) -> End:
     if side.stations is not None:
         line = Line(side.stations, joint.axis, joint.bodies[0], joint.at)
         onto = onto * np.atleast_1d(side.surface[:, :3].any(axis=(0, 1)))[:, None]  # of a planar beam not ψ
-        return End(side.body, LINE, side.points[0], np.eye(3), np.ones(3), 0, *_selected(onto), line)
+        return End(
+            side.body, LINE, side.points[0], np.eye(3), np.ones(3), 0, *_selected(onto, side.columns), line
+        )
     directions, lengths, known = np.eye(3), np.ones(3), p - 1
     arms = side.points[1:] - side.points[0]
     if known:
@@ -58,7 +63,15 @@ def end_of(side: Side, joint: ConstraintJoint) -> End:
             directions[2] = [0, 0, 1]
         elif known == 2:
             directions[2] = np.cross(directions[0], directions[1])
-    return End(side.body, _form(side, d, known), side.points[0], directions, lengths, known, *_selected(onto))
+    return End(
+        side.body,
+        _form(side, d, known),
+        side.points[0],
+        directions,
+        lengths,
+        known,
+        *_selected(onto, side.columns),
+    )
 
 
 def line_weights(end: End, motion: RigidMotion) -> Float[np.ndarray, "T p"]:
