@@ -114,9 +114,10 @@ def _tied(
 
 
 def _beside(H: Float[np.ndarray, "k k"] | sp.csr_array, tie: Tie) -> Float[np.ndarray, " r"]:
-    """σ of each row: about as stiff as the interface is, at most half of a spring."""
+    """σ of each row: about as stiff as the interface is, at most half of a spring; links alone may bear nothing there."""
+    mean = float(H.trace()) / H.shape[0]
     size = np.asarray((tie.C * tie.C).sum(axis=1))
-    usual = np.where(size > 0, H.trace() / H.shape[0] / np.where(size > 0, size, 1.0), 0.0)
+    usual = np.where(size > 0, (mean if mean > 0.0 else 1.0) / np.where(size > 0, size, 1.0), 0.0)
     return np.asarray(usual / (1 + 2 * usual * tie.compliance))
 
 
