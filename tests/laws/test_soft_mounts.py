@@ -25,7 +25,7 @@ def mounted(guided: str, beam: str, R: np.ndarray, **analysis: Any) -> dict[str,
     """
     hinged, end = guided in HINGED, [0.0, ARM, 0.0] if guided in HINGED else [0.0, 0.0, 0.0]
     body = {"model": "rigid", "mass": 1.0, "inertia": [1e-3, 1e-3, 1e-3, 0, 0, 0]}
-    links = {"block": {**body, "centre": (R @ end).tolist()}, "carriage": {**body, "centre": [0, 0, 0]}}
+    links = {"block": {**body, "centre": end}, "carriage": {**body, "centre": [0, 0, 0]}}
     along: dict[str, Any] = {"at": [0, 0, 0], "axis": [1, 0, 0]}
     soft = {"stiffness": MOUNT, "rotational_stiffness": MOUNT * ARM**2}
     joints: dict[str, Any] = {

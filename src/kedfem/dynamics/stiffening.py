@@ -18,7 +18,7 @@ from kedfem.dynamics.history import Forcing
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
 from kedfem.dynamics.joints.constraint_matrices import JointRows, joint_rows
-from kedfem.dynamics.joints.ports import Rotation, in_balance, port_columns
+from kedfem.dynamics.joints.ports import Rotation, port_columns
 from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.matrices.interface import solved, static_tie
 from kedfem.dynamics.matrices.substructure import Substructure, factored, mass_matrix
@@ -137,11 +137,7 @@ def stiffening(model: Model, elements: RigidElements | None = None) -> Stiffenin
     SolveError
         If nothing holds a link.
     """
-    parts = [
-        replace(part, S=in_balance(link, joint, part.S)) if link.rigid else part
-        for link, joint in zip(model.links, model.joints, strict=True)
-        for part in (factored(link, joint, 0.0, 1.0),)
-    ]
+    parts = [factored(link, joint, 0.0, 1.0) for link, joint in zip(model.links, model.joints, strict=True)]
     modes = [
         stress_modes(link, part, loads, [] if elements is None else unit_loads_on(k, link, elements))
         for k, (link, part, loads) in enumerate(zip(model.links, parts, model.loads, strict=True))

@@ -11,7 +11,6 @@ from kedfem.links.reduced import rigid_modes
 Rotation = Float[np.ndarray, "d d"]
 
 RIGIDLY = 1e-9  # of the largest motion of ports
-ROUNDING = 1e-14  # of the largest stiffness
 
 
 def port_columns(attachment: Attachment, n: int) -> Float[np.ndarray, "k q"]:
@@ -72,5 +71,4 @@ def in_balance(link: Link, joint: Attachment, S: Float[np.ndarray, "c c"]) -> Fl
     out, ports = S.copy(), len(joint.keep)
     out[:ports, :ports] -= N @ (N.T @ out[:ports, :ports])
     out[:ports, :ports] -= (out[:ports, :ports] @ N) @ N.T
-    out[np.abs(out) < ROUNDING * np.abs(S).max(initial=0.0)] = 0.0
     return out

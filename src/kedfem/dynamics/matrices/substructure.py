@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from kedfem.dynamics.joints.attachments import Attachment
-from kedfem.dynamics.joints.ports import Rotation, port_columns, port_rotation, port_values
+from kedfem.dynamics.joints.ports import Rotation, in_balance, port_columns, port_rotation, port_values
 from kedfem.dynamics.matrices.cholesky import Cholesky
 from kedfem.dynamics.matrices.interface import MANY, Tie, solved
 from kedfem.dynamics.stepping.scheme import Scheme
@@ -177,6 +177,11 @@ def _interface(part: Substructure, R: Rotation, held: Int[np.ndarray, " c"]) -> 
 
 def factored(link: Link, joint: Attachment, c_M: float, c_K: float) -> Substructure:
     """A link with A = c_M M + c_K K0 held at its anchors, factored and condensed onto its ports."""
+    made = _held(link, joint, c_M, c_K)
+    return replace(made, S=in_balance(link, joint, made.S)) if link.rigid and c_M == 0.0 else made
+
+
+def _held(link: Link, joint: Attachment, c_M: float, c_K: float) -> Substructure:
     anchors = anchors_of(link)
     if link.full is not None:
         return _dense_factored(link, joint, effective_matrix(link, c_M, c_K), anchors, c_K)
