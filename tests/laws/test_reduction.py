@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from kedfem.accuracy.histories import histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed, training_motion
 from kedfem.accuracy.reduction import reduced
-from kedfem.dynamics.matrices.substructure import coupled
+from kedfem.dynamics.matrices.closed import coupled
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.bases import bases
 from kedfem.dynamics.modes.reduction import Basis, static_parts

@@ -12,7 +12,7 @@ from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics import stiffening
 from kedfem.dynamics.joints.ports import add_port_forces
-from kedfem.dynamics.matrices.substructure import coupled
+from kedfem.dynamics.matrices.closed import coupled
 from kedfem.dynamics.rigid_body import forcings, motions
 from kedfem.dynamics.stepping.first_state import started
 from kedfem.dynamics.stepping.monolithic import MonolithicSteps

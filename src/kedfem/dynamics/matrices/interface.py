@@ -14,6 +14,7 @@ part is known, and the new μ₁ acts along the new rows alone: joint forces at 
 swing from step to step.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,57 +61,58 @@ class RowState:
 def solved(
     H: Float[np.ndarray, "k k"] | sp.csr_array, f: Float[np.ndarray, " k"], tie: Tie | None
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " r"]]:
-    """Interface unknowns z and the rows' forces m; of a sparse H by a sparse factor.
+    """Interface unknowns z and the rows' forces m; see `solver`."""
+    return solver(H, tie)(f)
+
+
+def solver(
+    H: Float[np.ndarray, "k k"] | sp.csr_array, tie: Tie | None
+) -> Callable[[Float[np.ndarray, " k"]], tuple[Float[np.ndarray, " k"], Float[np.ndarray, " r"]]]:
+    """What gives interface unknowns z and the rows' forces m for any f; of a sparse H by a sparse factor.
 
     Raises
     ------
     SolveError
         If H is not positive definite.
     """
+    if tie is None:
+        alone = _factor(H)
+        return lambda f: (alone(f), np.zeros(0))
+    C, beside = tie.C, _beside(H, tie)
+    inverse = _factor(H + (C.T * beside) @ C)
+    compliance = tie.compliance / (1 - beside * tie.compliance)
+    L, kept = semidefinite_factor(_symmetric(C @ inverse(sp.csr_array(C).T.toarray())) + np.diag(compliance))
+
+    def of(f: Float[np.ndarray, " k"]) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " r"]]:
+        z, m = inverse(f + tie.force), np.zeros(len(compliance))
+        for _ in range(2):  # the second closes joints to rounding
+            left = tie.target - C @ z - compliance * m
+            change = np.zeros(len(m))
+            change[kept] = scipy.linalg.cho_solve((L, True), left[kept], check_finite=False)
+            m += change
+            z += inverse(C.T @ change)
+        return z, m - beside * (C @ z)
+
+    return of
+
+
+def _factor(
+    H: Float[np.ndarray, "k k"] | sp.csr_array,
+) -> Callable[[Float[np.ndarray, "k *n"]], Float[np.ndarray, "k *n"]]:
+    """H⁻¹, times vectors or matrices."""
+    what = "joints: the joints' common system"
     if sp.issparse(H):
-        return _solved_sparsely(sp.csr_array(H), f, tie)
-    k = np.zeros(0) if tie is None else _beside(H, tie)
+        sparse = Cholesky(sp.csr_array(H), what)
+        return lambda f: sparse.solve_many(f) if f.ndim == 2 else np.array(sparse.solve(f))
     try:
-        if tie is not None:
-            H = H + (tie.C.T * k) @ tie.C
         factor = scipy.linalg.cho_factor(H, lower=True, check_finite=False)
     except np.linalg.LinAlgError as error:
-        raise SolveError(f"joints: the joints' common system must be definite, got {error}") from error
-    if tie is None:
-        return np.asarray(scipy.linalg.cho_solve(factor, f, check_finite=False)), np.zeros(0)
-    Y = scipy.linalg.solve_triangular(factor[0], tie.C.T, lower=True, check_finite=False)
-    z = np.asarray(scipy.linalg.cho_solve(factor, f + tie.force, check_finite=False))
-    X = scipy.linalg.solve_triangular(factor[0], Y, lower=True, trans="T", check_finite=False)
-    return _tied(z, X, tie.C, Y.T @ Y, k, tie)
+        raise SolveError(f"{what} must be definite, got {error}") from error
+    return lambda f: np.asarray(scipy.linalg.cho_solve(factor, f, check_finite=False))
 
 
-def _solved_sparsely(
-    H: sp.csr_array, f: Float[np.ndarray, " k"], tie: Tie | None
-) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " r"]]:
-    """The same by a sparse factor."""
-    if tie is None:
-        return np.array(Cholesky(H, "joints: the joints' common system").solve(f)), np.zeros(0)
-    C, k = sp.csr_array(tie.C), _beside(H, tie)
-    factor = Cholesky(sp.csr_array(H + C.T @ sp.diags_array(k) @ C), "joints: the joints' common system")
-    X, z = factor.solve_many(C.T.toarray()), np.array(factor.solve(f + tie.force))
-    return _tied(z, X, C, C @ X, k, tie)
-
-
-def _tied(
-    z: Float[np.ndarray, " k"], X: Float[np.ndarray, "k r"], C: Float[np.ndarray, "r k"] | sp.csr_array,
-    G: Float[np.ndarray, "r r"], beside: Float[np.ndarray, " r"], tie: Tie,
-) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " r"]]:  # fmt: skip
-    """z and m from z without forces of rows, X = H'⁻¹ Cᵀ and G = C H'⁻¹ Cᵀ."""
-    compliance = tie.compliance / (1 - beside * tie.compliance)
-    L, kept = semidefinite_factor(G + np.diag(compliance))
-    m = np.zeros(len(G))
-    for _ in range(2):  # the second closes joints to rounding
-        left = tie.target - C @ z - compliance * m
-        change = np.zeros(len(G))
-        change[kept] = scipy.linalg.cho_solve((L, True), left[kept], check_finite=False)
-        m += change
-        z += X @ change
-    return z, m - beside * (C @ z)
+def _symmetric(G: Float[np.ndarray, "r r"]) -> Float[np.ndarray, "r r"]:
+    return np.asarray((G + G.T) / 2)
 
 
 def _beside(H: Float[np.ndarray, "k k"] | sp.csr_array, tie: Tie) -> Float[np.ndarray, " r"]:

@@ -3,7 +3,7 @@
 Exact block elimination of the coupled system, because T M Tᵀ = M and K = T K0 Tᵀ [KED, eqs. (12)(14)].
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
@@ -13,11 +13,10 @@ import scipy.sparse as sp
 from jaxtyping import Float, Int
 
 from kedfem.dynamics.joints.attachments import Attachment
-from kedfem.dynamics.joints.ports import Rotation, in_balance, port_columns, port_rotation, port_values
+from kedfem.dynamics.joints.ports import in_balance, port_columns, port_values
 from kedfem.dynamics.matrices.cholesky import Cholesky
-from kedfem.dynamics.matrices.interface import MANY, Tie, solved
 from kedfem.dynamics.stepping.scheme import Scheme
-from kedfem.dynamics.stepping.state import Nodal, NodalOf, Rayleigh
+from kedfem.dynamics.stepping.state import Nodal, Rayleigh
 from kedfem.errors import SolveError
 from kedfem.links.record import Link
 
@@ -94,85 +93,6 @@ def _stiffness(F: Float[np.ndarray, "c c"], anchored: int) -> Float[np.ndarray, 
         B[p:, p:] = np.linalg.cholesky(Z.T @ Z - F[p:, p:])
     inverse = scipy.linalg.solve_triangular(B, np.eye(len(F)), lower=True, check_finite=False)
     return np.asarray((inverse[:p].T @ inverse[:p]) - inverse[p:].T @ inverse[p:])
-
-
-def coupled(
-    parts: Sequence[Substructure], R: Sequence[Rotation], rhs: Sequence[NodalOf], tie: Tie | None = None
-) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]]]:
-    """Solve all links together: A g = r + Wᵀ λ, joints closed: R W g = B z, joint forces in balance: Σ Bᵀ R λ = 0.
-
-    The mechanism of [KED, eq. (19)]: joints make shared points move together.
-
-    Parameters
-    ----------
-    parts, R, rhs : per link; R link to world, rhs (n, d) in the link frame
-    tie : what joints enforced by constraint equations ask of z; then Σ Bᵀ R λ is what these exert
-
-    Returns
-    -------
-    g : per link (n, d), link frame
-    forces : per link (q,) λ on the link at its ports, link frame
-    """
-    return _closed(parts, R, [part.solve(r) for part, r in zip(parts, rhs, strict=True)], tie)
-
-
-def coupled_all(
-    parts: Sequence[Substructure], cases: Sequence[tuple[Sequence[Rotation], Sequence[NodalOf], Tie | None]]
-) -> list[list[NodalOf]]:
-    """g of several sets of R, rhs and tie, as of `coupled`: with each link's solves of all sets together."""
-    if not cases:
-        return []
-    answers = [
-        part.solve_many(np.stack([rhs[k].ravel() for _, rhs, _ in cases], axis=1))
-        for k, part in enumerate(parts)
-    ]
-    return [
-        _closed(parts, R, [X[:, k].reshape(r.shape) for X, r in zip(answers, rhs, strict=True)], tie)[0]
-        for k, (R, rhs, tie) in enumerate(cases)
-    ]
-
-
-def _closed(
-    parts: Sequence[Substructure], R: Sequence[Rotation], y: Sequence[NodalOf], tie: Tie | None
-) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]]]:
-    """`coupled`, from y = Ã⁻¹ r."""
-    v = [part.seen(x) for part, x in zip(parts, y, strict=True)]
-    held = [np.flatnonzero(part.attachment.B.any(axis=0)) for part in parts]  # few of all unknowns
-    RB = [_interface(part, R_, c) for part, R_, c in zip(parts, R, held, strict=True)]
-    z = np.zeros(parts[0].attachment.B.shape[1])
-    if len(z):
-        # Σ Bᵀ (R S Rᵀ) B z = Σ Bᵀ R S v
-        f = np.zeros(len(z))
-        for part, b, c, x in zip(parts, RB, held, v, strict=True):
-            f[c] += b.T @ (part.S @ x)
-        z, _ = solved(
-            _common(held, [b.T @ part.S @ b for part, b in zip(parts, RB, strict=True)], len(z)), f, tie
-        )
-    forces = [part.S @ (b @ z[c] - x) for part, b, c, x in zip(parts, RB, held, v, strict=True)]
-    g = [x + (part.Y @ force).reshape(x.shape) for part, x, force in zip(parts, y, forces, strict=True)]
-    return g, [force[: len(part.attachment.keep)] for part, force in zip(parts, forces, strict=True)]
-
-
-def _common(
-    held: Sequence[Int[np.ndarray, " c"]], own: Sequence[Float[np.ndarray, "c c"]], k: int
-) -> Float[np.ndarray, "k k"] | sp.csr_array:
-    """The links' matrices on the interface unknowns that each has a share in, added up; sparse where there are many."""
-    if k > MANY:
-        columns = [np.broadcast_to(c, (len(c), len(c))) for c in held]
-        at = [np.concatenate([x.ravel() for x in each]) for each in ([c.T for c in columns], columns)]
-        return sp.csr_array(sp.coo_array((np.concatenate([x.ravel() for x in own]), at), (k, k)))
-    H = np.zeros((k, k))
-    for c, x in zip(held, own, strict=True):
-        H[np.ix_(c, c)] += x
-    return H
-
-
-def _interface(part: Substructure, R: Rotation, held: Int[np.ndarray, " c"]) -> Float[np.ndarray, "p c"]:
-    """[Rᵀ B; 0]: port components in the link frame from the interface unknowns that the link has a share in."""
-    B = part.attachment.B[:, held]
-    out = np.zeros((len(part.S), len(held)))
-    out[: len(B)] = port_rotation(part.attachment, R).T @ B
-    return out
 
 
 def factored(link: Link, joint: Attachment, c_M: float, c_K: float) -> Substructure:

@@ -13,7 +13,8 @@ import scipy.sparse as sp
 from jaxtyping import Float
 
 from kedfem.dynamics.joints.attachments import Attachment
-from kedfem.dynamics.matrices.substructure import Substructure, coupled_all, factored
+from kedfem.dynamics.matrices.closed import closed, coupled_all
+from kedfem.dynamics.matrices.substructure import Substructure, factored
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.start import Instant
 from kedfem.dynamics.stepping.state import NodalOf
@@ -136,16 +137,14 @@ def _krylov(
     All instants go level by level, so that their solves go together.
     """
 
-    def answers(instants: Sequence[Instant], loads: Sequence[Sequence[NodalOf]]) -> list[list[NodalOf]]:
-        each = zip(instants, loads, strict=True)
-        return coupled_all(parts, [([now.R for now in at.at], rhs, at.tie) for at, rhs in each])
-
+    frozen = [closed(parts, [now.R for now in instant.at], instant.tie) for instant in instants]
     loads = [[now.F @ now.R for now in instant.at] for instant in instants]
-    found = [_Krylov(model, static, levels) for static in answers(instants, loads)]
-    growing = [(at, each) for at, each in zip(instants, found, strict=True)]
+    static = coupled_all(parts, list(zip(frozen, loads, strict=True)))
+    found = [_Krylov(model, x, levels) for x in static]
+    growing = list(zip(frozen, found, strict=True))
     for _ in range(levels):
         growing = [(at, each) for at, each in growing if each.grows()]
-        new = answers([at for at, _ in growing], [each.images[-1] for _, each in growing])
+        new = coupled_all(parts, [(at, each.images[-1]) for at, each in growing])
         for (_, each), x in zip(growing, new, strict=True):
             each.add(x)
     return found

@@ -8,8 +8,9 @@ from jaxtyping import Float
 from kedfem.dynamics.history import LinkMoment, Snapshot
 from kedfem.dynamics.joints.constraint_matrices import joint_rows
 from kedfem.dynamics.joints.ports import add_port_forces
+from kedfem.dynamics.matrices.closed import closed, coupled_all
 from kedfem.dynamics.matrices.interface import static_tie
-from kedfem.dynamics.matrices.substructure import Substructure, coupled_all
+from kedfem.dynamics.matrices.substructure import Substructure
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.stepping.start import damping_times
@@ -42,7 +43,7 @@ def residual_deflections(
         rows = joint_rows(full.rows, motion)
         tie = None if rows is None else static_tie(rows, 0)
         R = [state.R for state in snapshot.states]
-        cases.append((R, _residuals(full, model, motion, snapshot.states), tie))
+        cases.append((closed(parts, R, tie), _residuals(full, model, motion, snapshot.states)))
     return coupled_all(parts, cases)
 
 

@@ -10,8 +10,9 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.first_rows import FirstRows, interface_values
 from kedfem.dynamics.joints.ports import Rotation
+from kedfem.dynamics.matrices.closed import Closed, closed, coupled
 from kedfem.dynamics.matrices.interface import Tie
-from kedfem.dynamics.matrices.substructure import Substructure, coupled, factored, mass_substructure
+from kedfem.dynamics.matrices.substructure import Substructure, factored, mass_substructure
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.state import ForcingAt, LinkState, Nodal, NodalOf, Rayleigh
 from kedfem.errors import SolveError
@@ -158,23 +159,24 @@ def _turning(links: Sequence[Link], parts: Sequence[Substructure], instant: Inst
     R = [now.R for now in instant.at]
     load = [now.F @ now.R for now in instant.at]
     spin = [R_.T @ S @ R_ for S, R_ in zip(instant.spin, R, strict=True)]
-    g, _ = coupled(parts, R, load, instant.tie)
+    linkage = closed(parts, R, instant.tie)
+    g, _ = linkage.coupled(load)
     before = np.inf
     for _ in range(TURNING_ITERATIONS if instant.turnings is None else 0):
         inertia = [mass_times(link.mass, x @ S.T) for link, x, S in zip(links, g, spin, strict=True)]
-        new, _ = coupled(parts, R, [b - m for b, m in zip(load, inertia, strict=True)], instant.tie)
+        new, _ = linkage.coupled([b - m for b, m in zip(load, inertia, strict=True)])
         change, size = _change(new, g)
         if change > 0.5 * before:
             break
         before, g = change, new
         if change <= CONVERGED * size:
             return [x @ R_.T for x, R_ in zip(g, R, strict=True)]
-    found = _turned_static(links, parts, instant, g, coupled(parts, R, load, instant.tie)[0])
+    found = _turned_static(links, linkage, instant, g, linkage.coupled(load)[0])
     return [x @ R_.T for x, R_ in zip(found, R, strict=True)]
 
 
 def _turned_static(
-    links: Sequence[Link], parts: Sequence[Substructure], instant: Instant, guess: Sequence[NodalOf],
+    links: Sequence[Link], linkage: Closed, instant: Instant, guess: Sequence[NodalOf],
     static: Sequence[NodalOf],
 ) -> list[NodalOf]:  # fmt: skip
     """The deflection by GMRES: inertia and stress stiffness need not be small, (1 + K0⁻¹ (M spin + k P)) g = g0.
@@ -192,14 +194,14 @@ def _turned_static(
     spin = [R_.T @ S @ R_ for S, R_ in zip(instant.spin, R, strict=True)]
     ends = np.cumsum([x.size for x in static])[:-1]
     none = [np.zeros_like(x) for x in static]
-    fixed = np.concatenate([y.ravel() for y in coupled(parts, R, none, instant.tie)[0]])
+    fixed = np.concatenate([y.ravel() for y in linkage.coupled(none)[0]])
 
     def applied(x: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
         each = [y.reshape(z.shape) for y, z in zip(np.split(x, ends), static, strict=True)]
         forces = [mass_times(link.mass, y @ S.T) for link, y, S in zip(links, each, spin, strict=True)]
         if instant.turnings is not None:
             forces = [f + k(y) for f, k, y in zip(forces, instant.turnings, each, strict=True)]
-        solved = np.concatenate([y.ravel() for y in coupled(parts, R, forces, instant.tie)[0]])
+        solved = np.concatenate([y.ravel() for y in linkage.coupled(forces)[0]])
         return np.asarray(x + solved - fixed)
 
     start, first = (np.concatenate([x.ravel() for x in each]) for each in (static, guess))
