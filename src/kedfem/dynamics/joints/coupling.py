@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import scipy.sparse as sp
 from jaxtyping import Float
 
 from kedfem.dynamics.joints.attachments import Attachment, SharedCut
@@ -61,21 +62,23 @@ class _Ports:
         self.joints.append(joint)
         self.selection.append((first, block))
 
-    def attachment(self, unknowns: int) -> Attachment:
-        d = self.link.d
-        if not self.weights:
-            none = np.zeros(0, int)
-            return Attachment(none, np.zeros((0, 0)), d, np.zeros((0, 3)), (), none, np.zeros((0, unknowns)))
-        B = np.zeros((len(self.keep), unknowns))
+    def attachment(self) -> Attachment:
+        """Without what the interface unknowns are to its components."""
+        q, d = len(self.keep), self.link.d
+        W = np.array(self.weights) if self.weights else np.zeros((0, 0))
+        nodes = np.flatnonzero(W.any(axis=0))
+        points = np.array(self.points) if self.points else np.zeros((0, 3))
+        keep = np.array(self.keep, int)
+        return Attachment(nodes, W[:, nodes], d, points, tuple(self.joints), keep, np.zeros((q, 0)))
+
+    def selected(self, unknowns: int) -> sp.csr_array:
+        """Held components from all interface unknowns."""
+        B = sp.lil_array((len(self.keep), unknowns))
         row = 0
         for first, block in self.selection:
             B[row : row + block.shape[0], first : first + block.shape[1]] = block
             row += block.shape[0]
-        W = np.array(self.weights)
-        nodes = np.flatnonzero(W.any(axis=0))
-        return Attachment(
-            nodes, W[:, nodes], d, np.array(self.points), tuple(self.joints), np.array(self.keep), B
-        )
+        return sp.csr_array(B)
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,11 +154,11 @@ def joined(
                 d = ports[key].link.d
                 ports[key].add(row_, point, "", list(range(d)), unknowns, np.eye(d))
             unknowns += d
-    every = [ports[name].attachment(unknowns) for name in links]
+    every = [ports[name].attachment() for name in links]
     sides = list(zip((side for _, both in rows for side in both), columns, strict=True))
     bear = [k for side, here in sides if side is not None and not side.slider for k in here]
     riding = [k for side, here in sides if side is not None and side.slider for k in here]
-    found, Z = independent(every, bear, riding)
+    found, Z = independent(every, [ports[name].selected(unknowns) for name in links], bear, riding)
     return Joined(dict(zip(links, found, strict=True)), tuple(_on(rows, columns, Z)))
 
 
@@ -175,7 +178,7 @@ def _own_columns(
 
 
 def _on(
-    rows: Sequence[tuple[ConstraintJoint, list[Own | None]]], columns: Sequence[list[int]], Z: np.ndarray
+    rows: Sequence[tuple[ConstraintJoint, list[Own | None]]], columns: Sequence[list[int]], Z: sp.csr_array
 ) -> Iterator[ConstraintJoint]:
     """Joints with rows on the interface unknowns, as these turned out."""
     of_side = iter(columns)

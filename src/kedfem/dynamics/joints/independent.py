@@ -20,8 +20,11 @@ Block = tuple[Int[np.ndarray, " r"], Int[np.ndarray, " c"], Float[np.ndarray, "r
 
 
 def independent(
-    every: Sequence[Attachment], own: Sequence[int] = (), riding: Sequence[int] = ()
-) -> tuple[list[Attachment], Float[np.ndarray, "k r"]]:
+    every: Sequence[Attachment],
+    selected: Sequence[sp.csr_array],
+    own: Sequence[int] = (),
+    riding: Sequence[int] = (),
+) -> tuple[list[Attachment], sp.csr_array]:
     """Joints on one coupling surface repeat rows of W: w_d = Σ l w_r. Each is held once, and the rest said of z instead.
 
     With all rows W = L W_r of the independent ones W_r, (B − L B_r) z = 0. An orthonormal basis Z of these z makes
@@ -29,15 +32,16 @@ def independent(
 
     Parameters
     ----------
+    selected : (q, k) held components of each, in world axes, from all interface unknowns
     own : unknowns z of ports on which rows of joints bear, side by side
     riding : those of rigid sliders on which rows bear
 
     Returns
     -------
-    attachments on the new unknowns, and Z
+    attachments on the new unknowns, and Z (k, r)
     """
     relations = [_relation(each) for each in every]
-    B = sp.vstack([sp.csr_array(each.B) for each in every], format="csr")
+    B = sp.vstack(selected, format="csr")
     h, k = B.shape
     shares, loose, from_rows = sp.eye_array(h, format="csr"), sp.csr_array((h, 0)), sp.csr_array((h, 0))
     Z = sp.eye_array(k, format="csr")
@@ -47,15 +51,15 @@ def independent(
         Z = _null_space(left, list(_blocks(left)))
         shares, from_rows, loose = _port_forces(L, B, own, riding)
     found, first = [], 0
-    for each, (kept, _) in zip(every, relations, strict=True):
+    for each, own_B, (kept, _) in zip(every, selected, relations, strict=True):
         here = slice(first, first := first + len(each.keep))
         found.append(
             replace(
-                each, keep=each.keep[kept], B=each.B[kept] @ Z, shares=_placed(each, shares[here]),
+                each, keep=each.keep[kept], B=(own_B[kept] @ Z).toarray(), shares=_placed(each, shares[here]),
                 from_rows=_placed(each, from_rows[here]), loose=_placed(each, loose[here]),
             )
         )  # fmt: skip
-    return found, Z.toarray()
+    return found, Z
 
 
 def _relation(each: Attachment) -> tuple[Bool[np.ndarray, " h"], Float[np.ndarray, "h q"]]:
