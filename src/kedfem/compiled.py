@@ -105,14 +105,14 @@ def _kept(options: dict[str, Any]) -> Callable[[Callable[..., Any]], Any]:
         file.save, cache.load_overload = alone, loaded
         begin, part = dispatcher.compile, "no_cpython_wrapper" in options
 
-        def told(types: object) -> Any:
+        def reported(types: object) -> Any:
             outside = _part.set(part)
             try:
                 return begin(types)
             finally:
                 _part.reset(outside)
 
-        dispatcher.compile = told
+        dispatcher.compile = reported
         return dispatcher
 
     return compiles
