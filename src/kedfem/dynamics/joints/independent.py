@@ -123,9 +123,10 @@ def _null_space(A: sp.csr_array, blocks: Sequence[Block]) -> sp.csr_array:
         part = Vt[int((s > DEPENDENT).sum()) :].T
         parts.append((columns, count + np.arange(part.shape[1]), part))
         count, alone[columns] = count + part.shape[1], False
-    alone = np.flatnonzero(alone)
-    parts.append((alone, count + np.arange(len(alone)), np.eye(len(alone))))
-    every = _assembled(parts, (A.shape[1], count + len(alone)))
+    rest = np.flatnonzero(alone)
+    shape = A.shape[1], count + len(rest)
+    units = sp.csr_array((np.ones(len(rest)), (rest, count + np.arange(len(rest)))), shape)
+    every = _assembled(parts, shape) + units
     first = abs(every).argmax(axis=0)
     return every[:, np.argsort(first, kind="stable")]
 
@@ -134,8 +135,10 @@ def _assembled(
     parts: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]], shape: tuple[int, int]
 ) -> sp.csr_array:
     """Dense parts at their rows and columns."""
+    if not parts:
+        return sp.csr_array(shape)
     rows, columns, values = (
-        np.concatenate([x.ravel() for x in each] or [np.zeros(0)])
+        np.concatenate([x.ravel() for x in each])
         for each in zip(*((*np.broadcast_arrays(i[:, None], j), x) for i, j, x in parts), strict=True)
     )
     out = sp.csr_array((values, (rows.astype(int), columns.astype(int))), shape)

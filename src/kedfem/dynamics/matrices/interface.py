@@ -78,7 +78,7 @@ def solver(
     if tie is None:
         alone = _factor(H)
         return lambda f: (alone(f), np.zeros(0))
-    C, beside = tie.C, _beside(H, tie)
+    C, beside = sp.csr_array(tie.C) if sp.issparse(H) else tie.C, _beside(H, tie)
     inverse = _factor(H + (C.T * beside) @ C)
     compliance = tie.compliance / (1 - beside * tie.compliance)
     L, kept = semidefinite_factor(_symmetric(C @ inverse(sp.csr_array(C).T.toarray())) + np.diag(compliance))
