@@ -8,7 +8,9 @@ from numpy.testing import assert_allclose
 
 from kedfem.dynamics.stepping.first_state import first_states
 from kedfem.dynamics.system.march import displacements, march
+from kedfem.dynamics.system.starts import deflected
 from kedfem.dynamics.system.starts.deflected import plucked, quasi_static, static
+from kedfem.dynamics.system.starts.equilibrium import stands_off
 from kedfem.dynamics.system.starts.instant import Instant
 from kedfem.dynamics.system.starts.rates import coordinates, places
 from kedfem.dynamics.system.starts.start import rest
@@ -233,3 +235,28 @@ def test_a_start_knows_the_turns_of_its_drive() -> None:
     now = Instant(of.ready, of.motion, 0.05)
     assert now.motion.drives[0, 0] > np.pi
     assert np.abs(now.coordinates(np.zeros((3, of.ready.system.unknowns)))[0]).max(initial=0.0) < 1e-9
+
+
+@pytest.mark.parametrize("kind", ["gears, rack", "screw"])
+def test_a_balance_with_open_joints_is_none(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Iterations of large motions once settled with an upright turned over and torn off its wishbones, as if in balance.
+
+    A link that is moved off its shared points is named, and so is a constraint that is not met.
+    """
+    of = at(BEAMS[kind](), "co-rotational")
+    now = Instant(of.ready, of.motion, 0.0)
+    u = quasi_static(of.ready, of.motion, []).u
+    assert stands_off(now, u, None) == ""
+    z = now.interface(u)
+    rates = np.random.default_rng(5).standard_normal(len(z))
+    opened = np.concatenate(
+        [np.linalg.pinv(part.W) @ (joint.B @ (z + 0.1 * rates)) for part, joint in zip(
+            of.ready.parts, of.ready.system.model.joints, strict=True)]
+    )  # fmt: skip
+    assert "would be open by" in stands_off(now, opened, None)
+    first = of.ready.bodies.at[1]
+    off = u + np.where(np.arange(len(u)) < first, 0.05 * np.sign(u + 1e-30), 0.0)
+    assert "off its joints" in stands_off(now, off, None)
+    monkeypatch.setattr(deflected, "_iterated", lambda *_: off)
+    with pytest.raises(SolveError, match=r"link '\w+' would stand .* m off its joints"):
+        quasi_static(of.ready, of.motion, [])

@@ -156,15 +156,19 @@ def _unbalanced(scene: Scene, motion: RigidMotion, moves: str) -> str:
     kind = scene.analysis.kind
     advice = (
         "a link that nothing holds, a load beyond buckling, or links that rotate too far under their loads for the "
-        "balance to be found: hold them by joints, springs or a drive, let loads grow in smaller steps over time, or "
-        "take kind = 'transient' with damping"
+        "balance to be found: hold them by joints, springs or a drive, take positions nearer to each other, as each is "
+        "found from the one before, let loads grow in smaller steps over time, or take kind = 'transient' with damping"
         if kind == "static"
         else "a drive near a natural frequency, or a linkage near a dead point, where small loads move it far: take a "
         "slower drive, stiffer links, another position or kind = 'steady'"
     )
+    driven, along = list(scene.driven_joints), float(motion.phi[0])
+    where = f", drive angle {np.degrees(along):.6g} deg" if len(driven) == 1 else ""
+    if where and scene.joints[driven[0]].kind == "prismatic":
+        where = f", drive travel {1e3 * along:.6g} mm"
     return (
         f"analysis.kind: all forces must balance at each position of a {kind} analysis, got no balance at "
-        f"t = {motion.t[0]:.6g} s, drive angle {np.degrees(motion.phi[0]):.6g} deg; {moves}{'; ' * bool(moves)}{advice}"
+        f"t = {motion.t[0]:.6g} s{where}; {moves}{'; ' * bool(moves)}{advice}"
     )
 
 

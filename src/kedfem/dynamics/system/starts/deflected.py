@@ -18,7 +18,7 @@ from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.record import RATE, Spring, Stop, curve_of
 from kedfem.dynamics.system.starts.accelerations import accelerations, own_spin
 from kedfem.dynamics.system.starts.balance import Asked, Balance
-from kedfem.dynamics.system.starts.equilibrium import Equilibrium, equilibrium
+from kedfem.dynamics.system.starts.equilibrium import Equilibrium, equilibrium, stands_off
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
 from kedfem.dynamics.system.starts.internal import own, rows, turned_rate
 from kedfem.dynamics.system.starts.start import as_coordinates, begun
@@ -29,9 +29,7 @@ from kedfem.motion.newton import cross_matrix
 
 ITERATIONS = 60
 DAMPED = 8  # times that rates of a deflection are found anew where dampers feel them
-DIRECT = (
-    2  # iterations of a linear system of dense bodies before its matrix gets rid of what makes it definite
-)
+DIRECT = 2  # iterations of a linear system of dense bodies before mass leaves its matrix
 LEAST = 1 / 64  # of loads, that an increment of theirs is
 ROUNDING, LINEAR = 1e-8, 1e-3  # of the deflection: changes below it that do not fall are rounding
 STALLED, IN_A_ROW = 1e-5, 3  # the same of so many changes that do not fall, by matrices without mass
@@ -40,7 +38,6 @@ DIVERGED = 1e3  # times the first change: iterations that Newton's method takes 
 LATER = np.array([
     [-25, 48, -36, 16, -3], [-3, -10, 18, -6, 1], [1, -8, 0, 8, -1], [-1, 6, -18, 10, 3], [3, -16, 36, -48, 25],
 ]) / 12  # rates at five instants, of fourth order  # fmt: skip
-
 AHEAD = {1: [1], 2: [-1, 2], 3: [1, -3, 3], 4: [-1, 4, -6, 4]}  # the next of values at equal steps
 
 Rows = Sequence[Float[np.ndarray, "_ _"]]
@@ -217,10 +214,21 @@ def _relieved(now: Instant, v: Flat) -> tuple[Flat, Flat]:
     return u, rate(u)
 
 
-@np.errstate(over="ignore", invalid="ignore")  # of iterations that diverge
 def _balanced(
     now: Instant, u: Flat, more: Callable[[Flat, Flat], Flat], spins: Spins | None,
     z1: Flat | None, rounding: float = ROUNDING,
+) -> Flat:  # fmt: skip
+    """The deflection at which all forces balance and joints are closed; see `_iterated`."""
+    found = _iterated(now, u, more, spins, z1, rounding)
+    if not now.of.c.single and (off := stands_off(now, found, z1)):
+        raise NoBalanceError(off)
+    return found
+
+
+@np.errstate(over="ignore", invalid="ignore")  # of iterations that diverge
+def _iterated(
+    now: Instant, u: Flat, more: Callable[[Flat, Flat], Flat], spins: Spins | None,
+    z1: Flat | None, rounding: float,
 ) -> Flat:  # fmt: skip
     """The deflection at which all forces balance, by Newton's method with the stiffness of the mean frames.
 
@@ -259,13 +267,8 @@ def _balanced(
         stalls = size > last / 2 and size <= (LINEAR if linear else rounding) * reached
         stalls = stalls and (n > DIRECT or not linear)
         if n >= DIRECT and size > last / 2 and rounding != FREE and not exact:
-            exact, mixing, last, first = (
-                True,
-                Mixing(),
-                np.inf,
-                0.0,
-            )  # it may be the mass in the matrices that slows it
-            now.slow = True
+            exact, mixing, last, first = True, Mixing(), np.inf, 0.0
+            now.slow = True  # it may be the mass in the matrices that slows it
             continue
         slow = slow + 1 if exact and size > last / 2 and size <= STALLED * reached else 0
         stalls = stalls or slow >= IN_A_ROW

@@ -34,6 +34,7 @@ ITERATIONS = 120
 SHORTEST, IN_A_ROW = 1 / 64, 4  # of a step; so many of them end a search
 FALLS = 0.25  # of a step's length: share by which what is left has to fall
 KRYLOV = 40
+OPEN = 1e-4  # of the largest link: what joints may be open in a balance; found ones are at 1e-9
 LEFT = 1e-3  # of a residual by GMRES: an iteration leaves about as much of the error
 ROUNDING = 1e-8  # of the deflection: changes below it that do not fall
 DIFFERENCE = 1e-9  # of the size of bodies: displacements along which forces are differenced
@@ -219,6 +220,26 @@ class Equilibrium:
             placed = np.outer(link.one, share @ after) + shape @ turned.T
             u[here] += coordinates(link, of.parts[k], placed - after).ravel()
         return np.asarray(u)
+
+
+def stands_off(now: Instant, u: Flat, z1: Flat | None) -> str:
+    """Which link a deflection leaves off its joints, in words; nothing where all are closed.
+
+    Forces of open joints balance nothing: iterations of large motions may settle there.
+    """
+    of, z = now.of, now.interface(u)
+    models = list(zip(of.system.model.links, of.system.model.joints, of.parts, strict=True))
+    off = [
+        np.abs(part.W @ u[own(of, k)] - joint.B @ z).max(initial=0.0)
+        for k, (_, joint, part) in enumerate(models)
+    ]
+    size, C = OPEN * max(reach(link) for link, _, _ in models), now.gradients(z)
+    if max(off) > size:
+        return f"link '{models[int(np.argmax(off))][0].name}' would stand {max(off):.3g} m off its joints"
+    e = np.abs(now.coordinates(np.stack([z, 0 * z if z1 is None else z1, 0 * z]))[0]) * now.hard(C)
+    if e.max(initial=0.0) > size:
+        return f"{of.system.constraints[int(e.argmax())].name} would be open by {e.max():.3g} (m or rad)"
+    return ""
 
 
 @dataclass(frozen=True, slots=True)
