@@ -227,10 +227,12 @@ def _check_mobility(scene: Scene, drawn: Drawn) -> int:
     if corotational_links(scene).issuperset(link for each in motions for link in each.links):
         return free
     words = "; ".join(each.words for each in motions)
+    remedies = ["; ".join(held_by(each) for each in motions), 'let these links have frames = "co-rotational"']
+    if scene.springs or scene.motors:
+        remedies = [f"{remedies[1]}, if springs or motors hold them", remedies[0]]
     raise MotionError(
         "joints: every motion must be held or driven, got free motion left at drive angle 0 deg: "
-        f"{words}; free motions: {free} (remedy: {'; '.join(held_by(each) for each in motions)}; "
-        'or let these links have frames = "co-rotational")'
+        f"{words}; free motions: {free} (remedy: {'; or '.join(remedies)})"
     )
 
 

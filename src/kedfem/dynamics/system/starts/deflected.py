@@ -54,7 +54,7 @@ class NoBalanceError(SolveError):
         super().__init__(
             "analysis.initial: the start must be a deflection that can be found, got none: links that nothing holds but "
             "their weight, springs whose preload is far from what they bear there, or a drive at a natural frequency"
-            f'{seen}; take initial = "rest", a slower drive or stiffer links'
+            f'{seen}; give springs preload or free_length near that, take initial = "rest", a slower drive, stiffer links'
         )
         self.moves = moves
 
