@@ -54,7 +54,7 @@ def worth_drawing(results: Results) -> list[Picture]:
     for each in every:
         floor = least.get(each.channel.unit, 0.0) if each.channel else 0.0
         if each.channel and each.channel.name in beside:
-            floor = max(floor, faint[each.group, each.panels[0].quantity])
+            floor = max(floor, faint.get((each.group, each.panels[0].quantity), 0.0))
         if not floor or max(map(_peak, each.panels), default=0.0) > floor:
             drawn.append(each)
     return _on_one_scale(drawn)
