@@ -83,9 +83,8 @@ for each in (
 
 def main() -> None:
     """Entry point: errors of kedfem become messages and an exit code, never a traceback."""
-    gc.set_threshold(
-        200_000
-    )  # imports drop nothing, but what looks for that takes a sixth of their time; see progress
+    # imports drop nothing, but what looks for that takes a sixth of their time; see `screen.progress`
+    gc.set_threshold(200_000)
     end_as_interrupted()
     one_blas_thread()
     try:

@@ -36,6 +36,11 @@ class Attachment:
     from_rows: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
     loose: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
 
+    @property
+    def columns(self) -> Int[np.ndarray, " c"]:
+        """Interface unknowns that the link has a share in: few of all."""
+        return np.flatnonzero(self.B.any(axis=0))
+
 
 @dataclass(frozen=True, slots=True)
 class SharedCut:

@@ -86,7 +86,7 @@ def rows_over(
 class RowGroup:
     """Joints whose rows share no interface unknown with those of others.
 
-    joints : numbers; rows, columns : where their rows are among all, and the interface unknowns that these touch
+    rows, columns : where the joints' rows are among all, and the interface unknowns that these touch
     """
 
     joints: tuple[ConstraintJoint, ...]

@@ -89,7 +89,7 @@ def coupled_all(
 
 def closed(parts: Sequence[Substructure], R: Sequence[Rotation], tie: Tie | None) -> Closed:
     """A linkage with its joints closed; `coupled` has what is asked for."""
-    held = [np.flatnonzero(part.attachment.B.any(axis=0)) for part in parts]  # few of all unknowns
+    held = [part.attachment.columns for part in parts]
     RB = [_interface(part, R_, c) for part, R_, c in zip(parts, R, held, strict=True)]
     k = parts[0].attachment.B.shape[1]
     H = [b.T @ part.S @ b for part, b in zip(parts, RB, strict=True)]

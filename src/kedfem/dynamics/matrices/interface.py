@@ -16,6 +16,7 @@ swing from step to step.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -78,10 +79,12 @@ def solver(
     if tie is None:
         alone = _factor(H)
         return lambda f: (alone(f), np.zeros(0))
-    C, beside = sp.csr_array(tie.C) if sp.issparse(H) else tie.C, _beside(H, tie)
+    C: Any = sp.csr_array(tie.C) if sp.issparse(H) else tie.C
+    beside = _beside(H, tie)
     inverse = _factor(H + (C.T * beside) @ C)
     compliance = tie.compliance / (1 - beside * tie.compliance)
-    L, kept = semidefinite_factor(_symmetric(C @ inverse(sp.csr_array(C).T.toarray())) + np.diag(compliance))
+    G = C @ inverse(C.T.toarray() if sp.issparse(C) else C.T)
+    L, kept = semidefinite_factor((G + G.T) / 2 + np.diag(compliance))
 
     def of(f: Float[np.ndarray, " k"]) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " r"]]:
         z, m = inverse(f + tie.force), np.zeros(len(compliance))
@@ -109,10 +112,6 @@ def _factor(
     except np.linalg.LinAlgError as error:
         raise SolveError(f"{what} must be definite, got {error}") from error
     return lambda f: np.asarray(scipy.linalg.cho_solve(factor, f, check_finite=False))
-
-
-def _symmetric(G: Float[np.ndarray, "r r"]) -> Float[np.ndarray, "r r"]:
-    return np.asarray((G + G.T) / 2)
 
 
 def _beside(H: Float[np.ndarray, "k k"] | sp.csr_array, tie: Tie) -> Float[np.ndarray, " r"]:

@@ -89,7 +89,7 @@ def body_arrays(system: System, parts: Sequence[Part], profile: Profile) -> Bodi
     """All bodies as flat arrays, their parts factored."""
     model, stiffening = system.model, system.stiffening
     links, joints, numbers = model.links, model.joints, model.bodies
-    columns = [np.flatnonzero(joint.B.any(axis=0)) for joint in joints]
+    columns = [joint.columns for joint in joints]
     frames = [frame_of(link) if stiffening is None else STRESSED for link in links]
     sizes, ports = [link.unknowns for link in links], [len(joint.keep) for joint in joints]
     beams = [k for k, frame in enumerate(frames) if frame == TANGENTIAL]
@@ -257,7 +257,7 @@ def is_large(link: Link) -> bool:
 
 def profile(system: System) -> Profile:
     """The profile of the interface: unknowns that a body, or a constraint, couples with each other."""
-    bodies = [np.flatnonzero(joint.B.any(axis=0)) for joint in system.model.joints]
+    bodies = [joint.columns for joint in system.model.joints]
     constraints = [
         np.unique(np.concatenate([system.ends[n].columns for term in each.terms for n in (term.i, term.j)]))
         for each in system.constraints

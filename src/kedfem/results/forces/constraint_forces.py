@@ -1,11 +1,11 @@
 """Joints enforced by constraint equations: their forces, Σ Bᵀ R λ = Cᵀ μ, and the energy of springs in them."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, in_plane
@@ -30,19 +30,16 @@ class ConstraintForces:
     """μ of all rows over successive blocks, worked out once for each block; rows that share no unknown one by one."""
 
     model: Model
-    block: Block | None = None
-    mu: Float[np.ndarray, "T r"] = field(default_factory=lambda: np.zeros((0, 0)))
 
     @cached_property
     def groups(self) -> tuple[RowGroup, ...]:
         """Joints by constraint equations that share interface unknowns."""
         return tuple(row_groups(self.model.rows))
 
-    def of(self, block: Block) -> Float[np.ndarray, "T r"]:
+    @cached_property
+    def of(self) -> Callable[[Block], Float[np.ndarray, "T r"]]:
         """Force of each row on link i along its gap, moment along its turn [N, N m]; none where no joint has rows."""
-        if block is not self.block:
-            self.mu, self.block = self._multipliers(block), block
-        return self.mu
+        return once(self._multipliers)
 
     def wrench(
         self, name: str, block: Block
@@ -71,27 +68,31 @@ class ConstraintForces:
     @cached_property
     def _ports(self) -> Callable[[Block], Float[np.ndarray, "T m"]]:
         """The same from the rows' forces, once for all joints that ask."""
+        return once(self._from_rows)
 
-        def of(block: Block) -> Float[np.ndarray, "T m"]:
-            mu, out, first = self.of(block), [], 0
-            for joint in self.model.rows:
-                here = mu[:, first : first + len(joint.gap)]
-                first += len(joint.gap)
-                for side, each in port_rows(joint, block.motion):
-                    if side.shared:
-                        out.append(np.einsum("tr,trpd->tpd", here, each).reshape(len(here), -1))
-            return np.concatenate(out, axis=1)
+    def _from_rows(self, block: Block) -> Float[np.ndarray, "T m"]:
+        mu, out, first = self.of(block), [], 0
+        for joint in self.model.rows:
+            here = mu[:, first : first + len(joint.gap)]
+            first += len(joint.gap)
+            for side, each in port_rows(joint, block.motion):
+                if side.shared:
+                    out.append(np.einsum("tr,trpd->tpd", here, each).reshape(len(here), -1))
+        return np.concatenate(out, axis=1)
 
-        return once(of)
+    @cached_property
+    def _shares(self) -> list[tuple[Int[np.ndarray, " c"], Float[np.ndarray, "q c"]]]:
+        """Interface unknowns that each link has a share in, and its B of these."""
+        return [(joint.columns, joint.B[:, joint.columns]) for joint in self.model.joints]
 
     def _multipliers(self, block: Block) -> Float[np.ndarray, "T r"]:
         rows = sum(len(group.rows) for group in self.groups)
-        p = np.zeros((len(block), self.model.joints[0].B.shape[1] if rows else 0))
-        for joint, history in zip(self.model.joints, block.links, strict=True):
-            columns = np.flatnonzero(joint.B.any(axis=0)) if rows else np.zeros(0, int)
-            if len(columns):
-                p[:, columns] += turned_ports(joint, history.R, history.port_forces) @ joint.B[:, columns]
         mu = np.zeros((len(block), rows))
+        if not rows:
+            return mu
+        p = np.zeros((len(block), self.model.joints[0].B.shape[1]))
+        for joint, history, (columns, B) in zip(self.model.joints, block.links, self._shares, strict=True):
+            p[:, columns] += turned_ports(joint, history.R, history.port_forces) @ B
         for group in self.groups:
             C, size = _scaled(group.over(block.motion))
             inverse = np.linalg.pinv(C.transpose(0, 2, 1), rcond=DEPENDENT)

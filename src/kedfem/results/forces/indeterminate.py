@@ -15,14 +15,14 @@ from kedfem.scene import GROUND, Scene
 
 def undetermined(scene: Scene, model: Model, channels: Collection[str]) -> dict[str, str]:
     """The channels of joints and drives that a run does not have, each with the reason."""
-    out = {}
+    out, rows = {}, ConstraintForces(model)
     for name in scene.joints:
         for what in ("force", "moment"):
             if f"joints/{name}/{what}" not in channels and not (what == "moment" and _on_slider(model, name)):
-                out[f"joints/{name}/{what}"] = _reason(scene, model, name)
+                out[f"joints/{name}/{what}"] = _reason(scene, model, rows, name)
     for name in scene.driven_joints:
         if (key := drive_effort(scene, name)[0]) not in channels:
-            out[key] = _reason(scene, model, name)
+            out[key] = _reason(scene, model, rows, name)
     return out
 
 
@@ -40,12 +40,12 @@ def _on_slider(model: Model, name: str) -> bool:
     return any(name in (x.guide, x.joint) for x in model.sliders)
 
 
-def _reason(scene: Scene, model: Model, name: str) -> str:
+def _reason(scene: Scene, model: Model, rows: ConstraintForces, name: str) -> str:
     elastic = {link.name for link in model.links}
     links = [link for link in scene.joints[name].links if link != GROUND]
     if not elastic & set(links):
         return f"it joins rigid links alone ({', '.join(links)}), whose constraints are not solved for"
-    others = sorted({*_partners(model, name), *ConstraintForces(model).shared(name)} - {name, ""})
+    others = sorted({*_partners(model, name), *rows.shared(name)} - {name, ""})
     if not others:
         return "the balance of forces does not determine it: it bears on what others constrain already"
     return (

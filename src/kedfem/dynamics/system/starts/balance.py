@@ -131,7 +131,7 @@ class Balance:
     ) -> None:
         self.of, self.held, self.R, self.asked = of, held, R, asked
         joints = of.system.model.joints
-        self.columns = [np.flatnonzero(joint.B.any(axis=0)) for joint in joints]
+        self.columns = [joint.columns for joint in joints]
         self.RT = [port_rotation(joint, each[: joint.components, : joint.components]).T
                    for joint, each in zip(joints, R, strict=True)]  # fmt: skip
         self.RB = [RT @ joint.B[:, c] for RT, joint, c in zip(self.RT, joints, self.columns, strict=True)]

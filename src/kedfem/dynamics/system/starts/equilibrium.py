@@ -82,8 +82,7 @@ class Equilibrium:
         self.now, self.more, self.z1 = now, more, z1
         self.inertia = TurningBodies(now, spins)
         self.bodies = TurningBodies(now, None)
-        self.W = [part.W for part in now.of.parts]
-        self.right = [np.linalg.pinv(W) for W in self.W]
+        self.right = [np.linalg.pinv(part.W) for part in now.of.parts]
         links = now.of.system.model.links
         mass = sum(float(link.one @ link.m1[:, 0]) for link in links)
         self.size = DIFFERENCE * np.sqrt(mass) * max(reach(link) for link in links)
@@ -103,8 +102,7 @@ class Equilibrium:
         e = now.coordinates(np.stack([z, 0 * z if self.z1 is None else self.z1, 0 * z]))
         laws = now.forces(e)
         moved = np.zeros_like(u)
-        for k, joint in enumerate(of.system.model.joints):
-            open_ = self.W[k] @ u[own(of, k)] - joint.B @ z
+        for k, open_ in enumerate(gaps(now, u, z)):
             moved[own(of, k)] = self.right[k] @ open_
         return Point(u, f, r, R, z, C, e[0], laws[:, 0], laws[:, 1], now.hard(C), moved)
 
@@ -222,23 +220,28 @@ class Equilibrium:
         return np.asarray(u)
 
 
+def gaps(now: Instant, u: Flat, z: Flat) -> list[Flat]:
+    """How far the interface points of each body are from where the interface unknowns have them."""
+    every = zip(now.of.parts, now.of.system.model.joints, strict=True)
+    return [part.W @ u[own(now.of, k)] - joint.B @ z for k, (part, joint) in enumerate(every)]
+
+
 def stands_off(now: Instant, u: Flat, z1: Flat | None) -> str:
     """Which link a deflection leaves off its joints, in words; nothing where all are closed.
 
     Forces of open joints balance nothing: iterations of large motions may settle there.
     """
-    of, z = now.of, now.interface(u)
-    models = list(zip(of.system.model.links, of.system.model.joints, of.parts, strict=True))
-    off = [
-        np.abs(part.W @ u[own(of, k)] - joint.B @ z).max(initial=0.0)
-        for k, (_, joint, part) in enumerate(models)
-    ]
-    size, C = OPEN * max(reach(link) for link, _, _ in models), now.gradients(z)
+    system, z = now.of.system, now.interface(u)
+    links = system.model.links
+    off = [np.abs(x).max(initial=0.0) for x in gaps(now, u, z)]
+    size = OPEN * max(map(reach, links))
     if max(off) > size:
-        return f"link '{models[int(np.argmax(off))][0].name}' would stand {max(off):.3g} m off its joints"
-    e = np.abs(now.coordinates(np.stack([z, 0 * z if z1 is None else z1, 0 * z]))[0]) * now.hard(C)
+        return f"link '{links[int(np.argmax(off))].name}' would stand {max(off):.3g} m off its joints"
+    e = np.abs(now.coordinates(np.stack([z, 0 * z if z1 is None else z1, 0 * z]))[0]) * now.hard(
+        now.gradients(z)
+    )
     if e.max(initial=0.0) > size:
-        return f"{of.system.constraints[int(e.argmax())].name} would be open by {e.max():.3g} (m or rad)"
+        return f"{system.constraints[int(e.argmax())].name} would be open by {e.max():.3g} (m or rad)"
     return ""
 
 

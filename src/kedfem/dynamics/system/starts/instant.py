@@ -219,9 +219,7 @@ def renumbered(of: Ready) -> Int[np.ndarray, " k"]:
     """Where each interface unknown of the system stands in a state."""
     number, bodies = np.zeros(of.system.unknowns, int), of.bodies
     for k, joint in enumerate(of.system.model.joints):
-        number[np.flatnonzero(joint.B.any(axis=0))] = bodies.columns[
-            bodies.column_at[k] : bodies.column_at[k + 1]
-        ]
+        number[joint.columns] = bodies.columns[bodies.column_at[k] : bodies.column_at[k + 1]]
     return number
 
 
