@@ -21,6 +21,7 @@ from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.transmission import LEAST
 from kedfem.output.animation import AnimationWriter, remove_animation
+from kedfem.output.attached import rigid_springs
 from kedfem.output.derived import PLOTS, STEM, TABLE
 from kedfem.output.frames import rigid_fields, sights
 from kedfem.output.plots import write_plots
@@ -137,6 +138,7 @@ def _stepped(
     drive, wanted = drive_channel(scene), set(frame_steps(scene).tolist())
     frames = AnimationWriter(folder, STEM, drive_heading(drive))
     seen = sights(scene, linked, links)
+    size = float(np.linalg.norm(np.ptp(np.concatenate([each.points for each in seen]), axis=0)))
     notes: dict[str, str | float] = {"kind": "kinematics", "step [s]": time_grid(scene).step}
     with ResultsWriter(
         folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes, drive_channel(scene)
@@ -149,7 +151,8 @@ def _stepped(
             for k in sorted(wanted & set(range(first, first + len(motion.t)))):
                 frames.add(
                     float(motion.t[k - first]),
-                    rigid_fields(seen, motion, k - first),
+                    rigid_fields(seen, motion, k - first)
+                    + rigid_springs(scene.springs, linked, motion, k - first, size),
                     float(motion.phi[k - first]),
                 )
 

@@ -188,7 +188,7 @@ class _Frames:
         exerted = [joints] if joints else []
         self.frames.add(now.t, [*fields(scene, model, self.recoveries, now), *exerted], now.phi)
         if self.one is not None:
-            drawn = link_fields(model, self.recoveries, now, 0.0, scene.bodies)
+            drawn = link_fields(model, self.recoveries, now, 0.0, scene)
             self.one.add(now.t, now.phi, [*drawn, *exerted])
 
     def finish(self, but: int = 0) -> None:

@@ -24,7 +24,7 @@ from kedfem.output.plots.abscissa import abscissa
 from kedfem.output.plots.drawing import drawn_over, envelope
 from kedfem.output.plots.files import shown
 from kedfem.output.plots.groups import pictures
-from kedfem.output.views import body_labels, hidden, sight, view
+from kedfem.output.views import hidden, labels, sight, view
 from kedfem.output.vtu import write_frame
 from kedfem.output.words import prefixed
 from kedfem.results import Channel, Results
@@ -566,7 +566,7 @@ def test_masses_that_links_carry_are_balls_where_their_links_take_them(mass: flo
     recoveries = [stress_recovery(link) for link in ready.model.links]
     now = blocks[-1].at(len(blocks[-1]) - 1)
     scene = ready.scene
-    every = link_fields(ready.model, recoveries, now, 100.0, scene.bodies)
+    every = link_fields(ready.model, recoveries, now, 100.0, scene)
     told = [(x, f"{x}, {mass:.4g} kg") for x in ("tool", "far")]
     assert [(x.name, x.label) for x in every[-3:]] == [*told, ("wheel", "wheel, 0.01 kg m²")]
     links = [x for x in every if not x.label]
@@ -591,7 +591,7 @@ def test_a_ball_is_drawn_with_its_name_and_hides_no_stress(tmp_path: Path) -> No
     )  # fmt: skip
     vtu = drawn(tmp_path, [link, ball])
     grid = pyvista.read(vtu)
-    assert body_labels(grid) == {1: "load, 3 kg"}
+    assert labels(grid) == {1: "load, 3 kg"}
     assert not hidden(grid, np.array([0.0, 0, 1]))
     assert hidden(pyvista.read(drawn(tmp_path, [link, replace(ball, label="")])), np.array([0.0, 0, 1]))
     write_picture(vtu, tmp_path / "with.png", "a load")

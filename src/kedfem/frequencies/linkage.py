@@ -142,7 +142,7 @@ def frequencies(
                 f" at {clock(scene)} {moment(scene, *x)}" if scene.driven else ""
                 for x in zip(t, angle, strict=True)
             ]
-            write_shapes(target, _shapes(system, motion, every, where, wanted.shapes), scene.gravity)
+            write_shapes(target, _shapes(scene, system, motion, every, where, wanted.shapes), scene.gravity)
     return done
 
 
@@ -216,7 +216,7 @@ def _table(every: Sequence[Modes], count: int) -> Float[np.ndarray, "P f"]:
 
 
 def _shapes(
-    system: System, motion: RigidMotion, every: list[Modes], where: Sequence[str], count: int
+    scene: Scene, system: System, motion: RigidMotion, every: list[Modes], where: Sequence[str], count: int
 ) -> list[Shape]:
     """The lowest mode shapes where the first frequency is the lowest."""
     firsts = [found.frequencies[0] if len(found.frequencies) else np.inf for found in every]
@@ -229,7 +229,7 @@ def _shapes(
         for link, body, shapes in zip(model.links, model.bodies, modes.shapes, strict=True):
             u = factor * shapes[modes.still + mode]
             states.append(bent(u, motion.R[k, body][: link.d, : link.d]))
-        return link_fields(model, recoveries, Snapshot(0, motion, k, states), exaggeration)
+        return link_fields(model, recoveries, Snapshot(0, motion, k, states), exaggeration, scene)
 
     return [
         Shape(f, f"Mode {m + 1}: {f:.4g} Hz{where[k]}", partial(fields, m))

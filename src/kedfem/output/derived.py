@@ -72,7 +72,7 @@ def fields(
     """What a frame shows of each link, deformed as the animation exaggerates it."""
     animation = scene.output.animation
     scale = animation.deformation_scale if animation else 1.0
-    return link_fields(model, recoveries, snapshot, scale, scene.bodies)
+    return link_fields(model, recoveries, snapshot, scale, scene)
 
 
 def refuse_foreign(folder: Path) -> None:
@@ -104,7 +104,7 @@ def write_vibration(
 
     def sized(snapshot: Snapshot, factor: float, exaggeration: float) -> list[LinkField]:
         states = [replace(x, u=factor * x.u, g=factor * x.g) for x in snapshot.states]
-        return link_fields(model, recoveries, replace(snapshot, states=states), exaggeration)
+        return link_fields(model, recoveries, replace(snapshot, states=states), exaggeration, scene)
 
     frames = [(float(each.motion.t[each.k]), partial(sized, each)) for each in found.snapshots]
     try:

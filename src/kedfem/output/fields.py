@@ -12,7 +12,7 @@ LARGEST, SMALLEST = "largest principal stress [Pa]", "smallest principal stress 
 VELOCITY, ACCELERATION = "velocity [m/s]", "acceleration [m/s^2]"
 FORCE, MOMENT = "force [N]", "moment [N m]"
 DRIVE_FORCE, DRIVE_TORQUE = "drive force [N]", "drive torque [N m]"
-BODY = "body "  # how the name of a mass that a link carries begins, where links have "link "
+LINK, BODY, SPRING = "link ", "body ", "spring "  # how names of blocks begin
 JOINTS = "joints"  # the block of points with what joints exert
 
 
@@ -31,6 +31,7 @@ class LinkField:
     principal : (n, 2) smallest and largest principal stress [Pa]
     section : height and thickness [m] of a beam that is drawn as a line, and whether they are diameters of an ellipse
     label : what stands beside a mass that a link carries, drawn as a ball; empty of a link
+    spring : whether it is one, or a damper, and no link
     """
 
     name: str
@@ -43,6 +44,7 @@ class LinkField:
     principal: Float[np.ndarray, "n 2"]
     section: tuple[float, float, bool] | None = None
     label: str = ""
+    spring: bool = False
 
     def arrays(self) -> dict[str, np.ndarray]:
         """What each node has, by names with units."""
@@ -62,7 +64,7 @@ class RigidField:
 
     name, cell_type, cells, points : as of :class:`LinkField`; cells are surfaces, lines or a vertex
     velocity, acceleration : (n, 3) world components [m/s, m/s²]
-    label : as of :class:`LinkField`
+    label, spring : as of :class:`LinkField`
     """
 
     name: str
@@ -72,6 +74,7 @@ class RigidField:
     velocity: Float[np.ndarray, "n 3"]
     acceleration: Float[np.ndarray, "n 3"]
     label: str = ""
+    spring: bool = False
 
     def arrays(self) -> dict[str, np.ndarray]:
         """What each node has, by names with units."""
@@ -110,4 +113,6 @@ def numbered(field: Block) -> str:
     """What a file calls the number of a block."""
     if isinstance(field, JointField):
         return field.name
-    return f"{BODY}{field.label}" if field.label else f"link {field.name}"
+    if field.spring:
+        return f"{SPRING}{field.name}"
+    return f"{BODY}{field.label}" if field.label else f"{LINK}{field.name}"

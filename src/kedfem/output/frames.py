@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -23,21 +22,28 @@ from kedfem.links.recovery import (
     von_mises,
 )
 from kedfem.mesh.cad.sides import boundary_sides, side_corners
-from kedfem.mesh.elements.shape_functions import HEX8, HEX27
+from kedfem.mesh.elements.shape_functions import HEX8
 from kedfem.motion.constraints import cross
 from kedfem.motion.joint_equations import joint_axis
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
+from kedfem.output.attached import (
+    Carriers,
+    ball,
+    ball_words,
+    balls,
+    every_link,
+    slider_place,
+    springs,
+)
 from kedfem.output.fields import DRIVE_FORCE, DRIVE_TORQUE, FORCE, MOMENT, JointField, LinkField, RigidField
 from kedfem.results.recorded import drive_effort
-from kedfem.scene import Body, Flywheel, Scene
+from kedfem.scene import Scene
 
 Place = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]
 Rows = Mapping[str, Float[np.ndarray, "T c"]]
 BLOCK = 0.8  # width of the block that stands for a slider without a shape, of the link that it is joined to
 STOUT = 0.25  # of that link's length: most that its width is taken for
-STEEL = 7850.0  # kg/m³
-BALL = 0.01, 0.03  # least and largest radius of a mass that a link carries, of what is drawn
 
 
 def _joined(fields: Sequence[LinkField]) -> list[LinkField]:
@@ -61,7 +67,7 @@ def link_fields(
     recoveries: Sequence[StressRecovery],
     snapshot: Snapshot,
     deformation_scale: float,
-    bodies: Mapping[str, Body] = MappingProxyType({}),
+    scene: Scene | None = None,
 ) -> list[LinkField]:
     """All links at one time point: R' = R + f, [KED, eqs. (2)(3)], f times the exaggeration; and what they carry.
 
@@ -69,6 +75,7 @@ def link_fields(
     ----------
     recoveries : per link, then per prescribed link
     deformation_scale : factor on the elastic displacement where nodes are drawn, not on the displacement itself [-]
+    scene : whose masses and springs are drawn too
     """
     motion, k = snapshot.motion, snapshot.k
     fields = [
@@ -86,47 +93,13 @@ def link_fields(
         fields.append(
             LinkField(name, kind, cells, points, np.zeros_like(X), none, none[:, 0], none[:, :2], section)
         )
-    balls = _balls(model, recoveries, snapshot, fields, bodies) if bodies else []
-    return _joined(fields) + _blocks(model, snapshot, deformation_scale) + balls
-
-
-def _balls(
-    model: Model, recoveries: Sequence[StressRecovery], snapshot: Snapshot, fields: Sequence[LinkField],
-    bodies: Mapping[str, Body],
-) -> list[LinkField]:  # fmt: skip
-    """Masses that links carry, each where the nearest point of its link takes it."""
-    motion, k, out, given = snapshot.motion, snapshot.k, [], model.prescribed
-    every, numbers = [*model.links, *(x.link for x in given)], [*model.bodies, *(x.body for x in given)]
-    X = [recovery.at_points((link.full or link).X) for link, recovery in zip(every, recoveries, strict=True)]
-    size = float(np.linalg.norm(np.ptp(np.concatenate([x.points for x in fields]), axis=0)))
-    for name, body in bodies.items():
-        centre = np.asarray(getattr(body, "centre", body.at))
-        on = [i for i, link in enumerate(every) if link.name == body.link]
-        if not on:
-            continue  # on a slider without a shape, which is drawn itself
-        nearest = {i: np.linalg.norm(X[i] - centre, axis=1) for i in on}
-        i = min(on, key={i: x.min() for i, x in nearest.items()}.__getitem__)
-        n = int(nearest[i].argmin())
-        place = fields[i].points[n] + motion.R[k, numbers[i]] @ (centre - X[i][n])
-        points, none = place + _ball(body.mass, size), np.full((27, 6), np.nan)
-        moved = np.tile(fields[i].displacement[n], (27, 1))
-        cell, words = np.arange(27)[None], _words(name, body)
-        empty = none, none[:, 0], none[:, :2]
-        out.append(LinkField(name, "hexahedron27", cell, points, moved, *empty, label=words))
-    return out
-
-
-def _words(name: str, body: Body) -> str:
-    """What stands beside a mass; a flywheel may have inertia alone."""
-    if isinstance(body, Flywheel) and not body.mass:
-        return f"{name}, {body.inertia:.4g} kg m²"
-    return f"{name}, {body.mass:.4g} kg"
-
-
-def _ball(mass: float, size: float) -> Float[np.ndarray, "27 3"]:
-    """Nodes of a ball as large as one of steel, unless that is too small or too large beside what is drawn."""
-    radius = np.clip(np.cbrt(0.75 * mass / (np.pi * STEEL)), BALL[0] * size, BALL[1] * size)
-    return np.asarray(radius * HEX27 / np.maximum(np.linalg.norm(HEX27, axis=1, keepdims=True), 1.0))
+    out = _joined(fields) + _blocks(model, snapshot, deformation_scale)
+    if scene is None or not (scene.bodies or scene.springs):
+        return out
+    drawn = zip(every_link(model), recoveries, strict=True)
+    places = [recovery.at_points((link.full or link).X) for link, recovery in drawn]
+    carriers = Carriers(model, snapshot, fields, places, deformation_scale)
+    return out + balls(carriers, scene.bodies) + springs(carriers, scene.springs)
 
 
 def link_field(
@@ -173,11 +146,10 @@ def _blocks(model: Model, snapshot: Snapshot, deformation_scale: float) -> list[
     """Sliders without a shape: blocks along their guides, at the joints with the links that carry them."""
     if not model.sliders:
         return []
-    motion, k, out = snapshot.motion, snapshot.k, []
+    out = []
     for slider in model.sliders:
-        link, body = model.links[slider.carrier], model.bodies[slider.carrier]
-        moved = slider.weights @ in_space(link, snapshot.states[slider.carrier].u)
-        place = motion.p[k, body] + motion.R[k, body] @ (slider.weights @ link.X) + deformation_scale * moved
+        link = model.links[slider.carrier]
+        place, moved = slider_place(model, slider, snapshot, deformation_scale)
         z = slider.axis
         x = np.cross(z, np.eye(3)[np.abs(z).argmin()])
         x /= np.linalg.norm(x)
@@ -229,9 +201,9 @@ def sights(scene: Scene, linkage: Linkage, links: Mapping[str, Link]) -> list[Si
         out.append(Sight(name, body, points[used], numbers.reshape(cells.shape), kind))
     size = float(np.linalg.norm(np.ptp(np.concatenate([each.points for each in out]), axis=0)))
     for name, carried in scene.bodies.items():
-        points = np.asarray(getattr(carried, "centre", carried.at)) + _ball(carried.mass, size)
+        points = np.asarray(getattr(carried, "centre", carried.at)) + ball(carried.mass, size)
         on, cell = linkage.bodies.index(carried.link), np.arange(27)[None]
-        out.append(Sight(name, on, points, cell, "hexahedron27", _words(name, carried)))
+        out.append(Sight(name, on, points, cell, "hexahedron27", ball_words(name, carried)))
     return out
 
 

@@ -13,15 +13,16 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.output.bars import LINES, bars, heights
-from kedfem.output.fields import VON_MISES
-from kedfem.output.views import LIFT, View, body_labels, view
+from kedfem.output.fields import SPRING, VON_MISES
+from kedfem.output.views import LIFT, View, labels, view
 from kedfem.processes import end_with_parent
 
 WIDTHS, HEIGHTS = (1000, 1600), (700, 1100)  # least and most pixels; in between as the linkage asks
 LEFT, RIGHT, TOP, BOTTOM = 60, 260, 130, 60  # pixels kept free: title above, colour bar and axes on the right
 
 
-BALL = "steelblue"
+BALL, COIL = "steelblue", "#4d6b57"
+NAMED = 6  # most springs whose names stand beside them
 THROUGH = 0.12  # opacity of what lies before the highest stress where it would be hidden from both sides
 # quadratic faces are halved so many times, unless that makes more triangles than this
 FINEST, TRIANGLES = 4, 200_000
@@ -40,10 +41,12 @@ def render(vtu: str, png: str, title: str, deformation_scale: str = "1", *gravit
     plotter: Any = pyvista.Plotter(off_screen=True, window_size=window(shown.size))
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
-    balls = body_labels(grid)
-    is_ball = np.isin(grid.cell_data["link"], list(balls))
-    draw_links(plotter, grid.extract_cells(~is_ball) if balls else grid, shown)
+    balls, springs = labels(grid), labels(grid, SPRING)
+    is_ball, is_spring = (np.isin(grid.cell_data["link"], list(of)) for of in (balls, springs))
+    links = ~(is_ball | is_spring)
+    draw_links(plotter, grid if links.all() else grid.extract_cells(links), shown)
     draw_balls(plotter, grid.extract_cells(is_ball), balls)
+    draw_springs(plotter, grid, springs)
     draw_words(plotter, title, float(deformation_scale), shown.cut is not None)
     aim(plotter, grid, shown)
     mark(plotter, grid)
@@ -134,11 +137,26 @@ def draw_balls(plotter: Any, grid: Any, words: Mapping[int, str]) -> None:
         ball = grid.extract_cells([cell])
         look = {"color": BALL, "opacity": 0.5, "smooth_shading": True}
         plotter.add_mesh(curved_surface(ball), scalars=None, **look)
-        plotter.add_point_labels(
-            [ball.center], [words[int(ball.cell_data["link"][0])]], always_visible=True, font_size=20, show_points=False,
-            text_color="black", shape="rounded_rect", shape_color="white", shape_opacity=0.7, margin=2,
-            justification_vertical="bottom",
-        )  # fmt: skip
+        name(plotter, ball.center, words[int(ball.cell_data["link"][0])])
+
+
+def draw_springs(plotter: Any, grid: Any, words: Mapping[int, str]) -> None:
+    """Springs and dampers, with their names where these are few."""
+    for number, word in words.items():
+        spring = grid.extract_cells(grid.cell_data["link"] == number).extract_surface(
+            algorithm="dataset_surface"
+        )
+        plotter.add_mesh(spring, color=COIL, scalars=None, smooth_shading=True, split_sharp_edges=True)
+        if len(words) <= NAMED:
+            name(plotter, spring.center, word)
+
+
+def name(plotter: Any, place: Any, word: str) -> None:
+    """A word that is read whatever is before it."""
+    plotter.add_point_labels(
+        [place], [word], always_visible=True, font_size=20, show_points=False, text_color="black",
+        shape="rounded_rect", shape_color="white", shape_opacity=0.7, margin=2, justification_vertical="bottom",
+    )  # fmt: skip
 
 
 def lifted(grid: Any) -> Any:

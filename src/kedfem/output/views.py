@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from kedfem.output.bars import LINES, THINNEST, heights
-from kedfem.output.fields import BODY, VON_MISES
+from kedfem.output.fields import BODY, SPRING, VON_MISES
 
 # how far planar links that lie in one plane are drawn apart, as part of the diagonal: each covers those before it
 LIFT = 1e-3
@@ -33,10 +33,10 @@ class View:
     cut: Float[np.ndarray, " 3"] | None = None
 
 
-def body_labels(grid: Any) -> dict[int, str]:
-    """Numbers of masses that links carry, and what stands beside them."""
-    names = [name for name in grid.field_data.keys() if name.startswith(BODY)]  # noqa: SIM118
-    return {int(grid.field_data[name][0]): name.removeprefix(BODY) for name in names}
+def labels(grid: Any, what: str = BODY) -> dict[int, str]:
+    """Numbers of masses that links carry, or of springs, and what stands beside them."""
+    names = [name for name in grid.field_data.keys() if name.startswith(what)]  # noqa: SIM118
+    return {int(grid.field_data[name][0]): name.removeprefix(what) for name in names}
 
 
 def hidden(grid: Any, direction: Float[np.ndarray, " 3"]) -> bool:
@@ -45,8 +45,8 @@ def hidden(grid: Any, direction: Float[np.ndarray, " 3"]) -> bool:
     if not np.isfinite(stress).any():
         return False
     before = ~np.isin(grid.celltypes, list(LINES))
-    if balls := body_labels(grid):  # they are translucent
-        before &= ~np.isin(grid.cell_data["link"], list(balls))
+    if apart := labels(grid) | labels(grid, SPRING):  # translucent, and thin
+        before &= ~np.isin(grid.cell_data["link"], list(apart))
     solids = grid.extract_cells(before)
     if not solids.n_cells:
         return False

@@ -14,7 +14,7 @@ from jaxtyping import Float
 from kedfem.errors import OutputError
 from kedfem.output.animation import read_collection
 from kedfem.output.derived import STEM, WORST
-from kedfem.output.fields import BODY
+from kedfem.output.fields import BODY, LINK, SPRING
 from kedfem.output.stress_files import ENVELOPE
 from kedfem.output.views import view
 from kedfem.report.surfaces import Surface, sources_of
@@ -95,7 +95,7 @@ def _read(paths: Sequence[Path]) -> Any:
                 raise OutputError(f"{wanted}, got one that cannot be read") from error
         if not grid.n_points or not known:
             raise OutputError(f"{wanted}, got one that is damaged or has no links")
-        if any(name.startswith(("link ", BODY)) for name in grid.field_data.keys()):  # noqa: SIM118
+        if any(name.startswith((LINK, BODY, SPRING)) for name in grid.field_data.keys()):  # noqa: SIM118
             grids.append(grid)
     if not grids:
         raise OutputError(f"{paths[0]}: must be a file of kedfem's with links, got none")

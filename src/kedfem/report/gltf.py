@@ -103,7 +103,9 @@ class _Made:
         """A node with a link's surface in the reference position, and its motion."""
         import pygltflib as g
 
-        X = surface.points[0]
+        X, moves = surface.points[0], _moves(surface)
+        if surface.spring and surface.placements:
+            X = moves.own
         attributes = g.Attributes(
             POSITION=self.array(X, bounded=True), NORMAL=self.array(normals(X, surface.triangles)),
             COLOR_0=self.array(self.colours(surface.stress[0])),
@@ -113,14 +115,16 @@ class _Made:
         node, number = g.Node(name=surface.name, mesh=len(self.meshes) - 1), len(self.meshes)
         if not surface.placements:
             return node
-        p = np.array([placed.p for placed in surface.placements])
-        R = np.array([placed.R for placed in surface.placements])
-        q = continuous_quaternions(R)[:, [1, 2, 3, 0]]
+        p, q = moves.p, continuous_quaternions(moves.R)[:, [1, 2, 3, 0]]
         node.translation, node.rotation = p[0].tolist(), q[0].tolist()
+        every = [("translation", p), ("rotation", q)]
+        if surface.spring:
+            node.scale = moves.scale[0].tolist()
+            every.append(("scale", moves.scale))
         if len(times) > 1:
             if self.times is None:
                 self.times = self.array(times - times[0], bounded=True)
-            for what, values in (("translation", p), ("rotation", q)):
+            for what, values in every:
                 self.samplers.append(g.AnimationSampler(input=self.times, output=self.array(values)))
                 target = g.AnimationChannelTarget(node=number, path=what)
                 self.channels.append(g.AnimationChannel(sampler=len(self.samplers) - 1, target=target))
@@ -170,6 +174,32 @@ class _Made:
         shown = np.stack([np.interp(share, parts, c) for c in colours.T], axis=1)
         shown[~np.isfinite(stress)] = GREY
         return np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)
+
+
+@dataclass(frozen=True, slots=True)
+class _Moves:
+    """How a node moves: x = p + R (scale * own)."""
+
+    own: Float[np.ndarray, "n 3"]
+    p: Float[np.ndarray, "f 3"]
+    R: Float[np.ndarray, "f 3 3"]
+    scale: Float[np.ndarray, "f 3"]
+
+
+def _moves(surface: Surface) -> _Moves:
+    """Of a rigid link its placements; a spring is stretched along z, on which it lies in its own axes."""
+    X, count = surface.points[0], len(surface.placements)
+    p = np.array([placed.p for placed in surface.placements]).reshape(count, 3)
+    R = np.array([placed.R for placed in surface.placements]).reshape(count, 3, 3)
+    if not surface.spring:
+        return _Moves(X, p, R, np.ones((count, 3)))
+    axes = np.linalg.svd(X - X.mean(axis=0), full_matrices=False)[2][[1, 2, 0]].T
+    axes[:, 0] *= np.linalg.det(axes)
+    lengths = [float(np.ptp(points @ axes[:, 2])) for points in surface.points]
+    scale = np.ones((count, 3))
+    scale[:, 2] = np.array(lengths[1:]) / lengths[0]
+    centres = np.array([points.mean(axis=0) for points in surface.points[1:]]).reshape(count, 3)
+    return _Moves((X - X.mean(axis=0)) @ axes, p + np.einsum("fij,fj->fi", R, centres), R @ axes, scale)
 
 
 def normals(X: Float[np.ndarray, "n 3"], triangles: Int[np.ndarray, "t 3"]) -> Float[np.ndarray, "n 3"]:

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from kedfem.output.bars import LINES, THINNEST, heights, rims
-from kedfem.output.fields import BODY, DISPLACEMENT, VON_MISES
+from kedfem.output.fields import BODY, DISPLACEMENT, LINK, SPRING, VON_MISES
 from kedfem.output.rendering import QUADRILATERAL, SHARP
 from kedfem.output.stress_files import KINDS
 from kedfem.output.views import LIFT
@@ -40,6 +40,7 @@ class Surface:
         exaggerated
     stress : (n,) each, first the highest over all steps, then one a frame: von Mises [Pa]; nan where there is none
     placements : one a frame
+    spring : whether it is a spring, which stretches
     """
 
     name: str
@@ -47,6 +48,7 @@ class Surface:
     points: list[Places] = field(default_factory=list)
     stress: list[Float[np.ndarray, " n"]] = field(default_factory=list)
     placements: list[Placement] = field(default_factory=list)
+    spring: bool = False
 
     @property
     def stressed(self) -> bool:
@@ -63,6 +65,7 @@ class Surface:
 class _Source:
     """Where a link's surface is in the frames: its points there, and how surface points follow from them.
 
+    name : as :func:`links_of` has it
     part : its elements
     ids : (m,) which points of a frame are its own
     X : (m, 3) where these are in the reference position [m]
@@ -76,7 +79,8 @@ class _Source:
         self.sizes = heights(part) if self.beams else np.zeros((0, 2))
         self.tube: Places | None = None
         self.kept = np.zeros(0, int)
-        self.surface = Surface(name, np.zeros((0, 3), int))
+        plain = next(name.removeprefix(what) for what in (LINK, BODY, SPRING) if name.startswith(what))
+        self.surface = Surface(plain, np.zeros((0, 3), int), spring=name.startswith(SPRING))
 
     def outline(self, halvings: int) -> int:
         """Find the surface, faces of quadratic elements halved so many times; how many points it has."""
@@ -133,7 +137,8 @@ class _Source:
             moved = scale * np.asarray(grid.point_data[DISPLACEMENT])[self.ids]
             stress = np.asarray(grid.point_data[VON_MISES])[self.ids]
         placed = placement(self.X, x - moved, flat=self.beams)
-        self._add(self.X + moved @ placed.R, stress)
+        # a spring is as long as there, not as in the reference position
+        self._add((x - placed.p) @ placed.R if self.surface.spring else self.X + moved @ placed.R, stress)
         self.surface.placements.append(placed)
 
     def _add(self, points: Places, stress: Float[np.ndarray, " m"]) -> None:
@@ -204,9 +209,9 @@ def _thinned(sources: Sequence[_Source]) -> tuple[str, ...]:
 
 
 def links_of(grid: Any) -> Iterator[tuple[str, Int[np.ndarray, " e"]]]:
-    """Names of the links in a file, and their elements."""
+    """Names of the links, masses and springs in a file with what they begin with there, and their elements."""
     for key in grid.field_data.keys():  # noqa: SIM118
-        if key.startswith(("link ", BODY)):
+        if key.startswith((LINK, BODY, SPRING)):
             cells = np.flatnonzero(grid.cell_data["link"] == int(grid.field_data[key][0]))
             if len(cells):
-                yield key.removeprefix("link ").removeprefix(BODY), cells
+                yield key, cells

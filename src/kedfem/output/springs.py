@@ -1,0 +1,123 @@
+"""How springs and dampers between two points are drawn: coils and cylinders from one end to the other."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from kedfem.motion.constraints import perpendiculars
+from kedfem.scene import LineSpring, Spring
+
+WIDTH = 0.012  # radius of a coil, of what is drawn
+SLENDER = 0.15  # most that it is of the length between the two points as drawn
+WIRE = 0.2  # radius of its wire, of the coil's
+TURNS, AROUND, STRAIGHT = (
+    6,
+    12,
+    0.15,
+)  # turns, points on each, part of the length at each end that is straight
+RIM = 5  # points around a wire
+# along a damper: parts of its length, and radii there as parts of the coil's
+DAMPER = np.array([[0, 0.2], [0.3, 0.2], [0.3, 0.65], [0.65, 0.65], [0.65, 0.12], [1, 0.12]])
+SIDES = 12
+
+
+def drawn_springs(springs: Mapping[str, Spring]) -> dict[str, LineSpring]:
+    """Those that are drawn: between two points."""
+    return {
+        name: each
+        for name, each in springs.items()
+        if isinstance(each, LineSpring) and each.between is not None
+    }
+
+
+def spring_shape(spring: LineSpring, size: float) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e 4"]]:
+    """Points of a spring's surface and its quadrilaterals.
+
+    Parameters
+    ----------
+    size : of what is drawn [m]
+
+    Returns
+    -------
+    points : x and y across [m], z along from the first end (0) to the second (1)
+    cells : quadrilaterals
+    """
+    length = math.dist(*(end.at for end in spring.between)) if spring.between else 0.0
+    radius = min(WIDTH * size, SLENDER * length) if length else WIDTH * size
+    parts = (
+        [_coil(radius, length or radius / SLENDER)] if spring.stiffness or spring.force is not None else []
+    )
+    if spring.damping or (spring.force is not None and spring.force.over == "speed"):
+        parts.append(_damper(radius))
+    first = np.cumsum([0, *(len(points) for points, _ in parts)])
+    cells = [of + n for (_, of), n in zip(parts, first, strict=False)]
+    return np.concatenate([points for points, _ in parts]), np.concatenate(cells)
+
+
+def stretched(
+    points: Float[np.ndarray, "n 3"], drawn: Float[np.ndarray, "3"], ends: Float[np.ndarray, "2 3"]
+) -> Float[np.ndarray, "n 3"]:
+    """Points of :func:`spring_shape` between two ends.
+
+    Parameters
+    ----------
+    drawn : from the first end to the second in the reference position [m]; where a coil begins turns with it
+    """
+    a, b = ends
+    z = _direction(drawn, np.array([0.0, 0.0, 1.0]))
+    x, y = perpendiculars(z)
+    turn = _least_rotation(z, _direction(b - a, z))
+    return np.asarray(a + points[:, 2:] * (b - a) + points[:, :2] @ np.array([turn @ x, turn @ y]))
+
+
+def _direction(d: Float[np.ndarray, "3"], otherwise: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+    length = float(np.linalg.norm(d))
+    return d / length if length else otherwise
+
+
+def _least_rotation(z: Float[np.ndarray, "3"], d: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+    """The rotation about an axis across both that takes one unit vector to another."""
+    c, v = float(z @ d), np.cross(z, d)
+    if c < -1.0 + 1e-9:  # opposite: half a turn about any axis across
+        e = perpendiculars(z)[0]
+        return 2 * np.outer(e, e) - np.eye(3)
+    V = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+    return np.asarray(np.eye(3) + V + V @ V / (1.0 + c))
+
+
+def _coil(radius: float, length: float) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e 4"]]:
+    """A wire that winds about the axis, its ends on the axis."""
+    r, wire = radius * (1 - WIRE), WIRE * radius
+    t = np.linspace(0, 1, TURNS * AROUND + 1)
+    turn = 2 * np.pi * TURNS * t
+    winding = np.column_stack([r * np.cos(turn), r * np.sin(turn), STRAIGHT + (1 - 2 * STRAIGHT) * t])
+    start, end = [[0, 0, 0], [0, 0, STRAIGHT]], [[0, 0, 1 - STRAIGHT], [0, 0, 1]]
+    line = np.concatenate([start, winding, end])
+    along = np.gradient(line * [1, 1, length], axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    outwards = np.concatenate(
+        [[[1, 0, 0]] * 2, np.column_stack([winding[:, :2] / r, 0 * t]), [[1, 0, 0]] * 2]
+    )
+    across = outwards - (outwards * along).sum(axis=1, keepdims=True) * along
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    angle = 2 * np.pi * np.arange(RIM) / RIM
+    rim = np.cos(angle)[:, None] * across[:, None] + np.sin(angle)[:, None] * np.cross(along, across)[:, None]
+    points = line[:, None] + wire * rim * [1, 1, 1 / length]
+    return points.reshape(-1, 3), _sides(len(line), RIM)
+
+
+def _damper(radius: float) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e 4"]]:
+    """A cylinder with its rod, about the axis."""
+    angle = 2 * np.pi * np.arange(SIDES) / SIDES
+    ring = np.column_stack([np.cos(angle), np.sin(angle)])
+    rims = [np.column_stack([radius * r * ring, np.full(SIDES, z)]) for z, r in DAMPER]
+    return np.concatenate(rims), _sides(len(DAMPER), SIDES)
+
+
+def _sides(rims: int, corners: int) -> Int[np.ndarray, "e 4"]:
+    """Quadrilaterals between rims of so many corners."""
+    i, j = (x.ravel() for x in np.meshgrid(np.arange(rims - 1), np.arange(corners), indexing="ij"))
+    a, b = i * corners + j, i * corners + (j + 1) % corners
+    return np.column_stack([a, b, b + corners, a + corners])

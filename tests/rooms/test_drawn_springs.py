@@ -1,0 +1,120 @@
+"""Springs and dampers between two points are drawn from one to the other: in frames, the picture, the report and glTF."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import pyvista
+from numpy.testing import assert_allclose
+
+from kedfem.analysis import analyse
+from kedfem.kinematics import kinematics
+from kedfem.output.picture import write_picture
+from kedfem.output.springs import SLENDER, WIDTH, spring_shape, stretched
+from kedfem.output.views import hidden, labels
+from kedfem.report import write_gltf
+from kedfem.report.animated import animated
+from kedfem.results import read_results
+from kedfem.scene import LineSpring, scene_from
+from tests.frames import frames
+from tests.rooms.test_gltf import reader_of, shown
+from tests.rooms.test_output import pixels
+from tests.scenes import arm, bar, constant_speed
+
+TIP, TO = [0.5, 0, 0], [0.3, 0.7, 0.1]
+
+
+def scene(**spring: Any) -> dict[str, Any]:
+    """An arm that turns once, with a spring from its tip to the ground."""
+    ends = [{"link": "arm", "at": TIP}, {"link": "ground", "at": TO}]
+    pull = {"kind": "spring", "between": ends, "stiffness": 100, "damping": 1, **spring}
+    link = bar(0.5, 0.02, 0.02, mesh={"elements": [4, 1, 1]})
+    output = {"plots": False, "animation": {"frames_per_revolution": 8}}
+    analysis = {"revolutions": 1, "steps_per_revolution": 72, "accuracy": "quick", "initial": "quasi-static"}
+    return arm(link, constant_speed(10.0), springs={"pull": pull}, analysis=analysis, output=output)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return analyse(scene_from(scene(), tmp_path_factory.mktemp("spring"))).folder
+
+
+def cells_of(grid: Any) -> Any:
+    (number,) = (k for k, name in labels(grid, "spring ").items() if name == "pull")
+    return grid.extract_cells(grid.cell_data["link"] == number)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [{"stiffness": 5.0}, {"damping": 5.0}, {"stiffness": 5.0, "damping": 5.0}],
+    ids=["k", "c", "k and c"],
+)
+def test_shapes_reach_from_end_to_end_and_are_slender(law: dict[str, float]) -> None:
+    """However the line between the ends turns, half round too, and however short it was drawn."""
+    for drawn in ([0, 0, 2.0], [0.01, 0.02, 0], [0.0, 0, 0]):
+        ends = ({"link": "arm", "at": [0, 0, 0]}, {"link": "ground", "at": drawn})
+        free = {} if any(drawn) else {"free_length": 0.0}
+        spring = LineSpring.model_validate({"between": ends, **law, **free})
+        points, cells = spring_shape(spring, 1.0)
+        assert cells.max() == len(points) - 1
+        for direction in ([0, 0, 1.5], [0, 0, -0.5], [0.3, 0.6, -0.6]):
+            a, b = np.array([0.5, 0, 0]), np.array(direction) * (np.linalg.norm(drawn) or 0.08)
+            x = stretched(points, np.array(drawn), np.array([a, a + b])) - a
+            along = x @ b / np.linalg.norm(b)
+            assert_allclose([along.min(), along.max()], [0, np.linalg.norm(b)], atol=0.35 * WIDTH)
+            across = np.linalg.norm(x - np.outer(along, b) / np.linalg.norm(b), axis=1).max()
+            length = float(np.linalg.norm(drawn))
+            radius = min(WIDTH, SLENDER * length) if length else WIDTH
+            assert 0.6 * radius < across < 1.01 * radius
+
+
+def test_frames_have_them_as_long_as_their_channel(folder: Path) -> None:
+    results = read_results(folder / "results.h5")
+    length = results.channels["springs/pull/length"][1][:, 0]
+    every = frames(folder)
+    assert len(every) == 9
+    for grid, k in zip(every, range(0, 73, 9), strict=True):
+        x = np.asarray(cells_of(grid).points)
+        tip = np.asarray(grid.extract_cells(grid.cell_data["link"] == 0).points)
+        assert np.linalg.norm(tip - x[np.linalg.norm(x - TO, axis=1).argmax()], axis=1).min() < 0.03
+        assert np.linalg.norm(x - TO, axis=1).max() == pytest.approx(length[k], abs=1e-4)
+        assert np.linalg.norm(x - TO, axis=1).min() < 0.003  # radius of the wire
+
+
+def test_the_picture_has_them_and_they_hide_no_stress(folder: Path, tmp_path: Path) -> None:
+    grid = pyvista.read(folder / "worst.vtu")
+    assert labels(grid, "spring ") == {1: "pull"}
+    spring = cells_of(grid)
+    grid.point_data["von Mises [Pa]"][:] = 0
+    k = int(np.linalg.norm(grid.points - spring.points[0], axis=1).argmin())
+    grid.point_data["von Mises [Pa]"][k] = 1.0
+    assert not hidden(grid, np.array([0.0, 0, 1]))
+    write_picture(folder / "worst.vtu", tmp_path / "with.png", "a spring")
+    red, green, blue = pixels(tmp_path / "with.png").reshape(-1, 3).T.astype(int)
+    assert ((green > red + 10) & (green > blue) & (green < 150)).sum() > 1000
+
+
+def test_report_and_gltf_stretch_them(folder: Path, tmp_path: Path) -> None:
+    """The report's surface lies on the frame's in each; VTK's reader finds the same lengths in the glTF file."""
+    found = animated(folder, 1.0)
+    assert found is not None
+    spring = next(each for each in found.surfaces if each.spring)
+    assert spring.name == "pull"
+    for points, grid in zip(list(spring.world())[1:], frames(folder), strict=True):
+        own = np.asarray(cells_of(grid).points)
+        assert max(np.linalg.norm(own - x, axis=1).min() for x in points) < 1e-6
+    write_gltf(folder, tmp_path / "arm.glb")
+    reader = reader_of(tmp_path / "arm.glb")
+    for t, points in zip(found.times, list(spring.world())[1:], strict=True):
+        x = np.asarray(shown(reader, t - found.times[0]).points)[-len(points) :]
+        assert_allclose(x, points, atol=1e-3)  # of wires that the stretch along the axis takes along
+
+
+def test_rigid_motions_have_them_too(tmp_path: Path) -> None:
+    made = kinematics(scene_from(scene(), tmp_path))
+    for k, grid in enumerate(frames(made.folder)):
+        x = np.asarray(cells_of(grid).points)
+        tip = 0.5 * np.array([np.cos(k * np.pi / 4), np.sin(k * np.pi / 4), 0])
+        assert np.linalg.norm(x - tip, axis=1).min() < 0.003
+        assert np.linalg.norm(x - TO, axis=1).max() == pytest.approx(np.linalg.norm(tip - TO), abs=1e-4)
