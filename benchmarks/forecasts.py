@@ -61,7 +61,7 @@ def told(name: str) -> dict[str, float]:
 
     scene = _scene(name)
     plan = plan_for(scene, lambda stage: None)
-    cost = forecast(prepared(plan.scene if plan else scene)[0])
+    cost, _ = forecast(prepared(plan.scene if plan else scene)[0])
     return {"factor": cost.factor, "stepping": cost.steps, "memory": cost.memory}
 
 

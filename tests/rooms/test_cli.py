@@ -246,6 +246,34 @@ def test_check_shows_what_would_be_modelled_and_writes_nothing(run_kedfem: Comma
     assert [p.name for p in arm.parent.iterdir()] == [arm.name]
 
 
+HANGING = """
+gravity = [0, -9.81]
+[links.rod]
+model = "beam"
+material = "steel"
+%s
+shape = { kind = "bar", between = [[0, 0], [1, 0]], width = 0.02, thickness = 0.02 }
+[joints.A]
+kind = "revolute"
+links = ["rod", "ground"]
+at = [0, 0]
+[analysis]
+kind = "static"
+"""
+
+
+@pytest.mark.parametrize("mesh", ["", "mesh = { elements = 2 }"], ids=["open mesh", "given mesh"])
+def test_check_fails_where_no_position_balances(run_kedfem: Command, tmp_path: Path, mesh: str) -> None:
+    """Nothing holds the rod: with what a run says and its exit code, and no word of a mesh that would be too coarse."""
+    scene = tmp_path / "hanging.toml"
+    scene.write_text(HANGING % mesh)
+    said = run_kedfem("check", scene)
+    assert said.code == USER_ERROR
+    assert "got no balance at t = 0 s" in " ".join(said.err.split())
+    assert "mesh limits it" not in said.out
+    assert "finer" not in said.out + said.err
+
+
 GEOMETRY = Path(__file__).parents[2] / "geometry"
 
 

@@ -145,6 +145,7 @@ def chosen_beams(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, f
         try:
             reference = search.run(with_beams(scene, names, finest))
         except KedfemError as fault:
+            search.balances(with_beams(scene, names, choices[-1]))
             search.notes.append(f"finer beams could not be tried: {str(fault).splitlines()[0]}")
             break
         for choice in tried:
@@ -155,7 +156,8 @@ def chosen_beams(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, f
                 continue
             if error <= allowed:
                 return now, error
-    search.notes.append(f"the finest beams tried still leave an error of {percent(error)}")
+    if math.isfinite(error):
+        search.notes.append(f"the finest beams tried still leave an error of {percent(error)}")
     return with_beams(scene, names, choices[-1]), error
 
 

@@ -164,6 +164,7 @@ def first_enough(
         try:
             change = search.difference(now, better)
         except KedfemError as fault:
+            search.balances(now)
             search.notes.append(f"{finer} could not be tried: {str(fault).splitlines()[0]}")
             return k, error
         beyond = change / ((next_fine / fine) ** MESH_ORDER - 1)

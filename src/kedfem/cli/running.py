@@ -92,12 +92,12 @@ def _version(file: Path) -> tuple[int, int] | None:
 
 
 def check(scene: ScenePath, quick: Quick = False, within: Within = False) -> None:
-    """Show what would be modelled and its cost; solve nothing."""
+    """Show what would be modelled and its cost; of the solution a few steps are tried."""
     from kedfem.accuracy.plan import ready_to_step
     from kedfem.accuracy.sizes import size_warnings, sizes
     from kedfem.motion.assembly import assembled
     from kedfem.scene import read_scene
-    from kedfem.tables import assembly_table, check_tables, size_line
+    from kedfem.tables import assembly_table, check_tables, forecast, size_line
 
     read = read_scene(scene, within=within)
     loaded, assembly = assembled(with_plain_defaults(read) if quick else read)
@@ -105,7 +105,12 @@ def check(scene: ScenePath, quick: Quick = False, within: Within = False) -> Non
         plan, ready, reduction = ready_to_step(loaded, stage)
     found = sizes(loaded, ready.model)
     say(size_line(found))
-    show([assembly_table(assembly), *check_tables(ready, reduction, plan)], size_warnings(loaded, found))
+    cost, failed = forecast(ready)
+    show(
+        [assembly_table(assembly), *check_tables(ready, reduction, plan, cost)], size_warnings(loaded, found)
+    )
+    if failed is not None:
+        raise failed
 
 
 def kinematics(

@@ -1,7 +1,7 @@
 """Summary tables of what the commands find, for the terminal."""
 
 from kedfem.output.words import moment
-from kedfem.tables.check import check_tables
+from kedfem.tables.check import check_tables, forecast
 from kedfem.tables.mechanism import (
     case_tables,
     frequencies_tables,

@@ -43,9 +43,11 @@ PARALLEL = 1e-6  # of the largest: turns about other axes that rounding leaves
 NEARLY = 0.01  # deg: of a full revolution, by rounding
 
 
-def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None) -> list[Table]:
+def check_tables(
+    ready: Prepared, reduction: Reduction | None, plan: Plan | None, cost: Cost | None = None
+) -> list[Table]:
     """What would be modelled: the plan for an accuracy, links, what reducing them costs, motion, frequency, cost."""
-    cost, found = forecast(ready), resolution(ready)
+    cost, found = cost or forecast(ready)[0], resolution(ready)
     return [
         *(plan_tables(plan) if plan else []),
         *link_tables(ready.model),
@@ -58,10 +60,10 @@ def check_tables(ready: Prepared, reduction: Reduction | None, plan: Plan | None
     ]
 
 
-def forecast(ready: Prepared) -> Cost:
+def forecast(ready: Prepared) -> tuple[Cost, KedfemError | None]:
     """Cost of a run: a few steps are taken with all that a run makes of them, and one frame of the animation.
 
-    From sizes alone where they cannot be taken.
+    From sizes alone where they cannot be taken, with what fails then: the run's first steps do, too.
     """
     scene, model = ready.scene, ready.model
     every = [*model.links, *(prescribed.link for prescribed in model.prescribed)]
@@ -81,10 +83,12 @@ def forecast(ready: Prepared) -> Cost:
 
     try:
         cost = tried_cost(scene, model, run)
-    except KedfemError:  # the run will say why
-        return estimated_cost(scene, model)
-    frames = len(frame_steps(scene))
-    return replace(cost, steps=cost.steps + frames * _frame(ready, recoveries, seen[-1])) if seen else cost
+    except KedfemError as error:
+        return estimated_cost(scene, model), error
+    frames = len(frame_steps(scene)) if seen else 0
+    return replace(
+        cost, steps=cost.steps + frames * _frame(ready, recoveries, seen[-1])
+    ) if frames else cost, None
 
 
 def _frame(ready: Prepared, recoveries: list[StressRecovery], now: Snapshot) -> float:
