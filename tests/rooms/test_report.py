@@ -23,6 +23,7 @@ from kedfem.frequencies import Wanted, frequencies
 from kedfem.kinematics import kinematics
 from kedfem.output.bars import bars, heights
 from kedfem.output.fields import VON_MISES
+from kedfem.output.views import view
 from kedfem.output.words import with_prefix
 from kedfem.report import animated as over_frames
 from kedfem.report import surfaces, write_report
@@ -31,12 +32,14 @@ from kedfem.report.curves import cursor_places, curve_groups
 from kedfem.report.facts import loads_tables, notes_table, steady_table
 from kedfem.report.page import _moment as moment_told
 from kedfem.report.surfaces import placement
+from kedfem.report.viewer import first_view
 from kedfem.results import Results, read_results
 from kedfem.results.frequencies import SUMMARY
 from kedfem.results.records import TRAVEL
 from kedfem.scene import read_scene, scene_from
 from tests.browser import Browser, needs_browser
 from tests.frames import frames
+from tests.rooms.test_output import drawn, warped
 from tests.scenes import arm, bar, cycloidal, four_bar
 
 SCALE = 50.0
@@ -432,3 +435,18 @@ def test_a_moment_names_the_drives_position_where_there_is_one_drive(drives: int
     )
     results = Results(np.zeros(1), np.zeros(1), {}, "complete", "{}", drive=TRAVEL)
     assert moment_told(scene, results, 0.5, 0.02) == told
+
+
+@pytest.mark.parametrize("down", [[0, 0, -9.81], [0, -9.81, 0], [9.81, 0, 0]], ids=["z", "y", "-x"])
+def test_the_first_view_is_that_of_the_picture(tmp_path: Path, down: list[float]) -> None:
+    """Of a block as thick as high: from not far above, tan⁻¹(0.6 / √1.36) = 27° over the horizon, gravity downwards."""
+    vtu = drawn(tmp_path, [warped()]).rename(tmp_path / "worst.vtu")
+    gravity = (float(down[0]), float(down[1]), float(down[2]))
+    found = animated(tmp_path, 1.0, gravity)
+    assert found is not None
+    axes = first_view(found, np.ones(3), np.array(gravity))
+    picture = view(pyvista.read(vtu), np.array(gravity))
+    assert_allclose(axes, [picture.across, picture.up, picture.direction], atol=1e-12)
+    up = -np.array(down) / 9.81
+    assert np.degrees(np.arcsin(axes[2] @ up)) == pytest.approx(27.2, abs=0.1)
+    assert_allclose(axes[0] @ up, 0.0, atol=1e-12)

@@ -16,7 +16,7 @@ from kedfem.output.animation import read_collection
 from kedfem.output.derived import STEM, WORST
 from kedfem.output.fields import BODY, LINK, SPRING
 from kedfem.output.stress_files import ENVELOPE
-from kedfem.output.views import view
+from kedfem.output.views import View, view
 from kedfem.report.surfaces import Surface, sources_of
 
 FRAMES = 120
@@ -28,23 +28,26 @@ class Animated:
 
     times : (f,) of the frames [s]
     surfaces : of all links
-    seen_from : (3,) unit vector towards an eye that sees the highest stress; None where it is not known
+    seen_from : the view of the picture of the highest stress; None where that is not known
     thinned : what was left out to keep the page small, in words; empty if nothing was
     """
 
     times: Float[np.ndarray, " f"]
     surfaces: list[Surface]
-    seen_from: Float[np.ndarray, "3"] | None
+    seen_from: View | None
     thinned: tuple[str, ...]
 
 
-def animated(folder: Path, deformation_scale: float) -> Animated | None:
+def animated(
+    folder: Path, deformation_scale: float, gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+) -> Animated | None:
     """The surfaces of a run's links in all its frames; of a run without animation undeformed; None without either.
 
     Parameters
     ----------
     folder : of the results
     deformation_scale : by which the frames exaggerate the elastic displacement [-]
+    gravity : (3,) by which the picture's view is chosen [m/s²]
 
     Raises
     ------
@@ -76,7 +79,7 @@ def animated(folder: Path, deformation_scale: float) -> Animated | None:
         thinned += (f"{len(shown)} of {len(frames)} frames are shown",)
     if not sources:
         return None
-    eye = view(_read([worst]), np.zeros(3)).direction if worst.exists() else None
+    eye = view(_read([worst]), np.array(gravity)) if worst.exists() else None
     return Animated(np.array(times), [source.surface for source in sources], eye, thinned)
 
 

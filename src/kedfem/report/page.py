@@ -150,8 +150,9 @@ def _moving(
     """The viewer, what each frame is in words, where the cursor stands in it, the frame that is shown first."""
     animation = scene.get("output", {}).get("animation") or {}
     scale = float(animation.get("deformation_scale", 1.0))
+    gravity = tuple(scene.get("gravity") or (0.0, 0.0, 0.0))
     try:
-        shown = animated(folder, scale)
+        shown = animated(folder, scale, gravity)
     except OutputError as error:
         missing.append(f"the mechanism is not drawn: {error}")
         return None
@@ -164,10 +165,13 @@ def _moving(
     first = 0
     if highest is not None and len(shown.times):
         first = int(np.abs(shown.times - highest.time).argmin())
-    gravity = np.array(scene.get("gravity") or (0.0, 0.0, 0.0), float)
     return {
         "document": viewer(
-            shown, 0.0 if highest is None else highest.stress, _marks(scene, highest), gravity, first
+            shown,
+            0.0 if highest is None else highest.stress,
+            _marks(scene, highest),
+            np.array(gravity, float),
+            first,
         ),
         "frames": _frames(scene, results, shown, highest),
         "cursor": cursor_places(results, shown.times),

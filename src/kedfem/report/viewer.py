@@ -155,17 +155,25 @@ def _matrix(placed: Placement) -> Float[np.ndarray, "4 4"]:
     return out
 
 
+def first_view(
+    shown: Animated, taken: Float[np.ndarray, "3"], gravity: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "3 3"]:
+    """Unit vectors to the right, upwards and towards the eye as the picture has them: gravity downwards, if known."""
+    if shown.seen_from is not None:
+        return np.array([shown.seen_from.across, shown.seen_from.up, shown.seen_from.direction])
+    towards, up = sight(taken, gravity)
+    return np.array([*picture_axes(towards, up, gravity), towards])
+
+
 def _listens(
     shown: Animated, taken: Float[np.ndarray, "3"], gravity: Float[np.ndarray, "3"], first: int
 ) -> str:
-    """The script with the first view: all links in all frames, gravity downwards if it is known."""
-    towards, up = sight(taken, gravity)
-    towards = towards if shown.seen_from is None else shown.seen_from
-    axes = np.array([*picture_axes(towards, up, gravity), towards])
+    """The script with the first view, that of the picture of the highest stress: all links in all frames."""
+    axes = first_view(shown, taken, gravity)
     low, high = bounds(shown.surfaces, axes)
     wide, tall, deep = (high - low) / 2
     messages: Mapping[str, Any] = {
-        "middle": ((low + high) / 2 @ axes).tolist(), "towards": towards.tolist(), "up": axes[1].tolist(),
+        "middle": ((low + high) / 2 @ axes).tolist(), "towards": axes[2].tolist(), "up": axes[1].tolist(),
         "wide": wide, "high": tall, "deep": deep, "view": FIELD_OF_VIEW, "first": first,
     }  # fmt: skip
     return LISTENS % json.dumps(messages)
