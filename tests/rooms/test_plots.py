@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from kedfem.output.plots.abscissa import Abscissa
-from kedfem.output.plots.drawing import draw_curves, worth_drawing
+from kedfem.output.plots.abscissa import Abscissa, draw_abscissa
+from kedfem.output.plots.drawing import draw_curves, drawn_over, worth_drawing
 from kedfem.output.plots.files import shown
 from kedfem.output.plots.groups import STIFF, Picture
+from kedfem.report.curves import cursor_places
 from kedfem.results import Channel, Results
+from kedfem.results.records import ANGLE, TRAVEL
 
 LIMBS = {"foot": "universal", "slide": "prismatic", "head": "spherical"}
 
@@ -83,3 +85,43 @@ def test_faint_moments_are_named_but_not_drawn() -> None:
     draw_curves(ax, Abscissa(time), found["joint_moments"].panels[0])
     assert ax.get_legend_handles_labels()[1] == ["A", "C", "B: < 0.01 %"]
     assert not any("moment" in name for name in drawn({"A": 1e-9, "B": 2e-10}))
+
+
+def static(angle: np.ndarray, drive: Channel, kind: str = "static") -> Results:
+    time = np.linspace(0.0, 4.0, len(angle))
+    scene = json.dumps({"analysis": {"kind": kind}, "drive": {"joint": "road"}})
+    force = Channel("drive/force", ("force",), "N", "", "force")
+    return Results(time, angle, {"drive/force": (force, angle[:, None])}, "complete", scene, drive=drive)
+
+
+def test_static_positions_are_drawn_over_the_drive() -> None:
+    """Its travel in mm, its angle in degrees, there and back on one scale; at rest, and in motion, over time."""
+    up, back = np.array([-0.05, 0.0, 0.05]), np.array([0.0, 0.05, 0.0])
+    along = drawn_over(static(up, TRAVEL))
+    np.testing.assert_allclose(along.values, [-50, 0, 50])
+    np.testing.assert_allclose(drawn_over(static(up, ANGLE)).values, np.degrees(up))
+    np.testing.assert_allclose(drawn_over(static(up[::-1], TRAVEL)).ends, [50, -50])
+    assert drawn_over(static(back, TRAVEL)).ends == (0, 50)
+    np.testing.assert_allclose(cursor_places(static(back, TRAVEL), np.array([0, 1, 2, 4.0])), [0, 0.5, 1, 0])
+    assert drawn_over(static(0 * up, TRAVEL)).over_time
+    assert drawn_over(static(up, TRAVEL, "transient")).over_time
+    top = Figure().subplots()
+    draw_abscissa(top, top, along)
+    assert top.get_xlabel() == "drive travel (mm)"
+    assert top.get_xlim() == (-50, 50)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "rows", "told"),
+    [("travel", [3.0, 4, 0], False), ("displacement", [0.1, 4, 0], False), ("displacement", [3, 4, 0], True),
+     ("position", [3, 4, 0], False), ("force", [3, 4, 0], True), ("force", [0, -4, 0.2], False)],
+)  # fmt: skip
+def test_magnitudes_are_drawn_where_they_tell_more_than_a_component(
+    quantity: str, rows: list[float], told: bool
+) -> None:
+    channel = Channel(f"probes/p/{quantity}", ("x", "y", "z"), "m", "world", quantity)
+    time = np.linspace(0.0, 1.0, 3)
+    values = np.outer(time, rows)
+    (page,) = worth_drawing(Results(time, time, {channel.name: (channel, values)}, "complete", "{}"))
+    assert ("magnitude" in page.panels[0].curves) == told
+    assert {"x", "y", "z"} <= set(page.panels[0].curves)

@@ -69,8 +69,8 @@ def cursor_places(results: Results, times: Float[np.ndarray, " f"]) -> list[floa
         return []
     along: Abscissa = drawn_over(results)
     at = np.interp(times, results.time, along.values)
-    width = along.values[-1] - along.values[0]
-    return [float(x) for x in (at - along.values[0]) / width] if width else []
+    low, high = along.ends
+    return [float(x) for x in (at - low) / (high - low)] if high != low else []
 
 
 def _alone(svg: str) -> str:

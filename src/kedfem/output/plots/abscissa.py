@@ -1,4 +1,4 @@
-"""What curves are drawn over: the drive angle, or time where the drive does not keep turning or there is none."""
+"""What curves are drawn over: the drive's position, or time where the drive does not keep on or there is none."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -14,14 +14,24 @@ MOST_TICKS = 13
 class Abscissa:
     """Values of the horizontal axis.
 
-    values : (n,) [deg], or [s] over time
+    values : (n,) [deg], [mm] over the travel of a drive, or [s] over time
     degrees : (n,) the drive angle, when the curves are over time and there is one that moves [deg]
     over_time : whether the curves are over time
+    travel : whether they are over the travel of a drive
     """
 
     values: Float[np.ndarray, " n"]
     degrees: Float[np.ndarray, " n"] | None = None
     over_time: bool = False
+    travel: bool = False
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Left and right end; a drive that turns backwards still runs from left to right."""
+        steps = np.diff(self.values)
+        if steps.size and (steps >= 0).all() | (steps <= 0).all():
+            return float(self.values[0]), float(self.values[-1])
+        return float(np.min(self.values)), float(np.max(self.values))
 
 
 def abscissa(time: Float[np.ndarray, " n"], angle: Float[np.ndarray, " n"]) -> Abscissa:
@@ -38,6 +48,19 @@ def abscissa(time: Float[np.ndarray, " n"], angle: Float[np.ndarray, " n"]) -> A
     return Abscissa(time, degrees if steps.any() else None, over_time=True)
 
 
+def over_positions(angle: Float[np.ndarray, " n"], slides: bool) -> Abscissa | None:
+    """The drive's position, by which static positions differ; None where the drive rests.
+
+    Parameters
+    ----------
+    angle : of the drive [rad], or its travel [m]
+    slides : which of both it is
+    """
+    if not np.ptp(angle) > 0:
+        return None
+    return Abscissa(1e3 * angle, travel=True) if slides else Abscissa(np.degrees(angle))
+
+
 def draw_abscissa(top: Any, bottom: Any, along: Abscissa) -> None:
     """Label, ticks and limits; above, turns where there is more than one.
 
@@ -45,12 +68,13 @@ def draw_abscissa(top: Any, bottom: Any, along: Abscissa) -> None:
     ----------
     top, bottom : axes of matplotlib that share the abscissa
     """
-    first, last = float(along.values[0]), float(along.values[-1])
-    bottom.set_xlabel("time (s)" if along.over_time else "drive angle (°)")
+    first, last = along.ends
+    over = "time (s)" if along.over_time else "drive travel (mm)" if along.travel else "drive angle (°)"
+    bottom.set_xlabel(over)
     if first == last:
         return
-    bottom.set_xlim(first, last)  # a drive that turns backwards still runs from left to right
-    if along.over_time:
+    bottom.set_xlim(first, last)
+    if along.over_time or along.travel:
         return
     span = abs(last - first)
     bottom.xaxis.set_major_locator(_ticks(span))

@@ -1,6 +1,7 @@
 """How curves over the drive angle are drawn; `groups` says which pictures there are."""
 
 import io
+import json
 import re
 import textwrap
 import warnings
@@ -14,7 +15,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from jaxtyping import Float, Int
 
-from kedfem.output.plots.abscissa import Abscissa, abscissa, draw_abscissa
+from kedfem.output.plots.abscissa import Abscissa, abscissa, draw_abscissa, over_positions
 from kedfem.output.plots.groups import FAINT, STIFF, Panel, Picture, largest, pictures
 from kedfem.output.words import prefixed
 from kedfem.results import Channel, Results, replacing
@@ -99,9 +100,17 @@ def _span(panel: Panel) -> tuple[float, float]:
 
 
 def drawn_over(results: Results) -> Abscissa:
-    """The drive angle or time; time alone where channels are of a drive that slides, or of several."""
+    """The drive angle or time; time alone where channels are of a drive that slides, or of several.
+
+    Static positions are drawn over the position of the only drive.
+    """
     of_drives = [name.split("/")[1:] for name in results.channels if name.startswith("drive/")]
     slides = results.drive.unit == "m"
+    scene = json.loads(results.scene_json)
+    if scene.get("analysis", {}).get("kind") == "static" and len(scene.get("drives") or ()) < 2:
+        found = over_positions(results.angle, slides)
+        if found is not None:
+            return found
     if slides or any(len(parts) > 1 or parts[0] in {"force", "rigid_force"} for parts in of_drives):
         return Abscissa(results.time, over_time=True)
     return abscissa(results.time, results.angle)

@@ -13,6 +13,8 @@ from kedfem.results.records import XYZ, rounding
 Curves = Mapping[str, Float[np.ndarray, " n"]]
 SEVERAL = ("drive", "joints", "motors", "springs", "limits", "gears")  # how names of things of one kind begin
 CURVES = 9  # in one panel: so many its legend has room for
+SIGNED = {"position", "travel"}  # vectors that are drawn by their components alone
+ALONE = 1.05  # times the largest component: up to there the magnitude tells nothing beside it
 FAINT = 1e-4  # of the largest of their kind: curves that are named in a legend instead of drawn
 ENERGY = "energy/"
 RIGID = "rigid_"  # how the name of a channel begins that has the same of rigid links
@@ -175,8 +177,10 @@ def _single(channel: Channel, values: Float[np.ndarray, "n c"]) -> list[Panel]:
     curves = dict(zip(channel.columns, values.T, strict=True))
     quantity = channel.name.rsplit("/", 1)[-1].replace("_", " ")
     if channel.columns == XYZ:
-        if quantity != "position":  # how far off the origin means nothing
-            curves["magnitude"] = np.linalg.norm(values, axis=1)
+        size = np.linalg.norm(values, axis=1)
+        # how far off the origin means nothing, and a travel is read with its sign
+        if quantity not in SIGNED and largest(size) > ALONE * largest(values):
+            curves["magnitude"] = size
         return [readable(quantity, channel.unit, curves)]
     if "von_mises" in curves:
         equivalent = {"von Mises": curves.pop("von_mises")}
