@@ -239,19 +239,22 @@ def applied(
 ) -> Float[np.ndarray, "T n d"]:
     """P − M R0'' over time, world components, [KED, eqs. (17)(18)]: R0'' = 1 ⊗ p'' + X R''ᵀ.
 
+    All patterns of the link are combined in one product, component first in memory.
+
     Parameters
     ----------
     body : the link's number in the motion
     """
-    F = link.mX @ -motion.R2[:, body, : link.d].transpose(0, 2, 1)
-    F -= link.m1 * rigid_acceleration(link, motion, body)[:, None]
+    d, unit = link.d, np.eye(link.d)
+    shapes, amount = [link.mX, link.m1], [-motion.R2[:, body, :d]]
+    amount.append(-rigid_acceleration(link, motion, body)[:, :, None] * unit)
     for load in loads:
-        if load.own:
-            continue
-        factor = amounts(load, motion, body)
+        factor = np.zeros(1) if load.own else amounts(load, motion, body)
         if factor.any():
-            F += factor[:, None, None] * _in_world(link, load, motion, body)
-    return np.asarray(F)
+            shapes.append(load.forces)
+            amount.append(factor[:, None, None] * (motion.R[:, body, :d, :d] if load.follows else unit))
+    F = np.concatenate(amount, axis=2).reshape(len(motion.t) * d, -1) @ np.concatenate(shapes, axis=1).T
+    return np.asarray(F.reshape(len(motion.t), d, link.n).transpose(0, 2, 1))
 
 
 def unit_forces(

@@ -109,10 +109,10 @@ def work_over_time(part: Coordinates, rows: Float[np.ndarray, "T n d"]) -> Float
 
 
 def rows_of(link: Link, part: Coordinates, x: Float[np.ndarray, "T D n"]) -> Float[np.ndarray, "T _ d"]:
-    """States of x over time."""
+    """States of x over time, component first in memory; where coordinates are rows a view."""
     if part.unit:
-        return np.stack([x[:, c, : link.n] for c in range(link.d)], axis=2)
-    return np.stack([x[:, c, : link.n] @ part.T[c].T for c in range(link.d)], axis=2)
+        return x[:, :, : link.n].transpose(0, 2, 1)
+    return np.stack([x[:, c, : link.n] @ part.T[c].T for c in range(link.d)], axis=1).transpose(0, 2, 1)
 
 
 def _symmetric(A: Float[np.ndarray, "k k"]) -> Float[np.ndarray, "k k"]:

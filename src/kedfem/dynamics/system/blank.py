@@ -53,9 +53,8 @@ def room(bodies: Bodies) -> Work:
     n = max(int(np.diff(bodies.at).max()), int(np.diff(bodies.port_at).max(initial=0)))
     y, turned, strained, other = np.zeros((4, n))
     points = np.zeros((5, bodies.beams.tangent.shape[2]))
-    rows = np.zeros((int(bodies.functions.max()), 4))
     return Work(
-        rows, y, turned, strained, other, np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), points, np.zeros(16),
+        y, turned, strained, other, np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), points, np.zeros(16),
         np.zeros((12, 3)), np.zeros(3), room_for(bodies.elements), np.zeros((3, 3)),
     )  # fmt: skip
 

@@ -3,50 +3,57 @@
 Arrays of the latter are found by their addresses: each body has its own, as factors are too large for copies in one.
 """
 
-from kedfem.compiled import compiled, inner
+from kedfem.compiled import compiled, inlined, inner
 from kedfem.dynamics.matrices.triangle_kernel import solved
 from kedfem.dynamics.system.algebra_kernel import add_transposed, product
 from kedfem.dynamics.system.reference import integers_at, reals_at
 
 
 @inner
-def mass_times(bodies, i, x, out, rows):  # type: ignore[no-untyped-def]
-    """out becomes M x of a sparse body, in whichever axes.
+def mass_times(bodies, i, x, out):  # type: ignore[no-untyped-def]
+    """out becomes M x of a sparse body, in whichever axes; of a matrix that is symmetric rows end at their diagonal.
 
-    A matrix that all three components share is read once, and what it meets at a time stands in one of the rows.
-
-    Parameters
-    ----------
-    rows : room for (n, 4) numbers
+    One that all three components share is read once.
     """
     n, d, of = bodies.functions[i], bodies.components[i], bodies.mass
-    column, value = of.column, of.value
-    if d == 3 and of.of[i, 0] == of.of[i, 1] == of.of[i, 2]:
-        at = of.at[of.of[i, 0]]
-        ends = of.row[at : at + n + 1]
-        first, second, third = x[:n], x[n : 2 * n], x[2 * n : 3 * n]
-        to, to_second, to_third = out[:n], out[n : 2 * n], out[2 * n : 3 * n]
-        for j in range(n):
-            rows[j, 0], rows[j, 1], rows[j, 2] = first[j], second[j], third[j]
-        for j in range(n):
-            columns, values = column[ends[j] : ends[j + 1]], value[ends[j] : ends[j + 1]]
-            x0, x1, x2 = 0.0, 0.0, 0.0
-            for m in range(len(columns)):
-                y, row = values[m], rows[columns[m]]
-                x0 += y * row[0]
-                x1 += y * row[1]
-                x2 += y * row[2]
-            to[j], to_second[j], to_third[j] = x0, x1, x2
-        return
-    for b in range(d):
+    shared = d == 3 and of.of[i, 0] == of.of[i, 1] == of.of[i, 2]
+    for b in range(1 if shared else d):
         at = of.at[of.of[i, b]]
         ends, own, to = of.row[at : at + n + 1], x[b * n : (b + 1) * n], out[b * n : (b + 1) * n]
+        if shared:
+            shared_mass_times(
+                ends, of.column, of.value, (own, x[n : 2 * n], x[2 * n :]), (to, out[n : 2 * n], out[2 * n :])
+            )
+            continue
         for j in range(n):
-            columns, values = column[ends[j] : ends[j + 1]], value[ends[j] : ends[j + 1]]
-            total = 0.0
+            end = ends[j + 1] - 1
+            columns, values = of.column[ends[j] : end], of.value[ends[j] : end]
+            mine, total = own[j], of.value[end] * own[j]
             for m in range(len(columns)):
                 total += values[m] * own[columns[m]]
+                to[columns[m]] += values[m] * mine
             to[j] = total
+
+
+@inlined
+def shared_mass_times(ends, column, value, x, out):  # type: ignore[no-untyped-def]
+    """Of all three components (n,), from those of x."""
+    first, second, third = x
+    to, to_second, to_third = out
+    for j in range(len(ends) - 1):
+        end = ends[j + 1] - 1
+        columns, values, y = column[ends[j] : end], value[ends[j] : end], value[end]
+        p, q, r = first[j], second[j], third[j]
+        x0, x1, x2 = y * p, y * q, y * r
+        for m in range(len(columns)):
+            y, o = values[m], columns[m]
+            x0 += y * first[o]
+            x1 += y * second[o]
+            x2 += y * third[o]
+            to[o] += y * p
+            to_second[o] += y * q
+            to_third[o] += y * r
+        to[j], to_second[j], to_third[j] = x0, x1, x2
 
 
 @inner

@@ -138,11 +138,11 @@ def mass_of(link: Link) -> float:
 
 
 def mass_tables(links: Sequence[Link], parts: Sequence[Part]) -> Masses:
-    """Matrices m of all components of sparse bodies, each once."""
+    """Matrices m of all components of sparse bodies, each once, and of each row what ends at its diagonal."""
     of, every = np.full((len(links), 3), -1), dict[int, tuple[int, Any]]()
     for row, link, part in zip(of, links, parts, strict=True):
         for c, m in enumerate(link.mass if isinstance(part, SparsePart) else ()):
-            row[c] = every.setdefault(id(m), (len(every), m.tocsr()))[0]
+            row[c] = every.setdefault(id(m), (len(every), _lower(m)))[0]
     return _row_by_row(of, [m for _, m in every.values()])
 
 
@@ -154,6 +154,13 @@ def stiffness_tables(links: Sequence[Link], parts: Sequence[Part], which: Sequen
             row[0], order = len(every), component_order(link)
             every.append(sp.csr_array(sp.csr_array(link.K0)[order][:, order]))
     return _row_by_row(of, every)
+
+
+def _lower(m: Any) -> sp.csr_array:
+    """The lower triangle of a matrix, rows in order of columns; what is on its diagonal is there, be it zero."""
+    below, n = sp.tril(m, -1, format="coo"), np.arange(m.shape[0])
+    row, column = np.concatenate([below.row, n]), np.concatenate([below.col, n])
+    return sp.csr_array((np.concatenate([below.data, m.diagonal()]), (row, column)), shape=m.shape)
 
 
 def _row_by_row(of: Int[np.ndarray, "L 3"], every: Sequence[Any]) -> Masses:

@@ -166,9 +166,8 @@ class Trial(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Room for one body or end at a time; rows : (n, 4) of a body's functions."""
+    """Room for one body or end at a time."""
 
-    rows: Any
     y: Any
     turned: Any
     strained: Any
