@@ -10,6 +10,7 @@ from kedfem.accuracy.error_budget import Budget, attributes, budget_warning, kin
 from kedfem.accuracy.estimates import Strained, budget
 from kedfem.accuracy.given import given_warning
 from kedfem.accuracy.histories import Histories, steady_state
+from kedfem.accuracy.mass_damping import mass_damping_warning
 from kedfem.accuracy.meshes import stubby_warning
 from kedfem.accuracy.plan import Plan, ready_to_step
 from kedfem.accuracy.prepared import ALONE, Neighbours, Prepared
@@ -178,6 +179,7 @@ def _analysed(
     unbalanced = balance_warning(balance, scene.analysis.stiffening) if balance else ()
     notices += [
         *unbalanced,
+        *(mass_damping_warning(ready, balance.resisted) if balance else ()),
         *efforts.warnings(),
         *undetermined_warning(untold),
         *watched.passes.warnings(),

@@ -6,12 +6,17 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.integrate import trapezoid
+from scipy.interpolate import CubicSpline
 
-from kedfem.analysis import analyse
+from kedfem.accuracy.mass_damping import mass_damping_warning
+from kedfem.accuracy.prepared import meshed
+from kedfem.analysis import Run, analyse
 from kedfem.errors import KedfemError
 from kedfem.results import Results
 from kedfem.scene import Polynomial, drive_angle, scene_from
 from tests.laws.test_limits import AXES
+from tests.laws.test_mechanisms import rod_between_balls
 
 Raw = dict[str, Any]
 Vector = np.ndarray
@@ -107,6 +112,46 @@ def test_a_half_sine_shock_moves_a_block_as_its_closed_form_says(tmp_path: Path)
     r = np.pi / (w * T)
     z = -a / (w**2 * (1 - r**2)) * (np.sin(np.pi * found.time / T) - r * np.sin(w * found.time))
     assert_allclose(along(found, axis) - along(found, axis, "road"), z, atol=2e-4 * np.abs(z).max())
+
+
+def test_damping_by_mass_of_what_moves_freely_is_told_with_what_it_takes(tmp_path: Path) -> None:
+    """The block loses α ∫ m v² dt, of the largest energy exchanged, and 1 − exp(−α T) of its speed were it alone."""
+    axis, alpha, T = AXES["oblique"], 3.0, 0.5
+    motion = {"kind": "harmonic", "travel": 0.01, "frequency": 4.0}
+    raw = sprung(axis, motion, end_time=T, step=1e-3, accuracy="quick")
+    raw["output"] = {**QUIET, "probes": {"block": travel("block", 0.3 * axis)}}
+
+    def told(damping: Raw) -> tuple[Run, list[str]]:
+        done = analyse(scene_from({**raw, "damping": damping}, tmp_path))
+        return done, [text for text in done.warnings if text.startswith("damping: alpha")]
+
+    done, warnings = told({"alpha": alpha, "beta": 1e-5})
+    assert done.balance is not None
+    rows = {name: x for name, (_, x) in done.results.channels.items()}
+    t = done.results.time
+    v = CubicSpline(t, along(done.results, axis))(t, 1)
+    taken = alpha * M * trapezoid(v**2, t)
+    change = (
+        rows["energy/kinetic"] - rows["energy/kinetic"][0] + rows["energy/strain"] - rows["energy/strain"][0]
+    )
+    exchanged = max(
+        np.abs(x).max()
+        for x in (change, rows["energy/strain"], rows["energy/work"], rows["energy/dissipated"])
+    )
+    assert done.balance.resisted == pytest.approx(taken / exchanged, rel=1e-3)
+    (said,) = warnings
+    assert f"they lose {100 * (1 - np.exp(-alpha * T)):.2g} % of their speed in the 0.5 s" in said
+    assert f"it took {100 * taken / exchanged:.2g} % of the largest energy exchanged" in said
+    assert "take beta = 1e-05 [s] alone" in said
+    assert "links block as" in said
+    ready = meshed(scene_from({**raw, "damping": {"alpha": alpha}}))
+    (beforehand,) = mass_damping_warning(ready)  # of a check
+    assert "it took" not in beforehand
+    spinning = meshed(scene_from({**rod_between_balls(), "damping": {"alpha": alpha}}))
+    assert spinning.linkage.mobility == 1
+    assert mass_damping_warning(spinning) == ()
+    assert not told({"beta": 1e-5})[1]
+    assert not told({"alpha": 0.01})[1]  # takes half a percent of a speed
 
 
 @EVERY

@@ -93,6 +93,7 @@ def _version(file: Path) -> tuple[int, int] | None:
 
 def check(scene: ScenePath, quick: Quick = False, within: Within = False) -> None:
     """Show what would be modelled and its cost; of the solution a few steps are tried."""
+    from kedfem.accuracy.mass_damping import mass_damping_warning
     from kedfem.accuracy.plan import ready_to_step
     from kedfem.accuracy.sizes import size_warnings, sizes
     from kedfem.motion.assembly import assembled
@@ -105,10 +106,9 @@ def check(scene: ScenePath, quick: Quick = False, within: Within = False) -> Non
         plan, ready, reduction = ready_to_step(loaded, stage)
     found = sizes(loaded, ready.model)
     say(size_line(found))
+    doubts = (*size_warnings(loaded, found), *mass_damping_warning(ready))
     cost, failed = forecast(ready)
-    show(
-        [assembly_table(assembly), *check_tables(ready, reduction, plan, cost)], size_warnings(loaded, found)
-    )
+    show([assembly_table(assembly), *check_tables(ready, reduction, plan, cost)], doubts)
     if failed is not None:
         raise failed
 

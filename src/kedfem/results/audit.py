@@ -101,7 +101,7 @@ class Account:
         self._start = 0.0
         self._last: list[Last | None] = [None] * len(self._groups)
         self._springs: tuple[float, np.ndarray, np.ndarray] | None = None
-        self._largest = np.zeros(3)
+        self._largest = np.zeros(4)
 
     def rows(self, block: Block) -> dict[str, Rows]:
         """The channels over a block; the same block again is not counted twice.
@@ -134,12 +134,12 @@ class Account:
             taken = taken + springs.dissipated[:, None] * [1, 0]
         taken = np.column_stack([taken, pushed])
         energy = flow.kinetic + strain
-        rates = np.stack([flow.loads, flow.supports, flow.neglected, flow.led], axis=1)
+        rates = np.stack([flow.loads, flow.supports, flow.neglected, flow.led, flow.resisted], axis=1)
         if self._sums is None:
-            self._sums = _Sums(float(block.motion.t[0]), rates[0], np.zeros(4), np.zeros(3))
+            self._sums = _Sums(float(block.motion.t[0]), rates[0], np.zeros(5), np.zeros(3))
             self._start = float(energy[0])
         work, total = self._sums.add(block.motion.t, rates, taken)
-        loads, supports, neglected, led = work.T
+        loads, supports, neglected, led, resisted = work.T
         dissipated, drag, pushed = total.T
         driven, supports = supports - led, supports - pushed
         if block.exerted is not None:  # constraints along directions of displaced bodies do no work in all
@@ -147,7 +147,7 @@ class Account:
         change = energy - self._start
         left = change - loads - supports + dissipated + drag + neglected
         exchanged = change, strain, loads, supports, dissipated, LITTLE * flow.kinetic
-        found = (np.abs(exchanged).max(), np.abs(left).max(), np.abs(neglected).max())
+        found = tuple(np.abs(x).max() for x in (exchanged, left, neglected, resisted))
         self._largest = np.maximum(self._largest, found)
         rows = {
             "kinetic": flow.kinetic, "strain": strain, "dissipated": dissipated, "neglected": neglected + drag,

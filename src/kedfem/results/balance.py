@@ -26,6 +26,7 @@ class Flow:
     neglected : (T,) power on the rigid-body rotation of Σ δ × K δ, the moment that K's forces have on the bent link, as
         K turns with the rigid-body frame [W]
     led : (T,) power of the port forces on the elastic motion, where joints are enforced by constraint equations [W]
+    resisted : (T,) power that damping in proportion to mass takes, α δ' · M δ' [W]
     """
 
     kinetic: Scalars
@@ -33,6 +34,7 @@ class Flow:
     supports: Scalars
     neglected: Scalars
     led: Scalars
+    resisted: Scalars
 
     def __add__(self, other: "Flow") -> "Flow":
         """Both together."""
@@ -112,6 +114,7 @@ def flow(of: Sequence[Constants], found: Fields, at: RigidRates) -> Flow:
         supports.sum(axis=0),
         _neglected(found, at),
         found.powers[2].sum(axis=0),
+        np.array([x.damping.alpha for x in of]) @ found.powers[0],
     )
 
 
@@ -133,10 +136,12 @@ class Balance:
 
     energy : of the integration [-]
     neglected : energy that the neglected turning of K exchanges [-]
+    resisted : energy that damping in proportion to mass takes [-]
     """
 
     energy: float = 0.0
     neglected: float = 0.0
+    resisted: float = 0.0
 
 
 def balance_notes(found: Balance) -> dict[str, float]:

@@ -30,7 +30,7 @@ class Damping(Record):
     """Proportional damping C = α M + β K, [KED, eq. (20)]: α and β, or damping ratios at two frequencies."""
 
     alpha: Annotated[float, Quantity("1/s", least=0.0)] = 0.0
-    """mass-proportional α"""
+    """mass-proportional α; it also resists the motion of what no drive moves, as a body that a road carries"""
     beta: Annotated[float, Quantity("s", least=0.0)] = 0.0
     """stiffness-proportional β"""
     ratio: Ratios = None
