@@ -16,6 +16,8 @@ from kedfem.results.forces.constraint_forces import ConstraintForces, interface
 from kedfem.results.forces.force_elements import Measured, measured_elements
 from kedfem.results.recording import recording, rows
 from kedfem.scene import scene_from
+from tests.laws.test_limits import AXES
+from tests.laws.test_moving_ground import sprung
 from tests.moving import ran
 from tests.rooms.test_driven_efforts import ON_CRANK, four_bar
 from tests.spatial_joints import BEAMS, SLIDERS
@@ -61,6 +63,20 @@ def test_drives_do_the_work_of_all_port_forces_on_the_rigid_body_motion(kind: st
     checks, _ = compared(*ran((BEAMS | SLIDERS)[kind]()))
     assert checks.worked
     assert checks.unworked < 1e-8
+
+
+@pytest.mark.parametrize("moves", [0.0, 1e-5], ids=["at rest", "by 10 µm"])
+def test_a_drive_that_holds_what_rests_is_not_judged_by_rounding(moves: float) -> None:
+    """A block hangs on a spring of a ground that rests; what moves by a 30,000th of the size is judged as all else."""
+    motion = {"kind": "table", "time": [0, 0.01, 0.02], "travel": [0.0, moves / 2, moves]}
+    raw = sprung(AXES["oblique"], motion, end_time=0.02, step=1e-3, initial="quasi-static")
+    checks, _ = compared(*ran(raw | {"gravity": [0, 0, -9.81]}))
+    assert checks.warnings() == ()
+    checks._left = 0.42 * checks.exchanged
+    assert checks._left > 0
+    if moves:
+        assert checks.unworked == pytest.approx(0.42)
+    assert any("by 42 % of the energy exchanged" in text for text in checks.warnings()) == bool(moves)
 
 
 @pytest.mark.parametrize("effort", ["drive/A/torque", "drive/J/torque", "drive/K/force"])

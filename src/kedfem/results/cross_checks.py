@@ -27,6 +27,7 @@ SWING = 1.0  # and by this part of what swings beside it, whose share in c and m
 AMPLIFIED = 3.0  # times as much as rigid links: near a resonance elastic links bear more, in phase
 SMALL = 0.01  # of the largest effort of its unit: what is smaller is not compared
 UNWORKED = 1e-3  # of the energy exchanged: trapezoidal sums of one and the same step agree to rounding
+RESTING = 1e-7  # of the linkage's size, or rad: what moves less exchanges rounding; no work is judged by it
 MISSING = 0.02  # of it, from which on a part of an effort is missing; steps that hardly converge leave less
 
 
@@ -76,7 +77,7 @@ class CrossChecks:
         joints do.
     """
 
-    REMEMBERED = ("pairs", "_last", "_work", "_left", "exchanged")
+    REMEMBERED = ("pairs", "_last", "_work", "_left", "exchanged", "_rounding")
 
     def __init__(self, scene: Scene, linkage: Linkage, channels: Sequence[Channel], account: Account) -> None:
         known = {each.name: each for each in channels}
@@ -96,6 +97,7 @@ class CrossChecks:
         self._last: tuple[float, float] | None = None
         self._work, self._left = 0.0, 0.0
         self.exchanged = 0.0  # largest energy or work so far [J]
+        self._rounding = 0.0  # work of the largest drive effort on what RESTING allows [J]
 
     def add(self, block: Block, values: dict[str, Rows]) -> None:
         """The rows of one more block."""
@@ -113,14 +115,21 @@ class CrossChecks:
         work = self._work + np.cumsum(0.5 * h * (power + np.concatenate([[before], power[:-1]])))
         left = work - self.account.rows(block)["driven"][:, 0]
         exchanged = [values["energy/strain"], values["energy/kinetic"], values["energy/work"], work]
+        for effort, x in self.drives.items():
+            arm = self.size if x.kind == "prismatic" else 1.0
+            self._rounding = max(self._rounding, RESTING * arm * float(np.abs(values[effort]).max()))
         self._last, self._work = (float(motion.t[-1]), float(power[-1])), float(work[-1])
         self._left = max(self._left, float(np.abs(left).max()))
         self.exchanged = max(self.exchanged, *(float(np.ptp(x, axis=0).max()) for x in exchanged))
 
     @property
     def unworked(self) -> float:
-        """Work of the drives that the account of energy does not have, as a part of the energy exchanged [-]."""
-        return self._left / self.exchanged if self.exchanged else 0.0
+        """Work of the drives that the account of energy does not have, as a part of the energy exchanged [-].
+
+        Where all rests, of the least that a drive's effort would exchange if anything moved.
+        """
+        scale = max(self.exchanged, self._rounding)
+        return self._left / scale if scale else 0.0
 
     def warnings(self) -> tuple[str, ...]:
         """Efforts that contradict each other."""
