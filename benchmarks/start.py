@@ -23,12 +23,12 @@ analyse(ten_turns(sys.argv[1]))
 EXAMPLES = ("four_bar_beams", "four_bar_corotational", "four_bar_solids")
 ROWS = """
 import gc, sys
-gc.set_threshold(200_000)  # as the command line does
+from kedfem.processes import import_quickly, imported
+import_quickly()  # as the command line does
 from kedfem.analysis import analyse
 from kedfem.scene import read_scene
 import kedfem.compiled
-gc.freeze()
-gc.set_threshold(10_000)
+imported()
 scene = read_scene(sys.argv[1])
 nothing = {"animation": None, "plots": False, "picture": False, "csv": False, "parquet": False, "report": False}
 analyse(scene.model_copy(update={"output": scene.output.model_copy(update=nothing)}))

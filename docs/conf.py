@@ -6,6 +6,7 @@ from itertools import pairwise
 from os.path import relpath
 from pathlib import Path, PurePosixPath
 
+import jaxtyping  # noqa: F401  # before kedfem: its types of arrays stand in signatures
 from sphinx.application import Sphinx
 from sphinx.util import logging
 

@@ -44,7 +44,6 @@ from kedfem.output.derived import (
 )
 from kedfem.output.stress_files import Extremes, write_envelope, write_fatigue, write_top
 from kedfem.output.vtu import write_cells, write_frame
-from kedfem.report import require_report, write_report
 from kedfem.results import Channel, Fatigue, Peak, Results, add_notes, claimed, read_results
 from kedfem.results.additions import add_account, add_fatigue, add_peaks, mark_doubtful
 from kedfem.results.audit import Account, balance_warning
@@ -127,6 +126,8 @@ def analyse(
     if scene.output.parquet:
         require_parquet("output.parquet")
     if scene.output.report:
+        from kedfem.report import require_report
+
         require_report("output.report")
     if scene.fatigue is not None:
         require_fatigue("fatigue")
@@ -140,6 +141,8 @@ def analyse(
 
 def _reported(run: Run, watch: Watch) -> Run:
     """The run with its page for a browser."""
+    from kedfem.report import write_report
+
     clock = Clock(watch, run.seconds)
     missing = clock.timed("report", lambda: write_report(run.folder)).warnings
     return replace(run, warnings=(*run.warnings, *(f"report: {text}" for text in missing)))

@@ -6,8 +6,8 @@ from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import OutputError
 from kedfem.output.plots.comparison import write_comparison
 from kedfem.results import Results, read_results, results_file

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 
 import numpy as np
-from jaxtyping import Float
 
 from kedfem.accuracy.prepared import moving
 from kedfem.accuracy.variants import moved
+from kedfem.arrays import Float
 from kedfem.dynamics.inertias import Inertias, inertias_of_links
 from kedfem.dynamics.joints.places import slider_axis
 from kedfem.dynamics.rigid_body import all_motions

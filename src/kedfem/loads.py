@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 
 import numpy as np
-from jaxtyping import Bool
 
 from kedfem.accuracy.prepared import moving
+from kedfem.arrays import Bool
 from kedfem.errors import KedfemError, OutputError
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion, rigid_motion

@@ -10,12 +10,12 @@ from time import perf_counter
 from typing import Any, TypeVar
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from kedfem.accuracy.estimates import Seen, watcher
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.singular import SingularPasses
 from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
+from kedfem.arrays import Float, Int
 from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.model import mesh_methods, segments
 from kedfem.dynamics.stepping.levels import leveled

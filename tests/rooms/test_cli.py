@@ -168,7 +168,11 @@ def test_help_loads_no_heavy_library(tmp_path: Path) -> None:
 def test_importing_the_analysis_leaves_libraries_alone_that_few_runs_need(tmp_path: Path) -> None:
     few = [
         "gmsh",
+        "jaxtyping",
+        "kedfem.mesh.link",
+        "kedfem.report",
         "matplotlib",
+        "meshio",
         "pint",
         "pyvista",
         "scipy.interpolate",

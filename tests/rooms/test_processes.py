@@ -30,6 +30,16 @@ def busy(file):
 apart("part", PART, LONGEST, busy, Path(sys.argv[1]))
 """
 
+QUICK = """
+import sys
+from kedfem.processes import UNUSED, import_quickly
+import_quickly()
+import kedfem.analysis
+print([type(sys.modules[name]).__name__ for name in UNUSED])
+from numpy.testing import assert_allclose
+assert_allclose(1.0, 1.0)
+"""
+
 TOLD = """
 import signal, sys, time
 from kedfem.processes import end_as_interrupted
@@ -323,3 +333,11 @@ def test_the_command_line_gives_blas_one_thread_before_it_is_loaded(
         [sys.executable, "-c", told], env=free | given, capture_output=True, text=True, check=True
     )
     assert done.stdout.splitlines()[-1] == f"False {threads}"
+
+
+def test_what_nothing_uses_is_loaded_when_it_is_used() -> None:
+    """scipy loads all that numpy has."""
+    said = subprocess.run(
+        [sys.executable, "-c", QUICK], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert said.stdout.strip() == str(["_LazyModule"] * 2)

@@ -30,8 +30,8 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.dynamics.history import Block, LinkHistory
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.ports import turned_vectors

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from jaxtyping import Float
 
 from kedfem.accuracy.error_budget import percent
+from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.model import Model

@@ -4,10 +4,10 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
 from kedfem.accuracy.error_budget import kind_of_name
 from kedfem.accuracy.prepared import Prepared
+from kedfem.arrays import Float
 from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.levels import level_steps, leveled

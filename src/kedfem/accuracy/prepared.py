@@ -11,8 +11,8 @@ from hashlib import sha256
 from typing import Any, TypeVar
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_body import drive_range

@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from jaxtyping import Float
 
 from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
 from kedfem.accuracy.prepared import (
@@ -31,6 +30,7 @@ from kedfem.accuracy.prepared import (
     training_motion,
 )
 from kedfem.accuracy.variants import shortened, with_analysis
+from kedfem.arrays import Float
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.matrices.dense import SMALL
 from kedfem.dynamics.matrices.substructure import Substructure

@@ -6,10 +6,10 @@ from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
-from jaxtyping import Float
 
 from kedfem.accuracy.error_budget import percent
 from kedfem.accuracy.prepared import Prepared
+from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.reduction import frozen_frequencies, static_parts

@@ -19,9 +19,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from jaxtyping import Float
 
 from kedfem.accuracy.error_budget import Share
+from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.model import Model

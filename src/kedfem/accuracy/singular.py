@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
-from jaxtyping import Float
 
 from kedfem.accuracy.prepared import Prepared
+from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
 from kedfem.links.record import in_space
 from kedfem.motion.linkage import resting_poses

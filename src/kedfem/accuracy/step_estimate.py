@@ -7,12 +7,12 @@ from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
-from jaxtyping import Float
 
 from kedfem.accuracy.error_budget import kind_of_name
 from kedfem.accuracy.histories import Histories, counted
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.resolution import StepError
+from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
 from kedfem.results.recorded import Recorded
 from kedfem.scene import time_grid

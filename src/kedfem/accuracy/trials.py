@@ -4,7 +4,6 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from jaxtyping import Float
 
 from kedfem.accuracy.histories import Histories, asked_for, counted, histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, moving
@@ -12,6 +11,7 @@ from kedfem.accuracy.reduction import first_reduced
 from kedfem.accuracy.resolution import step_error
 from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
 from kedfem.accuracy.variants import shortened
+from kedfem.arrays import Float
 from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.rigid_body import drive_range
 from kedfem.links.build import bare_links

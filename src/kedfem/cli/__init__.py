@@ -15,7 +15,7 @@ from kedfem.cli.results import compare, loads, report, view
 from kedfem.cli.running import accuracy, check, kinematics, run, sweep
 from kedfem.cli.screen import out, progress, say, warn
 from kedfem.errors import KedfemError, OutputError
-from kedfem.processes import end_as_interrupted, interruption_asked, one_blas_thread
+from kedfem.processes import end_as_interrupted, import_quickly, interruption_asked, one_blas_thread
 
 app = typer.Typer(
     name="kedfem",
@@ -83,8 +83,7 @@ for each in (
 
 def main() -> None:
     """Entry point: errors of kedfem become messages and an exit code, never a traceback."""
-    # imports drop nothing, but what looks for that takes a sixth of their time; see `screen.progress`
-    gc.set_threshold(200_000)
+    import_quickly()
     end_as_interrupted()
     one_blas_thread()
     try:

@@ -1,6 +1,5 @@
 """What the commands print on: the two streams, tables, warnings, progress bars."""
 
-import gc
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 import typer
 
 from kedfem.cli.options import INTERRUPTED
+from kedfem.processes import imported
 from kedfem.terminal import terminal
 
 out, err = terminal(), terminal(stderr=True)
@@ -65,8 +65,7 @@ class progress:  # noqa: N801
     def __enter__(self) -> Callable[[str, int, int], None]:
         from kedfem.compiled import compiling
 
-        gc.freeze()  # what was imported stays
-        gc.set_threshold(10_000)
+        imported()
         self._shown = _Bars() if err.is_terminal else _Lines()
         self._compiling = compiling(self._shown.compiles)
         self._compiling.__enter__()

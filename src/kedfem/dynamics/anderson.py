@@ -1,7 +1,8 @@
 """Anderson acceleration of iterations."""
 
 import numpy as np
-from jaxtyping import Float
+
+from kedfem.arrays import Float
 
 DEPTH = 4  # iterations that are remembered
 SAME = 1e-8  # pairs that repeat each other

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.joints.attachments import SharedCut
 from kedfem.dynamics.joints.constraint_joints import needs_rows
 from kedfem.dynamics.joints.constraint_ports import LinkageLayout

@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.history import LinkHistory
 from kedfem.motion.constraints import cross, perpendiculars
 from kedfem.motion.rigid import RigidMotion

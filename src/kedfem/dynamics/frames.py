@@ -12,8 +12,8 @@ segment, turning Q costs τ, and so F_a = f_a − (G⁻¹ τ) × c_a with G = tr
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.stepping.state import Nodal
 from kedfem.links.beams.metric import pulled_back, strains_of
 from kedfem.links.record import Frame, Link

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.joints.places import slider_axis
 from kedfem.dynamics.loads import Pattern, Times, amounts, patterns
 from kedfem.dynamics.model import Model

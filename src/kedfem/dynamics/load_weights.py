@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.joints.places import on_part
 from kedfem.errors import SceneError
 from kedfem.links.point_rows import point_rows, require_on_axis

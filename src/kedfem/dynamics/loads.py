@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.joints.places import on_part, surface_of
 from kedfem.dynamics.load_weights import Vector, at_point, face, load_weights, point_weights
 from kedfem.errors import MeshError, SceneError

@@ -10,7 +10,6 @@ from kedfem.links.record import Link
 from kedfem.links.reduced import rigid
 from kedfem.links.solid import solid_link
 from kedfem.links.surfaces.coupling_surfaces import rigid_link_surface
-from kedfem.mesh import link_mesh
 from kedfem.motion.linkage import scene_size
 from kedfem.scene import Bar, LinkScene, Material, Scene
 
@@ -25,6 +24,8 @@ def moving_ground(scene: Scene, name: str, hub: str) -> Link:
     ----------
     hub : the driven joint
     """
+    from kedfem.mesh import link_mesh
+
     at = np.asarray(scene.joints[hub].at, float)
     edge = EDGE * scene_size(scene)
     x, y, z = at.tolist()

@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.joints.attachments import Attachment, SharedCut
 from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.model import Model, Slider, link_keys

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.history import Forcing
 from kedfem.dynamics.joints.constraint_matrices import joint_rows
 from kedfem.dynamics.joints.first_rows import INSTANTS, FirstRows, first_rows

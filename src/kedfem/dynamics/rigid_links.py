@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.scheme import borne_rotation
 from kedfem.dynamics.stepping.step_limit import StepLimit

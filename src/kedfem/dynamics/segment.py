@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.frames import Deformed, frame_force, frames_of, rotation
 from kedfem.dynamics.stepping.state import Nodal
 from kedfem.links.record import Link

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.dynamics.history import LinkMoment, Snapshot
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.march import displacements

@@ -6,10 +6,10 @@ from functools import partial
 from pathlib import Path as FilePath
 
 import numpy as np
-from jaxtyping import Float
 
 from kedfem.accuracy.plan import as_planned
 from kedfem.accuracy.prepared import moving
+from kedfem.arrays import Float
 from kedfem.dynamics.history import Snapshot, bent
 from kedfem.dynamics.modes.frozen import Frozen, Modes, UnstableError, require_drive, tangent_warning
 from kedfem.dynamics.modes.stiffened import Stiffened, frozen_linkage

@@ -6,9 +6,9 @@ from functools import partial
 from pathlib import Path as FilePath
 
 import numpy as np
-from jaxtyping import Float, Int
 
 from kedfem.accuracy.plan import as_planned
+from kedfem.arrays import Float, Int
 from kedfem.dynamics.history import bent
 from kedfem.dynamics.modes.frozen import Modes
 from kedfem.dynamics.modes.link_modes import Support, clamped_on, held_at, link_modes, single_link, together

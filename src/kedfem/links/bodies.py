@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.links.record import Link, Mass, mass_constants, read_only
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, face_normal, is_flat
 

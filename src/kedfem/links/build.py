@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from functools import partial
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import MeshError
 from kedfem.links.beams.beam import line_axes
 from kedfem.links.beams.beam_axis import directions
@@ -20,7 +20,7 @@ from kedfem.links.segments import Interval, Segments, along, corotational, most_
 from kedfem.links.solid import solid_link
 from kedfem.links.surfaces.choosing import with_chosen_faces
 from kedfem.links.surfaces.coupling_surfaces import joint_surface
-from kedfem.mesh import SolidMesh, link_mesh, plane_mesh, side_by_side
+from kedfem.mesh import SolidMesh, side_by_side
 from kedfem.scene import (
     Bar,
     Cad,
@@ -68,6 +68,8 @@ def part_meshes(scene: Scene, names: Iterable[str]) -> dict[str, SolidMesh]:
 
 def solid_mesh(scene: Scene, name: str) -> SolidMesh:
     """The mesh of a solid link."""
+    from kedfem.mesh import link_mesh
+
     return link_mesh(name, scene.links[name], scene.folder, touched(scene, name))
 
 
@@ -102,6 +104,8 @@ def bare_link(
         made = mesh or solid_mesh(scene, name)
         return with_chosen_faces(scene, solid_link(name, made, material, link_axes(link)))
     if link.family == "plane":
+        from kedfem.mesh import plane_mesh
+
         return plane_link(
             name, plane_mesh(name, link, scene.folder, touched(scene, name)), material, link_axes(link)
         )

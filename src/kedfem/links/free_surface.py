@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.links.record import Link
 from kedfem.links.recovery import StressRecovery
 from kedfem.links.surfaces.surface import boundary, surface_quadrature

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import skfem
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_gradients, nodal_state
 from kedfem.links.singular_stress import re_entrant

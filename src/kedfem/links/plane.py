@@ -5,8 +5,8 @@ Mass is ρ t ∫ N_a N_b dA, the stiffness made of four scalar matrices: there i
 
 import numpy as np
 import skfem
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.links.record import Link
 from kedfem.links.solid import meshed_link
 from kedfem.mesh import QuadMesh

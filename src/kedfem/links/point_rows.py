@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import SceneError
 from kedfem.links.beams.beam import shape_functions
 from kedfem.links.beams.beam_recovery import fibre_row, nearest_on_beam

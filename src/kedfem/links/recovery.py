@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 import skfem
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.links.beams.beam import line_pairs
 from kedfem.links.beams.beam_recovery import beam_fibre
 from kedfem.links.beams.spatial_recovery import drawn

@@ -11,8 +11,8 @@ from itertools import product
 import numpy as np
 import scipy.sparse as sp
 import skfem
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.links.record import Link, read_only
 
 RIGID = 1e3

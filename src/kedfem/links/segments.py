@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.errors import MeshError
 from kedfem.links.plane import plane_link
 from kedfem.links.record import Link

@@ -1,8 +1,8 @@
 """Where stress is not what it seems: at sharp re-entrant edges it grows with every refinement of the mesh."""
 
 import numpy as np
-from jaxtyping import Bool, Float
 
+from kedfem.arrays import Bool, Float
 from kedfem.links.record import Link
 from kedfem.links.surfaces.surface import boundary, neighbours, surface_quadrature
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 import skfem
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.links.record import Link, LinkFace, Mass, mass_constants, read_only
 from kedfem.mesh import SolidMesh
 from kedfem.mesh.elements.hexahedra import CELL_TYPES

@@ -9,8 +9,8 @@ mean of the material in a ball about it, as wide as the stations are apart.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
 

@@ -10,8 +10,8 @@ from collections.abc import Callable
 import numpy as np
 import scipy.sparse as sp
 import skfem
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.links.beams.beam import assembled, strain_rows
 from kedfem.links.beams.spatial_stress import spatial_stress_stiffness
 from kedfem.links.record import Link, Matrix, section_of

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from types import ModuleType
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.mesh.cad.faces import joined_faces
 from kedfem.mesh.cad.solids import USUAL, CadFace, OtherMethodError, Sizing, Solid
 from kedfem.mesh.cad.words import with_faces_in_words

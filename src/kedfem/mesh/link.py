@@ -5,8 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import MeshError, SceneError
 from kedfem.mesh.cad.model import CadKeys
 from kedfem.mesh.cad.solids import Sizing

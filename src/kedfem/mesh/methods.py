@@ -8,8 +8,8 @@ from pathlib import Path
 from types import ModuleType
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import MeshError
 from kedfem.mesh.cad.faces import with_faces
 from kedfem.mesh.cad.model import CadKeys, leave_only, solid_model

@@ -10,9 +10,9 @@ from types import ModuleType
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
 from scipy.sparse.csgraph import connected_components
 
+from kedfem.arrays import Float, Int
 from kedfem.errors import MeshError
 
 #: Debian packages that hold the shared libraries that gmsh's wheel links to.

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.linalg
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import MotionError
 from kedfem.motion.closed import Shift, closed_scene
 from kedfem.motion.constraints import GAP, ConstraintEquation, Rows, stacked

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.motion.constraints import Rows
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import (

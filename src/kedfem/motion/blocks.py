@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.motion.constraints import Rows
 from kedfem.motion.values import Features, coupled_terms, gradients
 

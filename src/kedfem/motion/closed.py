@@ -7,8 +7,8 @@ from itertools import pairwise
 from typing import Any, TypeVar
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import MotionError
 from kedfem.motion.joint_equations import moving_pair
 from kedfem.motion.newton import rotation

@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Float, Int
+
+from kedfem.arrays import Float, Int
 
 GAP, TURN, ANGLE = 0, 1, 2
 Vector = Float[np.ndarray, "3"]

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.joint_equations import moving_pair, unit
 from kedfem.motion.linkage import Linkage

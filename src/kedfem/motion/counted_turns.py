@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import MotionError
 from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.joint_equations import joint_axis, moving_pair

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import moved
 from kedfem.motion.path import Path, aimed, predicted

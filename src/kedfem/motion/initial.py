@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import MotionError
 from kedfem.motion.constraints import cross
 from kedfem.motion.joint_equations import joint_axis, joint_free_rows, moving_pair

@@ -9,8 +9,8 @@ from itertools import groupby
 
 import numpy as np
 import scipy.linalg
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import MotionError, SceneError
 from kedfem.motion.blocks import Blocks, blocks
 from kedfem.motion.constraints import (

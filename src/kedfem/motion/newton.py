@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
 
+from kedfem.arrays import Bool, Float
 from kedfem.motion.blocks import Blocks
 from kedfem.motion.constraints import Rows
 from kedfem.motion.linkage import Linkage

@@ -11,9 +11,9 @@ from itertools import combinations
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
+from kedfem.arrays import Float, Int
 from kedfem.motion.constraints import Rows
 from kedfem.motion.released_motions import rank
 from kedfem.motion.values import Poses, features, jacobian

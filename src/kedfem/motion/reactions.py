@@ -7,8 +7,8 @@ joint's force depends on that choice. All is linear in what acts, with factors t
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from kedfem.arrays import Bool, Float, Int
 from kedfem.motion.blocks import Blocks
 from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import Linkage

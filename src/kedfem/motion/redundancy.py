@@ -9,8 +9,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.motion.released_motions import Drawn, directions, listed, null_space, of_joints, rank, span
 from kedfem.scene import Joint
 

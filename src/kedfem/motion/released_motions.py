@@ -6,8 +6,8 @@ from itertools import combinations
 
 import numpy as np
 import scipy.linalg
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.motion.constraints import cross
 from kedfem.scene import Joint
 

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.motion.constraints import cross
 from kedfem.motion.joint_equations import GROUND, unit
 from kedfem.motion.linkage import Linkage

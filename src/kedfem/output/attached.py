@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.model import Model, Slider
 from kedfem.links.record import Link, in_space

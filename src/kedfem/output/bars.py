@@ -3,7 +3,8 @@
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+
+from kedfem.arrays import Float, Int
 
 SECTION = "height, thickness, round"  # the cell array of a frame that has the sections of beams
 THINNEST = 0.004  # least height and thickness of a beam in the picture, as part of the diagonal

@@ -6,8 +6,8 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.dynamics.history import LinkMoment, Snapshot
 from kedfem.dynamics.joints.constraint_joints import ordered
 from kedfem.dynamics.model import Model

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float
 
+from kedfem.arrays import Bool, Float
 from kedfem.output.plots.drawing import figure_saved
 from kedfem.output.words import prefixed
 from kedfem.results import Results

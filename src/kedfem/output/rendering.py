@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.output.bars import LINES, bars, heights
 from kedfem.output.fields import SPRING, VON_MISES
 from kedfem.output.views import LIFT, View, labels, view

@@ -4,8 +4,8 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.motion.constraints import perpendiculars
 from kedfem.scene import LineSpring, Spring
 

@@ -10,11 +10,11 @@ from typing import TextIO
 
 import numpy as np
 import scipy.linalg
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.links.record import Link
 from kedfem.motion.constraints import cross
-from kedfem.output.vtu import complete, write_vtu
+from kedfem.output.vtu import write_vtu
 from kedfem.results.files import replacing
 from kedfem.results.forces.load_cases import LoadCase
 from kedfem.results.table import text_file, write_rows
@@ -93,8 +93,7 @@ def write_case(path: Path, link: Link, case: LoadCase) -> None:
     }  # fmt: skip
     with replacing(path) as part:
         values = {name: np.ascontiguousarray(x) for name, x in fields.items()}
-        write_vtu(part, link.X, [(link.cell_type, link.cells)], point_data=values)
-        complete(part)
+        write_vtu(part, link.X, [(link.cell_type, link.cells)], values)
 
 
 def resultants(

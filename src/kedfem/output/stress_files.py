@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.links.recovery import StressRecovery
 from kedfem.output.vtu import write_points
 from kedfem.results import Fatigue, Peak

@@ -5,8 +5,8 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.output.bars import LINES, THINNEST, heights
 from kedfem.output.fields import BODY, SPRING, VON_MISES
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import OutputError
 from kedfem.output.animation import read_collection
 from kedfem.output.derived import STEM, WORST

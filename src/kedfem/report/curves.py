@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from jaxtyping import Bool, Float
 
+from kedfem.arrays import Bool, Float
 from kedfem.output.load_files import draw_polar, has_polar, polar_title
 from kedfem.output.plots.abscissa import Abscissa
 from kedfem.output.plots.drawing import draw_panels, drawn_over, figure_svg, heading, worth_drawing

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.errors import OutputError
 from kedfem.output.motion_file import continuous_quaternions
 from kedfem.report.animated import animated

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.output.bars import LINES, THINNEST, heights, rims
 from kedfem.output.fields import BODY, DISPLACEMENT, LINK, SPRING, VON_MISES
 from kedfem.output.rendering import QUADRILATERAL, SHARP

@@ -8,8 +8,8 @@ from html import escape
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.output.views import picture_axes, sight
 from kedfem.report.animated import Animated, bounds, extent
 from kedfem.report.surfaces import Placement, Surface

@@ -18,8 +18,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.dynamics.history import Block, LinkHistory
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.loads import applied

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.history import LinkHistory, Products
 from kedfem.dynamics.joints.ports import turned_vectors
 from kedfem.results.forces.moments import Constants, Field, RigidRates, dot, paired, rotated, turned

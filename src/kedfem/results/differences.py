@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.results.records import Channel, Results, largest_by_unit
 
 Over = Literal["time", "drive"]

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.inertias import Inertias
 from kedfem.motion.coordinates import Coordinate, coordinates, counted_on
 from kedfem.motion.joint_equations import GROUND

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, UInt8
+
+from kedfem.arrays import Float, UInt8
 
 FORMAT = 3  # version of the file's layout
 CACHED = 2**18  # bytes of chunks of each series: some chunks; HDF5 would hold 8 MB of each that is open

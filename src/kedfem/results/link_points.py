@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model, on_segment
 from kedfem.errors import SceneError

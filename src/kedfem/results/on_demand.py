@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import OutputError
 from kedfem.results.files import reason
 from kedfem.results.layout import all_rows, opened_to_read, read_text

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model, on_segment
 from kedfem.links.point_rows import point_rows

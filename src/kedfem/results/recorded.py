@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
 from kedfem.results.records import ANGLE, TRAVEL, Channel
 from kedfem.scene import Scene

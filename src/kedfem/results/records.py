@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from jaxtyping import Float
+
+from kedfem.arrays import Float
 
 Status = Literal["running", "complete", "doubtful", "interrupted", "abandoned"]
 

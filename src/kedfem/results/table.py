@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.results.dimensions import cf_units, columns_dimension
 from kedfem.results.files import of_extra, replacing
 from kedfem.results.records import Channel, Results

@@ -8,8 +8,8 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import OutputError, SolveError
 from kedfem.folders import own_part
 from kedfem.results.blocks import not_finite, require_channels

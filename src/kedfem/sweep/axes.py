@@ -7,8 +7,8 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import SceneError, Where, place
 from kedfem.scene import Scene
 from kedfem.scene.checks.hints import below, known_keys

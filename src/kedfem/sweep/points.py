@@ -12,12 +12,12 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
 from kedfem.accuracy.plan import plan_for
 from kedfem.accuracy.prepared import Neighbours
 from kedfem.accuracy.trials import Stage
 from kedfem.analysis import analyse
+from kedfem.arrays import Float
 from kedfem.dynamics.system.period.map import Carried
 from kedfem.errors import KedfemError, SceneError, Where, place
 from kedfem.motion.assembly import assembled

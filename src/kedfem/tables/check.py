@@ -6,7 +6,6 @@ from tempfile import TemporaryDirectory
 from time import perf_counter
 
 import numpy as np
-from jaxtyping import Float
 from rich.table import Table
 
 from kedfem.accuracy.plan import Plan
@@ -14,6 +13,7 @@ from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction
 from kedfem.accuracy.resolution import Resolution, resolution
 from kedfem.accuracy.singular import SingularPasses
+from kedfem.arrays import Float
 from kedfem.dynamics.force_elements import force_elements
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.stepping.cost import Cost, estimated_cost, tried_cost

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import SceneError
 from kedfem.mesh.cad.assembly import AssemblySolid, Meeting, assembly_solids, meetings
 from kedfem.scene import GROUND, ChosenFace, link_from, scene_from

@@ -3,11 +3,11 @@
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
-from jaxtyping import Float
 from rich.table import Table
 from rich.text import Text
 
 from kedfem.accuracy.sizes import Sizes
+from kedfem.arrays import Float
 from kedfem.dynamics.model import Model, mesh_methods, segments
 from kedfem.links.record import Link
 from kedfem.links.surfaces.part_candidates import Offer, axis_in_words

@@ -4,7 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
+
+from kedfem.arrays import Float, Int
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,8 @@ both linear in the port points, so that the point of the coupling surface's fram
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from kedfem.arrays import Bool, Float, Int
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
 from kedfem.links.stations import Stations

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import connected_components
 
+from kedfem.arrays import Bool, Float, Int
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side
 from kedfem.motion.constraints import cross
 from kedfem.motion.rigid import RigidMotion

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.joints.attachments import Attachment, SharedCut
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side, needs_rows
 from kedfem.dynamics.joints.constraint_ports import (

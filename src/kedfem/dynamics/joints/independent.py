@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
-from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import connected_components
 
+from kedfem.arrays import Bool, Float, Int
 from kedfem.dynamics.joints.attachments import Attachment
 
 DEPENDENT = (

@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping
 from typing import TypeVar
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.joints.constraint_joints import bore_axis
 from kedfem.errors import KedfemError, MeshError, SceneError
 from kedfem.links.record import Link

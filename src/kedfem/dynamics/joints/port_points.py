@@ -1,8 +1,8 @@
 """Port points of a joint on a link: where they lie about its place, and what is reported where they cannot."""
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, holds, is_flat

@@ -1,8 +1,8 @@
 """Ports of one link: the displacements there, W u, and forces on them, Wᵀ λ, in the link frame or turned."""
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.stepping.state import Nodal
 from kedfem.links.record import Link

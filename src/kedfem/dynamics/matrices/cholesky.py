@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from cvxopt import cholmod, matrix, sparse, spmatrix
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.errors import SolveError
 
 MANY = 32  # right-hand sides solved at once

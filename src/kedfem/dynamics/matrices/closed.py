@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.dynamics.joints.ports import Rotation, port_rotation
 from kedfem.dynamics.matrices.interface import MANY, Tie, solver
 from kedfem.dynamics.matrices.substructure import Substructure

@@ -7,8 +7,8 @@ from typing import Any, Protocol
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.ports import port_columns
 from kedfem.links.record import Link

@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.joints.constraint_matrices import JointRows
 from kedfem.dynamics.matrices.cholesky import Cholesky
 from kedfem.dynamics.stepping.scheme import Scheme

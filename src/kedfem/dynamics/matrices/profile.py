@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Bool, Int
 from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+from kedfem.arrays import Bool, Int
 
 Group = Int[np.ndarray, " c"]
 

@@ -12,8 +12,8 @@ those of links.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.modes.lanczos import Block, lanczos
 from kedfem.dynamics.modes.preloads import with_preloads
 from kedfem.dynamics.stepping.scheme import generalised_alpha

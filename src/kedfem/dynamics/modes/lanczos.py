@@ -3,7 +3,8 @@
 from collections.abc import Callable
 
 import numpy as np
-from jaxtyping import Float
+
+from kedfem.arrays import Float
 
 Block = Float[np.ndarray, "N _"]
 Product = Callable[[Block], Block]

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.modes.frozen import Frozen
 from kedfem.dynamics.stepping.state import Rayleigh

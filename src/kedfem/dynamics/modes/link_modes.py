@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Bool, Float, Int
 
+from kedfem.arrays import Bool, Float, Int
 from kedfem.dynamics.elastic_model import with_scene_body
 from kedfem.dynamics.joints.places import surface_of
 from kedfem.dynamics.joints.rigid_couplings import with_stiff_ports

@@ -6,8 +6,8 @@ Second derivatives are exact: where z moves along x at a steady rate and all els
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.system.record import Constraint
 from kedfem.dynamics.system.starts.balance import Asked
 from kedfem.dynamics.system.starts.instant import Instant

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.matrices.closed import closed, coupled_all
 from kedfem.dynamics.matrices.substructure import Substructure, factored

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.history import LinkMoment, Snapshot
 from kedfem.dynamics.joints.constraint_matrices import joint_rows
 from kedfem.dynamics.joints.ports import add_port_forces

@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.matrices.substructure import mass_matrix
 from kedfem.dynamics.model import Model

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.frames import mean_rotations
 from kedfem.dynamics.history import Block, LinkHistory, exerted_together
 from kedfem.dynamics.joints.ports import turned_vectors

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.matrices.dense import SMALL
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.levels import level_steps

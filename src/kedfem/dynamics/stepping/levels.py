@@ -20,8 +20,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.history import Block, exerted_together, joined
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_links import for_steps

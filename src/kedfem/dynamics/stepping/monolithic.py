@@ -11,8 +11,8 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.history import Forcing, LinkHistory, history
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.constraint_matrices import JointRows

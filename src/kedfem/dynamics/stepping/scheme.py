@@ -9,7 +9,8 @@ From the beginning (0) to the end (1) of a step:
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+
+from kedfem.arrays import Float
 
 # of the rotation 1 − ρ∞ in a step, at which vibration that no step resolves neither grows nor dies (measured,
 # docs/theory/errors.md); in space that of a link whose own is 3000/h grows from between 0.7 and 0.8 on

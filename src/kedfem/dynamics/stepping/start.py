@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
 from scipy.sparse.linalg import LinearOperator, gmres
 
+from kedfem.arrays import Float
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.first_rows import FirstRows, interface_values
 from kedfem.dynamics.joints.ports import Rotation

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.stepping.scheme import Scheme
 
 Nodal = Float[np.ndarray, "n d"]

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Int
 
+from kedfem.arrays import Int
 from kedfem.dynamics.metric import Elements
 
 

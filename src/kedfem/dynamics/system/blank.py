@@ -1,8 +1,8 @@
 """Empty states, trials, histories and working room for a system's arrays."""
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.anderson import DEPTH
 from kedfem.dynamics.metric import room_for
 from kedfem.dynamics.system.arrays import Bodies, Constraints, Ends

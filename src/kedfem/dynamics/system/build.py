@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.force_element import OVER
 from kedfem.dynamics.joints.constraint_joints import (

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.history import Exerted, Forcing, LinkHistory
 from kedfem.dynamics.joints.constraint_ports import LinkageLayout
 from kedfem.dynamics.joints.coupling import joined

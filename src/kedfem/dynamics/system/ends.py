@@ -1,8 +1,8 @@
 """Ends of constraints from what joints have on links: coupling surfaces, points of rigid links, prescribed bodies."""
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side
 from kedfem.dynamics.joints.constraint_matrices import seen_from
 from kedfem.dynamics.system.record import FACE, LINE, PLANAR, PLANAR_BEAM, POINT, RIGID, SOLID, End, Line

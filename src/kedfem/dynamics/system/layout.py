@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.matrices.dense import SMALL, component_first, coordinates, dense_part, work_on
 from kedfem.dynamics.matrices.profile import Profile, profile_of

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 from typing import cast
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.force_element import stiffness_factors
 from kedfem.dynamics.matrices.dense import rows_of, work_over_time
 from kedfem.dynamics.rigid_body import forcing_of, forcings

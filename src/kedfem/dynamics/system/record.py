@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.dynamics.force_element import OVER, Factor, Times
 from kedfem.links.stations import Stations
 from kedfem.scene import Pieces

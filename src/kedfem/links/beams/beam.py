@@ -4,8 +4,8 @@ from functools import cache
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.links.beams.section import Section
 from kedfem.links.record import Link, Mass, mass_constants, read_only
 from kedfem.scene import Material

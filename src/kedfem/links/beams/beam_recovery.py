@@ -8,8 +8,8 @@ more such points each: then it takes as many.
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.links.beams.beam import lagrange, nearest_parameter, parent_nodes, shape_functions, strain_rows
 from kedfem.links.record import Link
 

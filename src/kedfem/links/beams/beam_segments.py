@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.links.beams.beam import beam_link, planar_rigidities, shape_functions, strain_rows, tangent_fit
 from kedfem.links.beams.beam_axis import Axis
 from kedfem.links.beams.metric import beam_element

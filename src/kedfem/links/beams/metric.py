@@ -17,8 +17,8 @@ For small displacements they are `spatial_beam.space_strains` of p, q = θ × n1
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.links.beams.beam import parent_weights, shape_functions
 from kedfem.links.record import BeamElement, read_only
 

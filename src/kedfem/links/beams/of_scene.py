@@ -3,8 +3,8 @@
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.links.beams.beam import beam_link, spaced
 from kedfem.links.beams.beam_axis import Axis, smooth_axis, straight_axis
 from kedfem.links.beams.section import scene_section

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.scene import BoxSection, ISection, RectangleSection, RoundSection, SectionShape, TubeSection
 
 EDGE = 1e-9  # of a wall: points on its edge are in it

@@ -7,8 +7,8 @@ metric of curve and directions, linearised: no rigid motion strains anything.
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.links.beams.beam import (
     assembled,
     cell_type,

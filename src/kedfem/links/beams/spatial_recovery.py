@@ -2,8 +2,8 @@
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.links.beams.beam import lagrange, line_pairs, nearest_parameter, parent_nodes, shape_functions
 from kedfem.links.beams.section import Section, outline, torsion_stress
 from kedfem.links.beams.spatial_beam import space_strains

@@ -7,8 +7,8 @@ that, all along the beam, are ½ uᵀ (k ⊗ I) u.
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.links.beams.beam import assembled, parent_nodes, parent_weights, shape_functions
 from kedfem.links.beams.spatial_beam import (
     HUB_STIFFNESS,

@@ -9,8 +9,8 @@ from itertools import combinations
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from kedfem.arrays import Bool, Float, Int
 from kedfem.links.record import Link, LinkFace
 from kedfem.links.surfaces.round_surfaces import CLOSED
 from kedfem.links.surfaces.surface import (

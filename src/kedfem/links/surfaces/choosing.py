@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import MeshError
 from kedfem.links.record import Link, LinkFace
 from kedfem.links.surfaces.candidates import Candidate, distance, surfaces

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
 from scipy.linalg import qr
 
+from kedfem.arrays import Float, Int
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
 from kedfem.links.surfaces.facet_selection import named_facets, picked

@@ -6,8 +6,8 @@ from weakref import WeakKeyDictionary
 from zlib import crc32
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.errors import MeshError
 from kedfem.links.record import Link, read_only
 from kedfem.links.surfaces.candidates import round_candidates

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from operator import itemgetter
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.links.record import Link
 from kedfem.links.surfaces.candidates import Candidate, candidates, distance
 from kedfem.links.surfaces.round_surfaces import Round

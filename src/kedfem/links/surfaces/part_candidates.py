@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.errors import MeshError
 from kedfem.links.record import Link, LinkFace
 from kedfem.links.solid import link_faces, solid_basis, vtk_cells

@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.links.record import Link
 from kedfem.links.reduced import reduced, rigid_motions
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface

@@ -4,8 +4,8 @@ hexahedra."""
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from kedfem.arrays import Bool, Float, Int
 from kedfem.links.record import Link
 from kedfem.links.surfaces.surface import (
     CYLINDER_TOLERANCE,

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 import skfem
-from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import connected_components
 from skfem.quadrature import get_quadrature
 
+from kedfem.arrays import Bool, Float, Int
 from kedfem.links.record import Link
 
 CYLINDER_TOLERANCE = 1e-3  # of the radius, between the corner nodes of one bore

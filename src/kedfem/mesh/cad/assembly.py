@@ -7,8 +7,8 @@ from pathlib import Path
 from types import ModuleType
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.mesh.cad.faces import one_surface
 from kedfem.mesh.cad.file import cad_file
 from kedfem.mesh.cad.model import all_solids

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 from types import ModuleType
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from kedfem.arrays import Bool, Float, Int
 from kedfem.mesh.cad.sides import boundary_sides, side_normals
 from kedfem.mesh.cad.solids import CadFace, Solid
 from kedfem.mesh.cad.words import face_form

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float
+
+from kedfem.arrays import Float
 
 Kind = Literal["plane", "cylinder", "sphere", "other"]
 _NAN = np.full(3, np.nan)

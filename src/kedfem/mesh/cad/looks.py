@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from types import ModuleType
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.mesh.cad.solid_faces import places_on
 from kedfem.mesh.cad.solids import CadFace, Solid
 

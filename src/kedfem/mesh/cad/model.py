@@ -8,8 +8,8 @@ from pathlib import Path
 from types import ModuleType
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import MeshError
 from kedfem.mesh.cad.file import CadFile, cad_file, check_size, imported, read_solids
 from kedfem.mesh.cad.solid_faces import SAME_VOLUME, cad_faces, enclosed_volume, solid_box

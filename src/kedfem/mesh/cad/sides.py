@@ -1,8 +1,8 @@
 """The sides of elements on the outside of a mesh."""
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.mesh.elements.shape_functions import (
     HEX27,
     QUAD9,

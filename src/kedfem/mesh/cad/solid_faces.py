@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from types import ModuleType
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import MeshError
 from kedfem.mesh.cad.forms import Sample, fitted_form
 from kedfem.mesh.cad.solids import CadFace

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import KedfemError
 
 

@@ -4,8 +4,8 @@ import re
 from collections.abc import Iterable
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.mesh.cad.solids import CadFace
 from kedfem.mesh.places import in_mm
 

@@ -10,8 +10,8 @@ from functools import cache, reduce
 from math import comb, factorial, prod
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from kedfem.arrays import Bool, Float, Int
 from kedfem.mesh.elements.shape_functions import EDGES, HEX8, HEX20, NODES, QUAD9, TET10, shape_gradients
 
 _CHUNK = 512  # elements at a time: their coefficients fit in a processor's cache

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.mesh.elements.shape_functions import HEX8, HEX20, HEX27, QUAD9, node_numbers, shape_functions
 
 CELL_TYPES = {

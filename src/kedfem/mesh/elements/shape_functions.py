@@ -1,7 +1,8 @@
 """Shape functions of quadrilaterals, hexahedra and quadratic simplices, and where their nodes are."""
 
 import numpy as np
-from jaxtyping import Float, Int
+
+from kedfem.arrays import Float, Int
 
 #: Edges of a tetrahedron in VTK's order of its nodes 4 to 9, their middles; the first three are those of a triangle.
 EDGES: Int[np.ndarray, "6 2"] = np.array([(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)])

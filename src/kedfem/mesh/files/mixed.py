@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.errors import MeshError
 from kedfem.mesh.elements.shape_functions import EDGES, HEX20, HEX27, node_numbers, shape_functions
 

@@ -9,8 +9,8 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.errors import MeshError
 from kedfem.mesh.session import gmsh_model, numbered_nodes
 from kedfem.scene.records.shapes import MESH_ENDINGS

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
 from scipy.sparse.csgraph import connected_components
 
+from kedfem.arrays import Float, Int
 from kedfem.errors import MeshError
 from kedfem.mesh.cad.forms import Sample, fitted_form
 from kedfem.mesh.cad.sides import boundary_sides, side_corners, side_normals

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.mesh.layered.partition import Curve, Loop, Plan, Region, corner_angles
 
 CUSP = np.radians(6)  # an angle in which no element of quality can be

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
+from kedfem.arrays import Bool, Float, Int
 from kedfem.mesh.cad.solids import AROUND, Sizing
 from kedfem.mesh.layered.mapping import Mapping, mappings
 from kedfem.mesh.layered.partition import Curve, Loop, Plan, Region

@@ -4,8 +4,8 @@ from dataclasses import replace
 from types import ModuleType
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.errors import KedfemError
 from kedfem.mesh.cad.solid_faces import places_on
 from kedfem.mesh.cad.solids import CadFace, OtherMethodError, Sizing, Solid

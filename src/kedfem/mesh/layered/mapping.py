@@ -5,8 +5,8 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.mesh.layered.partition import Loop, Plan, Region, corner_angles, loop_samples, signed_area
 from kedfem.mesh.planar.areas import PlaneQuads
 

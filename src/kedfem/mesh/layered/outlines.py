@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from types import ModuleType
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import MeshError
 from kedfem.mesh.cad.solids import OtherMethodError, Sizing
 from kedfem.mesh.elements.quality import scaled_jacobian

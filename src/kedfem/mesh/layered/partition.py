@@ -4,7 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Bool, Float
+
+from kedfem.arrays import Bool, Float
 
 
 @dataclass(frozen=True, slots=True)

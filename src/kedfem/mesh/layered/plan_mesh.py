@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from types import ModuleType
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.mesh.cad.solids import OtherMethodError, Sizing
 from kedfem.mesh.layered.cusps import CUSP, cusps
 from kedfem.mesh.layered.division import Division, divided

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from types import ModuleType
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import KedfemError
 from kedfem.mesh.cad.solids import OtherMethodError, Solid
 from kedfem.mesh.layered.partition import Curve, Loop, Plan, Region, loop_samples, signed_area

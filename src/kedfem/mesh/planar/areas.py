@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
+
+from kedfem.arrays import Float, Int
 
 # nodes [m]; quad9 cells in VTK order, anticlockwise
 Quads = tuple[Float[np.ndarray, "_ 2"], Int[np.ndarray, "_ 9"]]

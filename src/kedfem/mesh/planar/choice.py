@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.mesh.elements.quality import scaled_jacobian
 from kedfem.mesh.elements.shape_functions import QUAD9, shape_gradients
 from kedfem.mesh.planar.areas import PlaneQuads, Quads, pillowed, quadratic_quads

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.mesh.elements.hexahedra import SolidMesh, extruded, keep_copies, placed
 from kedfem.mesh.planar.areas import Quads
 

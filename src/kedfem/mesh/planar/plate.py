@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.mesh.elements.hexahedra import rectangle_quads
 from kedfem.mesh.elements.shape_functions import QUAD9
 from kedfem.mesh.planar.areas import Quads

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from types import ModuleType
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import MeshError
 from kedfem.mesh.cad.faces import beyond, with_faces
 from kedfem.mesh.cad.model import leave_only

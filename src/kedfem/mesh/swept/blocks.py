@@ -3,8 +3,8 @@
 from types import ModuleType
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.mesh.cad.solids import OtherMethodError, Sizing, Solid
 from kedfem.mesh.elements.hexahedra import SolidMesh, without_spare_nodes
 from kedfem.mesh.elements.quality import mesh_quality

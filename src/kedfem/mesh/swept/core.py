@@ -3,8 +3,8 @@
 from collections.abc import Callable
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.mesh.elements.hexahedra import SolidMesh, stacked
 from kedfem.mesh.layered.mapping import Mapping, Rim, mapped
 from kedfem.mesh.layered.partition import Curve, Plan, Region

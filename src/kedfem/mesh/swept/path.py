@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from types import ModuleType
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.mesh.cad.looks import OFF, Frame, Looks, common_axes, looks
 from kedfem.mesh.cad.solids import CadFace, OtherMethodError, Sizing, Solid
 from kedfem.mesh.elements.hexahedra import SolidMesh, stacked, without_spare_nodes

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from types import ModuleType
 
 import numpy as np
-from jaxtyping import Bool, Float
 
+from kedfem.arrays import Bool, Float
 from kedfem.mesh.cad.looks import Axis, Frame, Looks, common_axes, looks
 from kedfem.mesh.cad.solids import OtherMethodError, Sizing, Solid
 from kedfem.mesh.cad.words import direction_in_words, face_in_words

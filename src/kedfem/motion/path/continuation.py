@@ -7,8 +7,8 @@ branch never jumps.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.errors import MotionError
 from kedfem.motion.batch import settled
 from kedfem.motion.linkage import Linkage

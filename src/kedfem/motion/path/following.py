@@ -5,8 +5,8 @@ from dataclasses import replace
 from hashlib import sha256
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.motion.constraints import ANGLE
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import OPEN

@@ -6,8 +6,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import Target, orthonormal, target
 from kedfem.motion.path.continuation import ROUNDING

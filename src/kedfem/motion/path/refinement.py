@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Float
 
+from kedfem.arrays import Bool, Float
 from kedfem.motion.batch import Moving, moving
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import OPEN, Target, orthonormal

@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.errors import MotionError
 from kedfem.motion.batch import independent
 from kedfem.motion.linkage import Linkage

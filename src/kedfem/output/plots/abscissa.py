@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+
+from kedfem.arrays import Float
 
 TICKS = (1, 2, 5, 10, 15, 30, 45, 60, 90, 180)  # steps of degrees that read well; beyond, whole turns
 MOST_TICKS = 13

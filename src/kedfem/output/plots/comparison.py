@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.output.plots.drawing import envelope, figure_saved
 from kedfem.output.plots.files import remove_plots
 from kedfem.output.words import prefixed

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.output.plots.abscissa import Abscissa, abscissa, draw_abscissa, over_positions
 from kedfem.output.plots.groups import FAINT, STIFF, Panel, Picture, largest, pictures
 from kedfem.output.words import prefixed

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.output.plots.drawing import figure_saved
 from kedfem.scene.records.units import RPM
 

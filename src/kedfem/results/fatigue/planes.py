@@ -6,7 +6,8 @@ axes (k, 3, 3) : two tangents and the normal of the surface, as rows
 """
 
 import numpy as np
-from jaxtyping import Float
+
+from kedfem.arrays import Float
 
 STEP = 5.0  # degrees between planes: a quarter of a percent of a normal stress at most, half of one of a shear stress
 DIRECTIONS = 12  # of shear on a plane, over half a turn: 0.9 % at most

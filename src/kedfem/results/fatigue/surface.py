@@ -5,8 +5,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.links.free_surface import FreeSurface, free_surface
 from kedfem.links.recovery import StressRecovery
 from kedfem.processes import threads

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, in_plane
 from kedfem.dynamics.joints.constraint_matrices import (

@@ -1,8 +1,8 @@
 """What a rigid link that a drive carries exerts on its hub."""
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.constraint_joints import ordered
 from kedfem.dynamics.loads import applied

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.history import LinkMoment, Snapshot
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.ports import port_vectors

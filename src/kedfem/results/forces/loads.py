@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
 
+from kedfem.arrays import Bool, Float
 from kedfem.motion.constraints import cross
 from kedfem.motion.joint_equations import joint_axis, moving_pair
 from kedfem.motion.linkage import Linkage

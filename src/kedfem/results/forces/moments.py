@@ -8,8 +8,8 @@ together, time last: (1 + k, k, S, T) for S links at T time points, whatever the
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.links.record import Link, Matrix

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float, Int
 
+from kedfem.arrays import Float, Int
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.ports import turned_ports

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.force_elements import rigid_elements
 from kedfem.dynamics.inertias import Inertias, acting
 from kedfem.dynamics.joints.places import slider_axis

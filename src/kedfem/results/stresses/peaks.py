@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.links.recovery import StressRecovery
 from kedfem.results.records import Peak
 from kedfem.results.stresses.envelope import VON_MISES, LinkEnvelope

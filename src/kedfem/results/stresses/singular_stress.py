@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.joints.places import on_part, part_surface
 from kedfem.dynamics.model import Model, link_keys
 from kedfem.errors import KedfemError

@@ -8,9 +8,9 @@ from itertools import combinations, count, pairwise
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 from pydantic import TypeAdapter, ValidationError
 
+from kedfem.arrays import Float
 from kedfem.scene.records.base import plain
 from kedfem.scene.records.loads import RigidBody, inertia_faults, inertia_tensor, moments_of_inertia
 from kedfem.scene.records.materials import LINE

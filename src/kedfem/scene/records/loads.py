@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from jaxtyping import Float
 from pydantic import BeforeValidator, Field, model_validator
 
+from kedfem.arrays import Float
 from kedfem.errors import Fault
 from kedfem.scene.records.base import LinkName, Record, refuse
 from kedfem.scene.records.curves import ONE, FactorOver, Force, Torque

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import numpy as np
-from jaxtyping import Bool, Float
 from pydantic import PlainSerializer, PlainValidator, TypeAdapter, field_validator, model_validator
 
+from kedfem.arrays import Bool, Float
 from kedfem.errors import Fault
 from kedfem.scene.records.base import Record, refuse
 from kedfem.scene.records.points import XYZ, Point, is_construction

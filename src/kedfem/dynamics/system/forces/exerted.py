@@ -6,8 +6,8 @@ A multiplier is a force along its coordinate; `Supports` turns it into forces an
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.history import Exerted
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side

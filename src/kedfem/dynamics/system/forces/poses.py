@@ -1,8 +1,8 @@
 """Where bodies and their ends are, displaced: poses, directions and points of forces."""
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.system.ends import line_weights
 from kedfem.dynamics.system.record import (
     ANGLE,

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.history import Forcing
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_body import forcings

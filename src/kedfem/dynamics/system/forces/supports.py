@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
 from kedfem.dynamics.system.ends import corners, end_of, same_end
 from kedfem.dynamics.system.forces.poses import Vectors, point_forces, poses, turning

@@ -10,8 +10,8 @@ in the world is three loads, the couples about the body's axes e_k, times m · G
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.matrices.dense import Coordinates, work_on
 from kedfem.dynamics.system.arrays import TurningLoads

@@ -15,8 +15,8 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.frames import Deformed, deformation, frame_force, frames_of, rotation
 from kedfem.dynamics.joints.ports import port_columns
 from kedfem.dynamics.loads import applied

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 from scipy.interpolate import PPoly
 
+from kedfem.arrays import Float
 from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.system.forces.turning_loads import shown_by
 from kedfem.dynamics.system.record import (

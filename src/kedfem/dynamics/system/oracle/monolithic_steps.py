@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.system.blank import empty_history
 from kedfem.dynamics.system.march import Ready, displacements

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from jaxtyping import Bool, Float
 from scipy.linalg import lu_factor, lu_solve, qr
 
+from kedfem.arrays import Bool, Float
 from kedfem.dynamics.system.oracle.monolithic_places import force
 from kedfem.motion.rigid import RigidMotion
 

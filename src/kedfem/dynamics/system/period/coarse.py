@@ -8,8 +8,8 @@ solved by GMRES. What is left for the full map are vibrations that the modes do 
 """
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.system.period.krylov import Derivative, Watched, gmres
 from kedfem.dynamics.system.period.map import PeriodMap

@@ -13,8 +13,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.system.arrays import ends_of
 from kedfem.dynamics.system.march import Ready, march

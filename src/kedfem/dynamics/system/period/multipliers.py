@@ -5,8 +5,8 @@ not excite: by the largest magnitude a vibration grows, or falls, in a period.
 """
 
 import numpy as np
-from jaxtyping import Complex
 
+from kedfem.arrays import Complex
 from kedfem.dynamics.system.period.krylov import Derivative, Watched, arnoldi, combined, scale_of
 from kedfem.dynamics.system.starts.instant import Flat
 

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Complex
 
+from kedfem.arrays import Complex
 from kedfem.dynamics.system.period.coarse import Coarse
 from kedfem.dynamics.system.period.krylov import (
     Derivative,

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.system.sparse import SparsePart
 from kedfem.dynamics.system.starts.balance import Asked, Balance, Solved, held_body, stepped_body

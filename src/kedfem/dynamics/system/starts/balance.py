@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
-from jaxtyping import Float
 from scipy.sparse.linalg import LinearOperator, splu
 
+from kedfem.arrays import Float
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.ports import port_rotation
 from kedfem.dynamics.matrices.substructure import Substructure, mass_substructure

@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from copy import copy
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.anderson import Mixing
 from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.system.march import Ready

@@ -16,9 +16,9 @@ from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
 from scipy.sparse.linalg import LinearOperator, gmres
 
+from kedfem.arrays import Bool, Float
 from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.segment import mean_orientation
 from kedfem.dynamics.system.record import COROTATIONAL

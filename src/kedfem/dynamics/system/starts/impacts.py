@@ -8,8 +8,8 @@ continuous: steps keep their order there undivided.
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Float
 
+from kedfem.arrays import Bool, Float
 from kedfem.dynamics.system.arrays import Constraints
 from kedfem.dynamics.system.march import Motion, Ready, march, shortened
 from kedfem.dynamics.system.sparse import SparsePart, momentum

@@ -6,9 +6,9 @@ from functools import cache, partial
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Bool, Float, Int
 from scipy.sparse.linalg import splu
 
+from kedfem.arrays import Bool, Float, Int
 from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.matrices.substructure import factored
 from kedfem.dynamics.system.forces.turning_loads import turned as turned_load

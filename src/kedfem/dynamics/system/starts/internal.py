@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.frames import Deformed, frames_of, seen_from
 from kedfem.dynamics.matrices.dense import component_first, coordinates, rows_of, work_on
 from kedfem.dynamics.segment import internal_force, mean_orientation, position

@@ -12,8 +12,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Complex, Float
 
+from kedfem.arrays import Complex, Float
 from kedfem.dynamics.system.record import (
     ANGLE,
     DISTANCE,

@@ -6,8 +6,8 @@ Rates of constraints are exact (`rates`), the bars of rigid links among them.
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from jaxtyping import Float
 
+from kedfem.arrays import Float
 from kedfem.dynamics.joints.first_rows import interface_forces
 from kedfem.dynamics.joints.ports import turned_ports
 from kedfem.dynamics.matrices.dense import coordinates, work_on

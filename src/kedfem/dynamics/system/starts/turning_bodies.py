@@ -1,9 +1,9 @@
 """Bodies with K0 and the inertia of turning, held at their interface points."""
 
 import numpy as np
-from jaxtyping import Float
 from scipy.sparse.linalg import LinearOperator, gmres
 
+from kedfem.arrays import Float
 from kedfem.dynamics.system.sparse import SparsePart, momentum
 from kedfem.dynamics.system.starts.balance import Balance, HeldBody, held_body
 from kedfem.dynamics.system.starts.instant import Flat, Instant
