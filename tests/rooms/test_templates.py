@@ -196,7 +196,7 @@ def test_the_legs_of_a_stewart_platform_bear_weight_and_inertia(tmp_path: Path) 
     rises = u[2]  # dl/dz
     swings = (up - u * rises) / length  # du/dz
     barrel, rod = STEEL * tube(0.05, 0.005) * h, STEEL * np.pi * 0.025**2 / 4 * h
-    corners = [np.radians(a) for a in (-50, 50, 70, 170, 190, 290)]
+    corners = [np.radians(a) for a in (-50, 50, 70, 170, 190, 290, 310)]
     ring = np.abs(np.diff(np.exp(1j * np.array(corners)))).sum() * above * 0.04 * 0.02 * ALUMINIUM
     mass = 200 + ring
     slope = G * (mass + 6 * (barrel * (swings * h / 2)[2] + rod * (up - swings * h / 2)[2]))

@@ -10,7 +10,7 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.errors import MeshError
-from kedfem.links.beams.beam import line_axes
+from kedfem.links.beams.beam import line_axes, polyline_axes
 from kedfem.links.beams.beam_axis import directions
 from kedfem.links.beams.beam_segments import beam_segments, space_segments
 from kedfem.links.beams.of_scene import scene_axis, scene_beam
@@ -83,7 +83,7 @@ def link_axes(link: LinkScene) -> Float[np.ndarray, "3 3"]:
         case Cad(origin=a, towards=b) | MeshFile(origin=a, towards=b) if b is not None:
             return line_axes(np.asarray(a), np.asarray(b))
         case Polyline(points=points):
-            return line_axes(np.asarray(points[0]), np.asarray(points[-1]))
+            return polyline_axes(np.asarray(points))
         case _:
             return np.eye(3)
 

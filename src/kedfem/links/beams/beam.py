@@ -141,10 +141,19 @@ def planar_rigidities(section: Section, material: Material) -> Float[np.ndarray,
 def beam_mesh(
     points: Float[np.ndarray, "p 3"], elements: int, nodes: int
 ) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e m"]]:
-    """Nodes and elements along a polyline, ends first; as many elements, of so many nodes, on each of its segments."""
+    """Nodes and elements along a polyline, ends first; as many elements, of so many nodes, on each of its segments.
+
+    One that ends where it begins has a single node there.
+    """
     s = spaced((len(points) - 1) * elements, nodes) / elements
     X = np.stack([np.interp(s, np.arange(len(points)), points[:, k]) for k in range(3)], axis=1)
-    return X, line_cells(np.arange(0, len(X) - 1, nodes - 1), nodes)
+    cells = line_cells(np.arange(0, len(X) - 1, nodes - 1), nodes)
+    return (X[:-1], cells % (len(X) - 1)) if closes(points) else (X, cells)
+
+
+def closes(points: Float[np.ndarray, "p 3"]) -> bool:
+    """Whether a line ends where it begins."""
+    return bool((points[0] == points[-1]).all())
 
 
 def beam_link(name: str, points: Float[np.ndarray, "p 3"], section: Section, material: Material,
@@ -170,9 +179,14 @@ def beam_link(name: str, points: Float[np.ndarray, "p 3"], section: Section, mat
     read_only(X, one, cells, m1, mX)
     return Link(
         name=name, kind="beam", X=X, one=one, cells=cells, cell_type=cell_type(nodes),
-        axes=line_axes(points[0], points[-1]), mass=mass, K0=K0, m1=m1, mX=mX, volume=m1[:, 0] / material.density,
+        axes=polyline_axes(points), mass=mass, K0=K0, m1=m1, mX=mX, volume=m1[:, 0] / material.density,
         E=material.youngs_modulus, lame=material.lame(), section=section,
     )  # fmt: skip
+
+
+def polyline_axes(points: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, "3 3"]:
+    """Link axes of a line through points, x from its start to its end; of a closed one along its first segment."""
+    return line_axes(points[0], points[1 if closes(points) else -1])
 
 
 def line_axes(start: Float[np.ndarray, "3"], end: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from kedfem.arrays import Bool, Float, Int
-from kedfem.links.beams.beam import line_axes, line_cells, spaced
+from kedfem.links.beams.beam import closes, line_axes, line_cells, spaced
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,7 +14,7 @@ class Axis:
     """Stations of an axis: the nodes, those at corners once for each segment that meets there.
 
     frame : (s, 4, 3) position [m], tangent, directions of the section's y and z
-    node : (s,) number of the station's node, ascending
+    node : (s,) number of the station's node, ascending, but for the last of a closed line, which is the first again
     cells : (e, m) stations of each element, ends first
     hub : (k,) which nodes carry a full affine field: where segments meet and at the ends
     """
@@ -47,9 +47,8 @@ def straight_axis(
     count = len(segments)
     node = (steps * np.arange(count)[:, None] + np.arange(steps + 1)).ravel()
     first = ((steps + 1) * np.arange(count)[:, None] + (nodes - 1) * np.arange(elements)).ravel()
-    return Axis(
-        np.concatenate(segments), node, line_cells(first, nodes), np.arange(count * steps + 1) % steps == 0
-    )
+    many = count * steps + (not closes(points))
+    return Axis(np.concatenate(segments), node % many, line_cells(first, nodes), np.arange(many) % steps == 0)
 
 
 def smooth_axis(

@@ -1,6 +1,8 @@
 """Beams element by element, each with frames of its own."""
 
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
@@ -27,10 +29,16 @@ def beam_segments(link: Link, material: Material) -> Segments:
         part = beam_link(link.name, link.X[cell[:2]], section_of(link), material, 1, nodes)
         parts.append(replace(corotational(part), axes=link.axes, frames=_gauss_frames(part, material)))
     cuts = [
-        Cut((k, k + 1), link.X[link.cells[k][1:2]], (_unit(parts[k], -1), _unit(parts[k + 1], 0)))
-        for k in range(len(parts) - 1)
+        Cut((i, j), link.X[link.cells[i][1:2]], (_unit(parts[i], -1), _unit(parts[j], 0)))
+        for i, j in _neighbours(len(parts), link.cells[-1][1] == link.cells[0][0])
     ]
     return Segments(tuple(parts), tuple(cuts))
+
+
+def _neighbours(count: int, closed: bool) -> list[tuple[int, int]]:
+    """Which elements meet, in order along the beam."""
+    pairs = list(pairwise(range(count)))
+    return [*pairs, (count - 1, 0)] if closed else pairs
 
 
 def _unit(part: Link, node: int) -> Float[np.ndarray, "1 n"]:
@@ -64,14 +72,15 @@ def space_segments(link: Link, axis: Axis, material: Material) -> Segments:
     """
     parts = [_space_part(link, axis, cell, material) for cell in axis.cells]
     cuts = [
-        _node_cut(parts[k], parts[k + 1], k, axis.frame[axis.cells[k][1], 0]) for k in range(len(parts) - 1)
+        _node_cut(parts, pair, axis.frame[axis.cells[pair[0]][1], 0])
+        for pair in _neighbours(len(parts), axis.node[-1] == axis.node[0])
     ]
     return Segments(tuple(parts), tuple(cuts))
 
 
 def _space_part(link: Link, axis: Axis, cell: Int[np.ndarray, " m"], material: Material) -> Link:
     stations = np.sort(cell)
-    node = axis.node[stations] - axis.node[stations[0]]
+    node = np.arange(len(stations))
     hub = axis.hub[axis.node[stations]]
     section = section_of(link)
     own = Axis(axis.frame[stations], node, np.searchsorted(stations, cell)[None], hub)
@@ -83,11 +92,9 @@ def _space_part(link: Link, axis: Axis, cell: Int[np.ndarray, " m"], material: M
     return replace(corotational(part), axes=link.axes, K0=K0, element=element)
 
 
-def _node_cut(a: Link, b: Link, number: int, point: Float[np.ndarray, "3"]) -> Cut:
-    surfaces = [joint_surface(part, f"links.{a.name}", point, None) for part in (a, b)]
+def _node_cut(parts: Sequence[Link], pair: tuple[int, int], point: Float[np.ndarray, "3"]) -> Cut:
+    surfaces = [joint_surface(parts[k], f"links.{parts[k].name}", point, None) for k in pair]
     known = [d for d, spread in zip(surfaces[0].directions, surfaces[0].spread, strict=True) if spread > 0]
     off = surfaces[0].spread[0] * np.array(known)
     points = np.concatenate([point[None], point + off])
-    return Cut(
-        (number, number + 1), points, (port_weights(surfaces[0], points), port_weights(surfaces[1], points))
-    )
+    return Cut(pair, points, (port_weights(surfaces[0], points), port_weights(surfaces[1], points)))

@@ -12,9 +12,9 @@ from kedfem.arrays import Float, Int
 from kedfem.links.beams.beam import (
     assembled,
     cell_type,
-    line_axes,
     parent_nodes,
     parent_weights,
+    polyline_axes,
     shape_functions,
 )
 from kedfem.links.beams.beam_axis import Axis
@@ -163,8 +163,8 @@ def spatial_beam_link(
 
 
 def _link_axes(axis: Axis) -> Float[np.ndarray, "3 3"]:
-    """Of a straight beam those of its section, else x between its ends."""
-    chord = line_axes(axis.frame[0, 0], axis.frame[-1, 0])
+    """Of a straight beam those of its section, else x between its ends; of a closed one along its first element."""
+    chord = polyline_axes(axis.frame[[0, axis.cells[0][1], -1], 0])
     straight = np.abs(axis.frame[:, 1] - chord[:, 0]).max() < STRAIGHT
     return np.asarray(axis.frame[0, 1:].T) if straight else chord
 
@@ -177,7 +177,7 @@ def functions(axis: Axis) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "
     X, one : coefficients of position and of the constant
     triples : (3s, n) values of (x, n1, n2), and so of (u, p, q), at every station
     """
-    first = np.searchsorted(axis.node, np.arange(len(axis.hub)))
+    first = np.unique(axis.node, return_index=True)[1]
     count = np.where(axis.hub, 4, 3)
     start = np.concatenate([[0], count.cumsum()])
     X, one = np.empty((start[-1], 3)), np.zeros(start[-1])

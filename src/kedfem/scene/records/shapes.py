@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import combinations, pairwise
 from typing import Annotated, Literal, Self
 
@@ -22,6 +23,17 @@ def different(points: tuple[XYZ, ...]) -> tuple[XYZ, ...]:
         if math.dist(P, Q) == 0.0:
             raise fault(f"must be different points, got ({P[0]:.6g}, {P[1]:.6g}, {P[2]:.6g}) twice")
     return points
+
+
+def different_but_closed(points: tuple[XYZ, ...]) -> tuple[XYZ, ...]:
+    """Points that all differ, but that the last may be the first again where there are three others."""
+    different(points[:-1] if is_closed(points) else points)
+    return points
+
+
+def is_closed(points: Sequence[XYZ]) -> bool:
+    """Whether a line through at least three points comes back to the first."""
+    return len(points) > 3 and math.dist(points[0], points[-1]) == 0.0
 
 
 def level(points: tuple[XYZ, XYZ]) -> tuple[XYZ, XYZ]:
@@ -138,8 +150,8 @@ class Polyline(Record):
     """A line through points, straight between them or smooth, of one section; beam."""
 
     kind: Literal["polyline"] = "polyline"
-    points: Annotated[tuple[Point, ...], AfterValidator(different)] = Field(min_length=2)
-    """its corners, at least two"""
+    points: Annotated[tuple[Point, ...], AfterValidator(different_but_closed)] = Field(min_length=2)
+    """its corners, at least two; with the first once more at the end it is a closed frame"""
     smooth: StrictBool = False
     """whether it is a smooth curve (a cubic spline) through the points, else straight with rigid corners"""
     width: PositiveLength | None = None
@@ -165,6 +177,9 @@ class Polyline(Record):
                 for key in ("width", "thickness")
                 if key not in given
             ]
+        if self.smooth and is_closed(self.points):
+            wanted = "must be left out of a line that ends where it begins"
+            faults.append(Fault(("smooth",), f"{wanted}, whose corners are straight, got true"))
         pairs = list(pairwise(self.points))[: 1 if self.smooth else None]
         refuse([*faults, *along_up(pairs, self.up)])
         return self
