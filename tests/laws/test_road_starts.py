@@ -12,7 +12,8 @@ from kedfem.dynamics.stepping.first_state import motion_of
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.march import Motion, march
-from kedfem.dynamics.system.starts.deflected import NoBalanceError, static
+from kedfem.dynamics.system.starts.balanced import NoBalanceError
+from kedfem.dynamics.system.starts.deflected import static
 from kedfem.dynamics.system.starts.instant import Instant
 from kedfem.dynamics.system.starts.internal import own, rows
 from kedfem.scene import scene_from

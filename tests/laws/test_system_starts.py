@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from kedfem.dynamics.stepping.first_state import first_states
 from kedfem.dynamics.system.march import displacements, march
-from kedfem.dynamics.system.starts import deflected
+from kedfem.dynamics.system.starts import balanced
 from kedfem.dynamics.system.starts.deflected import plucked, quasi_static, static
 from kedfem.dynamics.system.starts.equilibrium import stands_off
 from kedfem.dynamics.system.starts.instant import Instant
@@ -257,6 +257,6 @@ def test_a_balance_with_open_joints_is_none(kind: str, monkeypatch: pytest.Monke
     first = of.ready.bodies.at[1]
     off = u + np.where(np.arange(len(u)) < first, 0.05 * np.sign(u + 1e-30), 0.0)
     assert "off its joints" in stands_off(now, off, None)
-    monkeypatch.setattr(deflected, "_iterated", lambda *_: off)
+    monkeypatch.setattr(balanced, "_iterated", lambda *_: off)
     with pytest.raises(SolveError, match=r"link '\w+' would stand .* m off its joints"):
         quasi_static(of.ready, of.motion, [])

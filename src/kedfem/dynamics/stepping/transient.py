@@ -17,8 +17,9 @@ from kedfem.dynamics.stepping.solvers import ByLink, Steps, block_length
 from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.march import HALVINGS, ConvergenceError
 from kedfem.dynamics.system.period.search import residual_of
-from kedfem.dynamics.system.starts.deflected import NoBalanceError, static
+from kedfem.dynamics.system.starts.balanced import NoBalanceError
 from kedfem.dynamics.system.starts.deflected import quasi_static as deflection_in_motion
+from kedfem.dynamics.system.starts.deflected import static
 from kedfem.dynamics.system.starts.instant import Instant
 from kedfem.dynamics.system.state import State
 from kedfem.dynamics.system.steps import SystemSteps
