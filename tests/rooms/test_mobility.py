@@ -6,15 +6,19 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from kedfem.dynamics.stepping.transient import _moment as moment
 from kedfem.errors import MotionError
 from kedfem.motion.dead_point import DeadPoint
 from kedfem.motion.linkage import drawn_linkage, linkage, looser_rows
+from kedfem.motion.messages import place
 from kedfem.motion.mobility import Mobility, mobility
 from kedfem.motion.path import path
 from kedfem.motion.redundancy import redundancy, without_redundancy, wrenches
 from kedfem.motion.released_motions import free_motions, remedy
-from kedfem.scene import Scene, scene_from
+from kedfem.motion.rigid import rigid_motion
+from kedfem.scene import Scene, path_parameter, scene_from
 from kedfem.tables.model import mobility_table
+from tests.laws.test_moving_ground import sprung
 from tests.linkages import (
     RISE,
     UNIT_SPEED,
@@ -326,3 +330,38 @@ def test_a_five_bar_is_driven_twice_and_its_dead_point_is_told_by_time() -> None
     text = console.file.getvalue()  # type: ignore[attr-defined]
     assert "2, driven at joints A and E" in text
     assert "at t = " in text
+
+
+# -- a drive that slides ------------------------------------------------------------------------------------
+
+
+def carried(frames: str) -> Scene:
+    """A block on a spring of a ground that a drive lifts; its guide leaves it free."""
+    lift = {"kind": "table", "time": [0, 1], "travel": [-0.05, 0.05]}
+    return scene_from(
+        sprung(np.array(Z), lift, end_time=1.0, step=0.01) | {"analysis": {"frames": frames, "end_time": 1.0}}
+    )
+
+
+def test_messages_of_a_slide_speak_of_its_travel() -> None:
+    link = linkage(carried("co-rotational"))
+    assert place(link, -0.05) == "drive travel -50 mm"
+    scene = carried("co-rotational")
+    motion = rigid_motion(
+        link, path(link, -0.05, 0.05), np.array([0.25]), path_parameter(scene, np.array([0.25]))
+    )
+    assert moment(link, motion, 0) == "t = 0.25 s, drive travel -25 mm"
+    with pytest.raises(MotionError, match="free motion left at drive travel 0 mm, the reference position"):
+        linkage(carried("rigid-body"))
+
+
+def test_remedies_against_free_motions_are_told_where_the_first_steps_fail() -> None:
+    scene = carried("co-rotational")
+    link = linkage(scene)
+    told = mobility(scene, link, path(link, -0.05, 0.05))
+    for works in (True, False):
+        console = Console(width=160, file=StringIO())
+        console.print(mobility_table(scene, link, told, works))
+        text = console.file.getvalue()  # type: ignore[attr-defined]
+        assert "link 'block' can slide along z" in text
+        assert ("drive joint guide" in text) != works

@@ -110,7 +110,8 @@ def without(name: str) -> JointTable:
 def test_a_missing_joint_leaves_free_motion_and_the_message_says_of_what() -> None:
     message = refusal(without("D"))
     assert message.startswith(
-        "joints: every motion must be held or driven, got free motion left at drive angle 0 deg:"
+        "joints: every motion must be held or driven, got free motion left at drive angle 0 deg, the reference "
+        "position:"
     )
     assert "link 'rocker' can turn about z at joint C (revolute)" in message
     assert (

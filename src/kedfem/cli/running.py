@@ -107,10 +107,10 @@ def check(scene: ScenePath, quick: Quick = False, within: Within = False) -> Non
     found = sizes(loaded, ready.model)
     say(size_line(found))
     doubts = (*size_warnings(loaded, found), *mass_damping_warning(ready))
-    cost, failed = forecast(ready)
-    show([assembly_table(assembly), *check_tables(ready, reduction, plan, cost)], doubts)
-    if failed is not None:
-        raise failed
+    tried = forecast(ready)
+    show([assembly_table(assembly), *check_tables(ready, reduction, plan, tried)], doubts)
+    if tried[1] is not None:
+        raise tried[1]
 
 
 def kinematics(

@@ -217,10 +217,10 @@ def _check_mobility(scene: Scene, drawn: Drawn) -> int:
     if free == 0:
         return 0
     if mobility == drives:
-        angle = "drive angle 0 deg, " if drives == 1 else ""
+        at = _at_reference(scene)
         other = listed(_other_drives(scene, drawn), "or")
         raise MotionError(
-            f"{driven}: the linkage locks (dead point) at {angle}the reference position: "
+            f"{driven}: the linkage locks (dead point) at {at}the reference position: "
             f"draw it at another angle or drive {f'joint {other}' if other else 'another joint'}"
         )
     motions = free_motions(drawn)
@@ -231,9 +231,18 @@ def _check_mobility(scene: Scene, drawn: Drawn) -> int:
     if scene.springs or scene.motors:
         remedies = [f"{remedies[1]}, if springs or motors hold them", remedies[0]]
     raise MotionError(
-        "joints: every motion must be held or driven, got free motion left at drive angle 0 deg: "
+        "joints: every motion must be held or driven, got free motion left at "
+        f"{_at_reference(scene)}the reference position: "
         f"{words}; free motions: {free} (remedy: {'; or '.join(remedies)})"
     )
+
+
+def _at_reference(scene: Scene) -> str:
+    """Where the only drive is in the reference position, in words; nothing of none, or of several."""
+    if len(scene.driven_joints) != 1:
+        return ""
+    (name,) = scene.driven_joints
+    return "drive travel 0 mm, " if scene.joints[name].kind == "prismatic" else "drive angle 0 deg, "
 
 
 def _other_drives(scene: Scene, drawn: Drawn) -> list[str]:

@@ -41,4 +41,4 @@ def place(link: Linkage, tau: float, form: str = ".2f") -> str:
         return f"t = {tau:.6g} s"
     if link.drives.turning[0]:
         return f"drive angle {np.degrees(tau):{form}} deg"
-    return f"drive travel {tau:.6g} m"
+    return f"drive travel {1e3 * tau:.6g} mm"

@@ -44,16 +44,23 @@ NEARLY = 0.01  # deg: of a full revolution, by rounding
 
 
 def check_tables(
-    ready: Prepared, reduction: Reduction | None, plan: Plan | None, cost: Cost | None = None
-) -> list[Table]:
-    """What would be modelled: the plan for an accuracy, links, what reducing them costs, motion, frequency, cost."""
-    cost, found = cost or forecast(ready)[0], resolution(ready)
+    ready: Prepared, reduction: Reduction | None, plan: Plan | None,
+    tried: tuple[Cost, KedfemError | None] | None = None,
+) -> list[Table]:  # fmt: skip
+    """What would be modelled: the plan for an accuracy, links, what reducing them costs, motion, frequency, cost.
+
+    Parameters
+    ----------
+    tried : what `forecast` found, if that is known already
+    """
+    (cost, failed), found = tried or forecast(ready), resolution(ready)
+    moving = mobility(ready.scene, ready.linkage, ready.path)
     return [
         *(plan_tables(plan) if plan else []),
         *link_tables(ready.model),
         *([reduction_table(reduction)] if reduction else []),
         _motion(ready),
-        mobility_table(ready.scene, ready.linkage, mobility(ready.scene, ready.linkage, ready.path)),
+        mobility_table(ready.scene, ready.linkage, moving, works=failed is None),
         _force_elements(ready),
         *([resolution_table(found, ready.scene)] if found else []),
         _cost(ready, cost),

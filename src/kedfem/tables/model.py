@@ -102,8 +102,13 @@ def _quality(*parts: Link) -> str:
     return f"{min(mesh_quality(mesh).least for mesh in meshes):.2f}"
 
 
-def mobility_table(scene: Scene, link: Linkage, found: Mobility) -> Table:
-    """Degrees of freedom, what is held twice, what is not held, and the nearest dead point."""
+def mobility_table(scene: Scene, link: Linkage, found: Mobility, works: bool = False) -> Table:
+    """Degrees of freedom, what is held twice, what is not held, and the nearest dead point.
+
+    Parameters
+    ----------
+    works : whether a run's first steps were found: what is free is meant to be
+    """
     table = facts("Mobility (in the reference position)")
     driven = f"driven at {of_joints(tuple(scene.driven_joints))}" if found.drives else "none driven"
     table.add_row("degrees of freedom", f"{found.freedom}, {driven}")
@@ -117,7 +122,7 @@ def mobility_table(scene: Scene, link: Linkage, found: Mobility) -> Table:
         table.add_row("free motions", str(sum(motion.basis.shape[1] for motion in found.free)))
     for motion in found.free:
         table.add_row("free", motion.words)
-        if found.drives:
+        if found.drives and not works:
             table.add_row("to hold it", held_by(motion))
     for row in _dead_point(link, found.dead_point):
         table.add_row(*row)

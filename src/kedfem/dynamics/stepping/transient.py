@@ -76,7 +76,7 @@ def transient(
             forcing = forcings(model, part)
             if not isinstance(solver, SystemSteps):
                 links, state = solver.advance(state, forcing, joint_rows(model.rows, part))
-                yield from _finite(Block(first + k, part, links))
+                yield from _finite(linkage, Block(first + k, part, links))
                 continue
             try:
                 links, state = solver.advance(state, forcing, part, motion_at)
@@ -87,8 +87,8 @@ def transient(
                         first + k, done, solver.handed_on(failed.history, forcings(model, done), done)
                     )
                 advice = "give it more elements" if stresses is None else STIFFENED
-                raise SolveError(_stuck(first + k + failed.taken, part, failed, advice)) from None
-            yield from _finite(Block(first + k, part, links))
+                raise SolveError(_stuck(linkage, first + k + failed.taken, part, failed, advice)) from None
+            yield from _finite(linkage, Block(first + k, part, links))
     _marched(solver, state)
 
 
@@ -121,8 +121,10 @@ def _corotational(
                     links, exerted = solver.handed_on(failed.history, forcing, part)
                     yield Block(first + k, part.part(0, failed.taken), links, exerted=exerted)
                 advice, tried = _finer(model, failed), f", not even in {2**HALVINGS} parts"
-                raise SolveError(_stuck(first + k + failed.taken, part, failed, advice, tried)) from None
-            yield from _finite(Block(first + k, part, links, exerted=exerted))
+                raise SolveError(
+                    _stuck(linkage, first + k + failed.taken, part, failed, advice, tried)
+                ) from None
+            yield from _finite(linkage, Block(first + k, part, links, exerted=exerted))
 
 
 def _positions(
@@ -144,15 +146,15 @@ def _positions(
             else:
                 state = deflection_in_motion(of, motion_at, time=t, near=state, like=shared)
         except NoBalanceError as failed:
-            raise SolveError(_unbalanced(scene, motion, failed.moves)) from None
+            raise SolveError(_unbalanced(scene, _moment(linkage, motion, 0), failed.moves)) from None
         if isinstance(solver, CorotationalSteps):
             links, exerted = solver.first(state, forcing, motion_at, shared)
         else:
             links, exerted = solver.first(state, forcing, motion), None
-        yield from _finite(Block(k, motion, links, exerted=exerted))
+        yield from _finite(linkage, Block(k, motion, links, exerted=exerted))
 
 
-def _unbalanced(scene: Scene, motion: RigidMotion, moves: str) -> str:
+def _unbalanced(scene: Scene, moment: str, moves: str) -> str:
     """What to do about a position without a balance of forces."""
     kind = scene.analysis.kind
     advice = (
@@ -163,13 +165,9 @@ def _unbalanced(scene: Scene, motion: RigidMotion, moves: str) -> str:
         else "a drive near a natural frequency, or a linkage near a dead point, where small loads move it far: take a "
         "slower drive, stiffer links, another position or kind = 'steady'"
     )
-    driven, along = list(scene.driven_joints), float(motion.phi[0])
-    where = f", drive angle {np.degrees(along):.6g} deg" if len(driven) == 1 else ""
-    if where and scene.joints[driven[0]].kind == "prismatic":
-        where = f", drive travel {1e3 * along:.6g} mm"
     return (
         f"analysis.kind: all forces must balance at each position of a {kind} analysis, got no balance at "
-        f"t = {motion.t[0]:.6g} s{where}; {moves}{'; ' * bool(moves)}{advice}"
+        f"{moment}; {moves}{'; ' * bool(moves)}{advice}"
     )
 
 
@@ -190,13 +188,14 @@ def _first(model: Model, solver: ByLink, states: Start, drawn: RigidMotion) -> l
     return [history([state]) for state in states]
 
 
-def _stuck(step: int, part: RigidMotion, failed: ConvergenceError, advice: str, tried: str = "") -> str:
+def _stuck(
+    linkage: Linkage, step: int, part: RigidMotion, failed: ConvergenceError, advice: str, tried: str = ""
+) -> str:
     """What to do about a step whose iterations do not converge."""
-    k = failed.taken
     moves = f"link '{failed.moves}'" if failed.moves else "a joint or force element"
     return (
-        f"analysis: the iterations of a step must converge, got none that do at step {step}, t = {part.t[k]:.6g} s, "
-        f"drive angle {np.degrees(part.phi[k]):.6g} deg{tried}; {moves} moves most from iteration to iteration: "
+        f"analysis: the iterations of a step must converge, got none that do at step {step}, "
+        f"{_moment(linkage, part, failed.taken)}{tried}; {moves} moves most from iteration to iteration: "
         f"{advice}, take a smaller step, or more numerical damping (rho_inf)"
     )
 
@@ -214,7 +213,18 @@ def snapshots(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
         yield from (block.at(k) for k in range(len(block)))
 
 
-def _finite(block: Block) -> Iterator[Block]:
+def _moment(linkage: Linkage, motion: RigidMotion, k: int) -> str:
+    """A time point in words, with the angle or travel of the drive if there is one."""
+    if len(linkage.drives) != 1:
+        return f"t = {motion.t[k]:.6g} s"
+    x = float(motion.phi[k])
+    turn = f"drive angle {np.degrees(x):.6g} deg"
+    return (
+        f"t = {motion.t[k]:.6g} s, {turn if linkage.drives.turning[0] else f'drive travel {1e3 * x:.6g} mm'}"
+    )
+
+
+def _finite(linkage: Linkage, block: Block) -> Iterator[Block]:
     """The block, up to where a displacement is not finite any more, or beyond all measure."""
     fine = np.all([np.abs(link.g).max(axis=(1, 2)) < BEYOND for link in block.links], axis=0)
     k = len(block) if fine.all() else int(fine.argmin())
@@ -223,5 +233,5 @@ def _finite(block: Block) -> Iterator[Block]:
     if k < len(block):
         raise SolveError(
             f"analysis: the elastic motion must stay finite, got none at step {block.step + k}, "
-            f"t = {block.motion.t[k]:.6g} s, drive angle {np.degrees(block.motion.phi[k]):.6g} deg"
+            f"{_moment(linkage, block.motion, k)}"
         )
