@@ -13,12 +13,11 @@ from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.history import Forcing
 from kedfem.dynamics.rigid_body import forcings, motions
-from kedfem.dynamics.stepping.first_state import begun, started
-from kedfem.dynamics.stepping.solvers import Steps, steps_of
+from kedfem.dynamics.stepping.first_state import started
+from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
-from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.march import Motion
-from kedfem.dynamics.system.steps import SystemSteps
+from kedfem.dynamics.system.steps import Steps
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.results.recording import recording
 from kedfem.scene import Scene, path_parameter, scene_from
@@ -116,21 +115,14 @@ def _motion_at(ready: Prepared) -> Motion:
 
 def first_state(ready: Prepared, solver: Any) -> Any:
     """A solver's own state at the start."""
-    given = ready.scene, ready.linkage, ready.path, ready.model, solver
-    states = started(*given)
-    return states if isinstance(solver, CorotationalSteps) else begun(*given, states)
+    return started(ready.scene, ready.linkage, ready.path, ready.model, solver)
 
 
 def advanced(
     ready: Prepared, solver: Any, state: Any, forcing: Sequence[Forcing], motion: RigidMotion
 ) -> Any:
     """What a solver hands on of some steps: links first, its state last."""
-    known: tuple[Any, ...] = (forcing,)
-    if isinstance(solver, CorotationalSteps):
-        known = (forcing, motion, _motion_at(ready))
-    if isinstance(solver, SystemSteps):
-        known = (forcing, motion)
-    return solver.advance(state, *known)
+    return solver.advance(state, forcing, motion, _motion_at(ready))
 
 
 def _timed(ready: Prepared, solver: Any, state: Any, motion: RigidMotion) -> tuple[float, Any]:

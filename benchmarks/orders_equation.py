@@ -16,12 +16,12 @@ import scipy.linalg
 import scipy.sparse as sp
 from jaxtyping import Float
 
+from benchmarks.monolithic import shared_nodes
 from benchmarks.orders_schemes import RHO
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.matrices.substructure import mass_matrix
 from kedfem.dynamics.rigid_body import forcings
-from kedfem.dynamics.stepping.first_state import begun, motion_of, started
-from kedfem.dynamics.stepping.monolithic import MonolithicSteps, shared_nodes
+from kedfem.dynamics.stepping.first_state import motion_of, started
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.system.march import displacements, march, ready
@@ -52,12 +52,10 @@ class Mechanism:
         made = prepared(scene_from(raw))[0]
         given = made.scene, made.linkage, made.path
         solver = steps_of(made.scene, made.model)
-        if isinstance(solver, MonolithicSteps):
-            raise ValueError("analysis.solver: must be the condensed one, got the monolithic one")
         self.of = solver.ready
         self.model = self.of.system.model
         self.motion_at = motion_of(*given)
-        self.state: State = begun(*given, made.model, solver, started(*given, made.model, solver))  # type: ignore[arg-type]
+        self.state: State = started(*given, made.model, solver)
 
     def alpha(self, steps: int) -> "Run":
         """So many steps of generalised-α in all."""
@@ -81,7 +79,7 @@ class Equation:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism, model = mechanism, mechanism.model
-        self.T = shared_nodes(model.links, model.joints)[0].toarray()
+        self.T = shared_nodes(model.links, model.joints).toarray()
         self.at = np.concatenate([[0], np.cumsum([link.unknowns for link in model.links])])
         parts = [self.T[a:b] for a, b in zip(self.at, self.at[1:], strict=False)]
         masses = [mass_matrix(link).toarray() for link in model.links]

@@ -18,7 +18,6 @@ from kedfem.dynamics.stepping.levels import level_steps
 from kedfem.dynamics.stepping.solvers import block_length
 from kedfem.dynamics.system.period.map import PeriodMap
 from kedfem.dynamics.system.period.search import Periodic, periodic
-from kedfem.dynamics.system.state import State
 from kedfem.motion.period import over_one_period
 from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import Scene, path_parameter, scene_from, time_grid
@@ -63,13 +62,11 @@ def map_of(ready: Prepared) -> PeriodMap:
     )
     solver = level_steps(scene, ready.model)[0]
     start = started(scene, ready.linkage, ready.path, ready.model, solver)
-    if not isinstance(start, State):
-        raise TypeError("a steady motion is that of a system")
 
     def motion_at(t: Any) -> Any:
         return rigid_motion(ready.linkage, ready.path, t, path_parameter(scene, t))
 
-    return PeriodMap(solver.ready, start, motion_at, time_grid(scene).end, block_length(ready.model))  # type: ignore[union-attr]
+    return PeriodMap(solver.ready, start, motion_at, time_grid(scene).end, block_length(ready.model))
 
 
 def searched(ready: Prepared, over: PeriodMap, stability: bool) -> Periodic:

@@ -10,8 +10,9 @@ from benchmarks.scenes import mechanisms, with_reduced_links
 from kedfem.accuracy.histories import worst
 from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.reduction import Reduction, reduced
-from kedfem.dynamics.stepping.solvers import Steps, steps_of
+from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
+from kedfem.dynamics.system.steps import Steps
 from kedfem.results.recording import recording, rows
 from kedfem.scene import Scene, scene_from, time_grid
 from kedfem.stepping import Clock

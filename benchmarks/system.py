@@ -20,7 +20,7 @@ from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.march import march, ready
 from kedfem.dynamics.system.sparse import SparsePart
 from kedfem.dynamics.system.starts.start import rest
-from kedfem.dynamics.system.steps import SystemSteps, rigid_frame_system
+from kedfem.dynamics.system.steps import Steps, scene_system
 from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import path_parameter, scene_from, time_grid
 
@@ -103,7 +103,7 @@ def beside_solves(raw: dict[str, Any], count: int) -> tuple[float, float]:
     made, _ = prepared(scene_from(raw))
     scene, model = made.scene, made.model
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
-    solver = SystemSteps(scene, rigid_frame_system(scene, model), model, scheme)
+    solver = Steps(scene, scene_system(scene, model), model, scheme)
     state = started(scene, made.linkage, made.path, model, solver)
     _, motion = next(motions(scene, made.linkage, made.path))
     motion, of = motion.part(0, count), solver.ready
@@ -118,7 +118,7 @@ def beside_solves(raw: dict[str, Any], count: int) -> tuple[float, float]:
     steps, solves = [], []
     for _ in range(TURNS + 1):
         began = process_time()
-        solver.advance(state, forcings(model, motion), motion)  # type: ignore[arg-type]
+        solver.advance(state, forcings(model, motion), motion)
         steps.append(process_time() - began)
         began = process_time()
         for _ in range(count):

@@ -13,11 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from kedfem.dynamics.stepping.monolithic import MonolithicSteps
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.start import initial_rates
 from kedfem.dynamics.stepping.transient import transient
-from kedfem.dynamics.stiffening import stiffening
 from kedfem.dynamics.system.starts.accelerations import accelerated_in_a_step
 from kedfem.dynamics.system.starts.start import rest
 from kedfem.errors import KedfemError
@@ -260,14 +258,8 @@ def as_a_run(of: Begun) -> Begun:
 def run_of(of: Begun, monolithic: bool = False) -> np.ndarray:
     """Displacements (T, N) of all links by the solver that a run takes, or by the monolithic one."""
     made, model = of.prepared, of.prepared.model
-    if monolithic and (made.scene.springs or made.scene.motors):
-        analysis = made.scene.analysis.model_copy(update={"solver": "monolithic"})
-        solver: Any = steps_of(made.scene.model_copy(update={"analysis": analysis}), model)
-    elif monolithic:
-        links = model.links, model.joints
-        solver = MonolithicSteps(*links, of.ready.scheme, model.damping, stiffening(model))
-    else:
-        solver = steps_of(made.scene, model)
+    analysis = made.scene.analysis.model_copy(update={"solver": "monolithic"} if monolithic else {})
+    solver = steps_of(made.scene.model_copy(update={"analysis": analysis}), model)
     blocks = list(transient(made.scene, made.linkage, made.path, model, solver))
     every = [np.concatenate([x.links[k].u for x in blocks])[1:] for k in range(len(model.links))]
     return np.concatenate([u.reshape(len(u), -1) for u in every], axis=1)

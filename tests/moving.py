@@ -7,14 +7,10 @@ import numpy as np
 
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.stepping.monolithic import MonolithicSteps
-from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.results.recording import recording
-from kedfem.scene import scene_from, time_grid
-
-Solver = type[MonolithicSteps]
+from kedfem.scene import scene_from
 
 
 def bar(model: str, a: Sequence[float], b: Sequence[float], along: int = 8, **more: Any) -> dict[str, Any]:
@@ -54,13 +50,11 @@ def inverted(model: str = "beam", kind: str = "prismatic", **analysis: Any) -> d
     return {"links": links, "joints": joints, "drive": turning(), "analysis": given}
 
 
-def ran(raw: dict[str, Any], solver: Solver | None = None) -> tuple[Prepared, list[Block]]:
-    """A scene with all its blocks, by its own solver or a given one."""
+def ran(raw: dict[str, Any]) -> tuple[Prepared, list[Block]]:
+    """A scene with all its blocks."""
     scene = scene_from(raw)
     ready = meshed(scene)
-    links, joints = ready.model.links, ready.model.joints
-    scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
-    steps = solver(links, joints, scheme, ready.model.damping) if solver else steps_of(scene, ready.model)
+    steps = steps_of(scene, ready.model)
     return ready, list(transient(scene, ready.linkage, ready.path, ready.model, steps))
 
 

@@ -105,7 +105,7 @@ def by_oracle(of: Begun, count: int, keeps: bool = False) -> tuple[np.ndarray, n
         [nodal_forces(of.ready, k, start.f[own(of.ready, k)]).ravel() for k in range(len(links))]
     )
     seen = [[(0.0, x.copy()) for _ in frames_of(link)] for link, x in zip(links, none, strict=True)]
-    z = np.linalg.lstsq(solver.B, solver.W @ u, rcond=None)[0]
+    z = np.linalg.lstsq(solver.B.toarray(), solver.W @ u, rcond=None)[0]
     C = solver.coordinates(z, start.turned.copy(), at)[1]
     now = Now(
         u, v, a, internal, solver.applied(at), seen, z, start.e.copy(), start.turned.copy(),

@@ -25,9 +25,9 @@ from kedfem.dynamics.loads import coarse_steps
 from kedfem.dynamics.stepping.cost import factor_words
 from kedfem.dynamics.stepping.first_state import period_map
 from kedfem.dynamics.stepping.levels import level_steps
-from kedfem.dynamics.stepping.monolithic import MonolithicSteps
-from kedfem.dynamics.stepping.solvers import Steps, eased_warning
+from kedfem.dynamics.stepping.solvers import eased_warning
 from kedfem.dynamics.system.period.map import Carried
+from kedfem.dynamics.system.steps import Steps
 from kedfem.dynamics.vibration import Vibration, vibration
 from kedfem.links.recovery import stress_recovery
 from kedfem.motion.assembly import assembled, assembly_warning
@@ -234,15 +234,14 @@ def _solvers(ready: Prepared, beside: Neighbours) -> list[Steps]:
     """Those of all levels in time; a steady motion is looked for where that of a neighbour was."""
     solvers = level_steps(ready.scene, ready.model)
     for each in solvers:
-        if not isinstance(each, MonolithicSteps):
-            each.search = replace(each.search, near=beside.near)
+        each.search = replace(each.search, near=beside.near)
     return solvers
 
 
 def _growing(ready: Prepared, solvers: Sequence[Steps]) -> tuple[Steady | None, Vibration | None]:
     """What is known of a steady motion, and of one that is unstable the vibration that grows."""
     steady, solver = steady_of(ready.scene, solvers), solvers[-1]
-    if steady is None or not steady.unstable or isinstance(solver, MonolithicSteps) or solver.steady is None:
+    if steady is None or not steady.unstable or solver.steady is None:
         return steady, None
     over = period_map(ready.scene, ready.linkage, ready.path, ready.model, solver, solver.steady.state)
     found = vibration(over, solver, solver.steady)

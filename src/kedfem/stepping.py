@@ -20,8 +20,7 @@ from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.model import mesh_methods, segments
 from kedfem.dynamics.stepping.levels import leveled
 from kedfem.dynamics.stepping.marks import Marks
-from kedfem.dynamics.stepping.monolithic import MonolithicSteps
-from kedfem.dynamics.stepping.solvers import Steps
+from kedfem.dynamics.system.steps import Steps
 from kedfem.errors import OutputError
 from kedfem.links.recovery import StressRecovery
 from kedfem.output.animation import AnimationWriter
@@ -101,8 +100,7 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
         keeper.put_back(memories)
         refuse_without(shown.frames, shown.one)
     for each in solvers:
-        if not isinstance(each, MonolithicSteps):
-            each.watch = lambda marched: watch(f"steady motion: march {marched} over a period", 0, 0)
+        each.watch = lambda marched: watch(f"steady motion: march {marched} over a period", 0, 0)
     notes, drive = _notes(ready, watched), drive_channel(scene)
     written = ResultsWriter(
         folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes, drive

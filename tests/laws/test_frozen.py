@@ -13,10 +13,10 @@ from kedfem.accuracy.prepared import moving
 from kedfem.dynamics.matrices.dense import SMALL
 from kedfem.dynamics.modes.frozen import Frozen, Modes
 from kedfem.dynamics.modes.lanczos import lanczos
-from kedfem.dynamics.stepping.monolithic import rotated_stiffness
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.oracle.monolithic import Monolithic
+from kedfem.dynamics.system.oracle.monolithic_tangent import rotated_stiffness
 from kedfem.dynamics.system.record import Driven, Held, Spring, System
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.scene import path_parameter, scene_from
@@ -79,8 +79,8 @@ def monolithic_eigenvalues(system: System, motion: RigidMotion, s: float) -> np.
     kappa = np.array([x.stiffness if isinstance(x, Spring) else 0.0 for x in laws])
     hard = C[[isinstance(x, Held | Driven) for x in laws]]
     A = scipy.linalg.block_diag(*K, C.T @ (kappa[:, None] * C))
-    M = scipy.linalg.block_diag(oracle.M, np.zeros((oracle.k, oracle.k)))
-    G = np.block([[oracle.W, -oracle.B], [np.zeros((len(hard), oracle.N)), hard]])
+    M = scipy.linalg.block_diag(oracle.M.toarray(), np.zeros((oracle.k, oracle.k)))
+    G = np.block([[oracle.W.toarray(), -oracle.B.toarray()], [np.zeros((len(hard), oracle.N)), hard]])
     G /= np.maximum(np.linalg.norm(G, axis=1), 1e-300)[:, None]
     Z = scipy.linalg.null_space(G, rcond=1e-10)
     A, M = Z.T @ A @ Z, Z.T @ M @ Z

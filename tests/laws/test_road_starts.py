@@ -10,12 +10,12 @@ from scipy.spatial.transform import Rotation
 from kedfem.accuracy.prepared import meshed
 from kedfem.dynamics.stepping.first_state import motion_of
 from kedfem.dynamics.stepping.solvers import steps_of
-from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.march import Motion, march
 from kedfem.dynamics.system.starts.balanced import NoBalanceError
 from kedfem.dynamics.system.starts.deflected import static
 from kedfem.dynamics.system.starts.instant import Instant
 from kedfem.dynamics.system.starts.internal import own, rows
+from kedfem.dynamics.system.steps import Steps
 from kedfem.scene import scene_from
 
 Raw = dict[str, Any]
@@ -83,15 +83,15 @@ def corner(R: np.ndarray, strut: float = 6300.0, damping: float = 3e3, **analysi
     }  # fmt: skip
 
 
-def made(raw: Raw) -> tuple[CorotationalSteps, Motion]:
+def made(raw: Raw) -> tuple[Steps, Motion]:
     scene = scene_from(raw)
     ready = meshed(scene)
     solver = steps_of(scene, ready.model)
-    assert isinstance(solver, CorotationalSteps)
+    assert solver.corotational
     return solver, motion_of(scene, ready.linkage, ready.path)
 
 
-def travel(solver: CorotationalSteps, u: np.ndarray, name: str) -> np.ndarray:
+def travel(solver: Steps, u: np.ndarray, name: str) -> np.ndarray:
     """Displacement of a body's centre of mass."""
     for k, link in enumerate(solver.ready.system.model.links):
         if link.name == name:
@@ -101,23 +101,23 @@ def travel(solver: CorotationalSteps, u: np.ndarray, name: str) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def start() -> tuple[CorotationalSteps, Motion, np.ndarray]:
+def start() -> tuple[Steps, Motion, np.ndarray]:
     solver, motion = made(corner(np.eye(3), initial="quasi-static"))
-    return solver, motion, solver.begin(motion).u
+    return solver, motion, solver.start(motion, []).u
 
 
 def test_a_start_is_where_a_damped_march_from_rest_settles() -> None:
     """Of all bodies, 1e-4 of the largest displacement; dampers near critical damping leave e^-16 after three seconds."""
     raw = corner(np.eye(3), damping=1.5e4, initial="quasi-static", step=5e-3)
     solver, motion = made(raw)
-    wanted = solver.begin(motion).u
+    wanted = solver.start(motion, []).u
     at_rest, _ = made({**raw, "analysis": {**raw["analysis"], "initial": "rest"}})
     times = at_rest.ready.c.h * np.arange(1, 601)
-    last, _ = march(at_rest.ready, at_rest.begin(motion), motion(times), motion)
+    last, _ = march(at_rest.ready, at_rest.start(motion, []), motion(times), motion)
     assert_allclose(last.u, wanted, atol=1e-4 * np.abs(wanted).max())
 
 
-def test_the_tyre_bears_all_weight(start: tuple[CorotationalSteps, Motion, np.ndarray]) -> None:
+def test_the_tyre_bears_all_weight(start: tuple[Steps, Motion, np.ndarray]) -> None:
     """Its force along its line, and the weight: equilibrium along the slides that nothing drives, to 1e-6."""
     solver, _, u = start
     line = np.array([0, 0, 0.31]) + travel(solver, u, "upright")
@@ -127,18 +127,18 @@ def test_the_tyre_bears_all_weight(start: tuple[CorotationalSteps, Motion, np.nd
     assert force * line[2] / np.linalg.norm(line) == pytest.approx(weight - 9.81 * road, rel=1e-6)
 
 
-def test_a_start_turns_with_the_scene(start: tuple[CorotationalSteps, Motion, np.ndarray]) -> None:
+def test_a_start_turns_with_the_scene(start: tuple[Steps, Motion, np.ndarray]) -> None:
     """Axes of beams' sections and of hinges are found from the scene: 1e-6, what iterations leave."""
     solver, _, u = start
     askew, motion = made(corner(ASKEW, initial="quasi-static"))
-    found = askew.begin(motion).u
+    found = askew.start(motion, []).u
     for name in ("body", "upright", "upper"):
         there = travel(solver, u, name)
         assert_allclose(ASKEW.T @ travel(askew, found, name), there, atol=1e-6 * np.abs(u).max())
 
 
 def test_positions_of_a_static_analysis_are_its_starts(
-    start: tuple[CorotationalSteps, Motion, np.ndarray],
+    start: tuple[Steps, Motion, np.ndarray],
 ) -> None:
     """Rigid links of steps and of positions differ in stiffness: 1e-4 of what they move by."""
     solver, _, u = start
@@ -162,5 +162,5 @@ def test_a_start_that_is_not_found_is_refused_in_words_and_soon(monkeypatch: pyt
     with pytest.raises(
         NoBalanceError, match=r"link '\w+' moves most from iteration to iteration.*take initial"
     ):
-        solver.begin(motion)
+        solver.start(motion, [])
     assert counted[0] < 60 + 120 * 50

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from kedfem.dynamics.stepping.monolithic import MonolithicSteps
+from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.march import displacements, march, ready
 from kedfem.dynamics.system.record import COROTATIONAL, TANGENTIAL, Driven, Held, Spring, Stop
@@ -56,9 +56,9 @@ def elements() -> Raw:
 
 
 def monolithic_displacements(of: Begun) -> np.ndarray:
-    """Of the step that assembles and factors everything at each time, all bodies' rows over the steps."""
-    made, scheme = of.prepared, of.ready.scheme
-    solver = MonolithicSteps(made.model.links, made.model.joints, scheme, made.model.damping)
+    """As a run by the monolithic solver, all bodies' rows over the steps."""
+    made, analysis = of.prepared, of.prepared.scene.analysis.model_copy(update={"solver": "monolithic"})
+    solver = steps_of(made.scene.model_copy(update={"analysis": analysis}), made.model)
     blocks = list(transient(made.scene, made.linkage, made.path, made.model, solver))
     every = [np.concatenate([block.links[k].u for block in blocks])[1:] for k in range(len(made.model.links))]
     return np.concatenate([u.reshape(len(u), -1) for u in every], axis=1)

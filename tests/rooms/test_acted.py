@@ -11,7 +11,6 @@ from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
-from kedfem.dynamics.system.steps import SystemSteps
 from kedfem.results.audit import Account
 from kedfem.results.recording import recording
 from kedfem.scene import scene_from
@@ -104,7 +103,6 @@ def test_the_monolithic_solver_finds_the_same(initial: str, rho_inf: float) -> N
     )
     ready, _ = prepared(scene_from(monolithic))
     solver = steps_of(ready.scene, ready.model)
-    assert isinstance(solver, SystemSteps)
     assert solver.oracle is not None
     one, other = places(condensed), places(monolithic)
     assert apart(one, other) < 1e-9 * largest(one)

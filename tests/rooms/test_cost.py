@@ -7,7 +7,6 @@ import pytest
 from kedfem.accuracy.prepared import meshed
 from kedfem.dynamics.stepping import cost
 from kedfem.dynamics.stepping.solvers import steps_of
-from kedfem.dynamics.system.steps import SystemSteps
 from kedfem.scene import scene_from, time_grid
 from kedfem.stepping import frame_steps, stepped
 from kedfem.tables import check
@@ -33,7 +32,7 @@ def test_springs_on_rigid_body_frames_and_frames_that_follow_are_tried(frames: s
     assert 24 <= said.tried <= 120
     assert said.steps > 0.0
     solver = steps_of(ready.scene, ready.model)
-    assert isinstance(solver, SystemSteps) == (frames == "rigid-body")
+    assert solver.corotational == (frames != "rigid-body")
 
 
 def test_what_is_too_large_to_be_tried_is_forecast_by_its_sizes(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from kedfem.dynamics.history import Block, LinkHistory, Snapshot
 from kedfem.dynamics.joints.ports import port_vectors
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.stepping.solvers import Steps
+from kedfem.dynamics.system.steps import Steps
 from kedfem.links.record import mass_times
 from kedfem.results.recording import recording, rows
 from kedfem.scene import scene_from

@@ -14,9 +14,8 @@ from kedfem.accuracy.histories import Histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.dynamics.rigid_body import motions
 from kedfem.dynamics.stepping.first_state import started
-from kedfem.dynamics.stepping.monolithic import MonolithicSteps
 from kedfem.dynamics.stepping.scheme import generalised_alpha
-from kedfem.dynamics.stepping.solvers import Steps, steps_of
+from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import snapshots, transient
 from kedfem.dynamics.system import (
     algebra_kernel,
@@ -27,7 +26,7 @@ from kedfem.dynamics.system import (
     linear_kernel,
     rigid_frame_kernel,
 )
-from kedfem.dynamics.system.steps import SystemSteps, rigid_frame_system
+from kedfem.dynamics.system.steps import Steps, scene_system
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import rigid_motion
 from kedfem.results import Channel
@@ -72,9 +71,9 @@ def test_the_systems_steps_are_the_monolithic_ones(made: Any, rho_inf: float) ->
     ready = meshed(scene_from(made()))
     model = ready.model
     scheme = generalised_alpha(time_grid(ready.scene).step, rho_inf)
-    monolithic = displacements(ready, MonolithicSteps(model.links, model.joints, scheme, model.damping))
-    system = displacements(
-        ready, SystemSteps(ready.scene, rigid_frame_system(ready.scene, model), model, scheme)
+    monolithic, system = (
+        displacements(ready, Steps(ready.scene, scene_system(ready.scene, model), model, scheme, which))
+        for which in (True, False)
     )
     assert model.damping.present
     for got, wanted in zip(system, monolithic, strict=True):
@@ -128,11 +127,11 @@ def test_what_was_finite_before_a_blow_up_is_handed_on(monkeypatch: pytest.Monke
     advance, left, seen = solver.advance, [270], []  # not finite from a step in the second block on
 
     def breaking(*given: Any) -> Any:
-        links, state = advance(*given)
+        links, exerted, state = advance(*given)
         if left[0] <= len(links[1].g):
             links[1].g[left[0] - 1 :] = np.nan
         left[0] -= len(links[1].g)
-        return links, state
+        return links, exerted, state
 
     monkeypatch.setattr(solver, "advance", breaking)
 

@@ -10,10 +10,9 @@ from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.scheme import generalised_alpha
-from kedfem.dynamics.stepping.solvers import Steps, steps_of
+from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
-from kedfem.dynamics.system.steps import SystemSteps, rigid_frame_system
-from kedfem.errors import SolveError
+from kedfem.dynamics.system.steps import Steps, scene_system
 from kedfem.results.recording import recording
 from kedfem.results.records import Channel
 from kedfem.scene import Scene, scene_from, time_grid
@@ -68,10 +67,10 @@ def channels(raw: dict[str, Any], solver_of: Any) -> tuple[Steps, dict[Channel, 
     return solver, {x.channel: np.concatenate([x.rows(block) for block in blocks]) for x in every}
 
 
-def oracle_of(scene: Scene, model: Model) -> SystemSteps:
+def oracle_of(scene: Scene, model: Model) -> Steps:
     """The oracle on the same model, reduced or not: as of itself, `solver = "monolithic"` reduces nothing."""
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
-    return SystemSteps(scene, rigid_frame_system(scene, model), model, scheme, monolithic=True)
+    return Steps(scene, scene_system(scene, model), model, scheme, monolithic=True)
 
 
 def apart(found: dict[Channel, np.ndarray], wanted: dict[Channel, np.ndarray]) -> float:
@@ -96,7 +95,6 @@ def test_all_that_is_recorded_is_as_by_the_oracle(name: str) -> None:
     raw["analysis"]["revolutions"] = 0.06
     solver, found = channels(raw, steps_of)
     _, wanted = channels(raw, oracle_of)
-    assert isinstance(solver, SystemSteps)
     assert solver.oracle is None
     assert apart(found, wanted) <= 1e-8
     assert any(each.name.startswith(("springs/", "motors/")) for each in found)
@@ -137,11 +135,5 @@ def test_sparse_bodies_move_as_dense_ones(scene: Any, monkeypatch: pytest.Monkey
     for small in (0, 10_000):
         monkeypatch.setattr("kedfem.dynamics.system.layout.SMALL", small)
         solver, found[small] = channels(raw, steps_of)
-        assert isinstance(solver, SystemSteps)
         assert solver.ready.bodies.dense.all() == (small > 0)
     assert apart(found[0], found[10_000]) <= 1e-7
-
-
-def test_links_too_large_for_the_oracle_are_refused() -> None:
-    with pytest.raises(SolveError, match=r"analysis\.solver: .* at most 600 unknowns in all, .* got"):
-        channels(large(), oracle_of)

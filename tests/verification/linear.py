@@ -2,11 +2,11 @@
 
 import numpy as np
 import scipy.sparse as sp
+from benchmarks.monolithic import shared_nodes
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.matrices.cholesky import Cholesky
-from kedfem.dynamics.stepping.monolithic import shared_nodes
 from kedfem.links.record import Link
 from kedfem.links.surfaces.coupling_surfaces import face_surface, port_weights
 
@@ -80,4 +80,4 @@ def mean_support(link: Link, *ends: tuple[np.ndarray, list[tuple[int, str]]]) ->
     joint = Attachment(
         nodes, W[:, nodes], 3, np.zeros((p, 3)), ("support",) * p, keep, np.zeros((len(keep), 0))
     )
-    return shared_nodes([link], [joint])[0]
+    return shared_nodes([link], [joint])

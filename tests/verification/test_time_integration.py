@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from kedfem.dynamics.stepping.monolithic import rotated_stiffness
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.state import Rayleigh
+from kedfem.dynamics.system.oracle.monolithic_tangent import rotated_stiffness
 from kedfem.links.beams.beam import beam_link
 from kedfem.links.beams.section import rectangle
 from kedfem.links.record import Link, mass_times

@@ -31,7 +31,7 @@ from kedfem.accuracy.variants import with_analysis
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.matrices.dense import SMALL
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.stepping.solvers import Steps
+from kedfem.dynamics.system.steps import Steps
 from kedfem.errors import KedfemError
 from kedfem.links.indicator import Indicator, indicator
 from kedfem.results.recording import recording

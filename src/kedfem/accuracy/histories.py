@@ -11,10 +11,9 @@ from kedfem.arrays import Float
 from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.levels import level_steps, leveled
-from kedfem.dynamics.stepping.monolithic import MonolithicSteps
-from kedfem.dynamics.stepping.solvers import Steps
 from kedfem.dynamics.system.period.map import Carried, carried
 from kedfem.dynamics.system.period.search import Periodic, Search
+from kedfem.dynamics.system.steps import Steps
 from kedfem.results import Channel
 from kedfem.results.recording import recording, rows
 from kedfem.results.records import largest_by_unit
@@ -66,8 +65,7 @@ def histories(
     times, taken, kept = [], [], []
     solvers = level_steps(ready.scene, ready.model)
     for solver in solvers:
-        if not isinstance(solver, MonolithicSteps):
-            solver.search = Search(near, ROUGHLY)
+        solver.search = Search(near, ROUGHLY)
     for block in leveled(ready.scene, ready.linkage, ready.path, ready.model, solvers):
         times.append(block.motion.t)
         taken.append(rows(recorded, block))

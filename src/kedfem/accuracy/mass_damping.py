@@ -1,4 +1,4 @@
-"""A warning where damping in proportion to mass resists motions that the drive leaves free."""
+"""A warning where damping in proportion to mass resists motions that no drive prescribes."""
 
 import numpy as np
 
@@ -7,7 +7,9 @@ from kedfem.motion.linkage import drawn_linkage
 from kedfem.motion.released_motions import free_motions
 from kedfem.scene import time_grid, without_vibration
 
-LOST = 0.01  # of the speed of what moves freely over the run, and of the energy exchanged: less is not told
+LOST = (
+    0.01  # of the speed of what moves freely over the run, and of the energy exchanged: less is not reported
+)
 
 
 def mass_damping_warning(ready: Prepared, taken: float | None = None) -> tuple[str, ...]:

@@ -25,11 +25,9 @@ from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.stepping.solvers import Steps
 from kedfem.dynamics.system.arrays import Coefficients
-from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.sparse import Part, SparsePart, momentum
-from kedfem.dynamics.system.steps import SystemSteps
+from kedfem.dynamics.system.steps import Steps
 from kedfem.links.record import Link, in_space, mass_times
 from kedfem.links.reduced import rigid_modes
 from kedfem.results import Peak
@@ -98,14 +96,14 @@ class Rounding:
         """Of the links of a model, as its solver factored them."""
         first = solvers[0] if solvers else None
         stiffest = np.zeros(len(model.links))
-        if isinstance(first, CorotationalSteps):
+        if first is not None and first.corotational:
             ready = first.ready
             stiffest[:] = [
                 FOLLOWED[link.kind] * np.abs(part.S).max(initial=0.0) / ready.c.c_K
                 for part, link in zip(ready.parts, model.links, strict=True)
             ]
             stiffest[[link.rigid for link in model.links]] = 0.0
-        solver = first if isinstance(first, SystemSteps) and first.oracle is None else None
+        solver = None if first is None or first.corotational or first.oracle is not None else first
         defects: list[np.ndarray | None] = []
         for k, link in enumerate(model.links):
             if link.fit is not None or link.rigid:

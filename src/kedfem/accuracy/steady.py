@@ -7,8 +7,8 @@ from math import ceil, log
 import numpy as np
 
 from kedfem.dynamics.stepping.combined import level_weights
-from kedfem.dynamics.stepping.solvers import Steps
 from kedfem.dynamics.system.period.search import Periodic
+from kedfem.dynamics.system.steps import Steps
 from kedfem.scene import Scene, time_grid, turn_steps
 
 RESOLVED = (

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from kedfem.arrays import Float, Int
-from kedfem.dynamics.stepping.state import ForcingAt, LinkState
+from kedfem.dynamics.stepping.state import ForcingAt
 from kedfem.motion.rigid import RigidMotion
 
 
@@ -232,16 +232,3 @@ class Snapshot:
     def phi(self) -> float:
         """Drive angle [rad]."""
         return float(self.motion.phi[self.k])
-
-
-def history(states: Sequence[LinkState]) -> LinkHistory:
-    """States of one link at successive time points, stacked."""
-    stacked = {name: np.stack([getattr(s, name) for s in states]) for name in ("u", "v", "a", "g", "R", "F")}
-    Cg = [s.C[0] for s in states if s.C is not None]
-    products = Products(
-        np.stack([s.Mv for s in states]), np.stack([s.Kg for s in states]), np.stack(Cg) if Cg else None
-    )
-    return LinkHistory(
-        **stacked, port_forces=np.stack([s.port_forces for s in states]),
-        strain=np.array([0.5 * float(np.vdot(s.g, s.Kg)) for s in states]), products=products,
-    )  # fmt: skip

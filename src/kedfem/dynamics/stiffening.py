@@ -24,7 +24,7 @@ from kedfem.dynamics.matrices.interface import solved, static_tie
 from kedfem.dynamics.matrices.substructure import Substructure, factored, mass_matrix
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_elements import RigidElements, unit_loads_on, with_elements
-from kedfem.dynamics.stepping.state import ForcingAt, LinkState, Nodal
+from kedfem.dynamics.stepping.state import ForcingAt, Nodal
 from kedfem.links.record import Link, Matrix
 from kedfem.links.reduced import rigid_modes
 from kedfem.links.stress_stiffness import stress_stiffness, turned_directions
@@ -247,11 +247,6 @@ def _interface(part: Substructure, R: Float[np.ndarray, "T d d"]) -> Float[np.nd
     out = np.zeros((len(R), len(part.S), k))
     out[:, : len(joint.keep)] = turned[:, joint.keep]
     return out
-
-
-def with_turnings(states: Sequence[LinkState], turnings: Sequence[Turning]) -> list[LinkState]:
-    """The states with k g P in their internal force, so that it is part of all that the scheme says of f."""
-    return [replace(s, f=s.f + k(s.g)) for s, k in zip(states, turnings, strict=True)]
 
 
 def _given(now: ForcingAt) -> Float[np.ndarray, " m"]:

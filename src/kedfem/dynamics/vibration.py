@@ -7,12 +7,11 @@ import numpy as np
 
 from kedfem.arrays import Float, Int
 from kedfem.dynamics.history import LinkMoment, Snapshot
-from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.march import displacements
 from kedfem.dynamics.system.period.map import PeriodMap
 from kedfem.dynamics.system.period.search import Periodic
 from kedfem.dynamics.system.starts.instant import TURN, Flat
-from kedfem.dynamics.system.steps import SystemSteps
+from kedfem.dynamics.system.steps import Steps
 from kedfem.links.record import Link, mass_times
 from kedfem.motion.rigid import RigidMotion, joined
 
@@ -47,7 +46,7 @@ class Vibration:
         return f"at about {self.frequency:.4g} Hz, {mostly}"
 
 
-def vibration(over: PeriodMap, solver: SystemSteps | CorotationalSteps, found: Periodic) -> Vibration:
+def vibration(over: PeriodMap, solver: Steps, found: Periodic) -> Vibration:
     """The vibration of the multiplier of largest magnitude, from the difference that it makes in a march over the period.
 
     Parameters
@@ -105,9 +104,7 @@ class _States:
     R: list[Rows]
 
 
-def _states(
-    over: PeriodMap, solver: SystemSteps | CorotationalSteps, x: Flat, at: Int[np.ndarray, " f"]
-) -> _States:
+def _states(over: PeriodMap, solver: Steps, x: Flat, at: Int[np.ndarray, " f"]) -> _States:
     """What a march over the period passes through."""
     motions, out, done, links = [], [], 0, solver.links
     for motion, found in over.histories(x):

@@ -10,7 +10,7 @@ from kedfem.motion.constraints import perpendiculars
 from kedfem.scene import LineSpring, Spring
 
 WIDTH = 0.012  # radius of a coil, of what is drawn
-SLENDER = 0.15  # most that it is of the length between the two points as drawn
+SLENDER = 0.15  # most that it is of the length between the two points in the reference position
 WIRE = 0.2  # radius of its wire, of the coil's
 TURNS, AROUND, STRAIGHT = (
     6,

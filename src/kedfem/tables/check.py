@@ -17,7 +17,7 @@ from kedfem.arrays import Float
 from kedfem.dynamics.force_elements import force_elements
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.stepping.cost import Cost, estimated_cost, tried_cost
-from kedfem.dynamics.stepping.solvers import Steps
+from kedfem.dynamics.system.steps import Steps
 from kedfem.errors import KedfemError
 from kedfem.links.recovery import StressRecovery, stress_recovery
 from kedfem.motion.initial import initial_twists

@@ -12,7 +12,7 @@ from kedfem.arrays import Float
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.constraint_matrices import JointRows
 from kedfem.dynamics.joints.ports import port_rotation, port_values
-from kedfem.dynamics.matrices.interface import MANY, RowState, Tie
+from kedfem.dynamics.matrices.interface import MANY, Tie
 from kedfem.dynamics.stepping.state import LinkState, NodalOf
 
 # differences of fourth and third order at the first of five instants
@@ -45,14 +45,6 @@ class FirstRows:
         soft, of = self.rows.soft, self.rows
         push = -of.stiffness[soft] * e[soft] - of.damping[soft] * e1[soft]
         return self._hard(-2 * self.C1 @ z1 - self.C2 @ z, self.C[soft].T @ push)
-
-    def state(self, joints: Sequence[Attachment], states: Sequence[LinkState]) -> RowState:
-        """What rows carry into the first step."""
-        z, z1, z2 = (interface_values(joints, [getattr(s, x) for s in states]) for x in ("u", "v", "a"))
-        e = np.stack([
-            self.C @ z, self.C1 @ z + self.C @ z1, self.C2 @ z + 2 * self.C1 @ z1 + self.C @ z2,
-        ])  # fmt: skip
-        return RowState(interface_forces(joints, states), e * self.rows.soft)
 
 
 def first_rows(rows: JointRows, h: float) -> FirstRows:

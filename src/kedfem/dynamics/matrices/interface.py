@@ -25,7 +25,6 @@ import scipy.sparse as sp
 from kedfem.arrays import Float
 from kedfem.dynamics.joints.constraint_matrices import JointRows
 from kedfem.dynamics.matrices.cholesky import Cholesky
-from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.errors import SolveError
 
 MANY = 400  # interface unknowns above which few links share each, and their matrix is sparse
@@ -45,18 +44,6 @@ class Tie:
     compliance: Float[np.ndarray, " r"]
     target: Float[np.ndarray, " r"]
     force: Float[np.ndarray, " k"]
-
-
-@dataclass(frozen=True, slots=True)
-class RowState:
-    """What rows carry from step to step.
-
-    p : (k,) Cᵀ μ, their forces on the interface unknowns
-    e : (3, r) e, e', e''
-    """
-
-    p: Float[np.ndarray, " k"]
-    e: Float[np.ndarray, "3 r"]
 
 
 def solved(
@@ -138,24 +125,6 @@ def semidefinite_factor(G: Float[np.ndarray, "r r"]) -> tuple[Float[np.ndarray, 
             L[n, :n], L[n, n] = row, np.sqrt(left)
             kept.append(i)
     return L[: len(kept), : len(kept)], np.array(kept, int)
-
-
-def step_tie(C: Float[np.ndarray, "r k"], rows: JointRows, scheme: Scheme, state: RowState) -> Tie:
-    """What the rows ask in a step: κ = (1 − α_f) (k + c a₁), with e' by Newmark's formula."""
-    share = 1 - scheme.alpha_f
-    kappa = share * (rows.stiffness + rows.damping * scheme.a1)
-    known = C.T @ (share * rows.damping * (scheme.rate @ state.e))
-    return Tie(C, 1 / kappa, np.zeros(len(C)), scheme.alpha_f * state.p + known)
-
-
-def after_step(tie: Tie, z: np.ndarray, m: np.ndarray, scheme: Scheme, state: RowState) -> RowState:
-    """The rows' state at the end of a step."""
-    p = (tie.C.T @ m + tie.force - scheme.alpha_f * state.p) / (1 - scheme.alpha_f)
-    e0, e1, e2 = state.e
-    e = tie.C @ z
-    second = scheme.a0 * (e - e0) - scheme.acceleration[1] * e1 - scheme.acceleration[2] * e2
-    first = e1 + scheme.h * ((1 - scheme.gamma) * e2 + scheme.gamma * second)
-    return RowState(p, np.stack([e, first, second]))
 
 
 def static_tie(rows: JointRows, at: int) -> Tie:

@@ -10,7 +10,8 @@ from kedfem.arrays import Float
 from kedfem.dynamics.matrices.dense import SMALL
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.levels import level_steps
-from kedfem.dynamics.stepping.solvers import Steps, block_length
+from kedfem.dynamics.stepping.solvers import block_length
+from kedfem.dynamics.system.steps import Steps
 from kedfem.mesh.memory_forecast import ASSEMBLY_BYTES, FACTOR_BYTES, LINK_BYTES, PLANE_FILL
 from kedfem.scene import Scene, time_grid
 

@@ -1,7 +1,6 @@
 """How the elastic motion begins: at rest, quasi-static, from loads that are let go, or in its steady state."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -9,25 +8,21 @@ from kedfem.dynamics.joints.first_rows import FIRST, INSTANTS
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.coarse import coarse_model
 from kedfem.dynamics.rigid_body import instants, rows_at_start
-from kedfem.dynamics.stepping.monolithic import MonolithicSteps
-from kedfem.dynamics.stepping.solvers import ByLink, Steps, block_length, dampers_count, steps_of
+from kedfem.dynamics.stepping.solvers import block_length, dampers_count, steps_of
 from kedfem.dynamics.stepping.start import Deflected, initial_rates, initial_states, quasi_static
 from kedfem.dynamics.stepping.state import LinkState
 from kedfem.dynamics.stiffening import Stiffening
-from kedfem.dynamics.system.corotational import CorotationalSteps
 from kedfem.dynamics.system.march import Motion
 from kedfem.dynamics.system.period.map import PeriodMap
 from kedfem.dynamics.system.period.search import periodic
 from kedfem.dynamics.system.starts.instant import Instant
 from kedfem.dynamics.system.starts.start import from_links
 from kedfem.dynamics.system.state import State
-from kedfem.dynamics.system.steps import SystemSteps
+from kedfem.dynamics.system.steps import Steps
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import Scene, path_parameter, time_grid
-
-Start = list[LinkState] | State
 
 
 def motion_of(scene: Scene, linkage: Linkage, along: Path) -> Motion:
@@ -35,7 +30,7 @@ def motion_of(scene: Scene, linkage: Linkage, along: Path) -> Motion:
     return lambda t: rigid_motion(linkage, along, t, path_parameter(scene, t))
 
 
-def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Start:
+def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> State:
     """How the elastic motion begins: at rest, quasi-static, or with the steady state of the solver's own steps.
 
     Raises
@@ -46,14 +41,11 @@ def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: S
     start = _begun(scene, linkage, along, model, solver)
     if scene.analysis.kind != "steady":
         return start
-    if isinstance(solver, MonolithicSteps) or not isinstance(start, State):
-        raise ValueError("a steady state must be that of a system, got the monolithic solver's")
 
     over = period_map(scene, linkage, along, model, solver, solver.search.start(start))
     small = coarse_map(scene, linkage, along, model) if over.linear else None
     solver.steady = periodic(over, scene.analysis.stability, solver.watch, solver.search.closed, small)
-    if isinstance(solver, SystemSteps):
-        solver.over = over
+    solver.over = None if solver.corotational else over
     return solver.steady.state
 
 
@@ -64,51 +56,34 @@ def coarse_map(scene: Scene, linkage: Linkage, along: Path, model: Model) -> Per
         return None
     solver = steps_of(scene, small)
     start = _begun(scene, linkage, along, small, solver)
-    if isinstance(solver, MonolithicSteps) or not isinstance(start, State):
-        raise ValueError("a steady state must be that of a system, got the monolithic solver's")
     return period_map(scene, linkage, along, small, solver, start)
 
 
 def period_map(
-    scene: Scene,
-    linkage: Linkage,
-    along: Path,
-    model: Model,
-    solver: SystemSteps | CorotationalSteps,
-    start: State,
+    scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps, start: State
 ) -> PeriodMap:
     """The map of a solver's steps over the period of a steady motion."""
     motion_at = motion_of(scene, linkage, along)
     return PeriodMap(solver.ready, start, motion_at, time_grid(scene).end, block_length(model))
 
 
-def _begun(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Start:
+def _begun(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> State:
     """As `started`, of a motion that begins as it is told to; of a steady one the search for it begins there."""
     motion_at = motion_of(scene, linkage, along)
-    if isinstance(solver, CorotationalSteps):
-        return solver.begin(motion_at)
-    if not isinstance(solver, SystemSteps):
-        return first_states(scene, linkage, along, model, solver.stiffening)
-    at_rest = scene.analysis.initial == "rest"
-    pulled = scene.springs or scene.motors or scene.limits
-    plain = (solver.ready.c.single or solver.stiffening is not None) and not pulled
-    damped = dampers_count(model)
-    # nodal rows lose digits of links a million times as stiff as others
-    stiff = bool(model.rows) and any(link.rigid for link in model.links)
-    if plain and (at_rest or not (damped or stiff)) and not scene.analysis.initial_deflection:
+    if _in_nodal_rows(scene, model, solver):
         states = first_states(scene, linkage, along, model, solver.stiffening)
         return from_links(Instant(solver.ready, motion_at, 0.0), states)
-    return solver.start(at_rest, motion_at, initial_rates(scene, linkage, model) if at_rest else [])
+    return solver.start(motion_at, initial_rates(scene, linkage, model))
 
 
-def begun(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: ByLink, states: Start) -> Any:
-    """A solver's state at the first time point."""
-    if isinstance(states, State) or isinstance(solver, SystemSteps):
-        return states
-    if not model.rows:
-        return solver.begin(states)
-    rows = rows_at_start(scene, linkage, along, model)
-    return solver.begin(states, None if rows is None else rows.state(model.joints, states))
+def _in_nodal_rows(scene: Scene, model: Model, solver: Steps) -> bool:
+    """Whether nodal rows know all that acts at the start: they keep more digits of slender links, and cost less."""
+    elements = scene.springs or scene.motors or scene.limits or scene.analysis.initial_deflection
+    if solver.corotational or elements or not (solver.ready.c.single or solver.stiffening is not None):
+        return False
+    # they lose digits of links a million times as stiff as others
+    stiff = bool(model.rows) and any(link.rigid for link in model.links)
+    return scene.analysis.initial == "rest" or not (dampers_count(model) or stiff)
 
 
 def first_states(

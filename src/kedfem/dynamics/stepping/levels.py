@@ -28,11 +28,10 @@ from kedfem.dynamics.rigid_links import for_steps
 from kedfem.dynamics.stepping.combined import Combination, level_weights
 from kedfem.dynamics.stepping.first_state import started
 from kedfem.dynamics.stepping.marks import Mark, Marks
-from kedfem.dynamics.stepping.monolithic import MonolithicSteps
 from kedfem.dynamics.stepping.scheme import Scheme, generalised_alpha
-from kedfem.dynamics.stepping.solvers import Steps, block_length, steps_of
+from kedfem.dynamics.stepping.solvers import block_length, steps_of
 from kedfem.dynamics.stepping.transient import transient
-from kedfem.dynamics.system.corotational import CorotationalSteps
+from kedfem.dynamics.system.steps import Steps
 from kedfem.errors import SolveError
 from kedfem.mesh.memory_forecast import memory
 from kedfem.motion.linkage import Linkage
@@ -115,10 +114,7 @@ def leveled(
     """
     marks = fine if isinstance(fine, Marks) else Marks.of(len(solvers), kept=False)
     for each, mark in zip(solvers, marks.levels, strict=True):
-        if isinstance(each, CorotationalSteps):
-            each.eased = mark.eased
-        if not isinstance(each, MonolithicSteps):
-            each.steady = mark.steady
+        each.eased, each.steady = mark.eased, mark.steady
     if len(solvers) == 1:
         yield from _single(scene, linkage, along, model, solvers[0], marks)
         return

@@ -95,11 +95,7 @@ def initial_states(
             else None
         )
         Mu, Mv, Ma = (mass_times(link.mass, x) for x in (start.u, start.v, a))
-        states.append(
-            LinkState(
-                start.u, start.v, a, Mu, Mv, Ma, g[k], now.R, Kg[k], f[k], C, now.F, forces[k], start.g_rate
-            )
-        )
+        states.append(LinkState(start.u, start.v, a, Mu, Mv, Ma, now.R, f[k], C, forces[k]))
     return states
 
 

@@ -1,11 +1,10 @@
-"""What a link carries from step to step."""
+"""What acts on a link at a time, its damping, and its state where a march begins."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.stepping.scheme import Scheme
 
 Nodal = Float[np.ndarray, "n d"]
 NodalOf = Float[np.ndarray, "_ _"]  # of several links, each with its own n
@@ -40,17 +39,14 @@ class ForcingAt:
 
 @dataclass(frozen=True, slots=True)
 class LinkState:
-    """Elastic state of one link at one time; all (n, d).
+    """Elastic state of one link where a march begins; all (n, d).
 
     u, v, a : δ, δ', δ'', world components [m, m/s, m/s²; third row of a beam: ψ]
     Mu, Mv, Ma : the same times the mass
-    g : δ in the link frame; R : (d, d) the link's orientation
-    Kg : K0 g, link frame [N]
-    f : internal force K0 g + C0 g', link frame [N]
+    R : (d, d) the link's orientation
+    f : internal force K0 g + C0 g', link frame [N], with g = δ there
     C : (3, n, d) C0 times (g, g', g''), link frame, None without damping
-    F : P − M R0'', world components [N]
     port_forces : (q,) λ on the link at its ports, link frame [N]
-    g1 : g' where a march begins; None later, where C has what is needed of it
     """
 
     u: Nodal
@@ -59,24 +55,7 @@ class LinkState:
     Mu: Nodal
     Mv: Nodal
     Ma: Nodal
-    g: Nodal
     R: Float[np.ndarray, "d d"]
-    Kg: Nodal
     f: Nodal
     C: Float[np.ndarray, "3 n d"] | None
-    F: Nodal
     port_forces: Float[np.ndarray, " q"]
-    g1: Nodal | None = None
-
-
-def accelerated(scheme: Scheme, u1: Nodal, u: Nodal, v: Nodal, a: Nodal) -> tuple[Nodal, Nodal]:
-    """Rate and acceleration at the end of the step from the displacement there, Newmark's formulas."""
-    a1 = u1 - u
-    a1 *= scheme.a0
-    b = scheme.acceleration
-    a1 -= b[1] * v
-    a1 -= b[2] * a
-    v1 = (scheme.h * scheme.gamma) * a1
-    v1 += v
-    v1 += (scheme.h * (1 - scheme.gamma)) * a
-    return v1, a1

@@ -6,15 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from kedfem.dynamics.history import Block, LinkHistory, Snapshot, history
-from kedfem.dynamics.joints.constraint_matrices import joint_rows
+from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_body import forcings, motions
-from kedfem.dynamics.stepping.first_state import Start, begun, motion_of, started
+from kedfem.dynamics.stepping.first_state import motion_of, started
 from kedfem.dynamics.stepping.marks import Mark
-from kedfem.dynamics.stepping.monolithic import MonolithicSteps
-from kedfem.dynamics.stepping.solvers import ByLink, Steps, block_length
-from kedfem.dynamics.system.corotational import CorotationalSteps
+from kedfem.dynamics.stepping.solvers import block_length
 from kedfem.dynamics.system.march import HALVINGS, ConvergenceError
 from kedfem.dynamics.system.period.search import residual_of
 from kedfem.dynamics.system.starts.balanced import NoBalanceError
@@ -22,12 +19,12 @@ from kedfem.dynamics.system.starts.deflected import quasi_static as deflection_i
 from kedfem.dynamics.system.starts.deflected import static
 from kedfem.dynamics.system.starts.instant import Instant
 from kedfem.dynamics.system.state import State
-from kedfem.dynamics.system.steps import SystemSteps
+from kedfem.dynamics.system.steps import Steps
 from kedfem.errors import SolveError
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
-from kedfem.motion.rigid import RigidMotion, rigid_motion
-from kedfem.scene import Scene, path_parameter, time_grid, without_vibration
+from kedfem.motion.rigid import RigidMotion
+from kedfem.scene import Scene, time_grid, without_vibration
 
 BEYOND = 1e9  # m: a displacement that has grown past that is no more finite than inf
 STIFFENED = 'stiffening is not a small term; take frames = "co-rotational"'
@@ -35,7 +32,7 @@ STIFFENED = 'stiffening is not a small term; take frames = "co-rotational"'
 
 def transient(
     scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps,
-    start: Start | Mark | None = None,
+    start: State | Mark | None = None,
 ) -> Iterator[Block]:  # fmt: skip
     """All time points of the analysis, [KED, eq. (20)], block after block; nothing is kept.
 
@@ -54,56 +51,9 @@ def transient(
     if without_vibration(scene):
         yield from _positions(scene, linkage, along, model, solver, mark)
         return
-    if isinstance(solver, CorotationalSteps):
-        yield from _corotational(scene, linkage, along, model, solver, mark)
-        return
-    stresses = solver.stiffening
-    state: Any = mark.state
+    motion_at, state, length = motion_of(scene, linkage, along), mark.state, block_length(model)
     if state is None:
-        states = started(scene, linkage, along, model, solver) if mark.start is None else mark.start
-        drawn = rigid_motion(linkage, along, np.zeros(1), path_parameter(scene, np.zeros(1)))
-        yield Block(0, drawn, _first(model, solver, states, drawn))
-        state = begun(scene, linkage, along, model, solver, states)
-    length = block_length(model)
-
-    motion_at = motion_of(scene, linkage, along)
-    for first, motion in motions(scene, linkage, along, since):
-        for k in range(0, len(motion.t), length):
-            if first + k < since:
-                continue
-            mark.set(first + k, state, solver)
-            part = motion.part(k, k + length)
-            forcing = forcings(model, part)
-            if not isinstance(solver, SystemSteps):
-                links, state = solver.advance(state, forcing, joint_rows(model.rows, part))
-                yield from _finite(linkage, Block(first + k, part, links))
-                continue
-            try:
-                links, state = solver.advance(state, forcing, part, motion_at)
-            except ConvergenceError as failed:
-                if failed.taken:
-                    done = part.part(0, failed.taken)
-                    yield Block(
-                        first + k, done, solver.handed_on(failed.history, forcings(model, done), done)
-                    )
-                advice = "give it more elements" if stresses is None else STIFFENED
-                raise SolveError(_stuck(linkage, first + k + failed.taken, part, failed, advice)) from None
-            yield from _finite(linkage, Block(first + k, part, links))
-    _marched(solver, state)
-
-
-def _corotational(
-    scene: Scene, linkage: Linkage, along: Path, model: Model, solver: CorotationalSteps, mark: Mark
-) -> Iterator[Block]:
-    """All time points of a system with co-rotational frames; see `transient`."""
-
-    motion_at = motion_of(scene, linkage, along)
-    state, since, length = mark.state, mark.step, block_length(model)
-    if state is None:
-        begins = started(scene, linkage, along, model, solver) if mark.start is None else mark.start
-        if not isinstance(begins, State):
-            raise ValueError("a march must begin with a state of the system, got states of links")
-        state = begins
+        state = started(scene, linkage, along, model, solver) if mark.start is None else mark.start
         drawn = motion_at(np.zeros(1))
         links, exerted = solver.first(state, forcings(model, drawn), motion_at)
         yield Block(0, drawn, links, exerted=exerted)
@@ -120,19 +70,16 @@ def _corotational(
                 if failed.taken:
                     links, exerted = solver.handed_on(failed.history, forcing, part)
                     yield Block(first + k, part.part(0, failed.taken), links, exerted=exerted)
-                advice, tried = _finer(model, failed), f", not even in {2**HALVINGS} parts"
-                raise SolveError(
-                    _stuck(linkage, first + k + failed.taken, part, failed, advice, tried)
-                ) from None
+                at = _moment(linkage, part, failed.taken)
+                raise SolveError(_stuck(first + k + failed.taken, at, failed, solver)) from None
             yield from _finite(linkage, Block(first + k, part, links, exerted=exerted))
+    _marched(solver, state)
 
 
 def _positions(
     scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps, mark: Mark
 ) -> Iterator[Block]:
     """All positions of a static or quasi-static analysis, each with the deflection at which all forces balance."""
-    if isinstance(solver, MonolithicSteps):
-        raise ValueError("a balance must be that of a system, got the monolithic solver's")
     grid, motion_at, of, state = time_grid(scene), motion_of(scene, linkage, along), solver.ready, mark.state
     shared = Instant(of, motion_at, 0.0)
     for k in range(mark.step, grid.steps + 1):
@@ -147,10 +94,7 @@ def _positions(
                 state = deflection_in_motion(of, motion_at, time=t, near=state, like=shared)
         except NoBalanceError as failed:
             raise SolveError(_unbalanced(scene, _moment(linkage, motion, 0), failed.moves)) from None
-        if isinstance(solver, CorotationalSteps):
-            links, exerted = solver.first(state, forcing, motion_at, shared)
-        else:
-            links, exerted = solver.first(state, forcing, motion), None
+        links, exerted = solver.first(state, forcing, motion_at, shared)
         yield from _finite(linkage, Block(k, motion, links, exerted=exerted))
 
 
@@ -173,29 +117,23 @@ def _unbalanced(scene: Scene, moment: str, moves: str) -> str:
 
 def _marched(solver: Steps, last: Any) -> None:
     """What a period leaves of a steady state, from the state with which the recorded one ends."""
-    if isinstance(solver, SystemSteps) and solver.steady is not None and solver.over is not None:
+    if solver.steady is not None and solver.over is not None:
         over, steady = solver.over, solver.steady
         left = residual_of(over, over.vector(steady.state), over.vector(last), steady.scale)
         solver.steady = replace(steady, residual=max(left, steady.residual))
 
 
-def _first(model: Model, solver: ByLink, states: Start, drawn: RigidMotion) -> list[LinkHistory]:
-    """The first time point of all links, as their frames see it."""
-    if isinstance(solver, SystemSteps) and isinstance(states, State):
-        return solver.first(states, forcings(model, drawn), drawn)
-    if isinstance(states, State):
-        raise ValueError("the start of links must be their states, got a system's")
-    return [history([state]) for state in states]
-
-
-def _stuck(
-    linkage: Linkage, step: int, part: RigidMotion, failed: ConvergenceError, advice: str, tried: str = ""
-) -> str:
-    """What to do about a step whose iterations do not converge."""
+def _stuck(step: int, at: str, failed: ConvergenceError, solver: Steps) -> str:
+    """What to do about a step whose iterations do not converge; `at` is when that is."""
+    advice, tried = "give it more elements", ""
     moves = f"link '{failed.moves}'" if failed.moves else "a joint or force element"
+    if solver.stiffening is not None:
+        advice = STIFFENED
+    if solver.corotational:
+        advice, tried = _finer(solver.model, failed), f", not even in {2**HALVINGS} parts"
     return (
         f"analysis: the iterations of a step must converge, got none that do at step {step}, "
-        f"{_moment(linkage, part, failed.taken)}{tried}; {moves} moves most from iteration to iteration: "
+        f"{at}{tried}; {moves} moves most from iteration to iteration: "
         f"{advice}, take a smaller step, or more numerical damping (rho_inf)"
     )
 

@@ -1,4 +1,4 @@
-"""Steps of links with rigid-body frames, taken by the system, as histories of links.
+"""Steps of a scene's links, taken by its system, as histories of links.
 
 What a force element exerts on its links is part of their forces F there, and forces at ports are those of joints alone.
 """
@@ -6,39 +6,42 @@ What a force element exerts on its links is part of their forces F there, and fo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kedfem.arrays import Float, Int
-from kedfem.dynamics.history import Forcing, LinkHistory, Products
-from kedfem.dynamics.joints.attachments import Attachment
-from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
+from kedfem.arrays import Float
+from kedfem.dynamics.history import Exerted, Forcing, LinkHistory, Products
 from kedfem.dynamics.joints.constraint_ports import LinkageLayout
 from kedfem.dynamics.joints.coupling import joined
 from kedfem.dynamics.joints.ports import port_columns, turned_ports
 from kedfem.dynamics.loads import initial_forces
-from kedfem.dynamics.model import Model
+from kedfem.dynamics.matrices.dense import coordinates
+from kedfem.dynamics.model import Model, link_keys
 from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.dynamics.stiffening import Stiffening
+from kedfem.dynamics.system.blank import empty_history
 from kedfem.dynamics.system.build import system_of
-from kedfem.dynamics.system.ends import end_of
-from kedfem.dynamics.system.forces.exerted import ELEMENTS
+from kedfem.dynamics.system.forces.exerted import ELEMENTS, exerted, on_links
 from kedfem.dynamics.system.forces.supports import supports
-from kedfem.dynamics.system.march import displacements, march, ready
+from kedfem.dynamics.system.forces.turning_loads import turned, turning
+from kedfem.dynamics.system.layout import points_of
+from kedfem.dynamics.system.march import Motion, Ready, displacements, march, ready
 from kedfem.dynamics.system.period.krylov import Watch
 from kedfem.dynamics.system.period.map import PeriodMap
 from kedfem.dynamics.system.period.search import Periodic, Search
-from kedfem.dynamics.system.record import End, System
+from kedfem.dynamics.system.record import TANGENTIAL, System
+from kedfem.dynamics.system.starts.accelerations import accelerated_in_a_step, accelerations
 from kedfem.dynamics.system.starts.deflected import plucked, quasi_static
-from kedfem.dynamics.system.starts.instant import Motion
+from kedfem.dynamics.system.starts.instant import Instant
+from kedfem.dynamics.system.starts.internal import own
 from kedfem.dynamics.system.starts.start import rest
 from kedfem.dynamics.system.state import History, State
 from kedfem.links.stations import Stations
 from kedfem.motion.linkage import linkage
 from kedfem.motion.rigid import RigidMotion
-from kedfem.scene import Scene
+from kedfem.scene import Scene, corotational
 
 if TYPE_CHECKING:
     from kedfem.dynamics.system.oracle.monolithic import Now
@@ -46,8 +49,8 @@ if TYPE_CHECKING:
 Rows = Float[np.ndarray, "T _ _"]
 
 
-def rigid_frame_system(scene: Scene, model: Model, stresses: Stiffening | None = None) -> System:
-    """The system of a scene whose links have rigid-body frames.
+def scene_system(scene: Scene, model: Model, stresses: Stiffening | None = None) -> System:
+    """The system of a scene on the links of its model, with interface points for force elements.
 
     Parameters
     ----------
@@ -56,13 +59,15 @@ def rigid_frame_system(scene: Scene, model: Model, stresses: Stiffening | None =
     Raises
     ------
     MeshError
-        If a force element finds no coupling surface on its link that shows how it turns.
+        If the coupling surface of a force element does not determine how it turns as a whole.
     """
-    names, rigid = [link.name for link in model.links], linkage(scene)
-    layout = LinkageLayout({name: k for k, name in enumerate(rigid.bodies)}, _lines(model))
-    held = joined(scene, dict(zip(names, model.links, strict=True)), (), layout, elements=True)
-    here = replace(model, joints=tuple(held.attachments[name] for name in names), rows=held.rows)
-    return replace(system_of(scene, rigid, model=here), stiffening=stresses)
+    rigid = linkage(scene)
+    if scene.springs or scene.motors or scene.limits:
+        links = dict(zip(link_keys(model), model.links, strict=True))
+        layout = LinkageLayout({name: k for k, name in enumerate(rigid.bodies)}, _lines(model))
+        held = joined(scene, links, model.cuts, layout, elements=True)
+        model = replace(model, joints=tuple(held.attachments.values()), rows=held.rows)
+    return replace(system_of(scene, rigid, model=model), stiffening=stresses)
 
 
 def _lines(model: Model) -> dict[str, Stations]:
@@ -73,94 +78,86 @@ def _lines(model: Model) -> dict[str, Stations]:
         if side is not None and side.stations is not None:
             k = model.bodies.index(side.body)
             weights = np.zeros((len(side.points), model.links[k].n))
-            own = [name == row.name for name in model.joints[k].joints]
-            weights[:, model.joints[k].nodes] = model.joints[k].weights[own]
+            own_points = [name == row.name for name in model.joints[k].joints]
+            weights[:, model.joints[k].nodes] = model.joints[k].weights[own_points]
             out[row.name] = replace(side.stations, weights=weights)
     return out
 
 
-@dataclass(frozen=True, slots=True)
-class Bearing:
-    """An end of a force element on link k: interface points (p, b) on some of its nodes, and their part of its ports.
-
-    bears : number of components that it bears on: a slider has no moment
-    to_ports : (q, m) forces at ports of joints that are on the link what forces at these points are, link frame
-    """
-
-    name: str
-    k: int
-    end: End
-    nodes: Int[np.ndarray, " b"]
-    weights: Float[np.ndarray, "p b"]
-    bears: int
-    to_ports: Float[np.ndarray, "q m"]
-
-
-class SystemSteps:
+class Steps:
     """Advances all links, block by block.
 
     Parameters
     ----------
+    system : of `scene_system`
     model : of the links whose states are handed on, without interface points for force elements
+    tolerance : change of an iteration, of what a step moves; that of `ready` if not given
     monolithic : whether the oracle takes the steps
-
-    Raises
-    ------
-    SolveError
-        If links are too large for the oracle.
     """
 
     def __init__(
-        self, scene: Scene, system: System, model: Model, scheme: Scheme, monolithic: bool = False
-    ) -> None:
+        self, scene: Scene, system: System, model: Model, scheme: Scheme, tolerance: float | None = None,
+        monolithic: bool = False,
+    ) -> None:  # fmt: skip
         self.scene, self.model, self.links = scene, model, model.links
-        self.ready = ready(system, scheme)
+        self.corotational, self.stiffening = corotational(scene), system.stiffening
+        self.ready = ready(system, scheme) if tolerance is None else ready(system, scheme, tolerance)
+        self.factorisations, self.eased, self.iterations = len(self.ready.parts), 0, 0
         self.steady: Periodic | None = None
         self.over: PeriodMap | None = None  # whose steady state that is
         self.watch: Watch = lambda marched: None
         self.search = Search()
         self.oracle = None
         if monolithic:
-            from kedfem.dynamics.system.oracle.monolithic_steps import oracle
+            from kedfem.dynamics.system.oracle.monolithic import Monolithic
 
-            self.oracle = oracle(self.ready)
-        self.stiffening = system.stiffening
-        self.factorisations = len(self.ready.parts)
-        self._bearings, self._to_ports = _bearings(model, system.model, linkage(scene).bodies)
+            self.oracle = Monolithic(system, scheme)
+        every = dict(
+            zip(ELEMENTS, (list(scene.motors), list(scene.springs), list(scene.limits)), strict=True)
+        )
+        self.elements = [f"{kind}{name}" for kind, names in every.items() for name in names]
+        bodies = linkage(scene).bodies
+        self.riders = {bodies.index(x.name): (x.carrier, x.weights) for x in system.model.sliders}
+        joints = list(zip(model.links, model.joints, system.model.joints, strict=True))
+        self._inverse = [
+            np.linalg.pinv(port_columns(joint, link.n)) if self.elements else None
+            for link, joint, _ in joints
+        ]
+        self._to_ports = [
+            None if x is None else x @ port_columns(held, link.n)
+            for x, (link, _, held) in zip(self._inverse, joints, strict=True)
+        ]
 
-    def start(self, at_rest: bool, motion_at: Motion, rates: Sequence[Float[np.ndarray, "_ _"]]) -> State:
-        """The state at t = 0.
+    def start(self, motion_at: Motion, rates: Sequence[Float[np.ndarray, "_ _"]]) -> State:
+        """The state at t = 0 that the scene asks for: at rest, without vibration, or as forces are let go.
 
         Parameters
         ----------
-        rates : per link (n, d) δ' at rest, world components; none if not given
+        motion_at : rigid-body motion at given times
+        rates : per link (n, d) δ' of rigid motions, world components; none if not given
 
         Raises
         ------
         SolveError
-            If no quasi-static deflection is found.
+            If no deflection without vibration is found.
         """
-        if self.scene.analysis.initial_deflection:
+        analysis = self.scene.analysis
+        if analysis.initial_deflection:
             return plucked(self.ready, motion_at, initial_forces(self.scene, self.links))
-        return rest(self.ready, motion_at, rates) if at_rest else quasi_static(self.ready, motion_at, rates)
+        if analysis.initial != "rest":
+            return quasi_static(self.ready, motion_at, rates)
+        found = accelerated_in_a_step if self.corotational else accelerations
+        return rest(self.ready, motion_at, rates, accelerated=found)
 
-    def first(self, state: State, forcing: Sequence[Forcing], motion: RigidMotion) -> list[LinkHistory]:
-        """A state as histories of one time point."""
-        bodies, g = self.ready.bodies, np.zeros_like(state.u)
-        for k, link in enumerate(self.links):
-            here = slice(int(bodies.at[k]), int(bodies.at[k + 1]))
-            g[here] = (forcing[k].R[0].T @ state.u[here].reshape(link.d, -1)).ravel()
-        found = History(
-            u=state.u[None], v=state.v[None], a=state.a[None], F=state.F[None], g=g[None], strain=state.strain[:1],
-            R=motion.R[:, bodies.motion], port_force=state.port_force[None], energy=np.zeros((1, len(self.links))),
-            z=state.z[:1], e=state.e[:1], multiplier=state.multiplier[None], rate=state.e[1:2],
-            Kg=g[None, :0], Mv=g[None, :0], Cg=g[None, :0],
-        )  # fmt: skip
-        out = self.handed_on(found, forcing, motion)
-        for k, (x, link) in enumerate(zip(out, self.links, strict=True)):
-            flat = x.g.ravel()
-            out[k] = replace(x, strain=np.array([0.5 * float(flat @ (link.K0 @ flat))]))
-        return out
+    def first(
+        self, state: State, forcing: Sequence[Forcing], motion_at: Motion, like: Instant | None = None
+    ) -> tuple[list[LinkHistory], Exerted | None]:
+        """The time point at which a state is, as histories; `like` is another instant of the same system."""
+        motion = motion_at(state.time[:1])
+        found = _as_history(self.ready, state, motion)
+        if self.corotational:
+            _deformed(Instant(self.ready, motion_at, float(state.time[0]), like), state, found)
+        return self.handed_on(found, forcing, motion)
 
     def advance(
         self,
@@ -168,7 +165,7 @@ class SystemSteps:
         forcing: Sequence[Forcing],
         motion: RigidMotion,
         motion_at: Motion | None = None,
-    ) -> tuple[list[LinkHistory], State | Now]:
+    ) -> tuple[list[LinkHistory], Exerted | None, State | Now]:
         """All time points of a block, one step after the other, [KED, eq. (20)].
 
         Parameters
@@ -177,52 +174,85 @@ class SystemSteps:
 
         Raises
         ------
+        ConvergenceError
+            If the iterations of a step do not, in parts neither; `handed_on` shows what was done before.
         SolveError
-            If the iterations of a step do not converge.
+            If those of the oracle do not.
         """
+        later: State | Now
         if self.oracle is not None:
             from kedfem.dynamics.system.oracle.monolithic_steps import monolithic_march
 
             later, found = monolithic_march(self.ready, self.oracle, state, motion)
-            return self.handed_on(found, forcing, motion), later
-        if not isinstance(state, State):
+        elif not isinstance(state, State):
             raise ValueError("a march must begin with a state of the system, got one of the oracle")
-        between = motion_at if self.ready.constraints.jumps.any() else None
-        state, found = march(self.ready, state, motion, between, loads=[each.F for each in forcing])
-        return self.handed_on(found, forcing, motion), state
+        else:
+            between = motion_at if self.corotational or self.ready.constraints.jumps.any() else None
+            later, found = march(self.ready, state, motion, between, loads=[each.F for each in forcing])
+            self.iterations += int(later.passes[0] - state.passes[0])
+            self.eased += int(later.passes[1] - state.passes[1])
+        return (*self.handed_on(found, forcing, motion), later)
 
-    def handed_on(self, found: History, forcing: Sequence[Forcing], motion: RigidMotion) -> list[LinkHistory]:
-        """All links, with what force elements exert on them."""
-        acting, bodies, out = [each.F for each in forcing], self.ready.bodies, []
-        at_ports = [
-            _turned_back(joint, found.port_force[:, bodies.port_at[k] : bodies.port_at[k + 1]], each.R)
-            for k, (joint, each) in enumerate(zip(self.ready.system.model.joints, forcing, strict=True))
-        ]
-        if self._bearings:
-            seen, acting = supports(self.ready, found, motion), [each.F.copy() for each in forcing]
-            at_ports = [force @ to.T for force, to in zip(at_ports, self._to_ports, strict=True)]
-        for one in self._bearings:
-            R, c = forcing[one.k].R, one.bears
-            y = np.zeros((len(R), len(one.weights), R.shape[1]))
-            y[:, :, :c] = seen.on_end(one.name, one.end)[:, :, :c]
-            acting[one.k][:, one.nodes] += np.einsum("pb,tpd->tbd", one.weights, y)
-            at_ports[one.k] -= (y @ R).reshape(len(y), -1) @ one.to_ports.T
-        for k, (each, F) in enumerate(zip(forcing, acting, strict=True)):
-            u, v, a, g = (displacements(self.ready, k, x) for x in (found.u, found.v, found.a, found.g))
-            out.append(
-                LinkHistory(u, v, a, g, each.R, F, at_ports[k], found.energy[:, k].copy(),
-                            self._products(found, k, v))
-            )  # fmt: skip
-        return out
+    def handed_on(
+        self, found: History, forcing: Sequence[Forcing], motion: RigidMotion
+    ) -> tuple[list[LinkHistory], Exerted | None]:
+        """All links over the first time points of a block, as far as a history goes."""
+        T = len(found.u)
+        forcing, motion = [x.first(T) for x in forcing], motion.part(0, T)
+        forces = supports(self.ready, found, motion)
+        acting = on_links(forces, self.riders) if self.elements else {}
+        every = [self._link(k, found, each, acting.get(k)) for k, each in enumerate(forcing)]
+        if not self.corotational:
+            return every, None
+        return self._with_turning_loads(every, motion), exerted(forces, self.elements)
+
+    def _with_turning_loads(self, every: list[LinkHistory], motion: RigidMotion) -> list[LinkHistory]:
+        """Forces F with those of loads that turn with links."""
+        for k, load in turning(self.model.loads):
+            R, factor = motion.R[:, self.model.bodies[k]], load.factor(motion.t, motion.phi)
+            every[k] = replace(every[k], F=every[k].F + turned(self.links[k], load, R, every[k].u, factor))
+        return every
+
+    def _link(self, k: int, found: History, forcing: Forcing, acting: Rows | None) -> LinkHistory:
+        """How a link moves, in its frame as that is, and what acts on it."""
+        of, link = self.ready, self.links[k]
+        u, v, a = (displacements(of, k, x) for x in (found.u, found.v, found.a))
+        R = found.R[:, k, : link.d, : link.d].copy() if self.corotational else forcing.R
+        F = forcing.F if acting is None else forcing.F + acting
+        at = slice(of.bodies.port_at[k], of.bodies.port_at[k + 1])
+        force = turned_ports(of.system.model.joints[k], R.transpose(0, 2, 1), found.port_force[:, at])
+        to_ports, inverse = self._to_ports[k], self._inverse[k]
+        if to_ports is not None and inverse is not None:
+            force = force @ to_ports.T
+            if acting is not None:
+                force = force - (acting @ R).reshape(len(R), -1) @ inverse.T
+        return LinkHistory(
+            u,
+            v,
+            a,
+            self.deformation(k, found),
+            R,
+            F,
+            force,
+            found.energy[:, k].copy(),
+            self._products(found, k, v),
+        )
 
     def deformation(self, k: int, found: History) -> Rows:
-        """What stresses of link k come from."""
-        return displacements(self.ready, k, found.g)
+        """What stresses of link k come from; of a co-rotational planar beam with the strains that its points see."""
+        link, bodies = self.links[k], self.ready.bodies
+        if bodies.frame[k] != TANGENTIAL:
+            return displacements(self.ready, k, found.g)
+        points = points_of(link)
+        share = np.concatenate([point.share.T for point in points])  # (3E, 3n)
+        b, T = int(np.searchsorted(bodies.beams.segment, k)), len(found.u)
+        seen = found.strain[:, b, :, : len(points)].transpose(0, 2, 1).reshape(T, 3 * len(points))
+        return np.asarray((seen @ share).reshape(T, link.n, link.d))
 
     def _products(self, found: History, k: int, v: Rows) -> Products | None:
         """Products with the state of link k that its steps have at hand."""
         part, link = self.ready.parts[k], self.links[k]
-        if not part.unit or not found.Kg.size or self.oracle is not None:
+        if self.corotational or not part.unit or not found.Kg.size or self.oracle is not None:
             return None
         Kg = displacements(self.ready, k, found.Kg)
         if link.unknowns == part.G.shape[0]:
@@ -231,61 +261,26 @@ class SystemSteps:
         return Products(displacements(self.ready, k, found.Mv), Kg, Cg)
 
 
-def _bearings(
-    model: Model, seen: Model, bodies: Sequence[str]
-) -> tuple[list[Bearing], list[Float[np.ndarray, "_ _"]]]:
-    """Ends of all force elements, and per link what turns forces at interface points into those at ports of joints.
-
-    Parameters
-    ----------
-    seen : the model with interface points for force elements
-    bodies : of the linkage
-    """
-    elements = [row for row in seen.rows if row.name.startswith(ELEMENTS)]
-    if not elements:
-        return [], []
-    every = list(zip(model.links, model.joints, seen.joints, strict=True))
-    inverse = [np.linalg.pinv(port_columns(joint, link.n)) for link, joint, _ in every]
-    to_ports = [x @ port_columns(own, link.n) for x, (link, _, own) in zip(inverse, every, strict=True)]
-    found = [
-        _bearing(row, side, bodies, seen, inverse)
-        for row in elements for side in (0, 1) if row.sides[side] is not None
-    ]  # fmt: skip
-    return found, to_ports
+def _as_history(of: Ready, state: State, motion: RigidMotion) -> History:
+    """A state as a history of one time point, deformations as rigid-body frames see them."""
+    out = empty_history(1, of.bodies, of.constraints)._replace(Kg=np.zeros((1, 0)))
+    for name in ("u", "v", "a", "F", "port_force", "multiplier"):
+        getattr(out, name)[0] = getattr(state, name)
+    out.z[0], out.e[0], out.rate[0], out.strain[0] = state.z[0], state.e[0], state.e[1], state.strain[0]
+    for k, link in enumerate(of.system.model.links):
+        here, R = own(of, k), motion.R[0, of.bodies.motion[k]]
+        out.R[0, k] = R
+        out.g[0, here] = (R[: link.d, : link.d].T @ state.u[here].reshape(link.d, -1)).ravel()
+        g = displacements(of, k, out.g)[0].ravel()
+        out.energy[0, k] = 0.5 * float(g @ (link.K0 @ g))
+    return out
 
 
-def _bearing(
-    row: ConstraintJoint,
-    side: int,
-    bodies: Sequence[str],
-    model: Model,
-    inverse: Sequence[Float[np.ndarray, "_ _"]],
-) -> Bearing:
-    """What an end of a force element has on a link, or on the link that its slider rides on."""
-    on = row.sides[side]
-    if on is None:
-        raise ValueError(f"{row.name}: must have an end on a link, got none")
-    slider = next((x for x in model.sliders if x.name == bodies[on.body]), None)
-    if slider is not None:
-        k, weights = slider.carrier, slider.weights[None]
-    else:
-        k = model.bodies.index(on.body)
-        before = row.sides[0]
-        first = len(before.points) if side and before is not None and before.body == on.body else 0
-        ports = [p for p, name in enumerate(model.joints[k].joints) if name == row.name][first:][
-            : len(on.points)
-        ]
-        weights = np.zeros((len(ports), model.links[k].n))
-        weights[:, model.joints[k].nodes] = model.joints[k].weights[ports]
-    link, nodes = model.links[k], np.flatnonzero(weights.any(axis=0))
-    bears = 2 if slider is not None and link.planar else link.d
-    columns = np.zeros((link.n, link.d, len(weights), link.d))
-    for c in range(bears):
-        columns[:, c, :, c] = weights.T
-    to_ports = inverse[k] @ columns.reshape(link.n * link.d, -1)
-    return Bearing(row.name, k, end_of(on, row), nodes, weights[:, nodes], bears, to_ports)
-
-
-def _turned_back(joint: Attachment, force: Float[np.ndarray, "T q"], R: Rows) -> Float[np.ndarray, "T q"]:
-    """Rᵀ of forces at held components of ports."""
-    return turned_ports(joint, R.transpose(0, 2, 1), force)
+def _deformed(now: Instant, state: State, out: History) -> None:
+    """Deformations, orientations and energies of a history of one time point, as co-rotational frames see them."""
+    of = now.of
+    for k, each in enumerate(now.inside(state.u, state.v)):
+        link, here = of.system.model.links[k], own(of, k)
+        g = each.frames[0].g if each.frames else each.g
+        out.g[0, here] = coordinates(link, of.parts[k], g).ravel()
+        out.R[0, k], out.energy[0, k] = each.R, each.energy

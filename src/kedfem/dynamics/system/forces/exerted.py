@@ -123,7 +123,9 @@ def on_links(forces: Supports, riders: Mapping[int, tuple[int, np.ndarray]]) -> 
                 nodes = model.joints[k].nodes
             else:
                 k, weights = riders[side.body]
-                f = np.einsum("n,td->tnd", weights, _on_rider(forces, row.name, end_of(side, row)))
+                pull = _on_rider(forces, row.name, end_of(side, row))
+                pull[:, 2] *= not model.links[k].planar
+                f = np.einsum("n,td->tnd", weights, pull)
                 nodes = np.arange(len(weights))
             link = model.links[k]
             total = out.setdefault(k, np.zeros((len(forces.z), link.n, link.d)))

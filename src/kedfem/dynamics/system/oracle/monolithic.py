@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
+import scipy.sparse as sp
 
 from kedfem.arrays import Float
 from kedfem.dynamics.frames import Deformed, deformation, frame_force, frames_of, rotation
@@ -82,21 +83,15 @@ class Monolithic:
 
     def __post_init__(self) -> None:
         model = self.system.model
-        sizes = [link.unknowns for link in model.links]
-        ends = np.cumsum([0, *sizes])
+        every = list(zip(model.links, model.joints, strict=True))
+        ends = np.cumsum([0, *(link.unknowns for link in model.links)])
         self.of = [slice(a, b) for a, b in pairwise(ends)]
         self.N, self.k = int(ends[-1]), self.system.unknowns
         self.hard = [n for n, x in enumerate(self.system.constraints) if isinstance(x.law, Held | Driven)]
-        self.M = np.zeros((self.N, self.N))
-        for link, at in zip(model.links, self.of, strict=True):
-            self.M[at, at] = mass_matrix(link).toarray()
-        q = [len(joint.keep) for joint in model.joints]
-        self.W, self.B = np.zeros((sum(q), self.N)), np.zeros((sum(q), self.k))
-        row = 0
-        for link, joint, at in zip(model.links, model.joints, self.of, strict=True):
-            here = slice(row, row + len(joint.keep))
-            self.W[here, at], self.B[here] = port_columns(joint, link.n).T, joint.B
-            row = here.stop
+        self.masses = [sp.csr_array(mass_matrix(link)) for link in model.links]
+        self.M = sp.csr_array(sp.block_diag(self.masses))
+        self.W = sp.csr_array(sp.block_diag([port_columns(joint, link.n).T for link, joint in every]))
+        self.B = sp.csr_array(np.vstack([joint.B for joint in model.joints]))
 
     def rates(
         self, x: np.ndarray, x0: np.ndarray, v0: np.ndarray, a0: np.ndarray
@@ -134,7 +129,7 @@ class Monolithic:
         """The same; `patience` is how many changes in a row may fall slowly before tangents are assembled anew."""
         scheme, r, hard = self.scheme, len(self.system.constraints), self.hard
         now = self._guess(old, at)
-        q, size, slow = len(self.W), np.inf, 0
+        q, size, slow = self.W.shape[0], np.inf, 0
         lam, m = np.zeros(q), np.zeros(r)
         if patience and len(old.multiplier):
             m[hard] = (1 - scheme.alpha_f) * old.multiplier[hard]
@@ -182,7 +177,7 @@ class Monolithic:
         u = old.u + h * old.v + h * h / 2 * old.a
         F = self.applied(at)
         zero = np.zeros_like(old.u)
-        z = np.linalg.lstsq(self.B, self.W @ u, rcond=None)[0] if self.k else old.z
+        z = old.z_rates[0] + h * old.z_rates[1] + h * h / 2 * old.z_rates[2]
         return Now(u, zero, zero, zero, F, [], z, np.zeros_like(old.e), old.turned.copy(), zero, [],
                    old.z_rates)  # fmt: skip
 
@@ -205,7 +200,7 @@ class Monolithic:
         whole = at.R[0, self.system.model.bodies[k]]
         R = whole[: link.d, : link.d]
         x = u.reshape(link.n, link.d) @ R
-        Mx = (self.M[self.of[k], self.of[k]] @ x.ravel()).reshape(x.shape)
+        Mx = (self.masses[k] @ x.ravel()).reshape(x.shape)
         if link.fit is None:
             Kx = (link.K0 @ x.ravel()).reshape(x.shape)
             C = damping.alpha * Mx + damping.beta * Kx

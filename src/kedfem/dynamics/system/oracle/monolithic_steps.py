@@ -12,28 +12,8 @@ from kedfem.dynamics.system.oracle.monolithic import Monolithic, Now
 from kedfem.dynamics.system.starts.instant import renumbered
 from kedfem.dynamics.system.starts.internal import own
 from kedfem.dynamics.system.state import History, State
-from kedfem.errors import SolveError
 from kedfem.links.record import Link
 from kedfem.motion.rigid import RigidMotion
-
-MOST = 600  # unknowns of all links: a step solves with a dense matrix of all of them, some seconds there
-
-
-def oracle(of: Ready) -> Monolithic:
-    """The oracle of a system whose links have rigid-body frames.
-
-    Raises
-    ------
-    SolveError
-        If the links have too many unknowns.
-    """
-    count = sum(link.unknowns for link in of.system.model.links)
-    if count > MOST:
-        raise SolveError(
-            f"analysis.solver: the monolithic solver with springs, motors or damped bushings must have links of at most "
-            f'{MOST} unknowns in all, since it solves with dense tangents, got {count}: take solver = "condensed"'
-        )
-    return Monolithic(of.system, of.scheme)
 
 
 def monolithic_march(

@@ -6,16 +6,20 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve, qr
+import scipy.sparse as sp
+from scipy.linalg import qr
+from scipy.sparse.linalg import splu
 
 from kedfem.arrays import Bool, Float
 from kedfem.dynamics.system.oracle.monolithic_places import force
+from kedfem.errors import SolveError
 from kedfem.motion.rigid import RigidMotion
 
 if TYPE_CHECKING:
     from kedfem.dynamics.system.oracle.monolithic import Monolithic, Now
 
 DIFFERENCE = 1e-6  # of differences for tangents: Newton's method needs no better ones
+TINY = 1e-300  # size of a row of zeros
 REPEATED = 1e-9  # singular values of rows of length one that repeat each other
 Matrix = Float[np.ndarray, "_ _"]
 Column = Float[np.ndarray, " _"]
@@ -23,40 +27,52 @@ Inverse = Callable[[Column], Column]
 """Solutions for right sides."""
 
 
-def tangent(of: Monolithic, now: Now, old: Now, at: RigidMotion, C: Matrix, m: Column) -> Matrix:
+def tangent(of: Monolithic, now: Now, old: Now, at: RigidMotion, C: Matrix, m: Column) -> sp.csr_array:
     """Of all equations by all unknowns.
 
     Parameters
     ----------
     C, m : gradients of all constraints, and their multipliers
     """
-    s, N, k, q, hard = of.scheme, of.N, of.k, len(of.W), of.hard
-    J = np.zeros((N + k + q + len(hard),) * 2)
-    J[:N, :N] = (1 - s.alpha_m) * s.a0 * of.M
-    for n, own in enumerate(of.of):
-        J[own, own] += (1 - s.alpha_f) * _of_body(of, n, now, old, at)
-    J[:N, N + k : N + k + q] = -of.W.T
-    J[N : N + q, :N], J[N : N + q, N : N + k] = of.W, -of.B
-    balance = slice(N + q, N + q + k)
-    J[balance, N + k : N + k + q] = of.B.T
-    J[balance, N : N + k] = -_of_pull(of, now, old, at, m)
-    J[balance, N + k + q :] = -C[hard].T
-    J[N + q + k :, N : N + k] = C[hard]
-    return J
+    s, hard = of.scheme, sp.csr_array(C[of.hard])
+    bodies = sp.block_diag([_of_body(of, n, now, old, at) for n in range(len(of.of))])
+    A = (1 - s.alpha_m) * s.a0 * of.M + (1 - s.alpha_f) * bodies
+    pull = sp.csr_array(_of_pull(of, now, old, at, m))
+    none = sp.csr_array((len(of.hard), len(of.hard)))
+    blocks = [
+        [A, None, -of.W.T, None], [of.W, -of.B, None, None], [None, -pull, of.B.T, -hard.T],
+        [None, hard, None, none],
+    ]  # fmt: skip
+    return sp.csr_array(sp.block_array(blocks))
 
 
-def _of_body(of: Monolithic, n: int, now: Now, old: Now, at: RigidMotion) -> Matrix:
+def _of_body(of: Monolithic, n: int, now: Now, old: Now, at: RigidMotion) -> sp.csr_array | Matrix:
     """Of the internal force of body n: K + a₁ C with a rigid-body frame, else by differences; world components."""
     model, own, a1 = of.system.model, of.of[n], of.scheme.a1
     link = model.links[n]
     if link.fit is None:
-        R = np.kron(np.eye(link.n), at.R[0, model.bodies[n], : link.d, : link.d])
-        K = R @ (link.K0 @ R.T)
-        out = K + a1 * (model.damping.alpha * of.M[own, own] + model.damping.beta * K)
-        return np.asarray(out + of.stressed[n] if of.stressed else out)
+        K = rotated_stiffness(link.K0, at.R[0, model.bodies[n], : link.d, : link.d])
+        out = K + a1 * (model.damping.alpha * of.masses[n] + model.damping.beta * K)
+        return sp.csr_array(out + of.stressed[n] if of.stressed else out)
     pushed = np.eye(own.stop - own.start) * DIFFERENCE
     change = [of.force_of(n, now.u[own] + x, old, at)[0] - now.f[own] for x in pushed]
     return np.array(change).T / DIFFERENCE
+
+
+def rotated_stiffness(K0: sp.csr_array, R: Matrix) -> sp.csr_array:
+    """K = T K0 Tᵀ, [KED, eq. (14)], block by block.
+
+    Parameters
+    ----------
+    K0 : (dn, dn) in the link frame
+    R : (d, d) link to world
+
+    Returns
+    -------
+    (dn, dn) in the world frame
+    """
+    blocks = sp.bsr_array(K0, blocksize=R.shape)
+    return sp.csr_array(sp.bsr_array((R @ blocks.data @ R.T, blocks.indices, blocks.indptr), shape=K0.shape))
 
 
 def _of_pull(of: Monolithic, now: Now, old: Now, at: RigidMotion, m: Column) -> Matrix:
@@ -87,25 +103,36 @@ def _felt(of: Monolithic, n: int) -> Bool[np.ndarray, " k"]:
     return felt
 
 
-def inverse(J: Matrix, C: Matrix) -> Inverse:
-    """Of scaled equations; where constraints C, the last of them, repeat each other, with multipliers of least size."""
-    size = np.linalg.norm(C, axis=1)
+def inverse(J: sp.csr_array, C: Matrix) -> Inverse:
+    """Of scaled equations; where constraints C, the last of them, repeat each other, with multipliers of least size.
+
+    Raises
+    ------
+    SolveError
+        If the equations do not determine all unknowns.
+    """
+    size, n = np.linalg.norm(C, axis=1), J.shape[0]
     some = size > REPEATED * size.max(initial=0.0)  # one that says nothing is rounding of any direction
     unit = C * np.where(some, 1 / np.where(some, size, 1.0), 0.0)[:, None]
     R, order = qr(unit.T, mode="r", pivoting=True)
     independent = order[: int((np.abs(np.diag(R)) > REPEATED).sum())] if len(C) else order[:0]
-    first = len(J) - len(C)
+    first = n - len(C)
     kept = np.concatenate([np.arange(first), first + np.sort(independent)])
-    own = J[np.ix_(kept, kept)]
-    rows = 1 / np.maximum(np.abs(own).max(axis=1), 1e-300)
-    scaled = own * rows[:, None]
-    columns = 1 / np.maximum(np.abs(scaled).max(axis=0), 1e-300)
-    factors = lu_factor(scaled * columns)
+    own = J[kept][:, kept]
+    rows = 1 / np.maximum(abs(own).max(axis=1).toarray().ravel(), TINY)
+    scaled = sp.diags_array(rows) @ own
+    columns = 1 / np.maximum(abs(scaled).max(axis=0).toarray().ravel(), TINY)
+    try:
+        factors = splu(sp.csc_array(scaled @ sp.diags_array(columns)))
+    except RuntimeError as singular:
+        raise SolveError(
+            f"analysis.solver: the monolithic solver's equations must be regular, got {singular}"
+        ) from None
     least = np.linalg.pinv(C.T, rcond=REPEATED) @ C.T if len(independent) < len(C) else np.eye(len(C))
 
     def solution(right: Column) -> Column:
-        out = np.zeros(len(J))
-        out[kept] = lu_solve(factors, right[kept] * rows) * columns
+        out = np.zeros(n)
+        out[kept] = factors.solve(right[kept] * rows) * columns
         out[first:] = least @ out[first:]
         return out
 
