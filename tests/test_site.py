@@ -130,7 +130,11 @@ def test_a_lesson_does_what_it_says(
 @pytest.mark.usefixtures("wide")
 @pytest.mark.parametrize(
     ("page", "lines"),
-    [("how-to/drive-from-file.md", 0), ("how-to/parameter-study.md", 3)],
+    [
+        ("how-to/drive-from-file.md", 0),
+        ("how-to/parameter-study.md", 3),
+        pytest.param("how-to/suspension.md", 6, marks=pytest.mark.long),
+    ],
     ids=str,
 )
 def test_a_how_to_does_what_it_says(
