@@ -126,7 +126,7 @@ class Corotational(Mechanism):
         of, own, inside = stage_numbers(self, h, float(A.diagonal().max()))
         along = driving(of, self.motion_at(((np.arange(steps)[:, None] + c) * h).clip(0.0).ravel()))
         trial = empty_trial(of.bodies, of.ends, of.constraints, state)
-        solved = solver(of.parts, of.bodies.at, of.bodies.port_at, trial)
+        solved = solver(of.parts, of.bodies.at, trial)
         found, passes, failed = staged(
             own, inside, of.bodies, of.ends, of.constraints, along, (A, b, c, h), self.size, steps // SEEN,
             state, trial, room(of.bodies), solved,

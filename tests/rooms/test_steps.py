@@ -221,7 +221,7 @@ def test_an_interruption_while_a_large_link_is_solved_ends_the_march(monkeypatch
         raise KeyboardInterrupt
 
     start = started(ready.scene, ready.linkage, ready.path, ready.model, solver)
-    solver.ready.parts[1] = replace(solver.ready.parts[1], held=stopped)
+    solver.ready.parts[1] = replace(solver.ready.parts[1], solve=stopped)
     given = ready.scene, ready.linkage, ready.path, ready.model, solver, start
     with pytest.raises(KeyboardInterrupt):
         list(transient(*given))

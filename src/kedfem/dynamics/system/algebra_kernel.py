@@ -66,16 +66,19 @@ def interface_columns(bodies, i, R, RB):  # type: ignore[no-untyped-def]
     """RB (q × c, flat) becomes Rᵀ B of a body."""
     first, last = bodies.port_at[i], bodies.port_at[i + 1]
     c, at = bodies.column_at[i + 1] - bodies.column_at[i], bodies.B_at[i]
+    RB[:] = 0.0
     for q in range(first, last):
-        for m in range(c):
-            RB[(q - first) * c + m] = 0.0
+        own = RB[(q - first) * c : (q - first + 1) * c]
         for o in range(bodies.group[q], last):
             if bodies.group[o] != bodies.group[q]:
                 break
-            x = R[bodies.component[o], bodies.component[q]]
+            x, its = (
+                R[bodies.component[o], bodies.component[q]],
+                bodies.B[at + (o - first) * c : at + (o - first + 1) * c],
+            )
             if x != 0.0:
                 for m in range(c):
-                    RB[(q - first) * c + m] += x * bodies.B[at + (o - first) * c + m]
+                    own[m] += x * its[m]
 
 
 @inner

@@ -113,8 +113,9 @@ class Bodies(NamedTuple):
 
     at : (i + 1,) where the coordinates of each begin; functions, components : n and d; motion : number in the linkage
     frame, kind : NOMINAL, STRESSED, COROTATIONAL or TANGENTIAL; as `frames_kernel` counts kinds
-    dense : whether G is here; else a sparse factor gives G r and Yᵀ r, coordinates are nodal and `mass` counts
-    arrays : (i, 13, 2) where what `products_kernel.held` works with is, and how many numbers; zero: it is called
+    dense : whether G, Y and W are here; else a sparse factor gives Ã⁻¹ r, coordinates are nodal and `mass` counts
+    arrays : (i, 13, 2) where what `products_kernel` works with of sparse ones is, and how many numbers; without a
+        triangle Ã⁻¹ r is called for
     passed : where its coordinates stand among those that passes change, −1 if none
     port_at : (i + 1,) held components q; component : of each; group_at : (i + 2...) where interface points begin
     G, Y, W : N × N, q × N, q × N of each, in `G_at`, `Y_at`; S, B : q × q and q × c, in `S_at`, `B_at`

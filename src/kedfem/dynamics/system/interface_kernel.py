@@ -15,14 +15,15 @@ from kedfem.dynamics.matrices.profile_kernel import profile_factored, profile_so
 from kedfem.dynamics.system.algebra_kernel import copied, interface_columns
 from kedfem.dynamics.system.constraints_kernel import coordinate, law
 from kedfem.dynamics.system.ends_kernel import placed
+from kedfem.dynamics.system.products_kernel import take_ports
 
 REPEATED = 1e-10  # [-, 1/m] gradient of a constraint that the interface unknowns satisfy by themselves
 
 
 @inner
 def gathered(bodies, trial):  # type: ignore[no-untyped-def]
-    """Rᵀ B and S Rᵀ B of all bodies in their frames, and the matrix of z."""
-    H, S, place = trial.H, bodies.S, bodies.place
+    """Rᵀ B and (S Rᵀ B)ᵀ of all bodies in their frames, and the matrix of z; Rᵀ B is zero for the most part."""
+    H, place = trial.H, bodies.place
     H[:] = 0.0
     for i in range(len(bodies.motion)):
         q, c = bodies.port_at[i + 1] - bodies.port_at[i], bodies.column_at[i + 1] - bodies.column_at[i]
@@ -30,20 +31,22 @@ def gathered(bodies, trial):  # type: ignore[no-untyped-def]
         RB, SRB = trial.RB[at : at + q * c], trial.SRB[at : at + q * c]
         interface_columns(bodies, i, trial.Rp[i], RB)
         SRB[:] = 0.0
-        for r in range(q):
-            for p in range(q):
-                s = S[bodies.S_at[i] + r * q + p]
-                for m in range(c):
-                    SRB[r * c + m] += s * RB[p * c + m]
-        for r in range(q):
+        for p in range(q):
+            S = bodies.S[bodies.S_at[i] + p * q : bodies.S_at[i] + (p + 1) * q]
             for m in range(c):
-                x, row = RB[r * c + m], place[columns[m]]
+                x, own = RB[p * c + m], SRB[m * q : (m + 1) * q]
                 if x != 0.0:
-                    start = bodies.row_at[row] - bodies.first[row]
-                    for o in range(c):
-                        column = place[columns[o]]
-                        if column <= row:
-                            H[start + column] += x * SRB[r * c + o]
+                    for r in range(q):
+                        own[r] += x * S[r]
+        for m in range(c):
+            row = place[columns[m]]
+            own = H[bodies.row_at[row] : bodies.row_at[row + 1]]
+            for o in range(c):
+                column, its, total = place[columns[o]], SRB[o * q : (o + 1) * q], 0.0
+                if column <= row:
+                    for r in range(q):
+                        total += RB[r * c + m] * its[r]
+                    own[column - bodies.first[row]] += total
 
 
 @inner
@@ -56,18 +59,15 @@ def offset(bodies, i, u, trial, base):  # type: ignore[no-untyped-def]
     base : whether it has the second part
     """
     first, last, c = bodies.port_at[i], bodies.port_at[i + 1], bodies.column_at[i + 1] - bodies.column_at[i]
-    q, N = last - first, bodies.at[i + 1] - bodies.at[i]
-    RB, W, z, w, at = trial.RB, bodies.W, trial.z, trial.w, bodies.B_at[i]
+    RB, z, w, at = trial.RB, trial.z, trial.w, bodies.B_at[i]
     columns = bodies.columns[bodies.column_at[i] : bodies.column_at[i + 1]]
-    for r in range(q):
+    for r in range(last - first):
         x = 0.0
         for m in range(c):
             x += RB[at + r * c + m] * z[columns[m]]
-        if base:
-            row = W[bodies.Y_at[i] + r * N : bodies.Y_at[i] + (r + 1) * N]
-            for y in range(N):
-                x -= row[y] * u[y]
         w[first + r] = x
+    if base:
+        take_ports(bodies, i, u, w[first:last])
 
 
 @inner
@@ -80,7 +80,7 @@ def pushed(bodies, i, trial):  # type: ignore[no-untyped-def]
     for m in range(c):
         x = 0.0
         for r in range(q):
-            x += RB[at + r * c + m] * reaction[first + r] - SRB[at + r * c + m] * w[first + r]
+            x += RB[at + r * c + m] * reaction[first + r] - SRB[at + m * q + r] * w[first + r]
         right[columns[m]] += x
 
 

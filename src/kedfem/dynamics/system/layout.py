@@ -100,6 +100,8 @@ def body_arrays(system: System, parts: Sequence[Part], profile: Profile) -> Bodi
             passed[k], place = place, place + sizes[k]
     fits = [_fitted(link, part) for link, part in zip(links, parts, strict=True)]
     dense = np.array([not isinstance(part, SparsePart) for part in parts], bool)
+    Y, W = ([x[:0] if isinstance(part, SparsePart) else x for x, part in zip(each, parts, strict=True)]
+            for each in ([part.Y.T for part in parts], [part.W for part in parts]))  # fmt: skip
     stiff = [
         component_first(part.T, link.K0) if frame == COROTATIONAL and part.G.size else np.zeros(part.G.shape)
         for link, part, frame in zip(links, parts, frames, strict=True)
@@ -109,9 +111,9 @@ def body_arrays(system: System, parts: Sequence[Part], profile: Profile) -> Bodi
         motion=np.array(numbers), frame=np.array(frames), kind=np.array([KINDS[x.kind] for x in links]),
         dense=dense, arrays=address_tables(parts), passed=passed, port_at=ends_of(ports),
         component=_flat([joint.keep % joint.components for joint in joints], int), group=_groups(joints),
-        G_at=ends_of([x.G.size for x in parts]), Y_at=ends_of([q * n for q, n in zip(ports, sizes, strict=True)]),
+        G_at=ends_of([x.G.size for x in parts]), Y_at=ends_of([x.size for x in Y]),
         S_at=ends_of([q * q for q in ports]), B_at=ends_of([q * len(c) for q, c in zip(ports, columns, strict=True)]),
-        G=_flat([x.G for x in parts]), Y=_flat([x.Y.T for x in parts]), W=_flat([x.W for x in parts]),
+        G=_flat([x.G for x in parts]), Y=_flat(Y), W=_flat(W),
         S=_flat([x.S for x in parts]), B=_flat([joint.B[:, c] for joint, c in zip(joints, columns, strict=True)]),
         column_at=ends_of([len(c) for c in columns]), columns=_flat([profile.number[c] for c in columns], int),
         place=profile.unknown, first=profile.first, row_at=profile.at, multiplier=profile.multiplier,

@@ -145,7 +145,7 @@ def march(
     state, along, T, done = copied(state), driving(of, motion, loads), len(motion.t), 0
     history = empty_history(T, of.bodies, of.constraints, along.F)
     trial, work = empty_trial(*arrays, state), room(of.bodies)
-    solved, marched = solver(of.parts, of.bodies.at, of.bodies.port_at, trial), compiled_steps(of)
+    solved, marched = solver(of.parts, of.bodies.at, trial), compiled_steps(of)
     while done < T:
         left = _since(along, done), History(*(x[done:] for x in history))
         with solved.watched():

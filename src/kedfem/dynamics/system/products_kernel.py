@@ -5,7 +5,7 @@ Arrays of the latter are found by their addresses: each body has its own, as fac
 
 from kedfem.compiled import compiled, inlined, inner
 from kedfem.dynamics.matrices.triangle_kernel import solved
-from kedfem.dynamics.system.algebra_kernel import add_transposed, product
+from kedfem.dynamics.system.algebra_kernel import add_transposed, copied, product
 from kedfem.dynamics.system.reference import integers_at, reals_at
 
 
@@ -73,51 +73,113 @@ def stiffness_times(bodies, i, x, out):  # type: ignore[no-untyped-def]
 
 
 @inner
-def held(arrays, r, out, reaction):  # type: ignore[no-untyped-def]
-    """out becomes G r = y − Y v and reaction its part of v, where y = Ã⁻¹ r and v = S Cᵀ y; see `Substructure`.
+def condensed(arrays):  # type: ignore[no-untyped-def]
+    """C row by row, S and Y of a sparse body, room and v; see `sparse.compiled_arrays`."""
+    where, size = arrays[:, 0], arrays[:, 1]
+    return (
+        integers_at(where[6], size[6]), integers_at(where[7], size[7]), reals_at(where[8], size[8]),
+        reals_at(where[9], size[9]), reals_at(where[10], size[10]), reals_at(where[11], size[11]),
+        reals_at(where[12], size[12]),
+    )  # fmt: skip
+
+
+@inner
+def held(arrays, r, y, reaction, solve):  # type: ignore[no-untyped-def]
+    """y becomes Ã⁻¹ r unless it is that, and reaction what is held of v = S Cᵀ y, which is kept; see `Substructure`.
 
     Parameters
     ----------
-    arrays : (13, 2) addresses and sizes of the body's arrays, see `sparse.compiled_arrays`
+    arrays : (13, 2) addresses and sizes of the body's arrays
     """
-    where, size = arrays[:, 0], arrays[:, 1]
-    triangle = (
-        integers_at(where[0], size[0]), integers_at(where[1], size[1]), integers_at(where[2], size[2]),
-        integers_at(where[3], size[3]), reals_at(where[4], size[4]), integers_at(where[5], size[5]),
-    )  # fmt: skip
-    at, place, weight = (
-        integers_at(where[6], size[6]),
-        integers_at(where[7], size[7]),
-        reals_at(where[8], size[8]),
-    )
-    S, Y = reals_at(where[9], size[9]), reals_at(where[10], size[10])
-    seen, v, c = reals_at(where[11], size[11]), reals_at(where[12], size[12]), len(at) - 1
-    solved(triangle, r, seen, v, out)
+    at, place, weight, S, _, seen, v = condensed(arrays)
+    if solve:
+        where, size = arrays[:, 0], arrays[:, 1]
+        triangle = (
+            integers_at(where[0], size[0]), integers_at(where[1], size[1]), integers_at(where[2], size[2]),
+            integers_at(where[3], size[3]), reals_at(where[4], size[4]), integers_at(where[5], size[5]),
+        )  # fmt: skip
+        solved(triangle, r, seen, v, y)
+    c = len(at) - 1
     for k in range(c):
         x = 0.0
         for m in range(at[k], at[k + 1]):
-            x += weight[m] * out[place[m]]
+            x += weight[m] * y[place[m]]
         seen[k] = x
     product(S, 0, c, c, seen, v)
-    for k in range(len(reaction)):
-        reaction[k] = v[k]
+    copied(v, reaction)
+
+
+@inner
+def add_answer(arrays, w, out):  # type: ignore[no-untyped-def]
+    """out + Y (S w − v): what interface points that move by w, and anchors, do to Ã⁻¹ r."""
+    at, _, _, S, Y, forces, v = condensed(arrays)
+    c = len(at) - 1
     for k in range(c):
-        v[k] = -v[k]
-    add_transposed(Y, 0, c, len(r), v, out)
+        row, x = S[k * c : k * c + len(w)], -v[k]
+        for m in range(len(w)):
+            x += row[m] * w[m]
+        forces[k] = x
+    add_transposed(Y, 0, c, len(out), forces, out)
 
 
 @inner
 def sparse_held(bodies, i, trial, called):  # type: ignore[no-untyped-def]
-    """trial.held and trial.reaction of a sparse body from trial.r."""
-    if bodies.arrays[i, 0, 1] == 0:
+    """trial.held = Ã⁻¹ r and trial.reaction of a sparse body from trial.r."""
+    arrays, first, last = bodies.arrays[i], bodies.at[i], bodies.at[i + 1]
+    taken = arrays[0, 1] > 0
+    if not taken:
         called(i)
-        return
-    first, last = bodies.at[i], bodies.at[i + 1]
     reaction = trial.reaction[bodies.port_at[i] : bodies.port_at[i + 1]]
-    held(bodies.arrays[i], trial.r[first:last], trial.held[first:last], reaction)
+    held(arrays, trial.r[first:last], trial.held[first:last], reaction, taken)
+
+
+@inner
+def displaced(bodies, i, trial, out):  # type: ignore[no-untyped-def]
+    """out becomes g = G r + Y w, [KED, eq. (5)], of a body whose interface points move by trial.w."""
+    first, last, of_ports = bodies.at[i], bodies.at[i + 1], bodies.port_at[i]
+    q, N = bodies.port_at[i + 1] - of_ports, last - first
+    w = trial.w[of_ports : of_ports + q]
+    if bodies.dense[i]:
+        product(bodies.G, bodies.G_at[i], N, N, trial.r[first:last], out)
+        add_transposed(bodies.Y, bodies.Y_at[i], q, N, w, out)
+    else:
+        copied(trial.held[first:last], out[:N])
+        add_answer(bodies.arrays[i], w, out[:N])
+
+
+@inner
+def add_at_ports(bodies, i, x, out):  # type: ignore[no-untyped-def]
+    """out + Wᵀ x, x on a body's interface points."""
+    if bodies.dense[i]:
+        add_transposed(bodies.W, bodies.Y_at[i], len(x), bodies.at[i + 1] - bodies.at[i], x, out)
+        return
+    at, place, weight, _, _, _, _ = condensed(bodies.arrays[i])
+    for k in range(len(x)):
+        for m in range(at[k], at[k + 1]):
+            out[place[m]] += weight[m] * x[k]
+
+
+@inner
+def take_ports(bodies, i, u, out):  # type: ignore[no-untyped-def]
+    """out − W u, out on a body's interface points."""
+    N = bodies.at[i + 1] - bodies.at[i]
+    if bodies.dense[i]:
+        for k in range(len(out)):
+            row, x = bodies.W[bodies.Y_at[i] + k * N : bodies.Y_at[i] + (k + 1) * N], 0.0
+            for m in range(N):
+                x += row[m] * u[m]
+            out[k] -= x
+        return
+    at, place, weight, _, _, _, _ = condensed(bodies.arrays[i])
+    for k in range(len(out)):
+        x = 0.0
+        for m in range(at[k], at[k + 1]):
+            x += weight[m] * u[place[m]]
+        out[k] -= x
 
 
 @compiled
 def held_alone(arrays, r, out, reaction):  # type: ignore[no-untyped-def]
-    """`held` for what is not compiled."""
-    held(arrays, r, out, reaction)
+    """out becomes G r, and reaction Yᵀ r, for what is not compiled."""
+    held(arrays, r, out, reaction, True)
+    add_answer(arrays, reaction[:0], out)

@@ -2,7 +2,6 @@
 
 from kedfem.compiled import inner
 from kedfem.dynamics.system.algebra_kernel import (
-    add_transposed,
     copied,
     frame_copied,
     ports_turned,
@@ -12,7 +11,7 @@ from kedfem.dynamics.system.bodies_kernel import right_hand_side, rigid_frame_en
 from kedfem.dynamics.system.constraints_kernel import coordinate
 from kedfem.dynamics.system.ends_kernel import placed
 from kedfem.dynamics.system.interface_kernel import along, gradient, newmark_rate
-from kedfem.dynamics.system.products_kernel import sparse_held
+from kedfem.dynamics.system.products_kernel import add_at_ports, displaced, sparse_held
 
 
 @inner
@@ -33,14 +32,10 @@ def rigid_frame_begin(c, bodies, i, R, F, state, trial, work, solved):  # type: 
 def rigid_frame_finish(c, bodies, i, F, trial, state, history, t, work):  # type: ignore[no-untyped-def]
     """The displacement of a body, g = G r + Y w and δ = T g, [KED, eq. (5)], and its end of the step."""
     first, last, of_ports = bodies.at[i], bodies.at[i + 1], bodies.port_at[i]
-    q, N = bodies.port_at[i + 1] - of_ports, last - first
-    if bodies.dense[i]:
-        product(bodies.G, bodies.G_at[i], N, N, trial.r[first:last], work.y)
-    else:
-        copied(trial.held[first:last], work.y[:N])
-    add_transposed(bodies.Y, bodies.Y_at[i], q, N, trial.w[of_ports:], work.y)
+    N = last - first
+    displaced(bodies, i, trial, work.y)
     copied(trial.r[first:last], work.turned[:N])
-    add_transposed(bodies.W, bodies.Y_at[i], q, N, trial.force[of_ports:], work.turned)
+    add_at_ports(bodies, i, trial.force[of_ports : bodies.port_at[i + 1]], work.turned)
     rigid_frame_end(c, bodies, i, trial.Rp[i], F, work.y[:N], work.turned[:N], state, history, t, work)
 
 

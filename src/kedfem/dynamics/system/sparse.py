@@ -1,7 +1,7 @@
 """Large bodies of a system: a sparse factor seen from interface points, solved between what is compiled of a step.
 
 Their coordinates are nodal rows, component first, so that their mass is not one. What a compiled step asks of them, once
-a step or a pass of those with frames of their own, is G r and Yᵀ r of its right-hand side: by compiled triangular solves,
+a step or a pass of those with frames of their own, is Ã⁻¹ r of its right-hand side: by compiled triangular solves,
 or by a call out of compiled code where the factor is too large to be taken out of CHOLMOD.
 """
 
@@ -38,20 +38,22 @@ class SparsePart:
     """A body held at its interface points by a sparse factor, in nodal coordinates, component first.
 
     components : d; held : r (n, d) → G r (n, d), Yᵀ r (q,)
+    solve : r (n, d) → Ã⁻¹ r (n, d); no more where the factor was taken
     Y : (N, q); S : (q, q); W : (q, N)
     T : none: coordinates are nodal rows; G : none
-    arrays : of a factor that was taken out of CHOLMOD, see `compiled_arrays`; none of others
+    arrays : see `compiled_arrays`
     """
 
     components: int
     held: Held
+    solve: Callable[[Nodal], Nodal]
+    arrays: tuple[np.ndarray, ...]
     Y: Float[np.ndarray, "N q"]
     S: Float[np.ndarray, "q q"]
     W: Float[np.ndarray, "q N"]
     T: tuple[np.ndarray, ...] = ()
     unit: bool = True
     G: Float[np.ndarray, "_ _"] = field(default_factory=lambda: np.zeros((0, 0)))
-    arrays: tuple[np.ndarray, ...] = ()
 
 
 Part = DensePart | SparsePart
@@ -64,27 +66,33 @@ def sparse_part(link: Link, joint: Attachment, of: Substructure) -> SparsePart:
     """
     seen, order = held_substructure(of), component_order(link)
     W = port_columns(joint, link.n)[order].T
-    arrays = compiled_arrays(of, of.factor, order, W) if of.factor and link.unknowns <= TAKEN else ()
-    held = compiled_held(arrays, link.d, len(W)) if arrays else seen.held
-    return SparsePart(link.d, held, seen.Y[order], seen.S, W, arrays=arrays)
+    factor = of.factor if link.unknowns <= TAKEN else None
+    arrays = compiled_arrays(of, factor, order, W)
+    held = compiled_held(arrays, link.d, len(W)) if factor else seen.held
+    return SparsePart(link.d, held, of.solve, arrays, seen.Y[order], seen.S, W)
 
 
 def compiled_arrays(
-    of: Substructure, factor: Cholesky, order: Int[np.ndarray, " N"], W: Float[np.ndarray, "q N"]
+    of: Substructure, factor: Cholesky | None, order: Int[np.ndarray, " N"], W: Float[np.ndarray, "q N"]
 ) -> tuple[np.ndarray, ...]:
-    """What `products_kernel.held` works with: the triangle's arrays, C row by row, S, Y, and room for two vectors.
+    """What `products_kernel` works with: the triangle's arrays, C row by row, S, Y, and room for two vectors.
 
     Parameters
     ----------
+    factor : which is taken; without one arrays of the triangle are empty
     order : of `component_order`
     """
-    x, place = factor.taken(), np.empty(len(order), int)
+    place = np.empty(len(order), int)
     place[order] = np.arange(len(order))
     E = np.zeros((len(of.anchors), len(order)))
     E[np.arange(len(E)), place[of.anchors]] = 1.0
     C = sp.csr_array(np.concatenate([W, E]))
+    triangle: tuple[np.ndarray, ...] = (np.zeros(0, int),) * 6
+    if factor is not None:
+        x = factor.taken()
+        triangle = x.first, x.below_at, x.below, x.at, x.L, place[x.place]
     made = (
-        *(x.first, x.below_at, x.below, x.at, x.L, place[x.place]), C.indptr.astype(int), C.indices.astype(int), C.data,
+        *triangle, C.indptr.astype(int), C.indices.astype(int), C.data,
         of.S.ravel(), of.Y[order].T.ravel(), *np.zeros((2, max(C.shape))),
     )  # fmt: skip
     return tuple(np.ascontiguousarray(each) for each in made)
@@ -109,10 +117,10 @@ def addresses(arrays: Sequence[np.ndarray]) -> Int[np.ndarray, "a 2"]:
 
 
 def address_tables(parts: Sequence[Part]) -> Int[np.ndarray, "i a 2"]:
-    """Addresses of all bodies' arrays, zero of those without; these must be kept as long as they are used."""
+    """Addresses of all sparse bodies' arrays, which must be kept as long as they are used."""
     out = np.zeros((len(parts), ARRAYS, 2), int)
     for row, part in zip(out, parts, strict=True):
-        if isinstance(part, SparsePart) and part.arrays:
+        if isinstance(part, SparsePart):
             row[:] = addresses(part.arrays)
     return out
 
@@ -177,12 +185,8 @@ def _row_by_row(of: Int[np.ndarray, "L 3"], every: Sequence[Any]) -> Masses:
     )
 
 
-def solver(
-    parts: Sequence[Part], at: Int[np.ndarray, " _"], ports: Int[np.ndarray, " _"], trial: Trial
-) -> Any:
-    """What a compiled step calls with the number of a sparse body: trial.held and trial.reaction from trial.r.
-
-    Called of those whose factor stays where it is.
+def solver(parts: Sequence[Part], at: Int[np.ndarray, " _"], trial: Trial) -> Any:
+    """What a compiled step calls with the number of a sparse body whose factor was not taken: trial.held from trial.r.
 
     It must be kept as long as the step runs.
     """
@@ -190,8 +194,8 @@ def solver(
     from numba.experimental import function_type  # noqa: F401  (makes numba know such arguments)
 
     every = {
-        k: (part, slice(at[k], at[k + 1]), slice(ports[k], ports[k + 1]))
-        for k, part in enumerate(parts) if isinstance(part, SparsePart) and not part.arrays
+        k: (part, slice(at[k], at[k + 1]))
+        for k, part in enumerate(parts) if isinstance(part, SparsePart) and not part.arrays[0].size
     }  # fmt: skip
 
     failed: list[BaseException] = []
@@ -199,9 +203,9 @@ def solver(
     def solved(k: int) -> int:
         if not failed:
             try:
-                part, here, there = every[k]
-                g, trial.reaction[there] = part.held(trial.r[here].reshape(part.components, -1).T)
-                trial.held[here].reshape(part.components, -1)[:] = g.T
+                part, here = every[k]
+                y = part.solve(trial.r[here].reshape(part.components, -1).T)
+                trial.held[here].reshape(part.components, -1)[:] = y.T
             except BaseException as error:  # noqa: BLE001  (an interruption too: ctypes would print it and go on)
                 failed.append(error)
         return 0

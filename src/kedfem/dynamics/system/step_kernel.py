@@ -12,7 +12,6 @@ from kedfem.compiled import compiled, inlined
 from kedfem.dynamics.anderson_kernel import mixed
 from kedfem.dynamics.beams_kernel import begun, ended
 from kedfem.dynamics.system.algebra_kernel import (
-    add_transposed,
     copied,
     frame_copied,
     product,
@@ -35,7 +34,7 @@ from kedfem.dynamics.system.interface_kernel import (
     offset,
     pushed,
 )
-from kedfem.dynamics.system.products_kernel import sparse_held
+from kedfem.dynamics.system.products_kernel import displaced, sparse_held
 from kedfem.dynamics.system.record import NOMINAL, RIGID_BODY, STRESSED
 from kedfem.dynamics.system.reference import reference
 from kedfem.dynamics.system.rigid_frame_kernel import (
@@ -177,14 +176,8 @@ def asked(c, bodies, ends, of, driving, t, iteration, state, trial, work, solved
         ported(bodies, i, trial)
         if bodies.frame[i] != NOMINAL:
             first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
-            q, N, to = bodies.port_at[i + 1] - bodies.port_at[i], last - first, bodies.passed[i]
-            if bodies.dense[i]:
-                product(bodies.G, bodies.G_at[i], N, N, trial.r[first:last], work.y)
-            else:
-                copied(trial.held[first:last], work.y[:N])
-            add_transposed(
-                bodies.Y, bodies.Y_at[i], q, N, trial.w[bodies.port_at[i] : bodies.port_at[i + 1]], work.y
-            )
+            N, to = last - first, bodies.passed[i]
+            displaced(bodies, i, trial, work.y)
             turned(trial.Rp[i], d, work.y[:N], trial.change[to : to + N])
             for x in range(N):
                 before = trial.u[first + x] if bodies.frame[i] == STRESSED else 0.0
