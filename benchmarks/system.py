@@ -81,6 +81,12 @@ def speeds(raw: dict[str, Any], few: int) -> tuple[float, float, float]:
     return few / min(old), STEPS / min(new[1:]), float(after.passes[0]) / STEPS
 
 
+PAIRS = (
+    (200, 30),
+    (60, 6),
+    (40, 4),
+    (20, 3),
+)  # steps, and how often they are taken, solves after them each time
 SOLIDS = {  # elements of crank, coupler and rocker
     "a solid link of 951 unknowns beside two reduced ones": ([4, 1, 1], [16, 2, 1], [4, 1, 1]),
     "solids of 5,265 unknowns each": ([24, 4, 3],) * 3,
@@ -98,8 +104,8 @@ def solid(elements: tuple[list[int], ...]) -> dict[str, Any]:
     return raw
 
 
-def beside_solves(raw: dict[str, Any], count: int) -> tuple[float, float]:
-    """Processor time of a step of the system, histories and all, and of the sparse links' triangular solves [µs]."""
+def beside_solves(raw: dict[str, Any], count: int, turns: int) -> tuple[float, float]:
+    """Processor time of a step of the system, loads and histories too, and of its sparse links' triangular solves [µs]."""
     made, _ = prepared(scene_from(raw))
     scene, model = made.scene, made.model
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
@@ -116,7 +122,7 @@ def beside_solves(raw: dict[str, Any], count: int) -> tuple[float, float]:
         for k in large
     ]
     steps, solves = [], []
-    for _ in range(TURNS + 1):
+    for _ in range(turns + 1):
         began = process_time()
         solver.advance(state, forcings(model, motion), motion)
         steps.append(process_time() - began)
@@ -142,8 +148,8 @@ def main() -> None:
     for name, (raw, few) in cases.items():
         print("| {} | {:.0f} | {:.0f} | {:.1f} |".format(name, *speeds(raw, few)), flush=True)
     print("\n| scene | step, µs | triangular solves, µs | ratio |\n|---|---:|---:|---:|")
-    for (name, elements), count in zip(SOLIDS.items(), (200, 60, 40, 20), strict=True):
-        step, solves = beside_solves(solid(elements), count)
+    for (name, elements), count in zip(SOLIDS.items(), PAIRS, strict=True):
+        step, solves = beside_solves(solid(elements), *count)
         print(f"| {name} | {step:.0f} | {solves:.0f} | {step / solves:.2f} |", flush=True)
 
 

@@ -24,6 +24,7 @@ from kedfem.dynamics.system import (
     ends_kernel,
     interface_kernel,
     linear_kernel,
+    products_kernel,
     rigid_frame_kernel,
 )
 from kedfem.dynamics.system.steps import Steps, scene_system
@@ -35,7 +36,8 @@ from kedfem.scene import drive_angle, scene_from, time_grid
 from .test_dynamics import four_bar, slider_crank
 
 KERNELS = (
-    algebra_kernel, bodies_kernel, constraints_kernel, ends_kernel, interface_kernel, linear_kernel, rigid_frame_kernel,
+    algebra_kernel, bodies_kernel, constraints_kernel, ends_kernel, interface_kernel, linear_kernel, products_kernel,
+    rigid_frame_kernel,
 )  # fmt: skip
 
 

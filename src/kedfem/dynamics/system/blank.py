@@ -6,6 +6,7 @@ from kedfem.arrays import Float
 from kedfem.dynamics.anderson import DEPTH
 from kedfem.dynamics.metric import room_for
 from kedfem.dynamics.system.arrays import Bodies, Constraints, Ends
+from kedfem.dynamics.system.record import RIGID_BODY
 from kedfem.dynamics.system.state import History, State, Trial, Work
 
 
@@ -62,12 +63,19 @@ def room(bodies: Bodies) -> Work:
 def empty_history(
     T: int, bodies: Bodies, of: Constraints, F: Float[np.ndarray, "T N"] | None = None
 ) -> History:
-    """Room for T time points; of applied forces that are known beforehand none."""
+    """Room for T time points; of applied forces that are known beforehand none.
+
+    What steps write of every body is not set to zero before. It is one array, which asks for memory of the system anew
+    less often than several: pages that are seen for the first time would cost half of what a small solid's steps do.
+    """
     N, L, k, r = int(bodies.at[-1]), len(bodies.motion), len(bodies.place), len(of.law)
     b, _, E = bodies.beams.tangent.shape
-    u, v, a, g, Kg = np.zeros((5, T, N))
+    rows = np.empty((5 if bodies.dense.all() else 7, T, N))
+    if (bodies.frame > RIGID_BODY).any():
+        rows[3:] = 0.0
+    u, v, a, g, Kg, *more = rows
+    Mv, Cg = more or rows[:2, :0]
     forces = np.zeros((T, N)) if F is None else F
-    Mv, Cg = np.zeros((2, 0 if bodies.dense.all() else T, N))
     return History(
         u, v, a, forces, g, np.zeros((T, b, 3, E)), np.zeros((T, L, 3, 3)), np.zeros((T, int(bodies.port_at[-1]))),
         np.zeros((T, L)), np.zeros((T, k)), np.zeros((T, r)), np.zeros((T, r)), np.zeros((T, r)), Kg, Mv, Cg,

@@ -113,7 +113,8 @@ class Trial(NamedTuple):
 
     r : (N,) right-hand sides or residuals in the bodies' frames; held : (N,) Ã⁻¹ r of sparse bodies
     reaction, w, force : (q,) at their interface points
-    Rp : (bodies, 3, 3) frames of the step's factor; RB, SRB : flat, as B and its transpose; H : their common matrix, by its profile
+    Rp : (bodies, 3, 3) frames of the step's factor; RB, SRB : flat, as B and its transpose; H : their common matrix, by
+        its profile
     mixing : room of `mixing_kernel`
     C : gradients on what each constraint couples, in `columns`; target, compliance, beside, m : (r,); right, dz : (k,)
     K, inverse, x : H with constraints in it, factored, the inverse of its pivots, and what is solved for
