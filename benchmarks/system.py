@@ -105,7 +105,7 @@ def solid(elements: tuple[list[int], ...]) -> dict[str, Any]:
 
 
 def beside_solves(raw: dict[str, Any], count: int, turns: int) -> tuple[float, float]:
-    """Processor time of a step of the system, loads and histories too, and of its sparse links' triangular solves [µs]."""
+    """Processor time of a step, loads and histories too, and of the sparse links' triangular solves [µs]."""
     made, _ = prepared(scene_from(raw))
     scene, model = made.scene, made.model
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
