@@ -22,6 +22,7 @@ LEFT, RIGHT, TOP, BOTTOM = 60, 260, 130, 60  # pixels kept free: title above, co
 
 
 BALL, COIL = "steelblue", "#4d6b57"
+ASIDE = 0.25  # of the width, from the middle: names beyond it would reach into colour bar and axes
 NAMED = 6  # most springs whose names stand beside them
 THROUGH = 0.12  # opacity of what lies before the highest stress where it would be hidden from both sides
 # quadratic faces are halved so many times, unless that makes more triangles than this
@@ -45,8 +46,8 @@ def render(vtu: str, png: str, title: str, deformation_scale: str = "1", *gravit
     is_ball, is_spring = (np.isin(grid.cell_data["link"], list(of)) for of in (balls, springs))
     links = ~(is_ball | is_spring)
     draw_links(plotter, grid if links.all() else grid.extract_cells(links), shown)
-    draw_balls(plotter, grid.extract_cells(is_ball), balls)
-    draw_springs(plotter, grid, springs)
+    draw_balls(plotter, grid.extract_cells(is_ball), balls, shown)
+    draw_springs(plotter, grid, springs, shown)
     draw_words(plotter, title, float(deformation_scale), shown.cut is not None)
     aim(plotter, grid, shown)
     mark(plotter, grid)
@@ -131,16 +132,16 @@ def draw_links(plotter: Any, grid: Any, shown: View) -> None:
     draw_bar(plotter, links)
 
 
-def draw_balls(plotter: Any, grid: Any, words: Mapping[int, str]) -> None:
+def draw_balls(plotter: Any, grid: Any, words: Mapping[int, str], shown: View) -> None:
     """Masses that links carry, translucent so that they hide nothing, with their names."""
     for cell in range(grid.n_cells):
         ball = grid.extract_cells([cell])
         look = {"color": BALL, "opacity": 0.5, "smooth_shading": True}
         plotter.add_mesh(curved_surface(ball), scalars=None, **look)
-        name(plotter, ball.center, words[int(ball.cell_data["link"][0])])
+        name(plotter, ball.center, words[int(ball.cell_data["link"][0])], shown)
 
 
-def draw_springs(plotter: Any, grid: Any, words: Mapping[int, str]) -> None:
+def draw_springs(plotter: Any, grid: Any, words: Mapping[int, str], shown: View) -> None:
     """Springs and dampers, with their names where these are few."""
     for number, word in words.items():
         spring = grid.extract_cells(grid.cell_data["link"] == number).extract_surface(
@@ -148,14 +149,16 @@ def draw_springs(plotter: Any, grid: Any, words: Mapping[int, str]) -> None:
         )
         plotter.add_mesh(spring, color=COIL, scalars=None, smooth_shading=True, split_sharp_edges=True)
         if len(words) <= NAMED:
-            name(plotter, spring.center, word)
+            name(plotter, spring.center, word, shown)
 
 
-def name(plotter: Any, place: Any, word: str) -> None:
-    """A word that is read whatever is before it."""
+def name(plotter: Any, place: Any, word: str, shown: View) -> None:
+    """A word that is read whatever is before it; near the right side to the left of its place, where axes are free."""
+    off = (np.asarray(place) @ shown.across - shown.middle[0]) / shown.size[0]
     plotter.add_point_labels(
         [place], [word], always_visible=True, font_size=20, show_points=False, text_color="black",
         shape="rounded_rect", shape_color="white", shape_opacity=0.7, margin=2, justification_vertical="bottom",
+        justification_horizontal="right" if off > ASIDE else "left",
     )  # fmt: skip
 
 
