@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from shutil import copytree
 from tempfile import TemporaryDirectory
+from textwrap import indent
 
 from benchmarks.pages import ROOT as CHECKOUT
 from benchmarks.pages import script, seconds, table, write_page
@@ -21,6 +22,7 @@ from benchmarks.scenes import ten_turns
 analyse(ten_turns(sys.argv[1]))
 """
 EXAMPLES = ("four_bar_beams", "four_bar_corotational", "four_bar_solids")
+COMPILED = (*EXAMPLES, "motor_four_bar", "slider_crank_solids")
 ROWS = """
 import gc, sys
 from kedfem.processes import import_quickly, imported
@@ -33,6 +35,14 @@ scene = read_scene(sys.argv[1])
 nothing = {"animation": None, "plots": False, "picture": False, "csv": False, "parquet": False, "report": False}
 analyse(scene.model_copy(update={"output": scene.output.model_copy(update=nothing)}))
 gc.freeze()
+"""
+COMPILING = f"""
+import time
+from kedfem.compiled import compiling
+times = []
+with compiling(lambda begins: times.append(-time.process_time() if begins else time.process_time())):
+{indent(ROWS, "    ")}
+print(sum(times))
 """
 WHOLE = "import sys; from kedfem.cli import main; sys.argv = ['kedfem', 'run', sys.argv[1]]; main()"
 
@@ -47,7 +57,8 @@ def bench_start(folder: Path, quick: bool) -> None:
         rows.append((name, f"{spent:.2f}"))
     rows += _ten_turns(1 if quick else 5)
     examples = _examples(EXAMPLES[:1] if quick else EXAMPLES, 1 if quick else 5)
-    write_page(folder, "performance/start", [table(("command", "seconds"), rows), examples])
+    compiled = _compiled(COMPILED[:1] if quick else COMPILED)
+    write_page(folder, "performance/start", [table(("command", "seconds"), rows), examples, compiled])
 
 
 def _ten_turns(repeats: int) -> list[tuple[str, str]]:
@@ -76,6 +87,19 @@ def _examples(names: Sequence[str], repeats: int) -> list[str]:
         rows.append((name, f"{spent[0]:.1f}", f"{spent[1] - spent[0]:.1f}", f"{spent[1]:.1f}"))
     header = ("example, warm", "results file [s]", "frames, plots, picture [s]", "whole [s]")
     return table(header, rows)
+
+
+def _compiled(names: Sequence[str]) -> list[str]:
+    """Processor time that a first run compiles for, with an empty cache."""
+    rows = []
+    for name in names:
+        with TemporaryDirectory() as folder:
+            copied = copytree(CHECKOUT / "examples" / name, Path(folder) / name)
+            environment = os.environ | {"KEDFEM_CACHE": f"{folder}/cache"}
+            command = [sys.executable, "-c", COMPILING, str(copied / "scene.toml")]
+            said = subprocess.run(command, capture_output=True, check=True, text=True, env=environment)
+        rows.append((name, f"{float(said.stdout.split()[-1]):.1f}"))
+    return table(("example, first run", "compiling, processor time [s]"), rows)
 
 
 if __name__ == "__main__":

@@ -81,7 +81,8 @@ class Still:
         """
         from kedfem.dynamics.system.still_kernel import still_gradients
 
-        turning = motion.R[0], motion.v[0], motion.omega[0]
+        omega = np.ascontiguousarray(motion.omega[0])  # laid out as in steps: compiled once for both
+        turning = motion.R[0], motion.v[0], omega
         still_gradients(
             self.of.ends, self.of.constraints, turning, motion.p[0], stations, z, self._trial, self._work
         )
