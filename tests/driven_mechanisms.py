@@ -110,9 +110,9 @@ def energy(raw: Raw) -> dict[str, float]:
     """How far the account of energy is from closing, of a third of what it misses with steps twice as long.
 
     From a quasi-static start, as steps cannot resolve what loads that act at once excite of short links. No stops,
-    which steps meet at another time each, nor with stiffening, whose work is in the residual.
+    which steps meet at another time each.
     """
-    raw = {**raw, "limits": {}, "analysis": raw["analysis"] | {"stiffening": False}}
+    raw = {**raw, "limits": {}}
     rough, fine = (recorded(raw, n, initial="quasi-static") for n in (1, 2))
     scale = max(float(np.abs(fine[f"energy/{name}"]).max()) for name in ("kinetic", "strain", "work"))
     missing, other = (float(np.abs(x["energy/residual"]).max()) / scale for x in (rough, fine))

@@ -25,7 +25,7 @@ from kedfem.dynamics.loads import coarse_steps
 from kedfem.dynamics.stepping.cost import factor_words
 from kedfem.dynamics.stepping.first_state import period_map
 from kedfem.dynamics.stepping.levels import level_steps
-from kedfem.dynamics.stepping.solvers import eased_warning
+from kedfem.dynamics.stepping.solvers import eased_warning, stresses_in
 from kedfem.dynamics.system.period.map import Carried
 from kedfem.dynamics.system.steps import Steps
 from kedfem.dynamics.vibration import Vibration, vibration
@@ -161,7 +161,7 @@ def _analysed(
     plain = sizes(scene, ready.model)
     notices = [*size_warnings(scene, plain), *assembly_warning(assembly), *stubby_warning(ready.model)]
     solvers = clock.timed("factor", lambda: _solvers(ready, beside), factor_words(ready.model))
-    account = Account(ready.model, measured_elements(scene, ready.model))
+    account = Account(ready.model, measured_elements(scene, ready.model), lambda: stresses_in(solvers))
     recorded = clock.timed(
         "probes", lambda: recording(scene, ready.model, account, ready.path, ready.linkage)
     )
@@ -179,7 +179,7 @@ def _analysed(
         "steps", lambda: stepped(ready, solvers, watched, folder, watch, keeper)
     )
     balance = None if without_vibration(scene) else account.balance
-    unbalanced = balance_warning(balance, scene.analysis.stiffening) if balance else ()
+    unbalanced = balance_warning(balance) if balance else ()
     notices += [
         *unbalanced,
         *(mass_damping_warning(ready, balance.resisted) if balance else ()),
@@ -213,7 +213,7 @@ def _analysed(
     }  # fmt: skip
     add_notes(folder / "results.h5", notes)
     results = replace(results, notes={**results.notes, **notes})
-    why = meaningless(found, balance, efforts.unworked, bool(scene.analysis.stiffening))
+    why = meaningless(found, balance, efforts.unworked)
     if why := unstable(steady) or why:
         mark_doubtful(folder / "results.h5", why)
         results = replace(results, status="doubtful", reason=why)

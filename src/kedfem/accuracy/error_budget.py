@@ -143,21 +143,20 @@ def _beyond(budget: Budget, kind: str) -> list[Share]:
     return [x for x in budget.shares if x.errors.get(kind, 0.0) > WHOLE]
 
 
-def meaningless(budget: Budget, balance: Balance | None, unworked: float, stiffened: bool = False) -> str:
+def meaningless(budget: Budget, balance: Balance | None, unworked: float) -> str:
     """Why a run means nothing by its own account, in words; empty for one that may.
 
     Parameters
     ----------
     balance : of energy; none where there are no time steps
     unworked : work of the drives that the account of energy does not have, of the energy exchanged [-]
-    stiffened : the run has geometric stiffening, whose work is in the energy's residual too
     """
     # one part alone may be the phase of a vibration, whose size is right; several are another motion altogether
     lost = {
         f"estimated error of {kind}": error for kind, error in budget.together.items()
         if error >= FACTOR * WHOLE or len(_beyond(budget, kind)) > 1
     }  # fmt: skip
-    energy = {"energy": balance.energy} if balance and not stiffened else {}
+    energy = {"energy": balance.energy} if balance else {}
     left = {"the drive's work": unworked} | energy
     message = [f"{what} {percent(error)}" for what, error in lost.items()]
     message += [

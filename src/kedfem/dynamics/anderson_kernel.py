@@ -61,7 +61,7 @@ def definite_solved(A, x):  # type: ignore[no-untyped-def]
             total = A[i, j]
             for m in range(j):
                 total -= A[i, m] * A[j, m]
-            A[i, j] = np.sqrt(total) if i == j else total / A[j, j]
+            A[i, j] = np.sqrt(max(total, RIDGE)) if i == j else total / A[j, j]
         for m in range(i):
             x[i] -= A[i, m] * x[m]
         x[i] /= A[i, i]

@@ -8,6 +8,9 @@ because T K0 Tᵀ turns with the rigid-body motion, not with the bent link: its 
 real link's inner forces do not have. That is the equation's geometric error, and is kept apart. The residual is the
 integration's: of second order in the step, and what numerical damping takes (ρ∞ < 1).
 
+Geometric stiffening stores ½ Σ g · k g P, in the strain energy here, and its forces R (k g P) do work on the rigid-body
+motion; with what the stresses do as they change, which comes from loads that shorten bent links, that is apart too.
+
 Supports do work on the elastic motion too where joints are enforced by constraint equations whose directions vary in
 time. Springs in joints, bushings and shafts, store energy and dampers take it: that is no work of supports.
 
@@ -16,17 +19,20 @@ Work is the trapezoidal sum of powers; damping's is that of the means over a ste
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, partial
 
 import numpy as np
 
 from kedfem.arrays import Float, Int
-from kedfem.dynamics.history import Block, LinkHistory
+from kedfem.dynamics.history import Block, Forcing, LinkHistory
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.stepping.state import Rayleigh
+from kedfem.dynamics.stiffening import Stiffening, StressModes, Turning
 from kedfem.motion.rigid import RigidMotion
-from kedfem.results.balance import Balance, Flow, fields_of, flow, prescribed_fields
+from kedfem.results.balance import Balance, Flow, Stress, fields_of, flow, prescribed_fields, stress
 from kedfem.results.forces.constraint_forces import ConstraintForces, row_work
 from kedfem.results.forces.force_elements import Measured
 from kedfem.results.forces.moments import Constants, RigidRates, constants, rates_of_bodies
@@ -82,10 +88,13 @@ class _Sums:
 class Account:
     """Energy of all links from the first block on; a block that does not follow on begins anew."""
 
-    REMEMBERED = ("_next", "_sums", "_start", "_last", "_springs", "_largest")
+    REMEMBERED = ("_next", "_sums", "_start", "_stored", "_last", "_springs", "_largest")
 
-    def __init__(self, model: Model, force_elements: Measured | None = None) -> None:
-        self.model, self.force_elements = model, force_elements
+    def __init__(
+        self, model: Model, force_elements: Measured | None = None,
+        stresses: Callable[[], Stiffening | None] = lambda: None,
+    ) -> None:  # fmt: skip
+        self.model, self.force_elements, self.stresses = model, force_elements, cache(stresses)
         joined = zip(model.links, model.joints, model.bodies, strict=True)
         self.of = [constants(*each, model.damping) for each in joined]
         self.prescribed = [constants(x.link, NO_PORTS, x.body, Rayleigh()) for x in model.prescribed]
@@ -98,7 +107,7 @@ class Account:
     def _begin(self) -> None:
         self._next = -1
         self._sums: _Sums | None = None
-        self._start = 0.0
+        self._start = self._stored = 0.0
         self._last: list[Last | None] = [None] * len(self._groups)
         self._springs: tuple[float, np.ndarray, np.ndarray] | None = None
         self._largest = np.zeros(4)
@@ -133,13 +142,17 @@ class Account:
             strain, pushed, self._springs = strain + springs.stored, springs.pushed, springs.last
             taken = taken + springs.dissipated[:, None] * [1, 0]
         taken = np.column_stack([taken, pushed])
+        stressed = self._stress(block)
+        strain = strain + stressed.stored
         energy = flow.kinetic + strain
+        flow = replace(flow, neglected=flow.neglected + stressed.power)
         rates = np.stack([flow.loads, flow.supports, flow.neglected, flow.led, flow.resisted], axis=1)
         if self._sums is None:
             self._sums = _Sums(float(block.motion.t[0]), rates[0], np.zeros(5), np.zeros(3))
-            self._start = float(energy[0])
+            self._start, self._stored = float(energy[0]), float(stressed.stored[0])
         work, total = self._sums.add(block.motion.t, rates, taken)
         loads, supports, neglected, led, resisted = work.T
+        neglected = neglected - (stressed.stored - self._stored)
         dissipated, drag, pushed = total.T
         driven, supports = supports - led, supports - pushed
         if block.exerted is not None:  # constraints along directions of displaced bodies do no work in all
@@ -154,6 +167,21 @@ class Account:
             "residual": left, "driven": driven,
         }  # fmt: skip
         return {name: x[:, None] for name, x in rows.items()} | {"work": np.stack([loads, supports], axis=1)}
+
+    def _stress(self, block: Block) -> Stress:
+        """Of geometric stiffening; nothing without."""
+        stresses, none = self.stresses(), np.zeros(len(block))
+        found = Stress(none, none)
+        if stresses is None:
+            return found
+        forcing = stresses.over(forcings(self.model, block.motion), block.motion)
+        at = rates_of_bodies(block.motion)
+        for group in self._groups:
+            of, links = [self.of[i] for i in group], [block.links[i] for i in group]
+            made = [partial(_turning, stresses.modes[i], forcing[i]) for i in group]
+            more = stress(of, links, made, at.of(_bodies(of), of[0].k))
+            found = Stress(found.power + more.power, found.stored + more.stored)
+        return found
 
     def _mu(self, block: Block) -> Rows:
         """Forces of rows, unless the block knows those of springs."""
@@ -205,19 +233,21 @@ def energy_channels(account: Account) -> list[tuple[Channel, Callable[[Block], R
     ]
 
 
-def balance_warning(found: Balance, stiffened: bool = False) -> tuple[str, ...]:
-    """A warning where the integration loses or makes energy.
-
-    Parameters
-    ----------
-    stiffened : the run has geometric stiffening, whose work is in the residual too: it is not judged
-    """
-    if stiffened or found.energy <= UNBALANCED:
+def balance_warning(found: Balance) -> tuple[str, ...]:
+    """A warning where the integration loses or makes energy."""
+    if found.energy <= UNBALANCED:
         return ()
     return (
         f"the residual of the balance is {100 * found.energy:.2g} % of energy: the steps are too long for what moves, or "
         "numerical damping takes what they do not resolve; take shorter ones",
     )
+
+
+def _turning(modes: StressModes, forcing: Forcing, t: int) -> Turning:
+    """g → k g P of a link at a time point."""
+    if forcing.stress is None:
+        raise ValueError("stress factors must be there, got none")
+    return modes.turning(forcing.stress[t])
 
 
 def _grouped(of: Sequence[Constants], k: int) -> list[list[int]]:

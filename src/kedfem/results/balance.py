@@ -3,7 +3,7 @@
 The absolute motion is R' = R0 + δ, its rate R0' + δ' with R0' = 1 ⊗ p' + X R'ᵀ.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.dynamics.history import LinkHistory, Products
 from kedfem.dynamics.joints.ports import turned_vectors
+from kedfem.dynamics.stiffening import Turning
 from kedfem.results.forces.moments import Constants, Field, RigidRates, dot, paired, rotated, turned
 
 Scalars = Float[np.ndarray, " T"]
@@ -39,6 +40,42 @@ class Flow:
     def __add__(self, other: "Flow") -> "Flow":
         """Both together."""
         return Flow(*(getattr(self, each.name) + getattr(other, each.name) for each in fields(self)))
+
+
+@dataclass(frozen=True, slots=True)
+class Stress:
+    """Of geometric stiffening, all links together at T time points.
+
+    power : (T,) of its forces R (k g P) against the absolute motion R0' + δ' [W]
+    stored : (T,) its energy ½ Σ g · k g P [J]
+    """
+
+    power: Scalars
+    stored: Scalars
+
+
+def stress(
+    of: Sequence[Constants],
+    histories: Sequence[LinkHistory],
+    made: Sequence[Callable[[int], Turning]],
+    at: RigidRates,
+) -> Stress:
+    """Of links that are all planar or all in space.
+
+    Parameters
+    ----------
+    made : g → k g P of each link at a time point
+    at : rigid-body motion of their bodies
+    """
+    S, T = len(of), len(histories[0].u)
+    rows, power, stored = np.empty((len(of[0].fit), S, T)), np.zeros((S, T)), np.zeros(T)
+    for i, (x, history, turning) in enumerate(zip(of, histories, made, strict=True)):
+        f = np.stack([turning(t)(g) for t, g in enumerate(history.g)])
+        stored += 0.5 * dot(history.g, f)
+        f = f @ history.R.transpose(0, 2, 1)
+        rows[:, i], power[i] = x.fit @ f.reshape(T, -1).T, dot(history.v, f)
+    power += _work(rows[:-1].reshape(at.rates.shape[1:]), at.rates[0]) + rows[-1] * at.omega[-1]
+    return Stress(power.sum(axis=0), stored)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.inertias import inertias_of_model
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.stepping.solvers import stresses_of
 from kedfem.motion.linkage import Linkage, linkage
 from kedfem.motion.path import Path
 from kedfem.results.audit import Account, energy_channels
@@ -41,7 +42,7 @@ def recording(
     probes = probe_channels(scene, model, linked)
     force_elements = account.force_elements if account else None
     forces = Forces(ConstraintForces(model), force_elements or measured_elements(scene, model))
-    account = account or Account(model, forces.force_elements)
+    account = account or Account(model, forces.force_elements, lambda: stresses_of(scene, model))
     joints = [channel for name in scene.joints for channel in joint_channels(scene, model, name, forces)]
     drive = [
         channel for name in scene.driven_joints for channel in drive_channels(scene, model, name, forces)

@@ -28,15 +28,25 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     """
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
     tolerance = (FREE if scene.driven is None else CONVERGED) if corotational(scene) else None
-    stresses = _stresses(scene, model) if scene.analysis.stiffening else None
     monolithic = scene.analysis.solver == "monolithic"
-    return Steps(scene, scene_system(scene, model, stresses), model, scheme, tolerance, monolithic)
+    return Steps(
+        scene, scene_system(scene, model, stresses_of(scene, model)), model, scheme, tolerance, monolithic
+    )
 
 
-def _stresses(scene: Scene, model: Model) -> Stiffening:
+def stresses_of(scene: Scene, model: Model) -> Stiffening | None:
+    """Stress modes of a model's links, if the scene asks for geometric stiffening."""
+    if not scene.analysis.stiffening:
+        return None
     if not (scene.springs or scene.motors):
         return stiffening(model)
     return stiffening(model, rigid_elements_of(scene, model, path(linkage(scene), *drive_range(scene))))
+
+
+def stresses_in(solvers: Sequence[Steps]) -> Stiffening | None:
+    """Stress modes that solvers have, if geometric stiffening counts."""
+    found: Stiffening | None = solvers[0].stiffening
+    return found
 
 
 def dampers_count(model: Model) -> bool:

@@ -50,6 +50,10 @@ from kedfem.dynamics.system.stress_kernel import combined, stressed_begin, stres
 MET = -2  # instead of a body: a stop was met, and the step is to be divided
 PASSES = 40  # in a step, of which it takes 2 to 6
 PATIENCE, EASIER = 14, 100.0  # after so many a larger change is taken, and counted
+STALLED, ROUNDING = (
+    4,
+    1e-8,
+)  # passes in which changes do not halve are rounding below this share of a stiffened deflection
 
 
 @compiled
@@ -124,13 +128,19 @@ def begin(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type:
 def passes(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type: ignore[no-untyped-def]
     """Pass after pass, until none asks for a change; whether that came, and the body that moved most."""
     memory = (state.pairs, state.products, state.last, trial.mixing)
-    R, worst, count = driving.R[t], -1, 0
+    R, worst, count, least, stalled = driving.R[t], -1, 0, np.inf, 0
     for iteration in range(PASSES):
         count = iteration + 1
         asked(c, bodies, ends, of, driving, t, iteration, state, trial, work, solved)
         size, reached, worst = sizes(c, bodies, state, trial)
         allowed = c.tolerance if iteration < PATIENCE else EASIER * c.tolerance
         settled = size <= allowed * allowed * reached + c.floor * c.floor
+        stalled = 0 if size < least / 4 else stalled + 1
+        least = min(least, size)
+        if not settled and stalled >= STALLED and bodies.frame[max(worst, 0)] == STRESSED:
+            settled = size <= ROUNDING * ROUNDING * deflected(bodies, trial)
+            if settled:
+                state.counts[:] = 0.0  # what is kept of rounding would be much of the next step
         if not settled:
             mixed(memory, state.counts, iteration, trial.change)
         taken(c, bodies, trial)
@@ -209,6 +219,16 @@ def sizes(c, bodies, state, trial):  # type: ignore[no-untyped-def]
         size += trial.change[len(trial.change) - k + m] ** 2
         reached += (c.weight * (trial.z[m] + (trial.dz[m] if alone else -state.z[0, m]))) ** 2
     return size, reached, worst
+
+
+@inlined
+def deflected(bodies, trial):  # type: ignore[no-untyped-def]
+    """Square of the deflection of all bodies, as changes are measured."""
+    total = 0.0
+    for i in range(len(bodies.motion)):
+        for x in range(bodies.at[i], bodies.at[i + 1]):
+            total += (bodies.size[i] * trial.u[x]) ** 2
+    return total
 
 
 @inlined

@@ -36,6 +36,8 @@ LATER = np.array([
 ]) / 12  # rates at five instants, of fourth order  # fmt: skip
 AHEAD = {1: [1], 2: [-1, 2], 3: [1, -3, 3], 4: [-1, 4, -6, 4]}  # the next of values at equal steps
 
+THIRD, FOURTH = np.array([[-1, 3, -3, 1, 0], [1, -4, 6, -4, 1]])  # third and fourth differences
+
 Rows = Sequence[Float[np.ndarray, "_ _"]]
 
 
@@ -182,7 +184,15 @@ def _differenced(first: Instant, motion_at: Motion, h: float) -> tuple[tuple[Fla
             return (before[0], earlier[0]), max(left, rest)
         if again and change <= CONVERGED * float(np.linalg.norm(u[0])):
             return (u[0], felt[0]), 0.0
-    return (u[0], v[0] if again == 0 else felt[0]), left  # the rates that dampers have felt: u balances these
+    if again == 0:
+        return (u[0], v[0]), _scatter(u) / h
+    return (u[0], felt[0]), left  # the rates that dampers have felt: u balances these
+
+
+def _scatter(u: Float[np.ndarray, "5 N"]) -> float:
+    """How far values at five instants are from a smooth curve: nothing where higher differences fall."""
+    third, fourth = (float(np.linalg.norm(each @ u)) for each in (THIRD, FOURTH))
+    return fourth if fourth > third / 4 else 0.0
 
 
 def _feels_rates(of: Ready) -> bool:
