@@ -22,7 +22,7 @@ LEFT, RIGHT, TOP, BOTTOM = 60, 260, 130, 60  # pixels kept free: title above, co
 
 
 BALL, COIL = "steelblue", "#4d6b57"
-ASIDE = 0.25  # of the width, from the middle: names beyond it would reach into colour bar and axes
+LETTER, BESIDE = 11.5, 190  # pixels: of a letter; from the right side, where axes and colour bar begin
 NAMED = 6  # most springs whose names stand beside them
 THROUGH = 0.12  # opacity of what lies before the highest stress where it would be hidden from both sides
 # quadratic faces are halved so many times, unless that makes more triangles than this
@@ -153,12 +153,15 @@ def draw_springs(plotter: Any, grid: Any, words: Mapping[int, str], shown: View)
 
 
 def name(plotter: Any, place: Any, word: str, shown: View) -> None:
-    """A word that is read whatever is before it; near the right side to the left of its place, where axes are free."""
-    off = (np.asarray(place) @ shown.across - shown.middle[0]) / shown.size[0]
+    """A word that is read whatever is before it, from its place on; to the left of it where axes would be under it."""
+    wide, high = plotter.window_size
+    pixel = np.max(shown.size / [wide - LEFT - RIGHT, high - TOP - BOTTOM])
+    begins = LEFT + (wide - LEFT - RIGHT) / 2 + (np.asarray(place) @ shown.across - shown.middle[0]) / pixel
+    length = LETTER * len(word)
+    left = length * pixel * shown.across if begins + length > wide - BESIDE else np.zeros(3)
     plotter.add_point_labels(
-        [place], [word], always_visible=True, font_size=20, show_points=False, text_color="black",
+        [place - left], [word], always_visible=True, font_size=20, show_points=False, text_color="black",
         shape="rounded_rect", shape_color="white", shape_opacity=0.7, margin=2, justification_vertical="bottom",
-        justification_horizontal="right" if off > ASIDE else "left",
     )  # fmt: skip
 
 
