@@ -36,11 +36,11 @@ def shared_nodes(links: Sequence[Link], joints: Sequence[Attachment]) -> sp.csr_
         inverse = np.linalg.inv(W[:, s]) if len(W) else np.zeros((0, 0))
         T = sp.lil_array((link.unknowns, len(m)))
         T[m, np.arange(len(m))] = 1.0
-        Tz = np.zeros((link.unknowns, joint.B.shape[1]))
+        Tz = np.zeros((link.unknowns, joint.unknowns))
         if len(s):
             near = np.flatnonzero(W[:, m].any(axis=0))
             T[np.ix_(s, near)] = -inverse @ W[:, m[near]]
-            Tz[s] = inverse @ joint.B
+            Tz[np.ix_(s, joint.columns)] = inverse @ joint.B
         blocks.append(sp.csr_array(T))
         interface.append(sp.csr_array(Tz))
     return sp.csr_array(sp.hstack([sp.block_diag(blocks), sp.vstack(interface)]))

@@ -126,7 +126,7 @@ class Equation:
         k, first = of.system.unknowns, Instant(of, self.mechanism.motion_at, 0.0)
         instants = (Instant(of, at, TURN * n / WAVES, first) for n in range(WAVES))
         found = np.zeros((WAVES, len(of.system.constraints), self.T.shape[1]))
-        found[:, :, found.shape[2] - k :] = [each.gradients(np.zeros(k)) for each in instants]
+        found[:, :, found.shape[2] - k :] = [each.gradients(np.zeros(k)).toarray() for each in instants]
         waves = np.asarray(np.fft.rfft(found, axis=0)) / WAVES
         waves[1:] *= 2
         return waves[

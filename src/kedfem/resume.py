@@ -205,7 +205,7 @@ def _fingerprint(ready: Prepared) -> list[list[float]]:
     out = []
     for link, joint in zip(ready.model.links, ready.model.joints, strict=True):
         K0 = link.K0.data if sp.issparse(link.K0) else link.K0
-        for each in (link.X, link.m1, K0, joint.weights, joint.B):
+        for each in (link.X, link.m1, K0, joint.weights, joint.B, joint.columns):
             x = np.asarray(each, float).ravel()
             out.append([float(x.size), float(np.abs(x).sum()), float(np.cos(np.arange(x.size)) @ x)])
     return out

@@ -117,7 +117,8 @@ def test_what_constraints_that_vary_do_on_the_elastic_motion_is_their_forces_tim
         for block in blocks:
             found = account.rows(block)
             work.append(found["work"][:, 1] - found["driven"][:, 0])
-            C.append(joint_rows(model.rows, block.motion).C)
+            rows = joint_rows(model.rows, block.motion, model.interface_unknowns)
+            C.append([rows.at(k).toarray() for k in range(len(block))])
             z.append(interface(model, block))
             mu.append(forces.of(block))
         rate = np.einsum("tr,trk,tk->t", means(mu), np.diff(np.concatenate(C), axis=0), means(z))

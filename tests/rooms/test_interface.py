@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from kedfem.dynamics.matrices.bordered import MANY, independent_rows, multipliers
 from kedfem.dynamics.matrices.interface import Tie, solved
 
 
@@ -42,3 +43,31 @@ def test_forces_balance_and_rows_close() -> None:
         assert (of.C @ z)[:4] == pytest.approx(of.target[:4], abs=1e-13)
         assert m[4] == pytest.approx(-1e5 * (of.C @ z)[4], rel=1e-9)
         assert m[2] == pytest.approx(0.0, abs=1e-6 * np.abs(m).max())
+
+
+@pytest.mark.parametrize("repeated", [False, True])
+def test_many_constraints_are_independent_but_for_those_that_repeat_others(repeated: bool) -> None:
+    """As many as a sparse factor is asked of first; one that is the sum of two others is left out, laws never are."""
+    n = 3 * MANY
+    C = sp.lil_array((MANY + 2, n))
+    for row in range(MANY + 2):
+        C[row, [row, row + 1, 2 * row]] = 1.0, -0.7, 0.3
+    if repeated:
+        C[MANY] = C[[2]] + C[[5]]
+    C[MANY + 1] = C[[7]]
+    compliance = np.append(np.zeros(MANY + 1), 1e-5)
+    kept = independent_rows(sp.csr_array(C), compliance)
+    assert len(kept) == MANY + 2 - repeated
+    assert MANY + 1 in kept
+    assert np.linalg.matrix_rank(C.toarray()[kept[:-1]]) == len(kept) - 1
+
+
+def test_least_multipliers_of_many_constraints_are_those_of_few() -> None:
+    """By the bordered system as by dense least squares; forces that no constraint exerts are left."""
+    random = np.random.default_rng(4)
+    C = sp.csr_array(
+        sp.random_array((MANY + 20, 4 * MANY), density=0.03, rng=random) + sp.eye_array(MANY + 20, 4 * MANY)
+    )
+    p = random.standard_normal(4 * MANY)
+    wanted = np.linalg.lstsq(C.T.toarray(), p)[0]
+    assert multipliers(C, p) == pytest.approx(wanted, rel=1e-9, abs=1e-12 * np.abs(wanted).max())

@@ -113,11 +113,11 @@ def test_joints_stay_closed_and_what_is_free_is_free(kind: str) -> None:
     ready, blocks = ran(KINDS[kind]())
     open_, size = 0.0, 0.0
     for block in blocks:
-        rows = joint_rows(ready.model.rows, block.motion)
+        rows = joint_rows(ready.model.rows, block.motion, ready.model.interface_unknowns)
         assert rows is not None
         for k in range(len(block)):
             z = interface_values(ready.model.joints, [link.u[k] for link in block.links])
-            open_ = max(open_, float(np.abs(rows.C[k] @ z)[~rows.soft].max()))
+            open_ = max(open_, float(np.abs(rows.at(k) @ z)[~rows.soft].max()))
             size = max(size, float(np.abs(z).max()))
     assert open_ < 1e-10 * max(size, 1e-3)
     assert size > 1e-8 or kind == "driven slide"  # which holds all of its coupling surface
@@ -128,7 +128,7 @@ def test_joints_let_the_rigid_motion_pass(kind: str) -> None:
     """Rows see nothing of the linkage's own rigid rates; those of a drive see its own, 1 per radian or metre."""
     ready, blocks = ran(KINDS[kind]())
     motion, model = blocks[-1].motion, ready.model
-    rows = joint_rows(model.rows, motion)
+    rows = joint_rows(model.rows, motion, model.interface_unknowns)
     assert rows is not None
     for t in (0, len(motion.t) - 1):
         rates = []
@@ -138,7 +138,7 @@ def test_joints_let_the_rigid_motion_pass(kind: str) -> None:
             if link.kind == "beam":
                 u[:, 2] = omega[2] * link.one
             rates.append(u[:, : link.d])
-        seen = rows.C[t] @ interface_values(model.joints, rates)
+        seen = rows.at(t) @ interface_values(model.joints, rates)
         held, paced = np.abs(seen) < 1e-7, np.abs(np.abs(seen) - 1) < 1e-7
         assert (held | paced).all()
         assert paced.sum() == sum(x.name in ready.scene.driven_joints for x in model.rows)
@@ -154,11 +154,14 @@ def test_the_first_rates_and_accelerations_keep_rows_closed() -> None:
     raw["links"]["arm"] = bar("beam", (-0.3, 0), (0.8 * along - [0.3, 0]).tolist(), 16)
     raw["joints"]["S"] |= {"at": pin.tolist(), "axis": [*along.tolist(), 0]}
     ready, blocks = ran(raw)
-    first, later = blocks[0].links, joint_rows(ready.model.rows, blocks[1].motion)
+    first, later = (
+        blocks[0].links,
+        joint_rows(ready.model.rows, blocks[1].motion, ready.model.interface_unknowns),
+    )
     assert later is not None
     z, z1, z2 = (interface_values(ready.model.joints, [getattr(x, k)[0] for x in first]) for k in "uva")
     t = blocks[1].motion.t[[3, 7]]
-    e = [np.abs(later.C[k] @ (z + s * z1 + s**2 / 2 * z2)).max() for k, s in zip((3, 7), t, strict=True)]
+    e = [np.abs(later.at(k) @ (z + s * z1 + s**2 / 2 * z2)).max() for k, s in zip((3, 7), t, strict=True)]
     assert_allclose(e[1] / e[0], 8, rtol=0.2)
 
 
@@ -311,7 +314,7 @@ def swung(kind: str, rho_inf: float, revolutions: float) -> None:
     forces, open_, most = ConstraintForces(ready.model), 0.0, []
     force = []
     for block in blocks:
-        rows = joint_rows(ready.model.rows, block.motion)
+        rows = joint_rows(ready.model.rows, block.motion, ready.model.interface_unknowns)
         assert rows is not None
         open_ = max(open_, float(np.abs(deflections(ready.model, block, rows)).max()))
         force.append(forces.of(block)[:, 0])

@@ -34,7 +34,15 @@ def grounded(link: Link, dofs: np.ndarray) -> Attachment:
     nodes = np.unique(dofs // 3)
     keep = 3 * np.searchsorted(nodes, dofs // 3) + dofs % 3
     return Attachment(
-        nodes, np.eye(len(nodes)), 3, link.X[nodes], ("ground",) * len(nodes), keep, np.zeros((len(keep), 0))
+        nodes,
+        np.eye(len(nodes)),
+        3,
+        link.X[nodes],
+        ("ground",) * len(nodes),
+        keep,
+        np.zeros(0, int),
+        np.zeros((len(keep), 0)),
+        0,
     )
 
 
@@ -66,7 +74,7 @@ def history(run: Run, steps: int) -> Iterator[Moving]:
     """All states from t = 0, by the march of a system of one body."""
     link, joint = run.link, run.joint
     model = Model((link,), (0,), (joint,), ((),), (), run.damping)
-    of = ready(System(("link",), (), (), joint.B.shape[1], model), run.scheme)
+    of = ready(System(("link",), (), (), joint.unknowns, model), run.scheme)
     begin = Deflected(*(run.start or [np.zeros((link.n, 3))] * 3))
     states = initial_states([link], [joint], [ForcingAt(run.R(0.0), run.forces(0.0))], run.damping, [begin])
     state = from_links(Instant(of, lambda t: motion_of(run, t), 0.0), states)

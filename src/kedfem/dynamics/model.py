@@ -85,11 +85,16 @@ class Model:
         return sum(link.unknowns for link in self.links)
 
     @property
+    def interface_unknowns(self) -> int:
+        """Number of the interface unknowns z, which joints share."""
+        return self.joints[0].unknowns
+
+    @property
     def coordinates(self) -> int:
         """Generalised coordinates once the joints share theirs."""
         held = sum(len(joint.keep) for joint in self.joints)
         rows = sum(int(np.isinf(x.stiffness).sum()) for x in self.rows)  # springs constrain nothing
-        return self.unknowns - held + int(self.joints[0].B.shape[1]) - rows
+        return self.unknowns - held + self.interface_unknowns - rows
 
 
 def link_keys(model: Model) -> list[str]:

@@ -90,7 +90,7 @@ def instants(model: Model, motion: RigidMotion, stresses: Stiffening | None = No
     if stresses is not None:
         forcing = stresses.over(forcing, motion)
     ties = (
-        joint_rows(model.rows, motion.part(k, k + 1)) for k in range(len(motion.t))
+        joint_rows(model.rows, motion.part(k, k + 1), model.interface_unknowns) for k in range(len(motion.t))
     )  # of many links each is large
     W = cross_matrix(motion.omega)
     spin = cross_matrix(motion.alpha) + W @ W
@@ -112,7 +112,8 @@ def rows_at_start(scene: Scene, linkage: Linkage, along: Path, model: Model) -> 
     grid = time_grid(scene)
     h = min(grid.step, grid.end / (INSTANTS - 1)) / FINER
     t = h * np.arange(INSTANTS)
-    rows = joint_rows(model.rows, rigid_motion(linkage, along, t, path_parameter(scene, t)))
+    motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
+    rows = joint_rows(model.rows, motion, model.interface_unknowns)
     return None if rows is None else first_rows(rows, h)
 
 

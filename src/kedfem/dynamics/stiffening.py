@@ -81,7 +81,8 @@ class Stiffening:
 
     def over(self, forcing: Sequence[Forcing], motion: RigidMotion) -> list[Forcing]:
         """The same over the times of a motion with the factors s_i of the stress modes."""
-        return self.stressed(forcing, motion, joint_rows(self.joints, motion))
+        rows = joint_rows(self.joints, motion, self.parts[0].attachment.unknowns)
+        return self.stressed(forcing, motion, rows)
 
     def stressed(
         self, forcing: Sequence[Forcing], motion: RigidMotion | None, rows: JointRows | None
@@ -224,21 +225,24 @@ def port_forces(
     """
     v = [x.reshape(len(x), -1) @ part.Y for x, part in zip(loads, parts, strict=True)]
     RB = [_interface(part, each) for part, each in zip(parts, R, strict=True)]
-    if RB[0].shape[2]:
-        SRB = [part.S @ b for part, b in zip(parts, RB, strict=True)]
-        H = np.sum([b.transpose(0, 2, 1) @ x for b, x in zip(RB, SRB, strict=True)], axis=0)
-        f = np.sum([np.einsum("tck,tc->tk", x, y) for x, y in zip(SRB, v, strict=True)], axis=0)
+    held, k = [part.attachment.columns for part in parts], parts[0].attachment.unknowns
+    if k:
+        H, f = np.zeros((len(v[0]), k, k)), np.zeros((len(v[0]), k))
+        for part, b, x, c in zip(parts, RB, v, held, strict=True):
+            SRB = part.S @ b
+            H[:, c[:, None], c] += b.transpose(0, 2, 1) @ SRB
+            f[:, c] += np.einsum("tck,tc->tk", SRB, x)
         if rows is None:
             z = np.linalg.solve(H, f[..., None])
         else:
             each = enumerate(zip(H, f, strict=True))
             z = np.stack([solved(H_t, f_t, static_tie(rows, t))[0] for t, (H_t, f_t) in each])[..., None]
-        v = [x - (b @ z)[..., 0] for x, b in zip(v, RB, strict=True)]
+        v = [x - (b @ z[:, c])[..., 0] for x, b, c in zip(v, RB, held, strict=True)]
     return [(-x @ part.S)[:, : len(part.attachment.keep)] for x, part in zip(v, parts, strict=True)]
 
 
 def _interface(part: Substructure, R: Float[np.ndarray, "T d d"]) -> Float[np.ndarray, "T c k"]:
-    """[Rᵀ B; 0] over time: port components in the link frame from the interface unknowns."""
+    """[Rᵀ B; 0] over time: port components in the link frame from the interface unknowns that the link has a share in."""
     joint = part.attachment
     (p, d), k = (len(joint.weights), joint.components), joint.B.shape[1]
     B = np.zeros((p * d, k))

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
 
 from kedfem.accuracy.plan import as_planned
 from kedfem.accuracy.prepared import moving
+from kedfem.arrays import Float
 from kedfem.dynamics.history import Block, LinkHistory
 from kedfem.dynamics.loads import unit_forces
 from kedfem.dynamics.model import Model

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
 
 from kedfem.accuracy.plan import plan_for
 from kedfem.accuracy.reduction import prepared
+from kedfem.arrays import Bool, Float, Int
 from kedfem.dynamics.joints.places import surface_of
 from kedfem.dynamics.matrices.dense import as_dense
 from kedfem.dynamics.model import segments

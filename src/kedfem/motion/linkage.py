@@ -104,24 +104,25 @@ def linkage(scene: Scene) -> Linkage:
         )
     if any(joint.open for joint in scene.joints.values()):
         raise ValueError("a scene whose links are drawn apart must be assembled first")
-    rows, driven, drawn = _drawn(scene)
-    bodies, size = (GROUND, *drawn.links), drawn.size
+    rows, driven = _all_rows(scene)
+    bodies, size = (GROUND, *scene.links), scene_size(scene)
     every = stacked(rows)
     several = blocks(every, len(bodies), size) if driven and len(bodies) > MANY else None
     free = 0
     if not driven:
         rest = resting_poses(1, len(bodies))
-        free = drawn.J.shape[1] - sum(
+        free = 6 * (len(bodies) - 1) - sum(
             x.rank(rest, size) for x in parts(every, [row.joint for row in rows], len(bodies))
         )
     elif several is None or not _well_driven(every, several, size):
+        drawn = drawn_linkage(scene, rows)
         free = _check_mobility(scene, drawn)
         rows = rows + _holding(scene, drawn.J, bodies, size, free)
         every = stacked(rows)
         several = several and blocks(every, len(bodies), size)
     names = tuple(row.joint for row in rows)
     start = resting_poses(1, len(bodies))
-    return Linkage(bodies, every, names, size, drawn.centre, driven, start, free, several)
+    return Linkage(bodies, every, names, size, scene_centre(scene), driven, start, free, several)
 
 
 def _well_driven(rows: Rows, plan: Blocks, size: float) -> bool:
@@ -140,16 +141,19 @@ def _well_driven(rows: Rows, plan: Blocks, size: float) -> bool:
     return float(np.abs(plan.left(values, rates)).max()) <= RANK_TOLERANCE
 
 
-def _drawn(scene: Scene) -> tuple[list[ConstraintEquation], Drives, Drawn]:
-    """All rows of joints, couplings and drives, and their derivatives in the reference position."""
-    bodies = (GROUND, *scene.links)
-    centre, size = scene_centre(scene), scene_size(scene)
-    driven = drives(scene, size)
-    rows = passive_rows(scene)
-    rows += [drive_row(scene, name, bodies, k) for k, name in enumerate(driven.joints)]
+def _all_rows(scene: Scene) -> tuple[list[ConstraintEquation], Drives]:
+    """All rows of joints, couplings and drives, and these."""
+    driven, bodies = drives(scene, scene_size(scene)), (GROUND, *scene.links)
+    driving = [drive_row(scene, name, bodies, k) for k, name in enumerate(driven.joints)]
+    return passive_rows(scene) + driving, driven
+
+
+def drawn_linkage(scene: Scene, rows: list[ConstraintEquation] | None = None) -> Drawn:
+    """A scene's linkage, of all its rows if none are given, to first order where it is drawn; nothing is refused."""
+    bodies, size, rows = (GROUND, *scene.links), scene_size(scene), rows or _all_rows(scene)[0]
     J, names = drawn_jacobian(rows, len(bodies), size), tuple(row.joint for row in rows)
     moves = np.array([row.drive is not None for row in rows], bool)
-    return rows, driven, Drawn(J, names, moves, bodies[1:], scene.joints, centre, size)
+    return Drawn(J, names, moves, bodies[1:], scene.joints, scene_centre(scene), size)
 
 
 def passive_rows(scene: Scene) -> list[ConstraintEquation]:
@@ -157,11 +161,6 @@ def passive_rows(scene: Scene) -> list[ConstraintEquation]:
     bodies, centre = (GROUND, *scene.links), scene_centre(scene)
     rows = [row for name in scene.joints for row in rows_of(scene, name, bodies, centre)]
     return rows + [gear_row(scene, name, bodies) for name in scene.gears]
-
-
-def drawn_linkage(scene: Scene) -> Drawn:
-    """A scene's linkage to first order in the reference position; nothing is refused."""
-    return _drawn(scene)[2]
 
 
 def looser_rows(scene: Scene, drawn: Drawn) -> Looser:

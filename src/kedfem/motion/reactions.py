@@ -116,7 +116,8 @@ class BlockReactions:
         self, A: Float[np.ndarray, "T m c"]
     ) -> tuple[Float[np.ndarray, "c c"], Float[np.ndarray, "c c"]]:
         """Along which directions A λ is open, and along which there is any at all."""
-        D = self.blocks.left(self.values, A)
+        repeated = self.blocks.rows > 6 * self.blocks.count  # else rows hold every motion once
+        D = self.blocks.left(self.values, A) if repeated else np.zeros_like(A)
         return np.einsum("tmx,tmy->xy", D, D), np.einsum("tmx,tmy->xy", A, A)
 
     def _own(

@@ -59,9 +59,8 @@ ENERGIES = (
     ),
     ("residual", ("residual",), "residual energy of the integration"),
 )
-NO_PORTS = Attachment(
-    np.zeros(0, int), np.zeros((0, 0)), 3, np.zeros((0, 3)), (), np.zeros(0, int), np.zeros((0, 0))
-)
+NONE = np.zeros(0, int)
+NO_PORTS = Attachment(NONE, np.zeros((0, 0)), 3, np.zeros((0, 3)), (), NONE, NONE, np.zeros((0, 0)), 0)
 
 
 @dataclass

@@ -3,10 +3,10 @@
 from collections.abc import Callable
 
 import numpy as np
-import scipy.sparse as sp
 
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
+from kedfem.dynamics.joints.attachments import used_columns
 from kedfem.dynamics.model import Model, on_segment
 from kedfem.links.point_rows import point_rows
 from kedfem.links.recovery import von_mises
@@ -95,7 +95,7 @@ def _motion(probe: Probe, point: LinkPoint) -> Callable[[Block], Rows]:
 def _stress(scene: Scene, model: Model, where: str, name: str, probe: Probe) -> Recorded:
     drawn, kinks = np.asarray(probe.at), _kinks(scene, probe.link)
     k, at = on_segment(model, probe.link, drawn, lambda link: point_rows(link, where, drawn, kinks))
-    dofs, dense = _compact(at.stress)
+    dofs, dense = used_columns(at.stress)
 
     def stress(block: Block) -> Rows:
         g = block.links[k].g
@@ -113,9 +113,3 @@ def _kinks(scene: Scene, link: str) -> Float[np.ndarray, "_ 3"]:
     single = [x for x in scene.loads.values() if isinstance(x, ForceLoad | TorqueLoad) and x.link == link]
     forces = [load.at for load in single if load.at is not None]
     return np.array([*joints, *bodies, *forces]).reshape(-1, 3)
-
-
-def _compact(matrix: sp.csr_array) -> tuple[np.ndarray, np.ndarray]:
-    """The columns that a matrix uses, and the matrix on them, dense."""
-    columns = np.unique(matrix.indices)
-    return columns, matrix[:, columns].toarray()

@@ -102,14 +102,14 @@ def _refuse_foreign(file: Any, path: Path) -> None:
 
 def _results(file: Any, path: Path) -> Results:
     """The record; every series is cut to the rows that all of them have."""
-    every = sorted(series(file), key=lambda rows: int(rows.attrs["index"]))
-    n = min(len(rows) for rows in every)
-    named = {rows.name.removeprefix("/"): rows for rows in every}
+    every = sorted(series(file), key=lambda name: int(file[name].attrs["index"]))
+    n = min(len(file[name]) for name in every)
+    named = [name.removeprefix("/") for name in every]
     toml = file["scene"].get("toml")
     position = TRAVEL if TRAVEL.name in named else ANGLE
-    drive, facts = named.pop(position.name), read_facts(file)
-    time, scene = named.pop(TIME.name), read_text(file["scene/json"])
-    known = {name: _channel(name, rows) for name, rows in named.items()}
+    drive, facts = file[position.name], read_facts(file)
+    time, scene = file[TIME.name], read_text(file["scene/json"])
+    known = {name: _channel(name, file[name]) for name in named if name not in {position.name, TIME.name}}
     large = 8 * n * sum(len(channel.columns) for channel in known.values()) > on_demand.AT_ONCE
     later = on_demand.OnDemand(path, scene, known, n) if large and facts["status"] != "running" else None
     warnings, seconds = read_account(file)
@@ -117,7 +117,7 @@ def _results(file: Any, path: Path) -> Results:
         time=all_rows(time, n),
         angle=all_rows(drive, n),
         channels=later
-        or {name: (known[name], on_demand.rows_of(rows, known[name], n)) for name, rows in named.items()},
+        or {name: (channel, on_demand.rows_of(file[name], channel, n)) for name, channel in known.items()},
         status=_status(facts["status"]),
         scene_json=scene,
         scene_toml=None if toml is None else read_text(toml),

@@ -231,7 +231,7 @@ class ResultsWriter:
         require_space(self.path.parent, self.path.stat().st_size + SPARE_SPACE)
         copyfile(self.path, self._part)
         self._file = opened(self._part, "r+")
-        found = {each.name: each for each in series(self._file)}
+        found = series(self._file)
         names = {f"/{each.name}" for each in (TIME, self.drive, *self.channels)}
         if (
             read_facts(self._file).get("run") != self.run
@@ -242,8 +242,8 @@ class ResultsWriter:
             raise OutputError(f"{wanted}, got another run's or fewer; run without --resume")
         for name in ADDED:
             self._file.pop(name, None)
-        for rows in found.values():
-            rows.resize(self._before, axis=0)
+        for name in found:
+            self._file[name].resize(self._before, axis=0)
         write_facts(self._file["notes"], self._notes)
         write_facts(self._file, {"status": "running", "reason": ""})
         seal(self._file)

@@ -1,5 +1,6 @@
 """What the interface knows of a joint on one link, and of joints that cut a shared point."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,7 +19,9 @@ class Attachment:
     joints : (p,) name of each port's joint
     keep : (q,) which of the flattened (p, d) components are held; closed under the link's rotation; independent:
         what other ports of the link imply is left out
-    B : (q, k) held components, in world axes, from the interface unknowns z
+    columns, B : (c,) interface unknowns that the link has a share in, few of all, and (q, c): held components, in world
+        axes, from these
+    unknowns : k of all z
     shares : (dp, Σ q): forces at all ports of this link, world axes, from the λ of all links in world axes; sparse, as
         the next two
     from_rows : (dp, m): the same from the forces that rows of joints exert on their links' ports, world axes; m all
@@ -32,15 +35,26 @@ class Attachment:
     points: Float[np.ndarray, "p 3"]
     joints: tuple[str, ...]
     keep: Int[np.ndarray, " q"]
-    B: Float[np.ndarray, "q k"]
+    columns: Int[np.ndarray, " c"]
+    B: Float[np.ndarray, "q c"]
+    unknowns: int
     shares: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
     from_rows: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
     loose: sp.csr_array = field(default_factory=lambda: sp.csr_array((0, 0)))
 
-    @property
-    def columns(self) -> Int[np.ndarray, " c"]:
-        """Interface unknowns that the link has a share in: few of all."""
-        return np.flatnonzero(self.B.any(axis=0))
+
+def used_columns(matrix: sp.csr_array) -> tuple[Int[np.ndarray, " c"], Float[np.ndarray, "r c"]]:
+    """The columns that a matrix uses, and the matrix on them, dense."""
+    columns = np.unique(matrix.indices[matrix.data != 0.0])
+    return columns, matrix[:, columns].toarray()
+
+
+def interface_matrix(joints: Sequence[Attachment]) -> sp.csr_array:
+    """B of all links, one below the other, on all interface unknowns."""
+    width = np.concatenate([np.full(len(joint.B), len(joint.columns)) for joint in joints])
+    columns = np.concatenate([np.tile(joint.columns, len(joint.B)) for joint in joints])
+    values = np.concatenate([joint.B.ravel() for joint in joints])
+    return sp.csr_array((values, columns, np.append(0, np.cumsum(width))), (len(width), joints[0].unknowns))
 
 
 @dataclass(frozen=True, slots=True)

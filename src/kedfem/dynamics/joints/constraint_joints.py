@@ -33,7 +33,6 @@ class Side:
     surface : (p, 6, d) u₀ and θ from the displacements at its ports
     stations : of the link along which a slot's pin slides; its ports are these
     onto : (p, d, c) displacements at the ports, world components, from the interface unknowns z[columns]
-    unknowns : k of all z
     shared : whether the ports are the link's; not of a rigid slider, which rides on another link
     points : (p, 3) the ports in the reference position [m]
     """
@@ -46,7 +45,6 @@ class Side:
     shared: bool = True
     points: Float[np.ndarray, "p 3"] = field(default_factory=lambda: np.zeros((1, 3)))
     columns: Int[np.ndarray, " c"] = field(default_factory=lambda: np.zeros(0, int))
-    unknowns: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,17 +21,30 @@ REPEATED = (
 class JointRows:
     """Rows e = C z of all joints at T time points, z the interface unknowns.
 
-    C : (T, r, k) [-, 1/m]
+    entries : (T, n) of C, row by row [-, 1/m]
+    row_at, columns : (r + 1,) where each row's begin, and (n,) the unknown of each
+    unknowns : k of all z
     stiffness, damping : (r,) of rows that are springs, infinite and zero of those that hold, e = 0
     """
 
-    C: Float[np.ndarray, "T r k"]
+    entries: Float[np.ndarray, "T n"]
+    row_at: Int[np.ndarray, " _"]
+    columns: Int[np.ndarray, " n"]
+    unknowns: int
     stiffness: Float[np.ndarray, " r"]
     damping: Float[np.ndarray, " r"]
 
     def part(self, first: int, end: int) -> "JointRows":
         """The time points from one number up to another."""
-        return replace(self, C=self.C[first:end])
+        return replace(self, entries=self.entries[first:end])
+
+    def at(self, k: int) -> sp.csr_array:
+        """C (r, k) at one time point."""
+        return self.matrix(self.entries[k])
+
+    def matrix(self, entries: Float[np.ndarray, " n"]) -> sp.csr_array:
+        """C (r, k) from its entries, or its rates from theirs."""
+        return sp.csr_array((entries, self.columns, self.row_at), (len(self.stiffness), self.unknowns))
 
     @property
     def soft(self) -> Bool[np.ndarray, " r"]:
@@ -52,18 +65,19 @@ class Directions:
     turn: Float[np.ndarray, "T r 3"]
 
 
-def joint_rows(joints: Sequence[ConstraintJoint], motion: RigidMotion) -> JointRows | None:
-    """Rows of all joints at the times of a motion; None without any."""
+def joint_rows(joints: Sequence[ConstraintJoint], motion: RigidMotion, unknowns: int) -> JointRows | None:
+    """Rows of all joints, on so many interface unknowns, at the times of a motion; None without any."""
     if not joints:
         return None
-    ends = np.cumsum([0, *(len(joint.gap) for joint in joints)])
-    unknowns = max(side.unknowns for joint in joints for side in _sides(joint))
-    C = np.zeros((len(motion.t), ends[-1], unknowns))
-    for joint, first, last in zip(joints, ends, ends[1:], strict=False):
-        columns = _columns(joint)
-        C[:, first:last, columns] = rows_over(joint, motion, columns)
+    every = [(joint, _columns(joint)) for joint in joints]
+    width = np.concatenate([np.full(len(joint.gap), len(columns)) for joint, columns in every])
     return JointRows(
-        C,
+        np.concatenate(
+            [rows_over(joint, motion, x).reshape(len(motion.t), -1) for joint, x in every], axis=1
+        ),
+        np.append(0, np.cumsum(width)),
+        np.concatenate([np.tile(columns, len(joint.gap)) for joint, columns in every]),
+        unknowns,
         np.concatenate([joint.stiffness for joint in joints]),
         np.concatenate([joint.damping for joint in joints]),
     )

@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from kedfem.arrays import Float
-from kedfem.dynamics.joints.attachments import Attachment, SharedCut
+from kedfem.dynamics.joints.attachments import Attachment, SharedCut, used_columns
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side, needs_rows
 from kedfem.dynamics.joints.constraint_ports import (
     LinkageLayout,
@@ -69,7 +69,8 @@ class _Ports:
         nodes = np.flatnonzero(W.any(axis=0))
         points = np.array(self.points) if self.points else np.zeros((0, 3))
         keep = np.array(self.keep, int)
-        return Attachment(nodes, W[:, nodes], d, points, tuple(self.joints), keep, np.zeros((q, 0)))
+        none = np.zeros(0, int)
+        return Attachment(nodes, W[:, nodes], d, points, tuple(self.joints), keep, none, np.zeros((q, 0)), 0)
 
     def selected(self, unknowns: int) -> sp.csr_array:
         """Held components from all interface unknowns."""
@@ -185,7 +186,7 @@ def _on(
 
     def on(row: ConstraintJoint, own: Iterator[Own | None]) -> ConstraintJoint:
         sides = [
-            None if side is None or each is None else _seeing(side, each.selection @ Z[here])
+            None if side is None or each is None else _seeing(side, sp.csr_array(each.selection) @ Z[here])
             for side, each, here in zip(row.sides, own, of_side, strict=False)
         ]
         return replace(
@@ -196,11 +197,10 @@ def _on(
         yield on(row, iter(own))
 
 
-def _seeing(side: Side, selection: Float[np.ndarray, "m k"]) -> Side:
+def _seeing(side: Side, selection: sp.csr_array) -> Side:
     """A side whose ports know the interface unknowns."""
-    columns = np.flatnonzero(selection.any(axis=0))
-    onto = selection[:, columns].reshape(*side.onto.shape[:2], -1)
-    return replace(side, onto=onto, columns=columns, unknowns=selection.shape[1])
+    columns, onto = used_columns(selection)
+    return replace(side, onto=onto.reshape(*side.onto.shape[:2], len(columns)), columns=columns)
 
 
 def _mixed(scene: Scene, name: str, held: dict[str, tuple[_Ports, CouplingSurface]], first: int) -> int:

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import lsqr
 
 from kedfem.arrays import Float
-from kedfem.dynamics.joints.attachments import Attachment
+from kedfem.dynamics.joints.attachments import Attachment, interface_matrix
 from kedfem.dynamics.joints.constraint_matrices import JointRows
 from kedfem.dynamics.joints.ports import port_rotation, port_values
 from kedfem.dynamics.matrices.interface import MANY, Tie
@@ -27,9 +27,9 @@ class FirstRows:
     """Rows at the first time point: C, C', C'' (r, k), and which are springs."""
 
     rows: JointRows
-    C: Float[np.ndarray, "r k"]
-    C1: Float[np.ndarray, "r k"]
-    C2: Float[np.ndarray, "r k"]
+    C: sp.csr_array
+    C1: sp.csr_array
+    C2: sp.csr_array
 
     def _hard(self, target: Float[np.ndarray, " r"], force: Float[np.ndarray, " k"]) -> Tie:
         hard = ~self.rows.soft
@@ -49,23 +49,20 @@ class FirstRows:
 
 def first_rows(rows: JointRows, h: float) -> FirstRows:
     """From rows at five instants, each h after the other [s]."""
-    C1, C2 = np.tensordot(FIRST, rows.C, 1) / h, np.tensordot(SECOND, rows.C, 1) / h**2
-    return FirstRows(rows.part(0, 1), rows.C[0], C1, C2)
+    every = rows.entries[0], FIRST @ rows.entries / h, SECOND @ rows.entries / h**2
+    return FirstRows(rows.part(0, 1), *(rows.matrix(entries) for entries in every))
 
 
 def interface_values(joints: Sequence[Attachment], u: Sequence[NodalOf]) -> Float[np.ndarray, " k"]:
     """z from states with joints closed, world components: W u = B z."""
     w = np.concatenate([port_values(joint, x) for joint, x in zip(joints, u, strict=True)])
-    if joints[0].B.shape[1] > MANY:
-        B = sp.vstack([sp.csr_array(joint.B) for joint in joints], format="csr")
+    B = interface_matrix(joints)
+    if B.shape[1] > MANY:
         return np.asarray(lsqr(B, w, atol=ROUNDING, btol=ROUNDING, conlim=0.0)[0])
-    return np.asarray(np.linalg.lstsq(np.vstack([joint.B for joint in joints]), w, rcond=None)[0])
+    return np.asarray(np.linalg.lstsq(B.toarray(), w, rcond=None)[0])
 
 
 def interface_forces(joints: Sequence[Attachment], states: Sequence[LinkState]) -> Float[np.ndarray, " k"]:
     """Σ Bᵀ R λ: what rows exert."""
-    each = [
-        joint.B.T @ (port_rotation(joint, s.R) @ s.port_forces)
-        for joint, s in zip(joints, states, strict=True)
-    ]
-    return np.asarray(np.sum(each, axis=0))
+    each = [port_rotation(joint, s.R) @ s.port_forces for joint, s in zip(joints, states, strict=True)]
+    return np.asarray(interface_matrix(joints).T @ np.concatenate(each))

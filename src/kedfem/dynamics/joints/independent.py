@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from kedfem.arrays import Bool, Float, Int
-from kedfem.dynamics.joints.attachments import Attachment
+from kedfem.dynamics.joints.attachments import Attachment, used_columns
 
 DEPENDENT = (
     1e-9  # relative: ports of one coupling surface repeat each other to rounding, others differ by far more
@@ -41,21 +41,22 @@ def independent(
     attachments on the new unknowns, and Z (k, r)
     """
     relations = [_relation(each) for each in every]
-    B = sp.vstack(selected, format="csr")
-    h, k = B.shape
+    every_B = sp.vstack(selected, format="csr")
+    h, k = every_B.shape
     shares, loose, from_rows = sp.eye_array(h, format="csr"), sp.csr_array((h, 0)), sp.csr_array((h, 0))
     Z = sp.eye_array(k, format="csr")
     if not all(kept.all() for kept, _ in relations):
         L = sp.block_diag([L for _, L in relations], format="csr")
-        left = B - L @ B[np.concatenate([kept for kept, _ in relations])]
+        left = every_B - L @ every_B[np.concatenate([kept for kept, _ in relations])]
         Z = _null_space(left, list(_blocks(left)))
-        shares, from_rows, loose = _port_forces(L, B, own, riding)
+        shares, from_rows, loose = _port_forces(L, every_B, own, riding)
     found, first = [], 0
     for each, own_B, (kept, _) in zip(every, selected, relations, strict=True):
         here = slice(first, first := first + len(each.keep))
+        columns, B = used_columns(own_B[kept] @ Z)
         found.append(
             replace(
-                each, keep=each.keep[kept], B=(own_B[kept] @ Z).toarray(), shares=_placed(each, shares[here]),
+                each, keep=each.keep[kept], columns=columns, B=B, unknowns=Z.shape[1], shares=_placed(each, shares[here]),
                 from_rows=_placed(each, from_rows[here]), loose=_placed(each, loose[here]),
             )
         )  # fmt: skip

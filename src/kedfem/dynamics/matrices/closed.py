@@ -90,8 +90,8 @@ def coupled_all(
 def closed(parts: Sequence[Substructure], R: Sequence[Rotation], tie: Tie | None) -> Closed:
     """A linkage with its joints closed; `coupled` has what is asked for."""
     held = [part.attachment.columns for part in parts]
-    RB = [_interface(part, R_, c) for part, R_, c in zip(parts, R, held, strict=True)]
-    k = parts[0].attachment.B.shape[1]
+    RB = [_interface(part, R_) for part, R_ in zip(parts, R, strict=True)]
+    k = parts[0].attachment.unknowns
     H = [b.T @ part.S @ b for part, b in zip(parts, RB, strict=True)]
     return Closed(parts, held, RB, k, solver(_common(held, H, k), tie) if k else None)
 
@@ -110,9 +110,9 @@ def _common(
     return H
 
 
-def _interface(part: Substructure, R: Rotation, held: Int[np.ndarray, " c"]) -> Float[np.ndarray, "p c"]:
+def _interface(part: Substructure, R: Rotation) -> Float[np.ndarray, "p c"]:
     """[Rᵀ B; 0]: port components in the link frame from the interface unknowns that the link has a share in."""
-    B = part.attachment.B[:, held]
-    out = np.zeros((len(part.S), len(held)))
+    B = part.attachment.B
+    out = np.zeros((len(part.S), B.shape[1]))
     out[: len(B)] = port_rotation(part.attachment, R).T @ B
     return out

@@ -24,6 +24,7 @@ import scipy.sparse as sp
 
 from kedfem.arrays import Float
 from kedfem.dynamics.joints.constraint_matrices import JointRows
+from kedfem.dynamics.matrices.bordered import Bordered
 from kedfem.dynamics.matrices.cholesky import Cholesky
 from kedfem.errors import SolveError
 
@@ -35,12 +36,12 @@ DEPENDENT = 1e-11  # what is left of a row's own compliance where other rows hol
 class Tie:
     """What rows ask at one solution of the interface system.
 
-    C : (r, k), sparse where k is large; compliance : (r,) 1/κ, zero of rows that hold
+    C : (r, k); compliance : (r,) 1/κ, zero of rows that hold
     target : (r,) C z of rows that hold; zero of springs
     force : (k,) known forces on the interface
     """
 
-    C: Float[np.ndarray, "r k"] | sp.csr_array
+    C: Any
     compliance: Float[np.ndarray, " r"]
     target: Float[np.ndarray, " r"]
     force: Float[np.ndarray, " k"]
@@ -56,7 +57,7 @@ def solved(
 def solver(
     H: Float[np.ndarray, "k k"] | sp.csr_array, tie: Tie | None
 ) -> Callable[[Float[np.ndarray, " k"]], tuple[Float[np.ndarray, " k"], Float[np.ndarray, " r"]]]:
-    """What gives interface unknowns z and the rows' forces m for any f; of a sparse H by a sparse factor.
+    """What gives interface unknowns z and the rows' forces m for any f; of a sparse H by a sparse factor of both.
 
     Raises
     ------
@@ -66,11 +67,14 @@ def solver(
     if tie is None:
         alone = _factor(H)
         return lambda f: (alone(f), np.zeros(0))
-    C: Any = sp.csr_array(tie.C) if sp.issparse(H) else tie.C
-    beside = _beside(H, tie)
+    if sp.issparse(H):
+        bordered = Bordered(H, sp.csr_array(tie.C), tie.compliance)
+        return lambda f: bordered.solved(f + tie.force, tie.target, closes=True)
+    C: Any = tie.C.toarray() if sp.issparse(tie.C) else tie.C
+    beside = _beside(H, C, tie.compliance)
     inverse = _factor(H + (C.T * beside) @ C)
     compliance = tie.compliance / (1 - beside * tie.compliance)
-    G = C @ inverse(C.T.toarray() if sp.issparse(C) else C.T)
+    G = C @ inverse(C.T)
     L, kept = semidefinite_factor((G + G.T) / 2 + np.diag(compliance))
 
     def of(f: Float[np.ndarray, " k"]) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " r"]]:
@@ -101,12 +105,14 @@ def _factor(
     return lambda f: np.asarray(scipy.linalg.cho_solve(factor, f, check_finite=False))
 
 
-def _beside(H: Float[np.ndarray, "k k"] | sp.csr_array, tie: Tie) -> Float[np.ndarray, " r"]:
+def _beside(
+    H: Float[np.ndarray, "k k"], C: Float[np.ndarray, "r k"], compliance: Float[np.ndarray, " r"]
+) -> Float[np.ndarray, " r"]:
     """σ of each row: about as stiff as the interface is, at most half of a spring; links alone may bear nothing there."""
     mean = float(H.trace()) / H.shape[0]
-    size = np.asarray((tie.C * tie.C).sum(axis=1))
+    size = (C * C).sum(axis=1)
     usual = np.where(size > 0, (mean if mean > 0.0 else 1.0) / np.where(size > 0, size, 1.0), 0.0)
-    return np.asarray(usual / (1 + 2 * usual * tie.compliance))
+    return np.asarray(usual / (1 + 2 * usual * compliance))
 
 
 def semidefinite_factor(G: Float[np.ndarray, "r r"]) -> tuple[Float[np.ndarray, "q q"], np.ndarray]:
@@ -129,7 +135,5 @@ def semidefinite_factor(G: Float[np.ndarray, "r r"]) -> tuple[Float[np.ndarray, 
 
 def static_tie(rows: JointRows, at: int) -> Tie:
     """What the rows ask of a linkage at rest."""
-    r, k = rows.C[at].shape
-    return Tie(
-        sp.csr_array(rows.C[at]) if k > MANY else rows.C[at], 1 / rows.stiffness, np.zeros(r), np.zeros(k)
-    )
+    none = np.zeros(len(rows.stiffness))
+    return Tie(rows.at(at), 1 / rows.stiffness, none, np.zeros(rows.unknowns))

@@ -24,7 +24,7 @@ from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.record import TIME, Stop, System, curve_of
 from kedfem.dynamics.system.sparse import SparsePart, momentum
 from kedfem.dynamics.system.starts.balance import Asked, Balance, HeldBody, stepped_body
-from kedfem.dynamics.system.starts.instant import Instant
+from kedfem.dynamics.system.starts.instant import Instant, sizes
 from kedfem.dynamics.system.starts.internal import own, rows
 from kedfem.errors import SceneError, SolveError
 from kedfem.links.reduced import wave_frequency
@@ -182,7 +182,7 @@ def asked(now: Instant) -> Asked:
     z = np.zeros((3, now.of.system.unknowns))
     C, e = now.gradients(z[0]), now.coordinates(z)
     hard, stiffness = now.hard(C), now.forces(e)[:, 1]
-    kept = hard | ((stiffness != 0.0) & (np.abs(C).max(axis=1, initial=0.0) > 0.0))
+    kept = hard | ((stiffness != 0.0) & (sizes(C) > 0.0))
     compliance = np.where(hard, 0.0, 1 / np.where(stiffness != 0.0, stiffness, 1.0))[kept]
     return Asked(C[kept], np.zeros(len(compliance)), compliance, z[0])
 

@@ -78,7 +78,7 @@ def linear_model(
     r, f = np.zeros((len(x), count)), np.zeros((len(rest), count))
     for n, each in enumerate(loads):
         r[:, n] = _on_coordinates(frozen, each)
-    f[:, len(loads) :] = C[list(elements)].T
+    f[:, len(loads) :] = C[list(elements)].T.toarray()
     Mx = frozen.momentum(x)
     z = (omega**2 + frozen.shift) * _answers(balance, Mx, np.zeros((len(f), len(omega))))[1]
     soft = np.divide(1.0, omega**2, out=np.zeros_like(omega), where=omega > 0)[:, None]

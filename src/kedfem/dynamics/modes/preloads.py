@@ -6,6 +6,7 @@ Second derivatives are exact: where z moves along x at a steady rate and all els
 from itertools import combinations
 
 import numpy as np
+import scipy.sparse as sp
 
 from kedfem.arrays import Float
 from kedfem.dynamics.system.record import Constraint
@@ -28,11 +29,11 @@ def with_preloads(now: Instant, asked: Asked) -> Asked:
             some = np.abs(values) > ROUNDING * np.abs(values).max(initial=0.0)
             row = np.zeros((int(some.sum()), none.shape[1]))
             row[:, columns] = vectors[:, some].T
-            rows.append(row)
+            rows.append(sp.csr_array(row))
             stiffness.append(values[some])
     more = 1 / np.concatenate(stiffness)
     return Asked(
-        np.concatenate(rows),
+        sp.vstack(rows, format="csr"),
         np.append(asked.target, 0 * more),
         np.append(asked.compliance, more),
         asked.known,

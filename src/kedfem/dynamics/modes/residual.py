@@ -40,7 +40,7 @@ def residual_deflections(
     cases = []
     for snapshot in snapshots:
         motion = snapshot.motion.part(snapshot.k, snapshot.k + 1)
-        rows = joint_rows(full.rows, motion)
+        rows = joint_rows(full.rows, motion, full.interface_unknowns)
         tie = None if rows is None else static_tie(rows, 0)
         R = [state.R for state in snapshot.states]
         cases.append((closed(parts, R, tie), _residuals(full, model, motion, snapshot.states)))

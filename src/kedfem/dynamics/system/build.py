@@ -81,7 +81,7 @@ def system_of(
         found.joint(joint)
     found.between_prescribed({joint.name for joint in model.rows})
     names = tuple(link.name for link in model.links)
-    k = int(model.joints[0].B.shape[1])
+    k = model.interface_unknowns
     bars = {row.bodies[0] for row in model.rows if row.name.startswith("rigid.")}
     links = tuple(
         without_stiffness(x, turned=any(load.own for load in loads)) if n in bars else x
@@ -289,4 +289,4 @@ class _Builder:
     @property
     def unknowns(self) -> int:
         """Number of interface unknowns."""
-        return int(self.model.joints[0].B.shape[1])
+        return self.model.interface_unknowns

@@ -114,7 +114,7 @@ def body_arrays(system: System, parts: Sequence[Part], profile: Profile) -> Bodi
         G_at=ends_of([x.G.size for x in parts]), Y_at=ends_of([x.size for x in Y]),
         S_at=ends_of([q * q for q in ports]), B_at=ends_of([q * len(c) for q, c in zip(ports, columns, strict=True)]),
         G=_flat([x.G for x in parts]), Y=_flat(Y), W=_flat(W),
-        S=_flat([x.S for x in parts]), B=_flat([joint.B[:, c] for joint, c in zip(joints, columns, strict=True)]),
+        S=_flat([x.S for x in parts]), B=_flat([joint.B for joint in joints]),
         column_at=ends_of([len(c) for c in columns]), columns=_flat([profile.number[c] for c in columns], int),
         place=profile.unknown, first=profile.first, row_at=profile.at, multiplier=profile.multiplier,
         X=_flat([x for x, _, _ in fits]), one=_flat([x for _, x, _ in fits]), fit=_flat([x for _, _, x in fits]),

@@ -6,8 +6,9 @@ from functools import cached_property
 
 import numpy as np
 
-from kedfem.arrays import Float, Int
+from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
+from kedfem.dynamics.joints.attachments import interface_matrix
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, in_plane
 from kedfem.dynamics.joints.constraint_matrices import (
     JointRows,
@@ -80,19 +81,14 @@ class ConstraintForces:
                     out.append(np.einsum("tr,trpd->tpd", here, each).reshape(len(here), -1))
         return np.concatenate(out, axis=1)
 
-    @cached_property
-    def _shares(self) -> list[tuple[Int[np.ndarray, " c"], Float[np.ndarray, "q c"]]]:
-        """Interface unknowns that each link has a share in, and its B of these."""
-        return [(joint.columns, joint.B[:, joint.columns]) for joint in self.model.joints]
-
     def _multipliers(self, block: Block) -> Float[np.ndarray, "T r"]:
         rows = sum(len(group.rows) for group in self.groups)
         mu = np.zeros((len(block), rows))
         if not rows:
             return mu
-        p = np.zeros((len(block), self.model.joints[0].B.shape[1]))
-        for joint, history, (columns, B) in zip(self.model.joints, block.links, self._shares, strict=True):
-            p[:, columns] += turned_ports(joint, history.R, history.port_forces) @ B
+        p = np.zeros((len(block), self.model.interface_unknowns))
+        for joint, history in zip(self.model.joints, block.links, strict=True):
+            p[:, joint.columns] += turned_ports(joint, history.R, history.port_forces) @ joint.B
         for group in self.groups:
             C, size = _scaled(group.over(block.motion))
             inverse = np.linalg.pinv(C.transpose(0, 2, 1), rcond=DEPENDENT)
@@ -198,7 +194,7 @@ def _springs(model: Model, block: Block, mu: Float[np.ndarray, "T r"]) -> tuple[
         of = block.exerted
         return (of.spring[:, 0], of.spring[:, 1], of.stiffness, of.damping) if len(of.stiffness) else None
     springs = any(np.isfinite(joint.stiffness).any() for joint in model.rows)
-    rows = joint_rows(model.rows, block.motion) if springs else None
+    rows = joint_rows(model.rows, block.motion, model.interface_unknowns) if springs else None
     if rows is None:
         return None
     soft = rows.soft
@@ -207,7 +203,8 @@ def _springs(model: Model, block: Block, mu: Float[np.ndarray, "T r"]) -> tuple[
 
 def deflections(model: Model, block: Block, rows: JointRows) -> Float[np.ndarray, "T r"]:
     """e = C z over time."""
-    return np.asarray(np.einsum("trk,tk->tr", rows.C, interface(model, block)))
+    z = interface(model, block)
+    return np.stack([rows.at(k) @ x for k, x in enumerate(z)])
 
 
 def interface(model: Model, block: Block) -> Float[np.ndarray, "T k"]:
@@ -216,6 +213,4 @@ def interface(model: Model, block: Block) -> Float[np.ndarray, "T k"]:
         (joint.weights @ history.u[:, joint.nodes]).reshape(len(block), -1)[:, joint.keep]
         for joint, history in zip(model.joints, block.links, strict=True)
     ]
-    return np.asarray(
-        np.concatenate(w, axis=1) @ np.linalg.pinv(np.vstack([joint.B for joint in model.joints])).T
-    )
+    return np.asarray(np.concatenate(w, axis=1) @ np.linalg.pinv(interface_matrix(model.joints).toarray()).T)

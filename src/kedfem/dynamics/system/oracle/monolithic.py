@@ -19,6 +19,7 @@ import scipy.sparse as sp
 
 from kedfem.arrays import Float
 from kedfem.dynamics.frames import Deformed, deformation, frame_force, frames_of, rotation
+from kedfem.dynamics.joints.attachments import interface_matrix
 from kedfem.dynamics.joints.ports import port_columns
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.matrices.substructure import mass_matrix
@@ -91,7 +92,7 @@ class Monolithic:
         self.masses = [sp.csr_array(mass_matrix(link)) for link in model.links]
         self.M = sp.csr_array(sp.block_diag(self.masses))
         self.W = sp.csr_array(sp.block_diag([port_columns(joint, link.n).T for link, joint in every]))
-        self.B = sp.csr_array(np.vstack([joint.B for joint in model.joints]))
+        self.B = interface_matrix(model.joints)
 
     def rates(
         self, x: np.ndarray, x0: np.ndarray, v0: np.ndarray, a0: np.ndarray

@@ -15,18 +15,17 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
-from scipy.sparse.linalg import LinearOperator, splu
+from scipy.sparse.linalg import LinearOperator
 
 from kedfem.arrays import Float
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.ports import port_rotation
+from kedfem.dynamics.matrices.bordered import Bordered
 from kedfem.dynamics.matrices.substructure import Substructure, mass_substructure
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.sparse import SparsePart, sparse_part
 from kedfem.errors import SolveError
 from kedfem.links.record import Link
-
-DEPENDENT = 1e-9  # what is left of a constraint of unit size where others constrain the same
 
 Flat = Float[np.ndarray, " _"]
 
@@ -40,7 +39,7 @@ class Asked:
     known : (k,) forces on the interface
     """
 
-    C: Float[np.ndarray, "r k"]
+    C: sp.csr_array
     target: Flat
     compliance: Flat
     known: Flat
@@ -134,33 +133,13 @@ class Balance:
         self.columns = [joint.columns for joint in joints]
         self.RT = [port_rotation(joint, each[: joint.components, : joint.components]).T
                    for joint, each in zip(joints, R, strict=True)]  # fmt: skip
-        self.RB = [RT @ joint.B[:, c] for RT, joint, c in zip(self.RT, joints, self.columns, strict=True)]
-        self.kept = _independent(asked.C, asked.compliance)
-        self._factored()
-
-    def _factored(self) -> None:
-        """The matrix of z and the multipliers, these scaled so that both parts are about as large."""
-        k, r = self.of.system.unknowns, len(self.kept)
+        self.RB = [RT @ joint.B for RT, joint in zip(self.RT, joints, strict=True)]
+        k = self.of.system.unknowns
         blocks = [RB.T @ each.S @ RB for each, RB in zip(self.held, self.RB, strict=True)]
         places = [(np.repeat(c, len(c)), np.tile(c, len(c))) for c in self.columns]
         index = tuple(np.concatenate(each) for each in zip(*places, strict=True))
         H = sp.coo_array((np.concatenate([b.ravel() for b in blocks]), index), (k, k))
-        usual = np.abs(H.diagonal()).mean() if k else 1.0
-        rows, compliance = self.asked.C[self.kept], self.asked.compliance[self.kept]
-        size = np.linalg.norm(rows, axis=1)
-        self.scale = usual / np.where(size > 0, size, 1.0)
-        C = sp.csr_array(rows * self.scale[:, None])
-        self.matrix = sp.csc_array(
-            sp.block_array([[H, -C.T], [C, sp.diags_array(self.scale**2 * compliance)]])
-        )
-        if k + r == 0:
-            return
-        try:
-            self.factor = splu(self.matrix)
-        except RuntimeError as error:
-            raise SolveError(
-                "joints: bodies must be held by joints or springs, got some that move freely"
-            ) from error
+        self.bordered = Bordered(H, asked.C, asked.compliance)
 
     def solved(
         self, r: Flat, moved: Flat | None = None, more: Flat | float = 0.0, alone: bool = False
@@ -175,7 +154,7 @@ class Balance:
         alone : whether these right-hand sides act alone, without what is asked: what they change
         """
         at, ports = self.of.bodies.at, self.of.bodies.port_at
-        k, local, offset = self.of.system.unknowns, [], []
+        local, offset = [], []
         f = more + (0.0 * self.asked.known if alone else self.asked.known)
         for i, (each, RB) in enumerate(zip(self.held, self.RB, strict=True)):
             here = slice(int(at[i]), int(at[i + 1]))
@@ -184,14 +163,7 @@ class Balance:
                 np.zeros(len(each.W)) if moved is None else each.W @ self.turned(i, moved[here], back=True)
             )
             f[self.columns[i]] += RB.T @ (each.left.T @ local[i] + each.S @ offset[i])
-        target = (0.0 if alone else self.scale) * self.asked.target[self.kept]
-        right = np.concatenate([f, target])
-        found = right
-        if len(right):
-            found = self.factor.solve(right)
-            found = found + self.factor.solve(right - self.matrix @ found)
-        z, m = found[:k], np.zeros(len(self.asked.target))
-        m[self.kept] = self.scale * found[k:]
+        z, m = self.bordered.solved(f, (0.0 if alone else 1.0) * self.asked.target)
         x, forces = np.zeros(len(r)), np.zeros(int(ports[-1]))
         for i, (each, RB) in enumerate(zip(self.held, self.RB, strict=True)):
             w = RB @ z[self.columns[i]] - offset[i]
@@ -204,14 +176,3 @@ class Balance:
         d = int(self.of.bodies.components[i])
         R = self.R[i, :d, :d]
         return np.asarray((R.T if back else R) @ x.reshape(d, -1)).ravel()
-
-
-def _independent(C: Float[np.ndarray, "r k"], compliance: Float[np.ndarray, " r"]) -> np.ndarray:
-    """Numbers of laws, and of constraints that do not repeat others."""
-    size = np.linalg.norm(C, axis=1)
-    hard = np.flatnonzero((compliance == 0.0) & (size > DEPENDENT))
-    soft = np.flatnonzero(compliance != 0.0)
-    if len(hard):
-        _, upper, order = scipy.linalg.qr((C[hard] / size[hard, None]).T, mode="economic", pivoting=True)
-        hard = hard[order[: int((np.abs(np.diag(upper)) > DEPENDENT).sum())]]
-    return np.sort(np.concatenate([hard, soft]))

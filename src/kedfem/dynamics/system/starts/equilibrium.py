@@ -16,6 +16,7 @@ from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from kedfem.arrays import Bool, Float
@@ -58,7 +59,7 @@ class Point:
     r: Flat
     R: Frames
     z: Flat
-    C: Float[np.ndarray, "r k"]
+    C: sp.csr_array
     e: Flat
     laws: Flat
     slopes: Flat
@@ -223,7 +224,7 @@ class Equilibrium:
 def gaps(now: Instant, u: Flat, z: Flat) -> list[Flat]:
     """How far the interface points of each body are from where the interface unknowns have them."""
     every = zip(now.of.parts, now.of.system.model.joints, strict=True)
-    return [part.W @ u[own(now.of, k)] - joint.B @ z for k, (part, joint) in enumerate(every)]
+    return [part.W @ u[own(now.of, k)] - joint.B @ z[joint.columns] for k, (part, joint) in enumerate(every)]
 
 
 def stands_off(now: Instant, u: Flat, z1: Flat | None) -> str:

@@ -9,6 +9,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from kedfem.arrays import Bool, Float, Int
+from kedfem.dynamics.joints.attachments import interface_matrix
 from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.matrices.substructure import factored
 from kedfem.dynamics.system.forces.turning_loads import turned as turned_load
@@ -146,22 +147,26 @@ class Instant:
                 place += 1
         return out
 
-    def gradients(self, z: Flat) -> Float[np.ndarray, "r k"]:
+    def gradients(self, z: Flat) -> sp.csr_array:
         """Of all coordinates by z."""
         always, known = self.always, np.zeros(self.of.system.unknowns)
         known[always.number] = z
-        C = always.still.gradients(self.motion, self._stations, known)
-        return np.asarray(C[:, always.number])
+        return always.still.gradients(self.motion, self._stations, known)[:, always.number]
 
     def forces(self, e: Float[np.ndarray, "3 r"]) -> Float[np.ndarray, "r 3"]:
         """Of all laws: force along the coordinate, and how it falls with it and its rate; zero of constraints."""
         laws = [law_at(each.law, self.motion.t, self.motion.phi) for each in self.of.system.constraints]
         return np.array([push(law, self.time, e[0, n], e[1, n]) for n, law in enumerate(laws)]).reshape(-1, 3)
 
-    def hard(self, C: Float[np.ndarray, "r k"]) -> Bool[np.ndarray, " r"]:
+    def hard(self, C: sp.csr_array) -> Bool[np.ndarray, " r"]:
         """Which are constraints that say something of z."""
         fixed = [isinstance(each.law, Held | Driven) for each in self.of.system.constraints]
-        return np.asarray(np.array(fixed, bool) & (np.abs(C).max(axis=1, initial=0.0) > NOTHING))
+        return np.asarray(np.array(fixed, bool) & (sizes(C) > NOTHING))
+
+
+def sizes(C: sp.csr_array) -> Float[np.ndarray, " r"]:
+    """Largest entry of each row."""
+    return np.asarray(abs(C).max(axis=1).toarray()) if C.shape[1] else np.zeros(C.shape[0])
 
 
 def push(law: Law, t: float, e: float, rate: float) -> tuple[float, float, float]:
@@ -208,7 +213,7 @@ def _lowest(of: Ready, still: Still) -> float:
 
 def closure(of: Ready) -> Callable[[Flat], Flat]:
     """z from displacements at all interface points, w = B z as nearly as can be."""
-    B = sp.vstack([sp.csr_array(joint.B) for joint in of.system.model.joints], format="csc")
+    B = interface_matrix(of.system.model.joints)
     if not B.shape[1]:
         return lambda w: np.zeros(0)
     factor = splu(sp.csc_array(B.T @ B))

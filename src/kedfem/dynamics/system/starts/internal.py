@@ -72,7 +72,7 @@ class Still:
 
     def gradients(
         self, motion: RigidMotion, stations: Float[np.ndarray, " w"], z: Float[np.ndarray, " k"]
-    ) -> Float[np.ndarray, "r k"]:
+    ) -> sp.csr_array:
         """Of all coordinates by the interface unknowns z, these in the order of a state.
 
         Parameters
@@ -87,9 +87,7 @@ class Still:
             self.of.ends, self.of.constraints, turning, motion.p[0], stations, z, self._trial, self._work
         )
         of = self.of.constraints
-        C = np.zeros((len(of.law), len(z)))
-        C[np.repeat(np.arange(len(C)), np.diff(of.column_at)), of.columns] = self._trial.C
-        return C
+        return sp.csr_array((self._trial.C.copy(), of.columns, of.column_at), (len(of.law), len(z)))
 
     def sprung(self, k: int, R: Float[np.ndarray, "3 3"], u: Flat) -> Flat:
         """R K0 Rᵀ u of the displacement u (N,) of body k, world components.

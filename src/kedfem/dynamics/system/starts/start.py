@@ -6,17 +6,18 @@ Rates of constraints are exact (`rates`), the bars of rigid links among them.
 from collections.abc import Callable, Sequence
 
 import numpy as np
+import scipy.sparse as sp
 
-from kedfem.arrays import Float
 from kedfem.dynamics.joints.first_rows import interface_forces
 from kedfem.dynamics.joints.ports import turned_ports
+from kedfem.dynamics.matrices.bordered import multipliers
 from kedfem.dynamics.matrices.dense import coordinates, work_on
 from kedfem.dynamics.stepping.state import LinkState
 from kedfem.dynamics.system.blank import empty_state
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.sparse import SparsePart
 from kedfem.dynamics.system.starts.accelerations import accelerations
-from kedfem.dynamics.system.starts.balance import DEPENDENT, Asked, Balance, Solved
+from kedfem.dynamics.system.starts.balance import Asked, Balance, Solved
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
 from kedfem.dynamics.system.starts.internal import own, put_momenta, remembered
 from kedfem.dynamics.system.state import State
@@ -74,7 +75,7 @@ def _multiplied(now: Instant, z: Flat, p: Flat, state: State) -> None:
     C = now.gradients(z)
     hard = now.hard(C)
     left = p - C[~hard].T @ state.multiplier[~hard]
-    state.multiplier[hard] = np.linalg.lstsq(C[hard].T, left, rcond=DEPENDENT)[0]
+    state.multiplier[hard] = multipliers(C[hard], left)
     state.bearing[now.always.number] = p
 
 
@@ -115,12 +116,12 @@ def begun(now: Instant, u: Flat, v: Flat, accelerated: Accelerated = acceleratio
     return state
 
 
-def _closing(now: Instant, C: Float[np.ndarray, "r k"], open_: Flat) -> Flat:
+def _closing(now: Instant, C: sp.csr_array, open_: Flat) -> Flat:
     """The smallest change of rates, in kinetic energy, that closes constraints."""
     of = now.of
     none = np.zeros(int(of.bodies.at[-1]))
     if not np.abs(open_).max(initial=0.0):
         return none
     held = [now.always.mass(k) for k in range(len(of.parts))]
-    asked = Asked(C, -open_, np.zeros(len(C)), np.zeros(of.system.unknowns))
+    asked = Asked(C, -open_, np.zeros(len(open_)), np.zeros(of.system.unknowns))
     return Balance(of, held, now.R, asked).solved(none).x

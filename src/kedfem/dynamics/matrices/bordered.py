@@ -1,0 +1,109 @@
+"""Unknowns under constraints and laws, by one sparse factor of both: H z = f + Cᵀ m, C z + m / κ = target."""
+
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
+
+from kedfem.arrays import Float, Int
+from kedfem.dynamics.matrices.cholesky import Cholesky
+from kedfem.errors import SolveError
+
+DEPENDENT = 1e-9  # what is left of a constraint of unit size where others constrain the same
+INDEPENDENT = (
+    1e-10  # least eigenvalue of products of constraints of unit size that shows at once that none do
+)
+MANY = 100  # constraints from which that is asked first: a dense decomposition takes the time of their cube
+
+Flat = Float[np.ndarray, " _"]
+
+
+class Bordered:
+    """H with constraints and laws, factored; constraints that repeat others get no force.
+
+    Parameters
+    ----------
+    H : (k, k), of the unknowns
+    C : (r, k)
+    compliance : (r,) 1/κ, zero of constraints
+
+    Raises
+    ------
+    SolveError
+        If both together leave a motion free.
+    """
+
+    def __init__(self, H: Any, C: sp.csr_array, compliance: Flat) -> None:
+        self.kept = independent_rows(C, compliance)
+        self.count = len(compliance)
+        rows = C[self.kept]
+        usual = np.abs(H.diagonal()).mean() if rows.shape[1] else 1.0
+        size = row_sizes(rows)
+        self.scale = usual / np.where(size > 0, size, 1.0)  # so that both parts are about as large
+        rows = sp.diags_array(self.scale) @ rows
+        self.matrix = sp.csc_array(
+            sp.block_array([[H, -rows.T], [rows, sp.diags_array(self.scale**2 * compliance[self.kept])]])
+        )
+        if not self.matrix.shape[0]:
+            return
+        try:
+            self.factor = splu(self.matrix)
+        except RuntimeError as error:
+            raise SolveError(
+                "joints: bodies must be held by joints or springs, got some that move freely"
+            ) from error
+
+    def solved(self, f: Flat, target: Flat, closes: bool = False) -> tuple[Flat, Flat]:
+        """z and m, refined once.
+
+        Parameters
+        ----------
+        closes : whether what constraints leave is mended alone: what forces leave is rounding where H is far stiffer
+            along some unknowns than along others, and differs from one right-hand side to the next
+        """
+        right, m = np.concatenate([f, self.scale * target[self.kept]]), np.zeros(self.count)
+        if len(right):
+            found = self.factor.solve(right)
+            left = right - self.matrix @ found
+            left[: len(f) if closes else 0] = 0.0
+            right = found + self.factor.solve(left)
+        m[self.kept] = self.scale * right[len(f) :]
+        return right[: len(f)], m
+
+
+def independent_rows(C: sp.csr_array, compliance: Flat) -> Int[np.ndarray, " q"]:
+    """Numbers of laws, and of constraints that do not repeat others."""
+    size = row_sizes(C)
+    hard = np.flatnonzero((compliance == 0.0) & (size > DEPENDENT))
+    soft = np.flatnonzero(compliance != 0.0)
+    unit = sp.csr_array(sp.diags_array(1 / size[hard]) @ C[hard])
+    if len(hard) and not _independent(unit):
+        _, upper, order = scipy.linalg.qr(unit.T.toarray(), mode="economic", pivoting=True)
+        hard = hard[order[: int((np.abs(np.diag(upper)) > DEPENDENT).sum())]]
+    return np.sort(np.concatenate([hard, soft]))
+
+
+def multipliers(C: sp.csr_array, p: Flat) -> Flat:
+    """The least m whose Cᵀ m is nearest to p."""
+    none = np.zeros(C.shape[0])
+    if len(none) > MANY and len(independent_rows(C, none)) == len(none):
+        return -Bordered(sp.eye_array(len(p)), C, none).solved(p, none)[1]
+    return np.asarray(np.linalg.lstsq(C.T.toarray(), p, rcond=DEPENDENT)[0])
+
+
+def row_sizes(C: sp.csr_array) -> Flat:
+    """Length of each row."""
+    return np.asarray(np.sqrt((C * C).sum(axis=1)))
+
+
+def _independent(unit: sp.csr_array) -> bool:
+    """Whether many rows of length one are surely independent, by a sparse factor of their products."""
+    if unit.shape[0] < MANY:
+        return False
+    try:
+        Cholesky(sp.csr_array(unit @ unit.T - INDEPENDENT * sp.eye_array(unit.shape[0])), "constraints")
+    except SolveError:
+        return False
+    return True
