@@ -15,11 +15,6 @@ FORCE, MOMENT = "force [N]", "moment [N m]"
 DRIVE_FORCE, DRIVE_TORQUE = "drive force [N]", "drive torque [N m]"
 LINK, BODY, SPRING = "link ", "body ", "spring "  # how names of blocks begin
 JOINTS = "joints"  # the block of points with what joints exert
-TYPES = {
-    "vertex": 1, "line": 3, "triangle": 5, "quad": 9, "tetra": 10, "hexahedron": 12, "line3": 21, "triangle6": 22,
-    "quad8": 23, "tetra10": 24, "hexahedron20": 25, "quad9": 28, "hexahedron27": 29,
-}  # fmt: skip
-"""VTK's numbers of meshio's names."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ import scipy.linalg
 from kedfem.arrays import Float
 from kedfem.links.record import Link
 from kedfem.motion.constraints import cross
-from kedfem.output.vtu import write_vtu
+from kedfem.output.vtu import complete, write_vtu
 from kedfem.results.files import replacing
 from kedfem.results.forces.load_cases import LoadCase
 from kedfem.results.table import text_file, write_rows
@@ -93,7 +93,8 @@ def write_case(path: Path, link: Link, case: LoadCase) -> None:
     }  # fmt: skip
     with replacing(path) as part:
         values = {name: np.ascontiguousarray(x) for name, x in fields.items()}
-        write_vtu(part, link.X, [(link.cell_type, link.cells)], values)
+        write_vtu(part, link.X, [(link.cell_type, link.cells)], point_data=values)
+        complete(part)
 
 
 def resultants(

@@ -11,12 +11,18 @@ from typing import Any
 import numpy as np
 
 from kedfem.errors import OutputError
-from kedfem.output.fields import TYPES, JointField, LinkField, numbered
+from kedfem.output.fields import JointField, LinkField, numbered
 from kedfem.results.files import ready_folder, reason, require_space
 
 VERSION = (2, 3)  # of the format: field data over time
 
 Blocks = Sequence[LinkField | JointField]
+TYPES = {
+    "vertex": 1, "line": 3, "hexahedron": 12, "line3": 21, "tetra10": 24, "hexahedron20": 25, "quad9": 28,
+    "hexahedron27": 29,
+}  # fmt: skip
+"""VTK's numbers of meshio's names."""
+
 SPARE = 1_000_000  # bytes for HDF5's own tables
 
 

@@ -1,82 +1,40 @@
 """VTU files: meshes, links with values, frames of an animation."""
 
-import sys
-from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
-from zlib import compress
 
 import numpy as np
 
 from kedfem.arrays import Float, Int
 from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.output.bars import SECTION
-from kedfem.output.fields import STRESS, TYPES, Block, JointField, numbered
+from kedfem.output.fields import STRESS, Block, JointField, numbered
 from kedfem.results.files import replacing
 
 STRESS_COMPONENTS = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
-ORDER = f"{sys.byteorder.capitalize()}Endian"
-HEAD = f'<VTKFile type="UnstructuredGrid" version="0.1" byte_order="{ORDER}" compressor="vtkZLibDataCompressor">\n'
-LETTERS = {"f": "Float", "i": "Int", "u": "UInt"}  # VTK's names of numpy's
-BLOCK = 1 << 15  # bytes that are compressed at once
-NONE: Mapping[str, Any] = {}
+GRID = b"<UnstructuredGrid>"
 Points = Float[np.ndarray, "n 3"]
 Cells = tuple[str, Int[np.ndarray, "e m"]]  # elements of one type: its name in meshio, and their nodes
 
 
-def write_vtu(
-    path: Path,
-    points: Points,
-    cells: Sequence[Cells],
-    point_data: Mapping[str, np.ndarray] = NONE,
-    cell_data: Mapping[str, Sequence[np.ndarray]] = NONE,
-    fields: str = "",
-) -> None:
-    """Points and elements with values: binary, compressed by zlib.
+def write_vtu(path: Path, points: Points, cells: Sequence[Cells], **values: Any) -> None:
+    """Points and elements with `point_data` and `cell_data` as meshio takes them: binary, compressed by zlib."""
+    import meshio
+    from meshio import vtu
 
-    Parameters
-    ----------
-    cell_data : as many arrays as there are kinds of elements
-    fields : values of the whole, as elements of XML
-    """
-    topology = {
-        "connectivity": np.concatenate([of.ravel() for _, of in cells]).astype(np.int32),
-        "offsets": np.cumsum(np.repeat([of.shape[1] for _, of in cells], [len(of) for _, of in cells])),
-        "types": np.concatenate([np.full(len(of), TYPES[kind], np.uint8) for kind, of in cells]),
-    }
-    sections = {
-        "Points": {"Points": points},
-        "Cells": topology,
-        "PointData": point_data,
-        "CellData": {name: np.concatenate(list(each)) for name, each in cell_data.items()},
-    }
-    counts = f'NumberOfPoints="{len(points)}" NumberOfCells="{len(topology["types"])}"'
-    with path.open("w", encoding="utf-8") as file:
-        file.write(
-            f'<?xml version="1.0"?>\n{HEAD}<UnstructuredGrid><FieldData>{fields}</FieldData>\n<Piece {counts}>\n'
-        )
-        for section, arrays in sections.items():
-            file.write(f"<{section}>\n{''.join(_array(name, x) for name, x in arrays.items())}</{section}>\n")
-        file.write("</Piece></UnstructuredGrid></VTKFile>\n")
+    whole = [(kind, of.astype(np.int32)) for kind, of in cells]
+    vtu.write(str(path), meshio.Mesh(points, whole, **values), binary=True, compression="zlib")
 
 
-def _array(name: str, x: np.ndarray) -> str:
-    """An array in blocks that are compressed, after their number and sizes."""
-    kind = f"{LETTERS[x.dtype.kind]}{8 * x.itemsize}"
-    names = (
-        "".join(f' ComponentName{i}="{each}"' for i, each in enumerate(STRESS_COMPONENTS))
-        if name == STRESS
-        else ""
-    )
-    columns = f' NumberOfComponents="{x.shape[1]}"{names}' if x.ndim == 2 else ""
-    whole = x.tobytes()
-    parts = [whole[k : k + BLOCK] for k in range(0, len(whole), BLOCK)]
-    compressed = [compress(part) for part in parts]
-    sizes = [len(parts), BLOCK, len(parts[-1]) if parts else 0, *map(len, compressed)]
-    content = b64encode(np.array(sizes, np.uint32).tobytes()) + b64encode(b"".join(compressed))
-    return f'<DataArray type="{kind}" Name={quoteattr(name)}{columns} format="binary">{content.decode()}</DataArray>\n'
+def complete(path: Path, fields: str = "") -> None:
+    """Put in what meshio leaves out: field data, and the names of the components of stresses."""
+    stress = f'Name="{STRESS}" NumberOfComponents="{len(STRESS_COMPONENTS)}"'
+    named = "".join(f' ComponentName{i}="{name}"' for i, name in enumerate(STRESS_COMPONENTS))
+    head = GRID + f"<FieldData>{fields}</FieldData>".encode() if fields else GRID
+    text = path.read_bytes().replace(GRID, head, 1)
+    path.write_bytes(text.replace(stress.encode(), (stress + named).encode(), 1))
 
 
 def write_mesh(mesh: SolidMesh, path: Path) -> None:
@@ -101,8 +59,8 @@ def write_points(
     link = [np.full(len(of), names.index(name), np.int32) for name, _, (_, of) in parts]
     whole = _together([(points, cells) for _, points, cells in parts])
     with replacing(path) as part:
-        fields = "".join(_number(f"link {name}", k) for k, name in enumerate(names))
-        write_vtu(part, *whole, values, {"link": link}, fields)
+        write_vtu(part, *whole, point_data=dict(values), cell_data={"link": link})
+        complete(part, "".join(_number(f"link {name}", k) for k, name in enumerate(names)))
 
 
 def write_cells(
@@ -110,7 +68,7 @@ def write_cells(
 ) -> None:
     """Elements in the reference position, points and cells of each part, with one value each, called `name`."""
     with replacing(path) as part:
-        write_vtu(part, *_together(parts), cell_data={name: values})
+        write_vtu(part, *_together(parts), cell_data={name: list(values)})
 
 
 def _together(parts: Sequence[tuple[Points, Cells]]) -> tuple[Points, list[Cells]]:
@@ -145,10 +103,10 @@ def write_blocks(path: Path, now: Mapping[str, float], fields: Sequence[Block], 
         path,
         points.astype(np.float32),
         cells,
-        values,
-        {"link": link} | _sections(fields),
-        _field_data(now, fields, first),
+        point_data=values,
+        cell_data={"link": link} | _sections(fields),
     )
+    complete(path, _field_data(now, fields, first))
 
 
 def _sections(fields: Sequence[Block]) -> dict[str, list[np.ndarray]]:
