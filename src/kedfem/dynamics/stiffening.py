@@ -82,17 +82,6 @@ class Stiffening:
     def over(self, forcing: Sequence[Forcing], motion: RigidMotion) -> list[Forcing]:
         """The same over the times of a motion with the factors s_i of the stress modes."""
         rows = joint_rows(self.joints, motion, self.parts[0].attachment.unknowns)
-        return self.stressed(forcing, motion, rows)
-
-    def stressed(
-        self, forcing: Sequence[Forcing], motion: RigidMotion | None, rows: JointRows | None
-    ) -> list[Forcing]:
-        """The same with the constraint equations known.
-
-        Parameters
-        ----------
-        motion : what motors and springs need, if there are any
-        """
         R = [each.R for each in forcing]
         loads = [F @ each.R for F, each in zip(self._loads(forcing, motion), forcing, strict=True)]
         forces = port_forces(self.parts, R, loads, rows)
@@ -103,14 +92,10 @@ class Stiffening:
             )
         ]
 
-    def _loads(
-        self, forcing: Sequence[Forcing], motion: RigidMotion | None
-    ) -> list[Float[np.ndarray, "T n d"]]:
+    def _loads(self, forcing: Sequence[Forcing], motion: RigidMotion) -> list[Float[np.ndarray, "T n d"]]:
         """Loads of all links with those of motors and springs, world components."""
         if self.elements is None:
             return [each.F for each in forcing]
-        if motion is None:
-            raise ValueError("the motion must be given with motors and springs, got none")
         forces = self.elements.over(motion).forces
         return [with_elements(k, each.F, self.elements, forces) for k, each in enumerate(forcing)]
 

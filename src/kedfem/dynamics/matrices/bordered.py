@@ -12,9 +12,7 @@ from kedfem.dynamics.matrices.cholesky import Cholesky
 from kedfem.errors import SolveError
 
 DEPENDENT = 1e-9  # what is left of a constraint of unit size where others constrain the same
-INDEPENDENT = (
-    1e-10  # least eigenvalue of products of constraints of unit size that shows at once that none do
-)
+INDEPENDENT = 1e-10  # least eigenvalue of products of constraints of unit size: above, none repeats others
 MANY = 100  # constraints from which that is asked first: a dense decomposition takes the time of their cube
 
 Flat = Float[np.ndarray, " _"]

@@ -50,10 +50,8 @@ from kedfem.dynamics.system.stress_kernel import combined, stressed_begin, stres
 MET = -2  # instead of a body: a stop was met, and the step is to be divided
 PASSES = 40  # in a step, of which it takes 2 to 6
 PATIENCE, EASIER = 14, 100.0  # after so many a larger change is taken, and counted
-STALLED, ROUNDING = (
-    4,
-    1e-8,
-)  # passes in which changes do not halve are rounding below this share of a stiffened deflection
+STALLED = 4  # passes in which changes do not halve: they may be rounding
+ROUNDING = 1e-8  # of a stiffened deflection: changes below are rounding then
 
 
 @compiled
