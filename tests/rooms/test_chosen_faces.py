@@ -59,7 +59,7 @@ def scene_with(tmp_path: Path, faces: Any, at: Any = (0, 0, 0.005), axis: str = 
 
 @pytest.fixture
 def sleeve(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("kedfem.links.build.link_mesh", lambda *_: turned(SLEEVE))
+    monkeypatch.setattr("kedfem.mesh.link.link_mesh", lambda *_: turned(SLEEVE))
 
 
 def held(scene: Scene) -> np.ndarray:

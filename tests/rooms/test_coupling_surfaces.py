@@ -285,7 +285,7 @@ def test_names_that_a_link_does_not_have_are_answered_with_those_it_has() -> Non
 
 def test_a_scene_names_the_faces_of_a_joint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Through the model, for a flywheel at the joint as well."""
-    monkeypatch.setattr("kedfem.links.build.link_mesh", lambda *_: with_names())
+    monkeypatch.setattr("kedfem.mesh.link.link_mesh", lambda *_: with_names())
     raw = {
         "links": {"part": {"material": "steel", "shape": {"kind": "mesh", "file": "any"}}},
         "joints": {"A": {"kind": "revolute", "links": ["ground", "part"], "at": [0, 0, 0.003],

@@ -65,7 +65,7 @@ def test_steps_at_an_eased_tolerance_are_counted_and_told(monkeypatch: Any) -> N
         assert (
             solvers.eased_warning([steps]) == () or "the iterations of" in solvers.eased_warning([steps])[0]
         )
-        return int(steps.eased)  # type: ignore[union-attr]
+        return int(steps.eased)
 
     assert eased() == 0
     monkeypatch.setattr(solvers, "CONVERGED", 1e-12)
@@ -78,10 +78,11 @@ def test_growth_in_any_function_ends_a_run(value: float) -> None:
     """Not only in the first function, and not only at infinity."""
     raw = arm("beam", 2)
     raw["analysis"] |= {"end_time": 0.01}
-    block = ran(raw)[1][1]
+    ready, blocks = ran(raw)
+    block = blocks[1]
     g = block.links[0].g.copy()
     g[2, -1, 1] = value
-    every = _finite(replace(block, links=[replace(block.links[0], g=g), *block.links[1:]]))
+    every = _finite(ready.linkage, replace(block, links=[replace(block.links[0], g=g), *block.links[1:]]))
     assert len(next(every)) == 2
     with pytest.raises(SolveError, match="got none at step 3"):
         next(every)

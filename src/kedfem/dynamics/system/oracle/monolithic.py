@@ -40,6 +40,7 @@ ITERATIONS = 40
 RATES = 0.01  # of a step, by which a mechanism moves on for the rates of its coordinates, of fourth order
 SLOW = 0.1  # changes that do not fall faster have their tangents assembled anew
 DIVERGED = 1e9  # m: a change with which iterations will not come back; forces of beams would soon overflow
+STIFF = 1e-6  # of the displacement: changes of linear systems below it that do not fall are rounding, of slender links
 BALANCED = 1e-6  # of the largest force: what may be left of a body's balance where changes are rounding
 Column = Float[np.ndarray, " _"]
 Seen = tuple[float, np.ndarray]
@@ -89,6 +90,9 @@ class Monolithic:
         self.of = [slice(a, b) for a, b in pairwise(ends)]
         self.N, self.k = int(ends[-1]), self.system.unknowns
         self.hard = [n for n, x in enumerate(self.system.constraints) if isinstance(x.law, Held | Driven)]
+        self.linear = all(link.fit is None for link in model.links) and all(
+            x.linear for x in self.system.constraints
+        )
         self.masses = [sp.csr_array(mass_matrix(link)) for link in model.links]
         self.M = sp.csr_array(sp.block_diag(self.masses))
         self.W = sp.csr_array(sp.block_diag([port_columns(joint, link.n).T for link, joint in every]))
@@ -162,7 +166,9 @@ class Monolithic:
                 break
             slow = slow + 1 if size > SLOW * before else 0
             self.kept = None if slow > patience else self.kept
-            if size <= 1e-14 * max(1.0, np.abs(now.u).max()) or (size < 1e-11 and size > 0.5 * before):
+            reached = float(np.abs(now.u).max())
+            rounding = max(1e-11, STIFF * reached) if self.linear else 1e-11
+            if size <= 1e-14 * max(1.0, reached) or (size < rounding and size > 0.5 * before):
                 borne = max(float(np.abs(x).max(initial=0.0)) for x in (self.W.T @ lam, now.F, old.F))
                 if float(np.abs(left[0]).max()) > BALANCED * borne:
                     break
