@@ -1,5 +1,7 @@
 """Steps a second of a system beside the solvers that it replaces, in one run: `python -m benchmarks.system`."""
 
+from collections.abc import Callable
+from pathlib import Path
 from time import perf_counter, process_time
 from typing import Any
 
@@ -10,6 +12,7 @@ from tests.rooms.test_acted import four_bar as hinged
 from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.matrices.substructure import factored
+from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_body import forcings, motions
 from kedfem.dynamics.segment import CONVERGED
 from kedfem.dynamics.stepping.first_state import started
@@ -17,12 +20,13 @@ from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.build import system_of
-from kedfem.dynamics.system.march import march, ready
+from kedfem.dynamics.system.march import Ready, march, ready
 from kedfem.dynamics.system.sparse import SparsePart
 from kedfem.dynamics.system.starts.start import rest
 from kedfem.dynamics.system.steps import Steps, scene_system
 from kedfem.motion.rigid import rigid_motion
-from kedfem.scene import path_parameter, scene_from, time_grid
+from kedfem.results.recording import recording, rows
+from kedfem.scene import path_parameter, read_scene, scene_from, time_grid
 
 STEPS, TURNS = 2000, 3
 
@@ -95,6 +99,9 @@ SOLIDS = {  # elements of crank, coupler and rocker
 }
 
 
+STAGE = Path(__file__).parents[1] / "examples" / "four_bar_solids"
+
+
 def solid(elements: tuple[list[int], ...]) -> dict[str, Any]:
     """A four-bar of solid links; those of four elements reduced."""
     raw = hinged("rigid-body", "solid", steps=360, analysis={"initial": "rest", "revolutions": 1})
@@ -113,25 +120,56 @@ def beside_solves(raw: dict[str, Any], count: int, turns: int) -> tuple[float, f
     state = started(scene, made.linkage, made.path, model, solver)
     _, motion = next(motions(scene, made.linkage, made.path))
     motion, of = motion.part(0, count), solver.ready
-    large = [k for k, part in enumerate(of.parts) if isinstance(part, SparsePart)]
-    bare = [
-        (
-            factored(model.links[k], of.system.model.joints[k], of.c.c_M, of.c.c_K),
-            np.ones(model.links[k].X.shape),
-        )
-        for k in large
-    ]
+    solve = bare_solves(model, of)
     steps, solves = [], []
     for _ in range(turns + 1):
         began = process_time()
         solver.advance(state, forcings(model, motion), motion)
         steps.append(process_time() - began)
+        solves.append(solve(count))
+    return 1e6 * min(steps[1:]) / count, 1e6 * min(solves[1:]) / count
+
+
+def bare_solves(model: Model, of: Ready) -> Callable[[int], float]:
+    """Processor time of so many triangular solves of each sparse link [s]."""
+    links = zip(of.parts, model.links, of.system.model.joints, strict=True)
+    bare = [
+        (factored(link, joint, of.c.c_M, of.c.c_K), np.ones(link.X.shape))
+        for part, link, joint in links
+        if isinstance(part, SparsePart)
+    ]
+
+    def solve(count: int) -> float:
         began = process_time()
         for _ in range(count):
             for part, r in bare:
                 part.solve(r)
-        solves.append(process_time() - began)
-    return 1e6 * min(steps[1:]) / count, 1e6 * min(solves[1:]) / count
+        return process_time() - began
+
+    return solve
+
+
+def example_beside_solves(path: Path, turns: int) -> tuple[float, float, float, float]:
+    """Processor time of a run's start, its steps, these with all channels and the account of energy, and of the bare
+    solves of as many steps [s]; no frames, no stresses of whole links."""
+    made, _ = prepared(read_scene(path))
+    scene, model = made.scene, made.model
+    solver = steps_of(scene, model)
+    solve = bare_solves(model, solver.ready)
+    every = []
+    for _ in range(turns + 1):
+        taken = []
+        for channels in ([], recording(scene, model)):
+            began = process_time()
+            blocks = transient(scene, made.linkage, made.path, model, solver)
+            rows(channels, next(blocks))
+            first = process_time()
+            for block in blocks:
+                rows(channels, block)
+            taken += [first - began, process_time() - first]
+        every.append((taken[0], taken[1], taken[3], solve(time_grid(scene).steps)))
+    start, steps, recorded, solves = np.min(every[1:], axis=0).tolist()
+    return start, steps, recorded, solves
 
 
 def main() -> None:
@@ -151,6 +189,14 @@ def main() -> None:
     for (name, elements), count in zip(SOLIDS.items(), PAIRS, strict=True):
         step, solves = beside_solves(solid(elements), *count)
         print(f"| {name} | {step:.0f} | {solves:.0f} | {step / solves:.2f} |", flush=True)
+    print(
+        "\n| scene | start, s | steps, s | recorded too, s | solves, s | ratio | recorded | with the start |"
+    )
+    print("|---|---:|---:|---:|---:|---:|---:|---:|")
+    start, steps, recorded, solves = example_beside_solves(STAGE / "scene.toml", 8)
+    seconds = " | ".join(f"{x:.3f}" for x in (start, steps, recorded, solves))
+    ratios = " | ".join(f"{x / solves:.2f}" for x in (steps, recorded, start + recorded))
+    print(f"| {STAGE.name} | {seconds} | {ratios} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from kedfem.arrays import Float
 from kedfem.dynamics.history import LinkHistory, Products
 from kedfem.dynamics.joints.ports import turned_vectors
 from kedfem.dynamics.stiffening import Turning
-from kedfem.results.forces.moments import Constants, Field, RigidRates, dot, paired, rotated, turned
+from kedfem.results.forces.moments import Constants, Field, RigidRates, crossed, dot, rotated
 
 Scalars = Float[np.ndarray, " T"]
 
@@ -68,12 +68,13 @@ def stress(
     at : rigid-body motion of their bodies
     """
     S, T = len(of), len(histories[0].u)
-    rows, power, stored = np.empty((len(of[0].fit), S, T)), np.zeros((S, T)), np.zeros(T)
+    rows, power, stored = np.empty((of[0].fit.m, S, T)), np.zeros((S, T)), np.zeros(T)
     for i, (x, history, turning) in enumerate(zip(of, histories, made, strict=True)):
         f = np.stack([turning(t)(g) for t, g in enumerate(history.g)])
         stored += 0.5 * dot(history.g, f)
         f = f @ history.R.transpose(0, 2, 1)
-        rows[:, i], power[i] = x.fit @ f.reshape(T, -1).T, dot(history.v, f)
+        x.fit.of(f, rows[:, i])
+        power[i] = dot(history.v, f)
     power += _work(rows[:-1].reshape(at.rates.shape[1:]), at.rates[0]) + rows[-1] * at.omega[-1]
     return Stress(power.sum(axis=0), stored)
 
@@ -83,12 +84,13 @@ class Fields:
     """Nodal fields of S links at T time points, as far as they matter, time last, in k dimensions.
 
     rows : (3, (1 + k) k + 1, S, T) moments and couple of M δ', P − M R0'' and port forces
-    elastic : (k, k, S, T) Σ g ⊗ K0 g, link frame; None if K turns with no link's rigid-body motion
+    elastic : (c, S, T) Σ g × K0 g, link frame, in a plane the one component across it;
+        None if K turns with no link's rigid-body motion
     powers : (3, S, T) δ' · M δ', δ' · (P − M R0'') and, where joints are enforced by constraint equations, δ' · port
     forces"""
 
     rows: Float[np.ndarray, "3 m S T"]
-    elastic: Float[np.ndarray, "k k S T"] | None
+    elastic: Float[np.ndarray, "c S T"] | None
     powers: Float[np.ndarray, "3 S T"]
 
 
@@ -104,15 +106,15 @@ def fields_of(
     rows_work : whether joints are enforced by constraint equations, whose forces do work on the elastic motion
     """
     S, T, k = len(of), len(histories[0].u), of[0].k
-    rows = np.empty((3, len(of[0].fit), S, T))
-    powers, elastic = np.zeros((3, S, T)), np.zeros((k, k, S, T)) if any(turns) else None
+    rows, powers = np.empty((3, of[0].fit.m, S, T)), np.zeros((3, S, T))
+    elastic = np.zeros((2 * k - 3, S, T)) if any(turns) else None
     for i, (x, history, product) in enumerate(zip(of, histories, made, strict=True)):
         v, F = history.v, history.F
         f = turned_vectors(x.joint, history.R, history.port_forces)
         for slot, (A, y) in enumerate(((x.weighted, v), (x.fit, F), (x.ports, f))):
-            np.matmul(A, y.reshape(T, -1).T, out=rows[slot, :, i])
+            A.of(y, rows[slot, :, i])
         if elastic is not None and turns[i]:
-            elastic[:, :, i] = paired(k, history.g, product.Kg)
+            elastic[:, i] = crossed(k, history.g, product.Kg)
         powers[0, i], powers[1, i] = dot(v, product.Mv), dot(v, F)
         if rows_work:
             powers[2, i] = dot(
@@ -124,9 +126,9 @@ def fields_of(
 def prescribed_fields(of: Sequence[Constants], forces: Sequence[Field]) -> Fields:
     """Of rigid links that the drive carries along; their supports give what their motion asks for, M R0'' − P."""
     S, T = len(of), len(forces[0])
-    rows = np.zeros((3, len(of[0].fit), S, T))
+    rows = np.zeros((3, of[0].fit.m, S, T))
     for i, (x, F) in enumerate(zip(of, forces, strict=True)):
-        rows[1, :, i] = x.fit @ F.reshape(T, -1).T
+        x.fit.of(F, rows[1, :, i])
     rows[2] = -rows[1]
     return Fields(rows, None, np.zeros((3, S, T)))
 
@@ -159,7 +161,7 @@ def _neglected(found: Fields, at: RigidRates) -> Scalars:
     """Power of the moment of the elastic forces on bent links."""
     if found.elastic is None:
         return np.zeros(found.powers.shape[2])
-    return np.asarray(np.einsum("ist,ist->t", rotated(at, turned(found.elastic)), at.omega))
+    return np.asarray(np.einsum("ist,ist->t", rotated(at, found.elastic), at.omega))
 
 
 def _work(y: Float[np.ndarray, "k1 k S T"], rates: Float[np.ndarray, "k1 k S T"]) -> Float[np.ndarray, "S T"]:

@@ -96,10 +96,10 @@ def _stress(scene: Scene, model: Model, where: str, name: str, probe: Probe) -> 
     drawn, kinks = np.asarray(probe.at), _kinks(scene, probe.link)
     k, at = on_segment(model, probe.link, drawn, lambda link: point_rows(link, where, drawn, kinks))
     dofs, dense = used_columns(at.stress)
+    nodes, components = np.divmod(dofs, model.links[k].d)
 
     def stress(block: Block) -> Rows:
-        g = block.links[k].g
-        s = g.reshape(len(g), -1)[:, dofs] @ dense.T
+        s = block.links[k].g[:, nodes, components] @ dense.T
         return np.column_stack([s, von_mises(s)])
 
     text = f"stress {_place(probe.link, at.X)}"

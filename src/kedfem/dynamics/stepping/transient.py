@@ -164,7 +164,8 @@ def _moment(linkage: Linkage, motion: RigidMotion, k: int) -> str:
 
 def _finite(linkage: Linkage, block: Block) -> Iterator[Block]:
     """The block, up to where a displacement is not finite any more, or beyond all measure."""
-    fine = np.all([np.abs(link.g).max(axis=(1, 2)) < BEYOND for link in block.links], axis=0)
+    ends = [(link.g.max(axis=(1, 2)), link.g.min(axis=(1, 2))) for link in block.links]
+    fine = np.all([(high < BEYOND) & (low > -BEYOND) for high, low in ends], axis=0)
     k = len(block) if fine.all() else int(fine.argmin())
     if k:
         yield block.part(0, k)

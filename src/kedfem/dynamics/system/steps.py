@@ -199,6 +199,8 @@ class Steps:
         """All links over the first time points of a block, as far as a history goes."""
         T = len(found.u)
         forcing, motion = [x.first(T) for x in forcing], motion.part(0, T)
+        if not (self.elements or self.corotational):  # nothing asks what constraints exert
+            return [self._link(k, found, each) for k, each in enumerate(forcing)], None
         forces = supports(self.ready, found, motion)
         acting = on_links(forces, self.riders) if self.elements else {}
         every = [self._link(k, found, each, acting.get(k)) for k, each in enumerate(forcing)]
@@ -213,7 +215,7 @@ class Steps:
             every[k] = replace(every[k], F=every[k].F + turned(self.links[k], load, R, every[k].u, factor))
         return every
 
-    def _link(self, k: int, found: History, forcing: Forcing, acting: Rows | None) -> LinkHistory:
+    def _link(self, k: int, found: History, forcing: Forcing, acting: Rows | None = None) -> LinkHistory:
         """How a link moves, in its frame as that is, and what acts on it."""
         of, link = self.ready, self.links[k]
         u, v, a = (displacements(of, k, x) for x in (found.u, found.v, found.a))

@@ -2,7 +2,8 @@
 
 A field y, forces or a momentum, matters to a rigid motion 1 ⊗ a + X Bᵀ only through Σ y and Σ X ⊗ y, its *moments*, and
 of a planar beam through its couple. So one product per field and block does; all further work is on moments of all links
-together, time last: (1 + k, k, S, T) for S links at T time points, whatever their size, in k dimensions.
+together, time last: (1 + k, k, S, T) for S links at T time points, whatever their size, in k dimensions. Products take
+one component after the other, as histories are in memory.
 """
 
 from dataclasses import dataclass
@@ -17,9 +18,34 @@ from kedfem.motion.constraints import cross
 from kedfem.motion.rigid import RigidMotion
 
 DENSE = 400  # unknowns of a link: up to here a dense product beats a sparse one
+ACROSS = ((1, 2), (2, 0), (0, 1))  # components of a cross product; in a plane the last
 SMALL = 100  # up to here one product with all of M beats one per component
 Field = Float[np.ndarray, "_ _ _"]
-Flat = Float[np.ndarray, "m _"]
+
+
+@dataclass(frozen=True, slots=True)
+class Weights:
+    """What makes moments of nodal vectors.
+
+    rows : (1 + k, n) of each of the first k components
+    couple : (n,) of the third component of a planar beam, else None
+    """
+
+    rows: Float[np.ndarray, "k1 n"]
+    couple: Float[np.ndarray, " n"] | None
+
+    @property
+    def m(self) -> int:
+        """How many moments there are, (1 + k) k and a couple."""
+        return len(self.rows) * (len(self.rows) - 1) + 1
+
+    def of(self, y: Field, out: Float[np.ndarray, "m T"]) -> None:
+        """Moments and couple of a field over time, into `out`."""
+        k = len(self.rows) - 1
+        moments = out[:-1].reshape(1 + k, k, len(y))
+        for j in range(k):
+            np.matmul(self.rows, y[:, :, j].T, out=moments[:, j])
+        out[-1] = 0.0 if self.couple is None else y[:, :, 2] @ self.couple
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,11 +53,11 @@ class Constants:
     """What the audit needs of a link, constant.
 
     k : 2 of planar links, which move in a plane, else 3
-    fit, weighted, ports : (m, ·) m = (1 + k) k + 1 moments and couple of nodal forces y, of M u, and of port forces
+    fit, weighted, ports : for moments of nodal forces y, of M u, and of port forces
     gram : (1 + k, 1 + k) [1, X]ᵀ m [1, X]: mass, its first and second moment
     spin : of a planar beam its sections' inertia
-    K0 : dense if small
-    masses : a matrix per component, or one for all of them; None for a mass that is 1
+    K0 : dense and for `flat` fields if small
+    masses : a matrix per component, or a dense one for all of `flat` fields; None for a mass that is 1
     """
 
     link: Link
@@ -39,9 +65,9 @@ class Constants:
     body: int
     damping: Rayleigh
     k: int
-    fit: Flat
-    weighted: Flat
-    ports: Flat
+    fit: Weights
+    weighted: Weights
+    ports: Weights
     gram: Float[np.ndarray, "k1 k1"]
     spin: float
     K0: Matrix
@@ -55,19 +81,21 @@ def constants(link: Link, joint: Attachment, body: int, damping: Rayleigh) -> Co
     weighted = np.column_stack([link.m1[:, 0], link.mX[:, :k]])
     at_ports = joint.weights @ fit[joint.nodes]
     spin = float(link.one @ link.m1[:, 2]) if link.kind == "beam" else 0.0
-    rows = (
-        _rows(link, fit, link.one), _rows(link, weighted, link.m1[:, -1]), _rows(link, at_ports, at_ports[:, 0])
-    )  # fmt: skip
+    couples = (link.one, link.m1[:, -1], at_ports[:, 0]) if link.kind == "beam" else (None,) * 3
+    every = zip((fit, weighted, at_ports), couples, strict=True)
+    of_forces, of_masses, of_ports = (Weights(np.ascontiguousarray(x.T), couple) for x, couple in every)
     return Constants(
         link,
         joint,
         body,
         damping,
         k,
-        *rows,
+        of_forces,
+        of_masses,
+        of_ports,
         fit.T @ weighted,
         spin,
-        _dense(link.K0, link.unknowns),
+        _stiffness(link),
         _masses(link),
     )
 
@@ -122,21 +150,32 @@ def mass_times(of: Constants, u: Field) -> Field:
     return out
 
 
+def flat(u: Field) -> Float[np.ndarray, "T dn"]:
+    """All components one after the other: of histories a view."""
+    return u.transpose(0, 2, 1).reshape(len(u), -1)
+
+
 def flat_times(A: Matrix, u: Field) -> Field:
-    """A u over time, of a symmetric matrix on all unknowns."""
-    flat = u.reshape(len(u), -1)
-    return np.asarray(flat @ A if isinstance(A, np.ndarray) else (A @ flat.T).T).reshape(u.shape)
+    """A u over time, of a symmetric matrix on all unknowns: of `flat` fields if it is dense, else node by node."""
+    T, n, d = u.shape
+    if isinstance(A, np.ndarray):
+        return (flat(u) @ A).reshape(T, d, n).transpose(0, 2, 1)
+    return np.asarray((A @ u.reshape(T, -1).T).T).reshape(u.shape)
 
 
-def paired(k: int, x: Field, y: Field) -> Float[np.ndarray, "k k T"]:
-    """Σ x ⊗ y of translations and forces, in k dimensions."""
-    return np.asarray((x[..., :k].transpose(0, 2, 1) @ y[..., :k]).transpose(1, 2, 0))
+def crossed(k: int, x: Field, y: Field) -> Float[np.ndarray, "c T"]:
+    """Σ x × y of translations and forces, in a plane the one component across it."""
+    return np.stack(
+        [
+            np.vecdot(x[:, :, i], y[:, :, j]) - np.vecdot(x[:, :, j], y[:, :, i])
+            for i, j in ACROSS[2 * (3 - k) :]
+        ]
+    )
 
 
-def turned(N: Float[np.ndarray, "*z k k S T"]) -> Float[np.ndarray, "*z c S T"]:
+def turned(N: Float[np.ndarray, "k k S T"]) -> Float[np.ndarray, "c S T"]:
     """Σ x × y from Σ x ⊗ y, in a plane the one component across it."""
-    pairs = ((1, 2), (2, 0), (0, 1))[-1 if N.shape[-3] == 2 else 0 :]
-    return np.stack([N[..., i, j, :, :] - N[..., j, i, :, :] for i, j in pairs], axis=-3)
+    return np.stack([N[i, j] - N[j, i] for i, j in ACROSS[2 * (3 - len(N)) :]])
 
 
 def rotated(at: RigidRates, x: Float[np.ndarray, "c S T"]) -> Float[np.ndarray, "c S T"]:
@@ -144,21 +183,16 @@ def rotated(at: RigidRates, x: Float[np.ndarray, "c S T"]) -> Float[np.ndarray, 
     return x if len(x) == 1 else np.einsum("ijst,jst->ist", at.R, x)
 
 
-def dot(x: Float[np.ndarray, "T ..."], y: Float[np.ndarray, "T ..."]) -> Float[np.ndarray, " T"]:
+def dot(x: Field, y: Field) -> Float[np.ndarray, " T"]:
     """Σ x · y at every time point."""
-    return np.asarray(np.einsum("tk,tk->t", x.reshape(len(x), -1), y.reshape(len(y), -1)))
+    return np.asarray(np.vecdot(flat(x), flat(y)))
 
 
-def _rows(link: Link, fit: Float[np.ndarray, "k _"], couple: Float[np.ndarray, " k"]) -> Flat:
-    """Moments of vectors with these weights, and the sum of the third components of a planar beam."""
-    k = fit.shape[1] - 1
-    out = np.zeros((1 + k, k, len(fit), link.d))
-    for j in range(k):
-        out[:, j, :, j] = fit.T
-    last = np.zeros((1, len(fit) * link.d))
-    if link.kind == "beam":
-        last[0, 2::3] = couple
-    return np.concatenate([out.reshape(k * (1 + k), -1), last])
+def _stiffness(link: Link) -> Matrix:
+    K0 = _dense(link.K0, link.unknowns)
+    if not isinstance(K0, np.ndarray):
+        return K0
+    return K0.reshape(link.n, link.d, link.n, link.d).transpose(1, 0, 3, 2).reshape(K0.shape)
 
 
 def _masses(link: Link) -> tuple[Matrix, ...] | None:
@@ -167,9 +201,9 @@ def _masses(link: Link) -> tuple[Matrix, ...] | None:
         return None
     if link.unknowns > SMALL:
         return masses
-    M = np.zeros((link.n, link.d, link.n, link.d))
+    M = np.zeros((link.d, link.n, link.d, link.n))
     for k, m in enumerate(masses):
-        M[:, k, :, k] = m
+        M[k, :, k] = m
     return (M.reshape(link.unknowns, -1),)
 
 

@@ -11,10 +11,10 @@ from kedfem.results.forces.moments import (
     Constants,
     Field,
     RigidRates,
+    crossed,
     dot,
     flat_times,
     mass_times,
-    paired,
     rotated,
     turned,
 )
@@ -61,7 +61,7 @@ def resistance(
     bodies = np.array([x.body for x in of])[which]
     taken = np.zeros(len(t))
     k, size = of[0].k, (len(which), len(t))
-    rows, arms = np.empty((len(of[0].fit), *size)), np.empty((k, k, *size))
+    rows, arms = np.empty((of[0].fit.m, *size)), np.empty((2 * k - 3, *size))
     for i, (x, history, product, last) in enumerate(zip(of, histories, made, before.links, strict=True)):
         end, (g, Cg) = history.g, _changes(x, history.g, product, *last[:3])
         taken += dot(g, Cg)
@@ -72,18 +72,18 @@ def resistance(
             taken += dot(g, Cg)
         if i in which:
             slot = int(np.searchsorted(which, i))
-            np.matmul(x.fit, Cg.reshape(len(t), -1).T, out=rows[:, slot])
-            arms[:, :, slot] = paired(k, end, Cg) - 0.5 * paired(k, g, Cg)
+            x.fit.of(Cg, rows[:, slot])
+            arms[:, slot] = crossed(k, end, Cg) - 0.5 * crossed(k, g, Cg)
     taken /= np.where(h > 0, h, 1.0)
     if not len(which):
         return Resistance(taken, np.zeros(len(t)))
     return Resistance(taken, _turning(rows, arms, _mean(at.of(bodies, k), before.at.of(bodies, k))))
 
 
-def _turning(rows: Float[np.ndarray, "m S T"], arms: Float[np.ndarray, "k k S T"], at: RigidRates) -> Scalars:
+def _turning(rows: Float[np.ndarray, "m S T"], arms: Float[np.ndarray, "c S T"], at: RigidRates) -> Scalars:
     """Drag of damping forces that turn with the rigid-body motion."""
     y = rows[:-1].reshape(at.rates.shape[1:])
-    moment = turned(y[1:] + arms)
+    moment = turned(y[1:]) + arms
     moment[-1] += rows[-1]
     impulse, turn = np.einsum("ijst,jst->ist", at.R, y[0]), rotated(at, moment)
     return np.asarray(
