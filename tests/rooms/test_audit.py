@@ -225,4 +225,3 @@ def test_a_run_says_what_is_left_over_and_warns_when_that_is_much(tmp_path: Path
     assert done.results.channels["energy/residual"][1].shape == (121, 1)
     assert balance_warning(Balance(energy=0.003)) == ()
     assert balance_warning(Balance(energy=0.03)) != ()
-    assert balance_warning(Balance(energy=0.03), stiffened=True) == ()
