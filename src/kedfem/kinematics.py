@@ -138,7 +138,7 @@ def _stepped(
     drive, wanted = drive_channel(scene), set(frame_steps(scene).tolist())
     frames = AnimationWriter(folder, STEM, drive_heading(drive))
     seen = sights(scene, linked, links)
-    size = float(np.linalg.norm(np.ptp(np.concatenate([each.points for each in seen]), axis=0)))
+    places = {each.name: each.points for each in seen if not each.label}
     notes: dict[str, str | float] = {"kind": "kinematics", "step [s]": time_grid(scene).step}
     with ResultsWriter(
         folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes, drive_channel(scene)
@@ -152,7 +152,7 @@ def _stepped(
                 frames.add(
                     float(motion.t[k - first]),
                     rigid_fields(seen, motion, k - first)
-                    + rigid_springs(scene.springs, linked, motion, k - first, size),
+                    + rigid_springs(scene, linked, motion, k - first, places),
                     float(motion.phi[k - first]),
                 )
 

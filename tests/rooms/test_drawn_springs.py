@@ -1,4 +1,4 @@
-"""Springs and dampers between two points are drawn from one to the other: in frames, the picture, the report and glTF."""
+"""Springs and dampers are drawn, from end to end or about their hinge: in frames, the picture, the report and glTF."""
 
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from kedfem.report import write_gltf
 from kedfem.report.animated import animated
 from kedfem.results import read_results
 from kedfem.scene import LineSpring, scene_from
+from kedfem.stepping import frame_steps
 from tests.frames import frames
 from tests.rooms.test_gltf import reader_of, shown
 from tests.rooms.test_output import pixels
@@ -43,6 +44,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def cells_of(grid: Any) -> Any:
     (number,) = (k for k, name in labels(grid, "spring ").items() if name == "pull")
     return grid.extract_cells(grid.cell_data["link"] == number)
+
+
+def coil_pixels(png: Path) -> int:
+    """How many pixels have the colour of springs."""
+    red, green, blue = pixels(png).reshape(-1, 3).T.astype(int)
+    return int(((green > red + 10) & (green > blue) & (green < 150)).sum())
 
 
 @pytest.mark.parametrize(
@@ -91,8 +98,7 @@ def test_the_picture_has_them_and_they_hide_no_stress(folder: Path, tmp_path: Pa
     grid.point_data["von Mises [Pa]"][k] = 1.0
     assert not hidden(grid, np.array([0.0, 0, 1]))
     write_picture(folder / "worst.vtu", tmp_path / "with.png", "a spring")
-    red, green, blue = pixels(tmp_path / "with.png").reshape(-1, 3).T.astype(int)
-    assert ((green > red + 10) & (green > blue) & (green < 150)).sum() > 1000
+    assert coil_pixels(tmp_path / "with.png") > 1000
 
 
 def test_report_and_gltf_stretch_them(folder: Path, tmp_path: Path) -> None:
@@ -118,3 +124,49 @@ def test_rigid_motions_have_them_too(tmp_path: Path) -> None:
         tip = 0.5 * np.array([np.cos(k * np.pi / 4), np.sin(k * np.pi / 4), 0])
         assert np.linalg.norm(x - tip, axis=1).min() < 0.003
         assert np.linalg.norm(x - TO, axis=1).max() == pytest.approx(np.linalg.norm(tip - TO), abs=1e-4)
+
+
+def test_springs_along_slides_stretch_with_the_travel(tmp_path: Path) -> None:
+    """From the joint, which moves, to a point of the ground on that side to which a pressed spring pushes back."""
+    slide = {"kind": "prismatic", "links": ["ground", "arm"], "at": [0, 0], "axis": [0, 1, 0]}
+    pull = {"kind": "spring", "joint": "A", "stiffness": 100, "preload": -5}
+    analysis = {"step": 0.01, "end_time": 0.2, "accuracy": "quick", "initial": "quasi-static"}
+    lift = {"kind": "cycloidal", "travel": 0.05, "rise": 0.2}
+    raw = scene() | {"joints": {"A": slide}, "springs": {"pull": pull}, "analysis": analysis}
+    raw["drive"] = {"joint": "A", "motion": lift}
+    elastic = analyse(scene_from(raw, tmp_path)).folder
+    results = read_results(elastic / "results.h5")
+    steps = frame_steps(scene_from(raw, tmp_path))
+    travel = results.channels["springs/pull/travel"][1][steps, 0]
+    assert travel[-1] == pytest.approx(0.05, rel=1e-3)
+    write_picture(elastic / "worst.vtu", tmp_path / "with.png", "a spring")
+    assert coil_pixels(tmp_path / "with.png") > 1000
+    for folder in (elastic, kinematics(scene_from(raw, tmp_path / "rigid")).folder):
+        every = [np.asarray(cells_of(grid).points) for grid in frames(folder)]
+        assert len(every) == len(travel)
+        for points, way in zip(every, travel, strict=True):
+            fixed, moving = points[:, 1].min(), points[:, 1].max()
+            assert moving == pytest.approx(way, abs=1e-3)
+            assert fixed == pytest.approx(every[0][:, 1].min(), abs=1e-3)
+            assert np.abs(points[:, [0, 2]]).max() < 0.03
+
+
+def test_springs_about_hinges_turn_with_their_link(tmp_path: Path) -> None:
+    """They wind about the axis, and are seen on both sides of the link."""
+    pull = {"kind": "torsion", "joint": "A", "stiffness": 3.0}
+    raw = scene() | {"springs": {"pull": pull}}
+    elastic = analyse(scene_from(raw, tmp_path)).folder
+    write_picture(elastic / "worst.vtu", tmp_path / "with.png", "a spring")
+    assert coil_pixels(tmp_path / "with.png") > 500
+    for folder in (elastic, kinematics(scene_from(raw, tmp_path / "rigid")).folder):
+        every = [np.asarray(cells_of(grid).points) for grid in frames(folder)]
+        first = every[0]
+        assert np.linalg.norm(first[:, :2], axis=1).max() < 0.01
+        assert first[:, 2].max() > 0.01  # half the link's thickness
+        assert first[:, 2].min() < -0.01
+        angles = np.arctan2(first[:, 1], first[:, 0])
+        assert len(np.unique(np.floor(angles / (np.pi / 4)) % 8)) == 8  # all round
+        assert len(every) == 9
+        for k, points in enumerate(every):
+            c, s = np.cos(k * np.pi / 4), np.sin(k * np.pi / 4)
+            assert_allclose(points, first @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]), atol=1e-4)

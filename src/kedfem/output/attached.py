@@ -1,11 +1,11 @@
-"""What links bear, in frames of the animation: masses that they carry as balls, springs between points of them."""
+"""What links bear, in frames of the animation: masses that they carry as balls, springs between them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from kedfem.arrays import Float
+from kedfem.arrays import Float, Int
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.model import Model, Slider
 from kedfem.links.record import Link, in_space
@@ -14,8 +14,9 @@ from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.output.fields import LinkField, RigidField
-from kedfem.output.springs import drawn_springs, spring_shape, stretched
-from kedfem.scene import GROUND, Body, Flywheel, Spring, SpringEnd
+from kedfem.output.joint_springs import hinge_springs, line_springs
+from kedfem.output.springs import stretched
+from kedfem.scene import GROUND, Body, Flywheel, Scene
 
 STEEL = 7850.0  # kg/m³
 BALL = 0.01, 0.03  # least and largest radius of a mass that a link carries, of what is drawn
@@ -40,22 +41,44 @@ class Carriers:
 
     def place(self, name: str, at: Point) -> tuple[Point, Point] | None:
         """Where the nearest point of a link takes a drawn point, and its displacement; None of no link that is drawn."""
+        found = self.pose(name, at)
+        return None if found is None else found[:2]
+
+    def pose(self, name: str, at: Point) -> tuple[Point, Point, Float[np.ndarray, "3 3"]] | None:
+        """As :meth:`place`, and how the link is turned there from the reference position."""
         if name == GROUND:
-            return at, np.zeros(3)
+            return at, np.zeros(3), np.eye(3)
         for slider in self.model.sliders:
             if slider.name == name:
                 there, moved = slider_place(self.model, slider, self.snapshot, self.deformation_scale)
-                return there + at - slider_drawn(self.model, slider), moved
-        motion, k = self.snapshot.motion, self.snapshot.k
-        numbers = [*self.model.bodies, *(x.body for x in self.model.prescribed)]
+                return there + at - slider_drawn(self.model, slider), moved, np.eye(3)
         on = [i for i, link in enumerate(every_link(self.model)) if link.name == name]
         if not on:
             return None
         nearest = {i: np.linalg.norm(self.X[i] - at, axis=1) for i in on}
         i = min(on, key={i: x.min() for i, x in nearest.items()}.__getitem__)
-        n = int(nearest[i].argmin())
-        place = self.fields[i].points[n] + motion.R[k, numbers[i]] @ (at - self.X[i][n])
-        return place, self.fields[i].displacement[n]
+        n, R = int(nearest[i].argmin()), self.turn(i)
+        return self.fields[i].points[n] + R @ (at - self.X[i][n]), self.fields[i].displacement[n], R
+
+    def turn(self, i: int) -> Float[np.ndarray, "3 3"]:
+        """How the frame of a link is turned from the reference position."""
+        motion, k, count = self.snapshot.motion, self.snapshot.k, len(self.model.links)
+        if i >= count:
+            return np.asarray(motion.R[k, self.model.prescribed[i - count].body])
+        R, own = np.eye(3), self.snapshot.states[i].R
+        R[: len(own), : len(own)] = own
+        return R
+
+    @property
+    def outlines(self) -> dict[str, Float[np.ndarray, "n 3"]]:
+        """Links in the reference position by their names, planar beams as wide and thick as they are [m]."""
+        out: dict[str, list[np.ndarray]] = {}
+        for link, X, field in zip(every_link(self.model), self.X, self.fields, strict=True):
+            height, thickness, _ = field.section or (0.0, 0.0, False)
+            sides = np.concatenate([d * np.diag([height, height, thickness]) / 2 for d in (-1, 1)])
+            corners = sides if field.section else np.zeros((1, 3))
+            out.setdefault(link.name, []).append((X[:, None] + corners).reshape(-1, 3))
+        return {name: np.concatenate(parts) for name, parts in out.items()}
 
 
 def every_link(model: Model) -> list[Link]:
@@ -95,51 +118,75 @@ def balls(carriers: Carriers, bodies: Mapping[str, Body]) -> list[LinkField]:
     return out
 
 
-def springs(carriers: Carriers, every: Mapping[str, Spring]) -> list[LinkField]:
-    """Springs and dampers between two points."""
-    out, size = [], _size(carriers.X)
-    for name, spring in drawn_springs(every).items():
-        ends = spring.between or ()
-        found = [carriers.place(end.link, np.asarray(end.at)) for end in ends]
+def springs(carriers: Carriers, scene: Scene) -> list[LinkField]:
+    """Springs and dampers between two points, along slides and about hinges."""
+    if not scene.springs:
+        return []
+    out, size, outlines = [], _size(carriers.X), carriers.outlines
+    for name, spring in line_springs(scene, outlines, size).items():
+        found = [carriers.place(end.link, np.asarray(end.at)) for end in spring.ends]
         if None in found:
             continue
         (a, moved_a), (b, moved_b) = (each for each in found if each is not None)
-        shape, cells = spring_shape(spring, size)
-        points = stretched(shape, _drawn(ends), np.array([a, b]))
-        moved = moved_a + shape[:, 2:] * (moved_b - moved_a)
-        none = np.full((len(points), 6), np.nan)
-        empty = none, none[:, 0], none[:, :2]
-        out.append(LinkField(name, "quad", cells, points, moved, *empty, spring=True))
+        shape, cells = spring.shape
+        points = stretched(shape, spring.line, np.array([a, b]))
+        out.append(_spring_field(name, points, cells, moved_a + shape[:, 2:] * (moved_b - moved_a)))
+    for name, winding in hinge_springs(scene, outlines, size).items():
+        pose = carriers.pose(winding.link, np.asarray(winding.at))
+        if pose is None:
+            continue
+        place, moved, R = pose
+        points, cells = winding.shape
+        out.append(_spring_field(name, place + points @ R.T, cells, np.tile(moved, (len(points), 1))))
     return out
+
+
+def _spring_field(
+    name: str,
+    points: Float[np.ndarray, "n 3"],
+    cells: Int[np.ndarray, "e 4"],
+    moved: Float[np.ndarray, "n 3"],
+) -> LinkField:
+    none = np.full((len(points), 6), np.nan)
+    return LinkField(name, "quad", cells, points, moved, none, none[:, 0], none[:, :2], spring=True)
 
 
 def rigid_springs(
-    every: Mapping[str, Spring], linkage: Linkage, motion: RigidMotion, k: int, size: float
+    scene: Scene,
+    linkage: Linkage,
+    motion: RigidMotion,
+    k: int,
+    seen: Mapping[str, Float[np.ndarray, "n 3"]],
 ) -> list[RigidField]:
-    """Springs between two points of rigid links at one time point."""
-    out = []
-    for name, spring in drawn_springs(every).items():
-        ends = spring.between or ()
-        p, v, a = np.zeros((3, 2, 3))
-        for n, end in enumerate(ends):
-            if end.link == GROUND:
-                p[n] = end.at
-                continue
-            b, X = linkage.bodies.index(end.link), np.asarray(end.at)
-            arm = motion.R[k, b] @ X
-            p[n] = motion.p[k, b] + arm
-            v[n] = motion.v[k, b] + cross(motion.omega[k, b], arm)
-            a[n] = motion.p2[k, b] + motion.R2[k, b] @ X
-        shape, cells = spring_shape(spring, size)
-        points = stretched(shape, _drawn(ends), p)
-        velocity, acceleration = (x[0] + shape[:, 2:] * (x[1] - x[0]) for x in (v, a))
+    """Springs of rigid links at one time point.
+
+    Parameters
+    ----------
+    seen : where links are drawn in the reference position, by their names [m]
+    """
+    if not scene.springs:
+        return []
+    out, size = [], _size(list(seen.values()))
+
+    def moved(link: str, X: Float[np.ndarray, "n 3"]) -> list[Float[np.ndarray, "n 3"]]:
+        """Places, velocities and accelerations."""
+        b = linkage.bodies.index(link)
+        arms = X @ motion.R[k, b].T
+        turning = cross(np.broadcast_to(motion.omega[k, b], arms.shape), arms)
+        return [motion.p[k, b] + arms, motion.v[k, b] + turning, motion.p2[k, b] + X @ motion.R2[k, b].T]
+
+    for name, spring in line_springs(scene, seen, size).items():
+        both = [moved(end.link, np.array([end.at])) for end in spring.ends]
+        p, *rates = (np.concatenate(each) for each in zip(*both, strict=True))
+        shape, cells = spring.shape
+        points = stretched(shape, spring.line, p)
+        velocity, acceleration = (x[0] + shape[:, 2:] * (x[1] - x[0]) for x in rates)
+        out.append(RigidField(name, "quad", cells, points, velocity, acceleration, spring=True))
+    for name, winding in hinge_springs(scene, seen, size).items():
+        around, cells = winding.shape
+        points, velocity, acceleration = moved(winding.link, winding.at + around)
         out.append(RigidField(name, "quad", cells, points, velocity, acceleration, spring=True))
     return out
-
-
-def _drawn(ends: Sequence[SpringEnd]) -> Point:
-    """From one end to the other in the reference position [m]."""
-    return np.subtract(ends[1].at, ends[0].at)
 
 
 def _size(points: Sequence[Float[np.ndarray, "n 3"]]) -> float:

@@ -99,7 +99,7 @@ def link_fields(
     drawn = zip(every_link(model), recoveries, strict=True)
     places = [recovery.at_points((link.full or link).X) for link, recovery in drawn]
     carriers = Carriers(model, snapshot, fields, places, deformation_scale)
-    return out + balls(carriers, scene.bodies) + springs(carriers, scene.springs)
+    return out + balls(carriers, scene.bodies) + springs(carriers, scene)
 
 
 def link_field(

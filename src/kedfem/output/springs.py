@@ -1,13 +1,12 @@
-"""How springs and dampers between two points are drawn: coils and cylinders from one end to the other."""
+"""How springs and dampers are drawn: coils and cylinders from one end to the other, windings about hinges."""
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
 from kedfem.arrays import Float, Int
 from kedfem.motion.constraints import perpendiculars
-from kedfem.scene import LineSpring, Spring
+from kedfem.scene import LineSpring
 
 WIDTH = 0.012  # radius of a coil, of what is drawn
 SLENDER = 0.15  # most that it is of the length between the two points in the reference position
@@ -21,23 +20,19 @@ RIM = 5  # points around a wire
 # along a damper: parts of its length, and radii there as parts of the coil's
 DAMPER = np.array([[0, 0.2], [0.3, 0.2], [0.3, 0.65], [0.65, 0.65], [0.65, 0.12], [1, 0.12]])
 SIDES = 12
+# about a hinge: least and most turns, how far one goes along the axis in radii, turns of the spirals at both ends
+WINDINGS, PITCH, CLOSING = (3, 12), 1.2, 1.5
+
+Shape = tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e 4"]]
 
 
-def drawn_springs(springs: Mapping[str, Spring]) -> dict[str, LineSpring]:
-    """Those that are drawn: between two points."""
-    return {
-        name: each
-        for name, each in springs.items()
-        if isinstance(each, LineSpring) and each.between is not None
-    }
-
-
-def spring_shape(spring: LineSpring, size: float) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e 4"]]:
+def spring_shape(spring: LineSpring, size: float, inner: float = 0.0) -> Shape:
     """Points of a spring's surface and its quadrilaterals.
 
     Parameters
     ----------
     size : of what is drawn [m]
+    inner : least inner radius, so that the coil goes round what is inside it [m]
 
     Returns
     -------
@@ -46,6 +41,7 @@ def spring_shape(spring: LineSpring, size: float) -> tuple[Float[np.ndarray, "n 
     """
     length = math.dist(*(end.at for end in spring.between)) if spring.between else 0.0
     radius = min(WIDTH * size, SLENDER * length) if length else WIDTH * size
+    radius = max(radius, inner / (1 - 2 * WIRE))
     parts = (
         [_coil(radius, length or radius / SLENDER)] if spring.stiffness or spring.force is not None else []
     )
@@ -87,28 +83,51 @@ def _least_rotation(z: Float[np.ndarray, "3"], d: Float[np.ndarray, "3"]) -> Flo
     return np.asarray(np.eye(3) + V + V @ V / (1.0 + c))
 
 
-def _coil(radius: float, length: float) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e 4"]]:
+def winding_shape(radius: float, half: float, axis: Float[np.ndarray, "3"]) -> Shape:
+    """A spring about a hinge, around its point: a wire that winds along the axis, and at both ends inwards to it.
+
+    Seen along the axis it is a spiral, on either side of the links.
+
+    Parameters
+    ----------
+    radius : of its middle line [m]
+    half : its length along the axis to either side [m]
+    """
+    count, turns = int(AROUND * CLOSING), int(np.clip(2 * half / (PITCH * radius), *WINDINGS))
+    grows, whole = np.linspace(0.2, 1, count, endpoint=False), np.ones(AROUND * turns + 1)
+    r = radius * np.concatenate([grows, whole, grows[::-1]])
+    z = half * np.concatenate([-np.ones(count), np.linspace(-1, 1, len(whole)), np.ones(count)])
+    turn = 2 * np.pi * np.arange(len(r)) / AROUND
+    x, y = perpendiculars(axis)
+    points, cells = _wire(np.column_stack([r * np.cos(turn), r * np.sin(turn), z]), WIRE * radius)
+    return points @ np.array([x, y, axis]), cells
+
+
+def _coil(radius: float, length: float) -> Shape:
     """A wire that winds about the axis, its ends on the axis."""
     r, wire = radius * (1 - WIRE), WIRE * radius
     t = np.linspace(0, 1, TURNS * AROUND + 1)
     turn = 2 * np.pi * TURNS * t
     winding = np.column_stack([r * np.cos(turn), r * np.sin(turn), STRAIGHT + (1 - 2 * STRAIGHT) * t])
     start, end = [[0, 0, 0], [0, 0, STRAIGHT]], [[0, 0, 1 - STRAIGHT], [0, 0, 1]]
-    line = np.concatenate([start, winding, end])
-    along = np.gradient(line * [1, 1, length], axis=0)
+    points, cells = _wire(np.concatenate([start, winding, end]) * [1, 1, length], wire)
+    return points / [1, 1, length], cells
+
+
+def _wire(line: Float[np.ndarray, "w 3"], wire: float) -> Shape:
+    """The surface of a wire of that radius about a line, which winds about z and has its ends on it or near it [m]."""
+    along = np.gradient(line, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
-    outwards = np.concatenate(
-        [[[1, 0, 0]] * 2, np.column_stack([winding[:, :2] / r, 0 * t]), [[1, 0, 0]] * 2]
-    )
+    outwards, far = line * [1, 1, 0], np.linalg.norm(line[:, :2], axis=1)
+    outwards[far == 0] = [1, 0, 0]
     across = outwards - (outwards * along).sum(axis=1, keepdims=True) * along
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     angle = 2 * np.pi * np.arange(RIM) / RIM
     rim = np.cos(angle)[:, None] * across[:, None] + np.sin(angle)[:, None] * np.cross(along, across)[:, None]
-    points = line[:, None] + wire * rim * [1, 1, 1 / length]
-    return points.reshape(-1, 3), _sides(len(line), RIM)
+    return (line[:, None] + wire * rim).reshape(-1, 3), _sides(len(line), RIM)
 
 
-def _damper(radius: float) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e 4"]]:
+def _damper(radius: float) -> Shape:
     """A cylinder with its rod, about the axis."""
     angle = 2 * np.pi * np.arange(SIDES) / SIDES
     ring = np.column_stack([np.cos(angle), np.sin(angle)])

@@ -1,0 +1,121 @@
+"""Where springs that have a joint instead of two points are drawn: coils along slides, windings about hinges."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from kedfem.arrays import Float
+from kedfem.motion.joint_equations import joint_axis, moving_pair
+from kedfem.output.springs import WIDTH, Shape, spring_shape, winding_shape
+from kedfem.scene import Joint, LineSpring, Scene, SpringEnd, TorsionSpring
+
+# of what is drawn: length of a coil along a slide in the reference position, largest radius of what coils go round,
+# and from how far a link reaches along a hinge's axis it is taken for a shaft
+ALONG, ROUND, SHAFT = 0.2, 0.03, 0.25
+MARGIN = 1.2  # length of such a coil, of the way to the stop that presses it together
+
+Points = Float[np.ndarray, "n 3"]
+
+
+@dataclass(frozen=True, slots=True)
+class DrawnSpring:
+    """A spring or damper from one point to another.
+
+    ends : where it is fixed
+    shape : as of :func:`spring_shape`
+    """
+
+    ends: tuple[SpringEnd, SpringEnd]
+    shape: Shape
+
+    @property
+    def line(self) -> Float[np.ndarray, "3"]:
+        """From one end to the other in the reference position [m]."""
+        return np.subtract(self.ends[1].at, self.ends[0].at)
+
+
+@dataclass(frozen=True, slots=True)
+class DrawnWinding:
+    """A spring or damper about a hinge, which turns with the link whose angle it is over.
+
+    link, at : that link, and the joint's point
+    shape : around that point, in the reference position
+    """
+
+    link: str
+    at: tuple[float, float, float]
+    shape: Shape
+
+
+def line_springs(scene: Scene, X: Mapping[str, Points], size: float) -> dict[str, DrawnSpring]:
+    """Springs between two points, and along slides.
+
+    Parameters
+    ----------
+    X : where links are drawn in the reference position, by their names [m]
+    size : of what is drawn [m]
+    """
+    out = {}
+    for name, spring in scene.springs.items():
+        if isinstance(spring, TorsionSpring):
+            continue
+        ends, inner = (spring.between, 0.0) if spring.between else _along(scene, spring, X, size)
+        between = spring.model_copy(update={"between": ends})
+        out[name] = DrawnSpring(ends, spring_shape(between, size, inner))
+    return out
+
+
+def _along(
+    scene: Scene, spring: LineSpring, X: Mapping[str, Points], size: float
+) -> tuple[tuple[SpringEnd, SpringEnd], float]:
+    """Ends of a spring along a slide, and the radius of what is inside it [m].
+
+    One end is on the moving link, at the joint; the other on the link that it moves against, on that side from which a
+    pressed spring pushes as this one does.
+    """
+    joint = scene.joints[spring.joint or ""]
+    link, other = moving_pair(joint)
+    side = 1.0 if spring.free < 0.0 else -1.0
+    stops = [x.range for x in scene.limits.values() if x.kind == "travel" and x.joint == spring.joint]
+    ways = [MARGIN * max(side * end for end in each) for each in stops]
+    length = max([ALONG * size, *(way for way in ways if np.isfinite(way))])
+    far = np.asarray(joint.at) + side * length * joint_axis(joint)
+    ends = SpringEnd(link=link, at=joint.at), SpringEnd(link=other, at=(far[0], far[1], far[2]))
+    _, inner = _around(joint, X, *sorted((0.0, side * length)))
+    return ends, inner if inner < ROUND * size else 0.0
+
+
+def hinge_springs(scene: Scene, X: Mapping[str, Points], size: float) -> dict[str, DrawnWinding]:
+    """Springs about hinges; parameters as of :func:`line_springs`."""
+    out = {}
+    for name, spring in scene.springs.items():
+        if isinstance(spring, TorsionSpring):
+            joint, radius, most = scene.joints[spring.joint], WIDTH * size, SHAFT * size
+            reach, _ = _around(joint, X, -most, most, within=1.5 * radius)
+            if reach == most:
+                reach = ROUND * size
+                inner = _around(joint, X, -reach, reach)[1]
+                radius = max(radius, MARGIN * inner if inner < reach else 0.0)
+            shape = winding_shape(radius, reach + 0.4 * radius, joint_axis(joint))
+            out[name] = DrawnWinding(moving_pair(joint)[0], joint.at, shape)
+    return out
+
+
+def _around(
+    joint: Joint, X: Mapping[str, Points], low: float, high: float, within: float = np.inf
+) -> tuple[float, float]:
+    """How far the links of a joint reach along its axis, and across it, from its point between two places on the axis.
+
+    Parameters
+    ----------
+    low, high : the places; what is beyond them is taken there for the first, and is left out for the second [m]
+    within : how far from the axis what counts for the first is, unless the nearest is farther [m]
+    """
+    points = np.concatenate([np.asarray(joint.at)[None], *(X[name] for name in joint.links if name in X)])
+    arms, axis = points - np.asarray(joint.at), joint_axis(joint)
+    along = arms @ axis
+    across = np.linalg.norm(arms - along[:, None] * axis, axis=1)
+    near = across <= max(within, across[1:].min(initial=np.inf) * 1.5 if len(across) > 1 else 0.0)
+    reach = np.abs(along.clip(low, high)[near]).max()
+    return float(reach), float(across[(along >= low) & (along <= high)].max())
