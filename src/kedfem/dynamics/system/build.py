@@ -37,6 +37,7 @@ from kedfem.dynamics.system.record import (
     Stop,
     System,
     Term,
+    rotation_term,
 )
 from kedfem.errors import SceneError
 from kedfem.links.record import Link
@@ -224,9 +225,9 @@ class _Builder:
             yield Term(TURN, i, j, one, one, other), self.bushing(joint.name, 2, turning=True)
         for axis in turns:
             n = "xyz".index(axis)
-            a, b = (frame[0], frame[1]) if n == 2 else (frame[2], frame[1 - n])
             if self.determines(joint, np.zeros(3), frame[n]):
-                yield Term(TURN, i, j, a, a, b), self.bushing(joint.name, n, turning=True)
+                law = self.bushing(joint.name, n, turning=True)
+                yield rotation_term(i, j, frame, n, law, tilt=len(turns) < 3), law
         yield from self.threaded(joint, i, j, at)
         yield from self.driven(joint)
 

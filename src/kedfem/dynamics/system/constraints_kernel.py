@@ -7,7 +7,20 @@ import numpy as np
 
 from kedfem.compiled import inlined, inner
 from kedfem.dynamics.system.ends_kernel import borne, cross, dot, times
-from kedfem.dynamics.system.record import CURVE, DISTANCE, DRIVEN, GAP, HELD, RATE, SPRING, TIME, TURN
+from kedfem.dynamics.system.record import (
+    CURVE,
+    DISTANCE,
+    DRIVEN,
+    GAP,
+    HELD,
+    RATE,
+    ROTATION,
+    SPRING,
+    TILT,
+    TIME,
+    TURN,
+)
+from kedfem.dynamics.system.rotations_kernel import rotation_along, tilt_along
 
 
 @inner
@@ -31,11 +44,16 @@ def coordinate(ends, of, r, rigid_motion, place, turned, row, y, w):  # type: ig
             times(Q[j], of.b[t], w[5])
             value = dot(w[4], w[5])
             cross(w[4], w[5], w[7])
-            for m in range(3):
-                w[6, m], w[8, m], w[9, m] = 0.0, 0.0, -w[7, m]
+        elif kind == ROTATION:
+            value = rotation_along(Q[i], Q[j], of.b[t], w)
+        elif kind == TILT:
+            value = tilt_along(Q[i], Q[j], of.a[t], of.b[t], w)
         else:
             value = angle(of, t, Q, turned[t], w)
             turned[t] = value
+        if kind not in (GAP, DISTANCE):
+            for m in range(3):
+                w[6, m], w[8, m], w[9, m] = 0.0, 0.0, -w[7, m]
         total += factor * value
         rate += borne(ends, i, w[6], w[7], factor, rigid_motion, place, row, y, w)
         rate += borne(ends, j, w[8], w[9], factor, rigid_motion, place, row, y, w)
@@ -70,7 +88,7 @@ def between(kind, ends, of, t, x, Q, w):  # type: ignore[no-untyped-def]
 
 @inlined
 def angle(of, t, Q, near, w):  # type: ignore[no-untyped-def]
-    """Twist of i against j about an axis, to within half a turn of an earlier one; gradient as in `between`."""
+    """Twist of i against j about an axis, to within half a turn of an earlier one; w[7] becomes its gradient."""
     i, j = of.i[t], of.j[t]
     directions(Q[i], of.a[t], of.b[t], w[4], w[5], w[10])
     directions(Q[j], of.a_j[t], of.b[t], w[6], w[8], w[10])
@@ -85,7 +103,6 @@ def angle(of, t, Q, near, w):  # type: ignore[no-untyped-def]
     cross(w[5], w[11], w[9])
     for m in range(3):
         w[7, m] -= w[9, m]
-        w[6, m], w[8, m], w[9, m] = 0.0, 0.0, -w[7, m]
     return value
 
 

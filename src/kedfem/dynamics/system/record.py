@@ -12,7 +12,7 @@ from kedfem.scene import Pieces
 
 HELD, DRIVEN, SPRING, CURVE, STOP = range(5)
 TIME, RATE, COORDINATE = OVER["time"], OVER["speed"], OVER["length"]
-GAP, TURN, ANGLE, DISTANCE = range(4)
+GAP, TURN, ANGLE, DISTANCE, ROTATION, TILT = range(6)
 RIGID, POINT, PLANAR_BEAM, PLANAR, FACE, SOLID, LINE = range(7)
 NOMINAL, STRESSED, COROTATIONAL, TANGENTIAL = range(4)
 RIGID_BODY = STRESSED  # frames up to it are those of the rigid-body motion
@@ -124,7 +124,9 @@ class Term:
     """A scalar function of two ends, by their numbers: directions and points in the reference position.
 
     kind : GAP: b · (x_i − x_j), b fixed in j; TURN: a · b, a fixed in i; ANGLE: twist of i against j about b from a_j in
-        j to a in i (see `motion.values`); DISTANCE: |x_i − x_j|
+        j to a in i (see `motion.values`); DISTANCE: |x_i − x_j|; ROTATION: component along b of the rotation vector of i
+        against j, less than half a turn; TILT: the same of the shortest rotation of an axis a from where it is in j to
+        where it is in i
     a, a_j : points of i and j [m], or directions [-]
     """
 
@@ -191,6 +193,19 @@ def _at_a_point(system: System, term: Term) -> bool:
     """Whether a term is the way of a point of one end along a direction of another that moves as prescribed."""
     one, other = system.ends[term.i], system.ends[term.j]
     return term.kind == GAP and other.form == RIGID and bool((term.a == one.origin).all())
+
+
+def rotation_term(i: int, j: int, frame: Float[np.ndarray, "3 3"], n: int, law: Law, tilt: bool) -> Term:
+    """The rotation about axis n of a joint: of a bushing, whose rotation may be large, that of the rotation vector.
+
+    Parameters
+    ----------
+    tilt : whether the joint releases the rotation about its axis, so that only the tilt of the axis is left
+    """
+    if isinstance(law, Held):
+        a, b = (frame[0], frame[1]) if n == 2 else (frame[2], frame[1 - n])
+        return Term(TURN, i, j, a, a, b)
+    return Term(TILT if tilt else ROTATION, i, j, frame[2], frame[2], frame[n])
 
 
 def without_unknowns(system: System, each: Constraint) -> bool:

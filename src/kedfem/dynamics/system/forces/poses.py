@@ -4,14 +4,17 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.system.ends import line_weights
+from kedfem.dynamics.system.forces.rotations import rotation_moment, tilt_moment
 from kedfem.dynamics.system.record import (
-    ANGLE,
     FACE,
     LINE,
     PLANAR,
     PLANAR_BEAM,
     POINT,
     RIGID,
+    ROTATION,
+    TILT,
+    TURN,
     End,
     Term,
 )
@@ -22,10 +25,14 @@ Vectors = Float[np.ndarray, "T 3"]
 
 
 def turning(term: Term, Q_i: Float[np.ndarray, "T 3 3"], Q_j: Float[np.ndarray, "T 3 3"]) -> Vectors:
-    """Moment on end i of a unit multiplier on a turn or an angle; on j it is the opposite."""
-    a = Q_i @ term.a
-    if term.kind != ANGLE:
-        return cross(a, Q_j @ term.b)
+    """Moment on end i of a unit multiplier on a turn, an angle or a rotation; on j it is the opposite."""
+    a, b = Q_i @ term.a, Q_j @ term.b
+    if term.kind == TURN:
+        return cross(a, b)
+    if term.kind == ROTATION:
+        return rotation_moment(Q_i, Q_j, b)
+    if term.kind == TILT:
+        return tilt_moment(a, Q_j @ term.a_j, b)
     a_j, e, e_j = Q_j @ term.a_j, Q_i @ cross(term.b, term.a), Q_j @ cross(term.b, term.a_j)
     along = (a * a_j + e * e_j).sum(axis=1)[:, None]
     across = (a * e_j - e * a_j).sum(axis=1)[:, None]

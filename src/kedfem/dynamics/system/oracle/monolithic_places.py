@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from scipy.interpolate import PPoly
+from scipy.linalg import expm
 
 from kedfem.arrays import Float
 from kedfem.dynamics.loads import Pattern
@@ -19,6 +20,8 @@ from kedfem.dynamics.system.record import (
     POINT,
     RATE,
     RIGID,
+    ROTATION,
+    TILT,
     TIME,
     Constraint,
     Curve,
@@ -34,6 +37,7 @@ from kedfem.motion.constraints import ConstraintEquation, stacked
 from kedfem.motion.rigid import RigidMotion
 from kedfem.motion.values import features, jacobian
 
+ALIGNED = 1e-12  # sine of an angle below which any normal of an axis is one of both
 Column = Float[np.ndarray, " _"]
 
 
@@ -161,6 +165,10 @@ def valued(system: System, term: Term, poses: list[Pose], near: float) -> tuple[
         n = gap / size
         by = [n @ pose.by_x + np.cross(arm, n) @ pose.by_Q for pose, arm in zip(poses, arms, strict=True)]
         return size, by[0] - by[1], near
+    if term.kind in (ROTATION, TILT):
+        along = _rotation_along if term.kind == ROTATION else _tilt_along
+        value, moment = along(term, one.Q, other.Q)
+        return value, moment @ (one.by_Q - other.by_Q), near
     origin = [x.x - x.Q @ system.ends[n].origin for x, n in zip(poses, (term.i, term.j), strict=True)]
     rows = stacked([ConstraintEquation(term.kind, 1, 2, term.a, term.b, "", term.a_j)])
     at = (np.stack([np.eye(3), one.Q, other.Q])[None], np.stack([np.zeros(3), *origin])[None])
@@ -172,3 +180,25 @@ def valued(system: System, term: Term, poses: list[Pose], near: float) -> tuple[
         row += of[:3] @ pose.by_x + (of[3:] - np.cross(pose.x - start, of[:3])) @ pose.by_Q
     value = float(f.value[0, 0])
     return value, row, value if term.kind == ANGLE else near
+
+
+def _rotation_along(term: Term, Q_i: Any, Q_j: Any) -> tuple[float, Float[np.ndarray, "3"]]:
+    """Along b the logarithm of the rotation; the gradient by the mean of rotations on the way, ∫ exp [s θ]× ds."""
+    from scipy.spatial.transform import Rotation
+
+    theta = Rotation.from_matrix(Q_j.T @ Q_i).as_rotvec()
+    both = np.zeros((6, 6))
+    both[:3, :3], both[:3, 3:] = np.cross(np.eye(3), theta), np.eye(3)
+    return float(theta @ term.b), Q_j @ np.linalg.solve(expm(both)[:3, 3:].T, term.b)
+
+
+def _tilt_along(term: Term, Q_i: Any, Q_j: Any) -> tuple[float, Float[np.ndarray, "3"]]:
+    """Along b the angle between both axes about the normal e of both: ω changes the angle, and turns e about the axis."""
+    a, n, b = Q_i @ term.a, Q_j @ term.a_j, Q_j @ term.b
+    normal = np.cross(n, a)
+    sine = float(np.linalg.norm(normal))
+    t = float(np.arctan2(sine, n @ a))
+    e, share = (normal, t / sine) if sine > ALIGNED else (b, 1.0)
+    e = e - (e @ n) * n  # of a small normal rounding is along the axis too
+    e /= np.linalg.norm(e)
+    return t * float(b @ e), (b @ e) * e + share * (b @ np.cross(n, e)) * np.cross(a, e)

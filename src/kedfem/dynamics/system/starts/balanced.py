@@ -63,6 +63,7 @@ def _iterated(
     of, mixing, bodies, settled, last = now.of, Mixing(), TurningBodies(now, spins), False, np.inf
     linear, slow, start, first = of.c.single, 0, u, 0.0
     exact = now.slow or (linear and any(bodies.sparse))
+    frames = bodies.still.frames()
     for n in range(ITERATIONS):
         sure = exact or rounding == FREE  # its small changes are not those of mass in the matrices
         exact = exact or (linear and n >= DIRECT) or (settled and not sure)
@@ -96,6 +97,7 @@ def _iterated(
         settled, last = stalls or size <= CONVERGED * reached + of.c.floor, size
     if linear or rounding == FREE:  # what nothing drives has rigid motions without stiffness
         raise NoBalanceError()
+    bodies.still.seek_from(frames)
     return _by_newton(now, start, more, spins, z1)
 
 

@@ -26,6 +26,7 @@ from kedfem.dynamics.system.record import COROTATIONAL
 from kedfem.dynamics.system.sparse import momentum
 from kedfem.dynamics.system.starts.balance import Asked, Balance
 from kedfem.dynamics.system.starts.instant import Flat, Instant
+from kedfem.dynamics.system.starts.internal import Frames as Sought
 from kedfem.dynamics.system.starts.internal import drawn, own, rows
 from kedfem.dynamics.system.starts.turning_bodies import CONVERGED, Spins, TurningBodies
 from kedfem.errors import SolveError
@@ -52,6 +53,7 @@ class Point:
     laws, slopes : (r,) force along each coordinate, and how it falls with it
     hard : which coordinates are constraints
     moved : (N,) what closes joints together with u
+    frames : of bodies, from which those nearby are sought
     """
 
     u: Flat
@@ -65,6 +67,7 @@ class Point:
     slopes: Flat
     hard: Bool[np.ndarray, " r"]
     moved: Flat
+    frames: Sought
 
 
 class Equilibrium:
@@ -105,7 +108,8 @@ class Equilibrium:
         moved = np.zeros_like(u)
         for k, open_ in enumerate(gaps(now, u, z)):
             moved[own(of, k)] = self.right[k] @ open_
-        return Point(u, f, r, R, z, C, e[0], laws[:, 0], laws[:, 1], now.hard(C), moved)
+        frames = self.bodies.still.frames()
+        return Point(u, f, r, R, z, C, e[0], laws[:, 0], laws[:, 1], now.hard(C), moved, frames)
 
     def asked(self, at: Point, m: Flat) -> Asked:
         """What constraints and laws ask of a change, with forces m of constraints in it."""
@@ -177,6 +181,7 @@ class Equilibrium:
         """
         part = 1.0
         while True:
+            self.bodies.still.seek_from(at.frames)
             new = self.at(self.taken(at, part * change))
             left = float(np.linalg.norm(self.left(new, m, balance)))
             if left <= (1 - FALLS * part) * before or tiny or part <= SHORTEST:

@@ -22,6 +22,8 @@ from kedfem.links.reduced import rigid_modes
 from kedfem.motion.rigid import RigidMotion
 
 Flat = Float[np.ndarray, " N"]
+Frames = tuple[Float[np.ndarray, "L 3 3"], Float[np.ndarray, " L"]]
+"""Rotations of bodies' frames against the rigid-body motion; of planar ones the angles, which count turns."""
 
 
 class Still:
@@ -69,6 +71,14 @@ class Still:
                 here = own(self.of, k)
                 f[here] = self.sprung(k, mean[k], u[here])
         return f, mean
+
+    def frames(self) -> Frames:
+        """The bodies' frames as they were last found, from which they are sought again."""
+        return self._trial.Q.copy(), self._trial.angle.copy()
+
+    def seek_from(self, frames: Frames) -> None:
+        """Have frames sought from these; from far off a rotation that is none of the bodies' may be found."""
+        self._trial.Q[:], self._trial.angle[:] = frames
 
     def gradients(
         self, motion: RigidMotion, stations: Float[np.ndarray, " w"], z: Float[np.ndarray, " k"]

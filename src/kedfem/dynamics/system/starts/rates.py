@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kedfem.arrays import Complex, Float
+from kedfem.dynamics.system.forces.rotations import arc
 from kedfem.dynamics.system.record import (
     ANGLE,
     DISTANCE,
@@ -24,6 +25,8 @@ from kedfem.dynamics.system.record import (
     PLANAR_BEAM,
     POINT,
     RIGID,
+    ROTATION,
+    TILT,
     TURN,
     Constraint,
     End,
@@ -220,12 +223,32 @@ def value(system: System, term: Term, one: tuple[Series, Series], other: tuple[S
         return product(np.dot, gap, Q_j @ term.b) if term.kind == GAP else root(product(np.dot, gap, gap))
     if term.kind == TURN:
         return product(np.dot, Q_i @ term.a, Q_j @ term.b)
+    if term.kind == ROTATION:
+        return _rotation_along(Q_i, Q_j, Q_j @ term.b)
+    if term.kind == TILT:
+        a, n = Q_i @ term.a, Q_j @ term.a_j
+        along = product(np.dot, product(np.cross, n, a), Q_j @ term.b)
+        return product(np.multiply, _arc(product(np.dot, a, n)), along)
     if term.kind != ANGLE:
-        raise ValueError(f"term: must be a gap, turn, angle or distance, got {term.kind}")
+        raise ValueError(f"term: must be one of those of `record.Term`, got {term.kind}")
     a, a_j = Q_i @ term.a, Q_j @ term.a_j
     e, e_j = Q_i @ np.cross(term.b, term.a), Q_j @ np.cross(term.b, term.a_j)
     along = product(np.dot, a, a_j) + product(np.dot, e, e_j)
     return _angle(along, product(np.dot, a, e_j) - product(np.dot, e, a_j))
+
+
+def _rotation_along(Q_i: Series, Q_j: Series, b: Series) -> Series:
+    """Component along b of the rotation vector: by the quaternion's scalar part, and twice its vector part times that."""
+    cosine = root(product(lambda x, y: np.sum(x * y), Q_i, Q_j) + np.eye(3)[0]) / 2
+    twice = product(lambda x, y: np.cross(x, y, axis=0).sum(axis=1), Q_j, Q_i)
+    share = product(np.multiply, _arc(cosine), inverse(2 * cosine))
+    return product(np.multiply, share, product(np.dot, twice, b))
+
+
+def _arc(c: Series) -> Series:
+    """arccos(c) / √(1 − c²) of a series (3,)."""
+    f, first, second = arc(c[0])
+    return np.array([f, first * c[1], second * c[1] ** 2 + first * c[2]])
 
 
 def _angle(c: Series, s: Series) -> Series:
