@@ -22,7 +22,7 @@ from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.march import Ready, march, ready
 from kedfem.dynamics.system.sparse import SparsePart
-from kedfem.dynamics.system.starts.start import rest
+from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.dynamics.system.steps import Steps, scene_system
 from kedfem.motion.rigid import rigid_motion
 from kedfem.results.recording import recording, rows

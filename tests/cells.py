@@ -17,7 +17,7 @@ from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.start import initial_rates
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.starts.accelerations import accelerated_in_a_step
-from kedfem.dynamics.system.starts.start import rest
+from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.errors import KedfemError
 from kedfem.scene.checks.capabilities import DRIVEN, KINDS, REFUSALS, SLID, Refusal
 from tests.moving import beam_in_space

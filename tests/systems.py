@@ -17,8 +17,8 @@ from kedfem.dynamics.system.layout import profile
 from kedfem.dynamics.system.march import Ready, displacements, march, ready
 from kedfem.dynamics.system.oracle.monolithic import Monolithic, Now
 from kedfem.dynamics.system.oracle.monolithic_steps import nodal_forces
-from kedfem.dynamics.system.starts.internal import own
-from kedfem.dynamics.system.starts.start import rest
+from kedfem.dynamics.system.starts.initial_states import rest
+from kedfem.dynamics.system.starts.internal_forces import own
 from kedfem.dynamics.system.state import History, State
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.scene import path_parameter, scene_from, time_grid

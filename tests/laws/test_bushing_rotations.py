@@ -12,7 +12,7 @@ from kedfem.dynamics.system.march import march
 from kedfem.dynamics.system.oracle import monolithic_places as oracle
 from kedfem.dynamics.system.record import ROTATION, TILT, Term
 from kedfem.dynamics.system.rotations_kernel import rotation_along, tilt_along
-from kedfem.dynamics.system.starts.rates import value
+from kedfem.dynamics.system.starts.coordinate_rates import value
 from kedfem.motion.newton import cross_matrix
 from tests.moving import channels, ran
 from tests.systems import begun, by_oracle, rows

@@ -11,10 +11,10 @@ from kedfem.accuracy.prepared import meshed
 from kedfem.dynamics.stepping.first_state import motion_of
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.system.march import Motion, march
-from kedfem.dynamics.system.starts.balanced import NoBalanceError
 from kedfem.dynamics.system.starts.deflected import static
 from kedfem.dynamics.system.starts.instant import Instant
-from kedfem.dynamics.system.starts.internal import own, rows
+from kedfem.dynamics.system.starts.internal_forces import own, rows
+from kedfem.dynamics.system.starts.modified_newton import NoBalanceError
 from kedfem.dynamics.system.steps import Steps
 from kedfem.scene import scene_from
 

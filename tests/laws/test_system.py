@@ -12,7 +12,7 @@ from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.march import displacements, march, ready
 from kedfem.dynamics.system.record import COROTATIONAL, TANGENTIAL, Driven, Held, Spring, Stop
-from kedfem.dynamics.system.starts.start import rest
+from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.scene import Gear, Motor
 from tests.moving import bar, beam_in_space, rising, turned
 from tests.spatial_joints import BEAMS

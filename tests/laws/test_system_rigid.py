@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from kedfem.dynamics.stepping.start import initial_rates
 from kedfem.dynamics.system.forces.supports import supports
 from kedfem.dynamics.system.march import displacements, march
-from kedfem.dynamics.system.starts.start import rest
+from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.dynamics.system.state import History
 from kedfem.motion.newton import cross_matrix
 from tests.laws.test_system import elements, four_bar

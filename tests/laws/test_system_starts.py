@@ -9,12 +9,12 @@ from numpy.testing import assert_allclose
 from kedfem.dynamics.joints.attachments import interface_matrix
 from kedfem.dynamics.stepping.first_state import first_states
 from kedfem.dynamics.system.march import displacements, march
-from kedfem.dynamics.system.starts import balanced
+from kedfem.dynamics.system.starts import modified_newton
+from kedfem.dynamics.system.starts.coordinate_rates import coordinates, places
 from kedfem.dynamics.system.starts.deflected import plucked, quasi_static, static
-from kedfem.dynamics.system.starts.equilibrium import stands_off
+from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.dynamics.system.starts.instant import Instant
-from kedfem.dynamics.system.starts.rates import coordinates, places
-from kedfem.dynamics.system.starts.start import rest
+from kedfem.dynamics.system.starts.newton_krylov import stands_off
 from kedfem.errors import SolveError
 from tests.laws.test_system import HINGE, KINDS, elements, four_bar
 from tests.moving import bar
@@ -258,6 +258,6 @@ def test_a_balance_with_open_joints_is_none(kind: str, monkeypatch: pytest.Monke
     first = of.ready.bodies.at[1]
     off = u + np.where(np.arange(len(u)) < first, 0.05 * np.sign(u + 1e-30), 0.0)
     assert "off its joints" in stands_off(now, off, None)
-    monkeypatch.setattr(balanced, "_iterated", lambda *_: off)
+    monkeypatch.setattr(modified_newton, "_iterated", lambda *_: off)
     with pytest.raises(SolveError, match=r"link '\w+' would stand .* m off its joints"):
         quasi_static(of.ready, of.motion, [])

@@ -14,8 +14,8 @@ from kedfem.dynamics.stepping.start import Deflected, initial_states
 from kedfem.dynamics.stepping.state import ForcingAt, Rayleigh
 from kedfem.dynamics.system.march import displacements, march, ready
 from kedfem.dynamics.system.record import System
+from kedfem.dynamics.system.starts.initial_states import from_links
 from kedfem.dynamics.system.starts.instant import Instant
-from kedfem.dynamics.system.starts.start import from_links
 from kedfem.links.record import Link
 from kedfem.motion.rigid import RigidMotion, resting
 

@@ -3,8 +3,9 @@
     (K + κ c cᵀ) x = ω² M x,   joints closed: W x = Rᵀ B z,  C z = 0
 
 K = T K0 Tᵀ of links, κ the tangents of force laws there. All links are factored once, with
-K0 + s M; at each position joints and laws add an interface of some dozen unknowns (`system.starts.balance`), and a block
-Lanczos run on (K + s M)⁻¹ M finds the lowest ω². s > 0, so that motions without strain, ω = 0, are found like the others.
+K0 + s M; at each position joints and laws add an interface of some dozen unknowns (`system.starts.linear_equations`), and
+a block Lanczos run on (K + s M)⁻¹ M finds the lowest ω². s > 0, so that motions without strain, ω = 0, are found like the
+others.
 Forces that stretch a link or a spring do not change its stiffness here, unless `preloads` are asked for; `stiffened` has
 those of links.
 """
@@ -23,9 +24,9 @@ from kedfem.dynamics.system.layout import as_arrays, coefficients, factored
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.record import TIME, Stop, System, curve_of
 from kedfem.dynamics.system.sparse import SparsePart, momentum
-from kedfem.dynamics.system.starts.balance import Asked, Balance, HeldBody, stepped_body
 from kedfem.dynamics.system.starts.instant import Instant, sizes
-from kedfem.dynamics.system.starts.internal import own, rows
+from kedfem.dynamics.system.starts.internal_forces import own, rows
+from kedfem.dynamics.system.starts.linear_equations import Asked, HeldBody, LinearEquations, stepped_body
 from kedfem.errors import SceneError, SolveError
 from kedfem.links.reduced import wave_frequency
 from kedfem.motion.rigid import RigidMotion
@@ -148,12 +149,14 @@ class Frozen:
         every = range(len(self.of.parts))
         return tuple(np.array([rows(self.of, k, each[own(self.of, k)]) for each in x.T]) for k in every)
 
-    def balance(self, motion: RigidMotion) -> tuple[Instant, Balance]:
+    def balance(self, motion: RigidMotion) -> tuple[Instant, LinearEquations]:
         """K + s M with all joints and laws at a position."""
         now = Instant(self.of, lambda t: motion, float(motion.t[0]), self._like)
         self._like = now
         found = asked(now)
-        return now, Balance(self.of, self.held, now.R, with_preloads(now, found) if self.preloaded else found)
+        return now, LinearEquations(
+            self.of, self.held, now.R, with_preloads(now, found) if self.preloaded else found
+        )
 
     def _lowest(self, motion: RigidMotion) -> tuple[Float[np.ndarray, " f"], Float[np.ndarray, "N f"]]:
         """ω² in rising order, and shapes on the coordinates of all bodies."""

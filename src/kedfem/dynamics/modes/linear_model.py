@@ -16,7 +16,7 @@ from kedfem.arrays import Float
 from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.modes.frozen import Frozen
 from kedfem.dynamics.stepping.state import Rayleigh
-from kedfem.dynamics.system.starts.balance import Balance
+from kedfem.dynamics.system.starts.linear_equations import LinearEquations
 from kedfem.errors import SolveError
 from kedfem.links.record import Link
 from kedfem.motion.rigid import RigidMotion
@@ -100,7 +100,7 @@ def _on_coordinates(frozen: Frozen, forces: Sequence[Float[np.ndarray, "n d"]]) 
 
 
 def _answers(
-    balance: Balance, r: Float[np.ndarray, "N i"], f: Float[np.ndarray, "k i"]
+    balance: LinearEquations, r: Float[np.ndarray, "N i"], f: Float[np.ndarray, "k i"]
 ) -> tuple[Float[np.ndarray, "N i"], Float[np.ndarray, "k i"]]:
     """(K + s M)⁻¹ of columns, and the interface with it."""
     x, z = np.zeros_like(r), np.zeros_like(f)
@@ -112,7 +112,7 @@ def _answers(
 
 def _constant(
     frozen: Frozen,
-    balance: Balance,
+    balance: LinearEquations,
     still: tuple[Float[np.ndarray, "N m"], Float[np.ndarray, "k m"]],
     forces: tuple[Float[np.ndarray, "N i"], Float[np.ndarray, "k i"]],
 ) -> tuple[Float[np.ndarray, "N i"], Float[np.ndarray, "k i"]]:

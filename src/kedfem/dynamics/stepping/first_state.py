@@ -15,8 +15,8 @@ from kedfem.dynamics.stiffening import Stiffening
 from kedfem.dynamics.system.march import Motion
 from kedfem.dynamics.system.period.map import PeriodMap
 from kedfem.dynamics.system.period.search import periodic
+from kedfem.dynamics.system.starts.initial_states import from_links
 from kedfem.dynamics.system.starts.instant import Instant
-from kedfem.dynamics.system.starts.start import from_links
 from kedfem.dynamics.system.state import State
 from kedfem.dynamics.system.steps import Steps
 from kedfem.motion.linkage import Linkage

@@ -14,10 +14,10 @@ from kedfem.dynamics.stepping.marks import Mark
 from kedfem.dynamics.stepping.solvers import block_length
 from kedfem.dynamics.system.march import HALVINGS, ConvergenceError
 from kedfem.dynamics.system.period.search import residual_of
-from kedfem.dynamics.system.starts.balanced import NoBalanceError
 from kedfem.dynamics.system.starts.deflected import quasi_static as deflection_in_motion
 from kedfem.dynamics.system.starts.deflected import static
 from kedfem.dynamics.system.starts.instant import Instant
+from kedfem.dynamics.system.starts.modified_newton import NoBalanceError
 from kedfem.dynamics.system.state import State
 from kedfem.dynamics.system.steps import Steps
 from kedfem.errors import SolveError

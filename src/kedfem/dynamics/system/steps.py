@@ -34,9 +34,9 @@ from kedfem.dynamics.system.period.search import Periodic, Search
 from kedfem.dynamics.system.record import TANGENTIAL, System
 from kedfem.dynamics.system.starts.accelerations import accelerated_in_a_step, accelerations
 from kedfem.dynamics.system.starts.deflected import plucked, quasi_static
+from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.dynamics.system.starts.instant import Instant
-from kedfem.dynamics.system.starts.internal import own
-from kedfem.dynamics.system.starts.start import rest
+from kedfem.dynamics.system.starts.internal_forces import own
 from kedfem.dynamics.system.state import History, State
 from kedfem.links.stations import Stations
 from kedfem.motion.linkage import linkage

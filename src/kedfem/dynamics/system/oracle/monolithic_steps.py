@@ -10,7 +10,7 @@ from kedfem.dynamics.system.blank import empty_history
 from kedfem.dynamics.system.march import Ready, displacements
 from kedfem.dynamics.system.oracle.monolithic import Monolithic, Now
 from kedfem.dynamics.system.starts.instant import renumbered
-from kedfem.dynamics.system.starts.internal import own
+from kedfem.dynamics.system.starts.internal_forces import own
 from kedfem.dynamics.system.state import History, State
 from kedfem.links.record import Link
 from kedfem.motion.rigid import RigidMotion

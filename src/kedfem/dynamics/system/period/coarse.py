@@ -14,7 +14,7 @@ from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.system.period.krylov import Derivative, Watched, gmres
 from kedfem.dynamics.system.period.map import PeriodMap
 from kedfem.dynamics.system.starts.instant import Flat
-from kedfem.dynamics.system.starts.internal import own, rows
+from kedfem.dynamics.system.starts.internal_forces import own, rows
 from kedfem.links.reduced import on_functions
 
 START, LATER = 1e-6, 1e-2  # what is left of the first of its equations, and of those that precondition

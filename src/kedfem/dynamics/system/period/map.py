@@ -19,7 +19,7 @@ from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.system.arrays import ends_of
 from kedfem.dynamics.system.march import Ready, march
 from kedfem.dynamics.system.starts.instant import TURN, Flat, Instant, Motion, turned
-from kedfem.dynamics.system.starts.internal import own, put_momenta, remembered
+from kedfem.dynamics.system.starts.internal_forces import own, put_momenta, remembered
 from kedfem.dynamics.system.state import History, State, copied
 from kedfem.motion.rigid import RigidMotion
 

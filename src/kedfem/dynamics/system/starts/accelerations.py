@@ -15,9 +15,15 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.system.sparse import SparsePart
-from kedfem.dynamics.system.starts.balance import Asked, Balance, Solved, held_body, stepped_body
 from kedfem.dynamics.system.starts.instant import Flat, Instant
-from kedfem.dynamics.system.starts.internal import drawn, own, rows, turned_rate
+from kedfem.dynamics.system.starts.internal_forces import drawn, own, rows, turned_rate
+from kedfem.dynamics.system.starts.linear_equations import (
+    Asked,
+    LinearEquations,
+    Solved,
+    held_body,
+    stepped_body,
+)
 from kedfem.links.record import Link
 from kedfem.motion.newton import cross_matrix
 
@@ -42,7 +48,7 @@ def accelerations(now: Instant, r: Flat, u: Flat, v: Flat, asked: Asked, rigid: 
             held.append(now.always.mass(k))
         else:
             held.append(held_body(P @ P.T + STIFFER * (np.eye(len(P)) - P @ P.T), part.W))
-    balance = Balance(of, held, now.R, asked)
+    balance = LinearEquations(of, held, now.R, asked)
     stress = np.zeros_like(r)
     turning = centripetal(now, u, v, stiff) if any(stiff) else stress
     for _ in range(AGAIN if any(stiff) else 1):
@@ -78,7 +84,7 @@ def in_a_step(now: Instant, pushed: Flat, asked: Asked) -> Solved:
         else held_body(np.eye(K[k].shape[0]) + share * K[k], part.W)
         for k, part in enumerate(of.parts)
     ]  # fmt: skip
-    balance = Balance(of, held, now.R, asked)
+    balance = LinearEquations(of, held, now.R, asked)
     more = balance.solved(pushed)
     x = [balance.turned(k, more.x[own(of, k)], back=True) for k in range(len(K))]
     f = np.concatenate([balance.turned(k, share * (K[k] @ x[k])) for k in range(len(K))])

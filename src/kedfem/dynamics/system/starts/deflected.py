@@ -17,11 +17,11 @@ from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.record import RATE, Spring, Stop, curve_of
 from kedfem.dynamics.system.starts.accelerations import accelerations, own_spin
-from kedfem.dynamics.system.starts.balance import Asked
-from kedfem.dynamics.system.starts.balanced import FREE, NoBalanceError, balanced
+from kedfem.dynamics.system.starts.initial_states import as_coordinates, begun
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
-from kedfem.dynamics.system.starts.internal import own, rows, turned_rate
-from kedfem.dynamics.system.starts.start import as_coordinates, begun
+from kedfem.dynamics.system.starts.internal_forces import own, rows, turned_rate
+from kedfem.dynamics.system.starts.linear_equations import Asked
+from kedfem.dynamics.system.starts.modified_newton import FREE, NoBalanceError, equilibrium
 from kedfem.dynamics.system.starts.turning_bodies import CONVERGED, Spins
 from kedfem.dynamics.system.state import State
 from kedfem.errors import MotionError, SolveError
@@ -87,7 +87,7 @@ def static(
     none = np.zeros(int(of.bodies.at[-1]))
     pull = none if forces is None else as_work(of, forces)
     try:
-        u = balanced(now, none if near is None else near.u, _constant(pull), None, None)
+        u = equilibrium(now, none if near is None else near.u, _constant(pull), None, None)
     except NoBalanceError:
         if of.c.single:
             raise
@@ -108,7 +108,7 @@ def _in_increments(now: Instant, pull: Flat) -> Flat:
         tried = min(1.0, share + part)
         part_loaded.F, part_loaded.amounts = tried * now.F, tried * now.amounts
         try:
-            u = balanced(part_loaded, u, _constant(tried * pull), None, None)
+            u = equilibrium(part_loaded, u, _constant(tried * pull), None, None)
         except NoBalanceError:
             part /= 2
             if part < LEAST:
@@ -128,7 +128,7 @@ def plucked(of: Ready, motion_at: Motion, forces: Rows, time: float = 0.0) -> St
         return static(of, motion_at, time, forces)
     u, v = _moving(now, motion_at)
     pull = as_work(of, forces)
-    return begun(now, balanced(now, u, _constant(pull), _spins(now), now.interface(v)), v)
+    return begun(now, equilibrium(now, u, _constant(pull), _spins(now), now.interface(v)), v)
 
 
 def as_work(of: Ready, forces: Rows) -> Flat:
@@ -173,7 +173,7 @@ def _differenced(first: Instant, motion_at: Motion, h: float) -> tuple[tuple[Fla
                     now.near = turned(instants[k - 1], instants[k - 1].interface(u[k - 1]))
                 now.slow = now.slow or instants[k - 1].slow
                 z1 = now.interface(v[k]) if again else None
-                u[k] = balanced(now, guess, _constant(np.zeros_like(guess)), _spins(now), z1)
+                u[k] = equilibrium(now, guess, _constant(np.zeros_like(guess)), _spins(now), z1)
         except SolveError:
             if again < 2:  # rounding has not grown yet
                 raise
@@ -227,5 +227,5 @@ def _relieved(now: Instant, v: Flat) -> tuple[Flat, Flat]:
         asked = Asked(C[hard], -e[2, hard], np.zeros(int(hard.sum())), C.T @ m)
         return -accelerations(now, now.F - f, u, moving, asked, rigid=True).x
 
-    u = balanced(now, np.zeros_like(v), inertia, None, now.interface(v), FREE)
+    u = equilibrium(now, np.zeros_like(v), inertia, None, now.interface(v), FREE)
     return u, rate(u)

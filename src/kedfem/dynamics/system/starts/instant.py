@@ -29,9 +29,9 @@ from kedfem.dynamics.system.record import (
     law_at,
 )
 from kedfem.dynamics.system.sparse import SparsePart, softening
-from kedfem.dynamics.system.starts.balance import HeldBody, mass_body, sparse_body
-from kedfem.dynamics.system.starts.internal import Inside, Still, inside, own, rows
-from kedfem.dynamics.system.starts.rates import coordinates, places, term_values, travels
+from kedfem.dynamics.system.starts.coordinate_rates import coordinates, places, term_values, travels
+from kedfem.dynamics.system.starts.internal_forces import Inside, Still, inside, own, rows
+from kedfem.dynamics.system.starts.linear_equations import HeldBody, mass_body, sparse_body
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.rigid import RigidMotion
 

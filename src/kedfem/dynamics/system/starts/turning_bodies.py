@@ -5,9 +5,9 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from kedfem.arrays import Float
 from kedfem.dynamics.system.sparse import SparsePart, momentum
-from kedfem.dynamics.system.starts.balance import Balance, HeldBody, held_body
 from kedfem.dynamics.system.starts.instant import Flat, Instant
-from kedfem.dynamics.system.starts.internal import own
+from kedfem.dynamics.system.starts.internal_forces import own
+from kedfem.dynamics.system.starts.linear_equations import HeldBody, LinearEquations, held_body
 
 KRYLOV = 60
 LEFT = 1e-4  # of a residual, by GMRES: iterations of the deflection go on, and rounding may leave 1e-8
@@ -38,7 +38,7 @@ class TurningBodies:
             self._made.append(held_body(A, self.now.of.parts[k].W))
         return self._made
 
-    def change(self, balance: Balance, r: Flat, exact: bool = False) -> Flat:
+    def change(self, balance: LinearEquations, r: Flat, exact: bool = False) -> Flat:
         """What a residual asks for: GMRES puts in the inertia of turning of sparse bodies, and takes out their mass.
 
         It puts in the stiffness that stresses of the rigid-body motion give, too.

@@ -1,13 +1,14 @@
-"""The deflection at which all forces balance at one instant, with the stiffness of bodies in their mean frames."""
+"""The deflection at which all forces balance at one instant, by a modified Newton method: the tangent is the stiffness
+of bodies in their mean frames, without what turns with them. Where it diverges `newton_krylov` takes over."""
 
 from collections.abc import Callable
 
 import numpy as np
 
 from kedfem.dynamics.anderson import Mixing
-from kedfem.dynamics.system.starts.balance import Asked, Balance
-from kedfem.dynamics.system.starts.equilibrium import Equilibrium, equilibrium, stands_off
 from kedfem.dynamics.system.starts.instant import Flat, Instant
+from kedfem.dynamics.system.starts.linear_equations import Asked, LinearEquations
+from kedfem.dynamics.system.starts.newton_krylov import Equilibrium, solution, stands_off
 from kedfem.dynamics.system.starts.turning_bodies import CONVERGED, Spins, TurningBodies
 from kedfem.errors import SolveError
 
@@ -35,7 +36,7 @@ class NoBalanceError(SolveError):
         self.moves = moves
 
 
-def balanced(
+def equilibrium(
     now: Instant, u: Flat, more: Callable[[Flat, Flat], Flat], spins: Spins | None,
     z1: Flat | None, rounding: float = ROUNDING,
 ) -> Flat:  # fmt: skip
@@ -70,7 +71,7 @@ def _iterated(
         f, R = bodies.still.forces(now.motion.R[0], u, now.amounts)
         r = now.F - f + more(u, f) - bodies.inertia(u) - now.stress(u)
         try:
-            balance = Balance(of, bodies.held(R), R, _asked(now, u, z1))
+            balance = LinearEquations(of, bodies.held(R), R, _asked(now, u, z1))
             change = bodies.change(balance, r, exact)
         except (SolveError, np.linalg.LinAlgError):
             break
@@ -105,7 +106,7 @@ def _by_newton(
     now: Instant, u: Flat, more: Callable[[Flat, Flat], Flat], spins: Spins | None, z1: Flat | None
 ) -> Flat:
     """The same by Newton's method with all that rotates with bodies, which costs more an iteration."""
-    found = equilibrium(Equilibrium(now, more, spins, z1), u)
+    found = solution(Equilibrium(now, more, spins, z1), u)
     if found.moves:
         raise NoBalanceError(found.moves)
     return found.u

@@ -1,4 +1,5 @@
-"""All bodies balanced together at one instant, with any matrix of each: what starts of a march are found by.
+"""Linear equations of all bodies with joints and constraints at one instant, condensed to the interface, for any matrix
+of each body: what starts of a march are found by.
 
     A_i x_i = r_i + W_iᵀ λ_i,   W_i (x_i + moved_i) = Rᵀ B z,   Σ Bᵀ R λ = Cᵀ m + known,   C z + m / κ = target
 
@@ -115,7 +116,7 @@ class Solved:
     f: Flat | None = None
 
 
-class Balance:
+class LinearEquations:
     """A system of bodies and constraints at one instant, factored.
 
     Parameters

@@ -17,9 +17,9 @@ from kedfem.dynamics.system.blank import empty_state
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.sparse import SparsePart
 from kedfem.dynamics.system.starts.accelerations import accelerations
-from kedfem.dynamics.system.starts.balance import Asked, Balance, Solved
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
-from kedfem.dynamics.system.starts.internal import own, put_momenta, remembered
+from kedfem.dynamics.system.starts.internal_forces import own, put_momenta, remembered
+from kedfem.dynamics.system.starts.linear_equations import Asked, LinearEquations, Solved
 from kedfem.dynamics.system.state import State
 
 Accelerated = Callable[[Instant, Flat, Flat, Flat, Asked], Solved]
@@ -124,4 +124,4 @@ def _closing(now: Instant, C: sp.csr_array, open_: Flat) -> Flat:
         return none
     held = [now.always.mass(k) for k in range(len(of.parts))]
     asked = Asked(C, -open_, np.zeros(len(open_)), np.zeros(of.system.unknowns))
-    return Balance(of, held, now.R, asked).solved(none).x
+    return LinearEquations(of, held, now.R, asked).solved(none).x

@@ -1,4 +1,4 @@
-"""Newton's method for a deflection at which all forces balance, however far bodies move to it.
+"""Newton–Krylov method for a deflection at which all forces balance, however far bodies move to it.
 
 With A the stiffness of bodies in their mean frames, and all forces on bodies and interface at u as right-hand sides,
 
@@ -24,10 +24,10 @@ from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.segment import mean_orientation
 from kedfem.dynamics.system.record import COROTATIONAL
 from kedfem.dynamics.system.sparse import momentum
-from kedfem.dynamics.system.starts.balance import Asked, Balance
 from kedfem.dynamics.system.starts.instant import Flat, Instant
-from kedfem.dynamics.system.starts.internal import Frames as Sought
-from kedfem.dynamics.system.starts.internal import drawn, own, rows
+from kedfem.dynamics.system.starts.internal_forces import Frames as Sought
+from kedfem.dynamics.system.starts.internal_forces import drawn, own, rows
+from kedfem.dynamics.system.starts.linear_equations import Asked, LinearEquations
 from kedfem.dynamics.system.starts.turning_bodies import CONVERGED, Spins, TurningBodies
 from kedfem.errors import SolveError
 from kedfem.links.reduced import reach
@@ -123,7 +123,7 @@ class Equilibrium:
         """Forces along all coordinates."""
         return np.asarray(np.where(at.hard, m, at.laws))
 
-    def change(self, at: Point, m: Flat, balance: Balance, direct: Flat) -> Flat:
+    def change(self, at: Point, m: Flat, balance: LinearEquations, direct: Flat) -> Flat:
         """The change that brings all forces into balance, to first order."""
         push = self.exerted(at, m)
 
@@ -154,7 +154,7 @@ class Equilibrium:
             out[here] = (R @ f.reshape(d, -1)).ravel()
         return out
 
-    def left(self, at: Point, m: Flat, balance: Balance) -> Flat:
+    def left(self, at: Point, m: Flat, balance: LinearEquations) -> Flat:
         """The change that a balance of another deflection asks for here."""
         asked = self.asked(at, m)
         if len(asked.target) != len(balance.asked.target):
@@ -170,7 +170,7 @@ class Equilibrium:
         return np.asarray(np.where(at.hard, m + added, 0.0))
 
     def stepped(
-        self, at: Point, m: Flat, balance: Balance, change: Flat, before: float, tiny: bool
+        self, at: Point, m: Flat, balance: LinearEquations, change: Flat, before: float, tiny: bool
     ) -> tuple[Point, float]:
         """All forces after a step along a change, and the part of it that is taken.
 
@@ -259,14 +259,14 @@ class Found:
     moves: str = ""
 
 
-def equilibrium(problem: Equilibrium, u: Flat) -> Found:
+def solution(problem: Equilibrium, u: Flat) -> Found:
     """The deflection at which all forces balance, from a guess."""
     now, bodies, last, settled, short = problem.now, problem.bodies, np.inf, False, 0
     at = problem.at(u)
     m, change, new = np.zeros(len(at.e)), np.zeros_like(u), at
     for _ in range(ITERATIONS):
         try:
-            balance = Balance(now.of, bodies.held(at.R), at.R, problem.asked(at, m))
+            balance = LinearEquations(now.of, bodies.held(at.R), at.R, problem.asked(at, m))
             first = balance.solved(at.r, at.moved)
             m = problem.reactions(at, m, first.m)
             change = problem.change(at, m, balance, first.x)
