@@ -98,6 +98,16 @@ def on_lines(ends, weights):  # type: ignore[no-untyped-def]
                 ends.onto[at + m] += weights[p] * ends.full[of + m]
 
 
+@inner
+def unmoved(ends, of, driving, t, trial, work):  # type: ignore[no-untyped-def]
+    """trial.fixed becomes where ends are in the rigid-body motion, for coordinates that are linear there."""
+    if of is None:
+        return
+    if of.linear.any():
+        on_lines(ends, driving.stations[t])
+        placed(ends, driving.R[t], driving.p[t], trial.row, trial.fixed, work.end, work.vectors)
+
+
 @inlined
 def moved(ends, e, z, y):  # type: ignore[no-untyped-def]
     """y becomes the displacements of an end's interface points, one after the other."""

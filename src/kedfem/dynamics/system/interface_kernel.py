@@ -87,9 +87,9 @@ def pushed(bodies, i, trial):  # type: ignore[no-untyped-def]
 @inner
 def evaluated(c, ends, of, driving, t, state, trial, work):  # type: ignore[no-untyped-def]
     """Gradients of all constraints and laws at z, and what these ask of Δz; forces without a tangent are known ones."""
-    r, share = len(of.law), 1 - c.alpha_f
-    if r == 0:
+    if of is None:
         return
+    r, share = len(of.law), 1 - c.alpha_f
     if not of.linear.all():
         placed(ends, driving.R[t], driving.p[t], trial.z, trial.moving, work.end, work.vectors)
     rigid_motion = (driving.R[t], driving.v[t], driving.omega[t])
@@ -201,11 +201,20 @@ def bordered(bodies, of, trial):  # type: ignore[no-untyped-def]
 def interface_solved(bodies, of, trial, begins):  # type: ignore[no-untyped-def]
     """trial.dz and trial.m from the right-hand side; without constraints the step's matrix is factored once."""
     k, r, x, inverse = len(trial.z), len(trial.m), trial.x, trial.inverse
-    if r > 0 or begins:
-        bordered(bodies, of, trial)
-        profile_factored(trial.K, bodies.first, bodies.row_at, bodies.multiplier, inverse)
+    if of is None:
+        if begins:
+            copied(trial.H, trial.K)
+            profile_factored(trial.K, bodies.first, bodies.row_at, bodies.multiplier, inverse)
+        for m in range(k):
+            x[bodies.place[m]] = trial.right[m]
+        profile_solved(trial.K, bodies.first, bodies.row_at, inverse, x)
+        for m in range(k):
+            trial.dz[m] = x[bodies.place[m]]
+        return
+    bordered(bodies, of, trial)
+    profile_factored(trial.K, bodies.first, bodies.row_at, bodies.multiplier, inverse)
     trial.dz[:] = 0.0
-    for again in range(2 if r > 0 else 1):  # the second closes joints to rounding
+    for again in range(2):  # the second closes joints to rounding
         for m in range(k):
             x[bodies.place[m]] = trial.right[m] if again == 0 else 0.0
         for a in range(r):

@@ -5,7 +5,7 @@ Apart from `step_kernel`, whose passes a linear scene has no use for and need no
 
 from kedfem.compiled import compiled, inlined
 from kedfem.dynamics.system.algebra_kernel import copied
-from kedfem.dynamics.system.ends_kernel import on_lines, placed
+from kedfem.dynamics.system.ends_kernel import unmoved
 from kedfem.dynamics.system.interface_kernel import evaluated, gathered, interface_solved, offset, pushed
 from kedfem.dynamics.system.reference import reference
 from kedfem.dynamics.system.rigid_frame_kernel import (
@@ -57,9 +57,7 @@ def solved_at_once(c, bodies, ends, of, driving, t, state, trial, work):  # type
     for i in range(len(bodies.motion)):
         offset(bodies, i, work.y, trial, False)
         pushed(bodies, i, trial)
-    if of.linear.any():
-        on_lines(ends, driving.stations[t])
-        placed(ends, driving.R[t], driving.p[t], trial.row, trial.fixed, work.end, work.vectors)
+    unmoved(ends, of, driving, t, trial, work)
     evaluated(c, ends, of, driving, t, state, trial, work)
     interface_solved(bodies, of, trial, True)
     for i in range(len(bodies.motion)):

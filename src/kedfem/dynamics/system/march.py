@@ -142,6 +142,9 @@ def march(
     if between is None or not halvings:
         constraints = constraints._replace(jumps=np.zeros_like(constraints.jumps))
     arrays = of.bodies, of.ends, constraints
+    related: tuple[Ends, Constraints] | tuple[None, None] = of.ends, constraints
+    if not len(constraints.law):
+        related = None, None  # so that what they need is not compiled
     state, along, T, done = copied(state), driving(of, motion, loads), len(motion.t), 0
     history = empty_history(T, of.bodies, of.constraints, along.F)
     trial, work = empty_trial(*arrays, state), room(of.bodies)
@@ -149,7 +152,7 @@ def march(
     while done < T:
         left = _since(along, done), History(*(x[done:] for x in history))
         with solved.watched():
-            taken, worst = marched(of.c, *arrays, left[0], state, trial, work, left[1], solved)
+            taken, worst = marched(of.c, of.bodies, *related, left[0], state, trial, work, left[1], solved)
         solved.check()
         done += int(taken)
         if done < T:

@@ -55,6 +55,9 @@ def _attribute(context: Any, builder: Any, kind: Reference, address: Any, name: 
 
 
 def _kept(_: Any, record: Any) -> Any:
+    if isinstance(record, types.NoneType):
+        return record(record), lambda context, builder, signature, arguments: arguments[0]
+
     def stored(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         data = default_manager.lookup(record).as_data(builder, arguments[0])
         place = cgutils.alloca_once(builder, data.type)
@@ -65,7 +68,7 @@ def _kept(_: Any, record: Any) -> Any:
 
 
 reference: Any = intrinsic(_kept)
-"""Called in compiled code with a record: where it is kept."""
+"""Called in compiled code with a record: where it is kept; None stays None."""
 
 
 def _array_at(number: Any) -> Any:

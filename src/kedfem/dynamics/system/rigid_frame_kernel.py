@@ -71,6 +71,8 @@ def ported(bodies, i, trial):  # type: ignore[no-untyped-def]
 @inner
 def constraints_end(c, ends, of, driving, t, state, trial, work, history):  # type: ignore[no-untyped-def]
     """Coordinates with their rates, forces along them, and their sum on z, at the end of the step."""
+    if of is None:
+        return
     share = 1 - c.alpha_f
     n0, n1, n2 = c.acceleration
     if not of.linear.all():

@@ -8,7 +8,7 @@ again. A linear system is done after one: `linear_kernel`.
 
 import numpy as np
 
-from kedfem.compiled import compiled, inlined
+from kedfem.compiled import compiled, inlined, inner
 from kedfem.dynamics.anderson_kernel import mixed
 from kedfem.dynamics.beams_kernel import begun, ended
 from kedfem.dynamics.system.algebra_kernel import (
@@ -26,7 +26,7 @@ from kedfem.dynamics.system.bodies_kernel import (
     own_end,
     residual,
 )
-from kedfem.dynamics.system.ends_kernel import on_lines, placed
+from kedfem.dynamics.system.ends_kernel import unmoved
 from kedfem.dynamics.system.interface_kernel import (
     evaluated,
     gathered,
@@ -81,9 +81,11 @@ def marched(c, bodies, ends, of, driving, state, trial, work, history, solved): 
     return len(driving.t), -1
 
 
-@inlined
+@inner
 def meets(of, state, trial):  # type: ignore[no-untyped-def]
     """Whether a stop's push begins at once in a step."""
+    if of is None:
+        return False
     for a in range(len(of.jumps)):
         if of.jumps[a] and state.multiplier[a] == 0.0:
             lower, upper, e0, e1 = of.numbers[a, 0], of.numbers[a, 1], state.e[0, a], trial.e[a]
@@ -117,9 +119,7 @@ def begin(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type:
         if bodies.frame[i] > RIGID_BODY:
             orientation(bodies, i, R, trial.u, trial, trial.Rp[i])
     gathered(bodies, trial)
-    if of.linear.any():
-        on_lines(ends, driving.stations[t])
-        placed(ends, R, driving.p[t], trial.row, trial.fixed, work.end, work.vectors)
+    unmoved(ends, of, driving, t, trial, work)
 
 
 @inlined

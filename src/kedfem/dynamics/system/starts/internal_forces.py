@@ -89,14 +89,14 @@ class Still:
         ----------
         motion : rigid-body motion at one time; stations : weights of ends on lines there
         """
+        of = self.of.constraints
+        if not len(of.law):
+            return sp.csr_array((0, len(z)))
         from kedfem.dynamics.system.still_kernel import still_gradients
 
         omega = np.ascontiguousarray(motion.omega[0])  # laid out as in steps: compiled once for both
         turning = motion.R[0], motion.v[0], omega
-        still_gradients(
-            self.of.ends, self.of.constraints, turning, motion.p[0], stations, z, self._trial, self._work
-        )
-        of = self.of.constraints
+        still_gradients(self.of.ends, of, turning, motion.p[0], stations, z, self._trial, self._work)
         return sp.csr_array((self._trial.C.copy(), of.columns, of.column_at), (len(of.law), len(z)))
 
     def sprung(self, k: int, R: Float[np.ndarray, "3 3"], u: Flat) -> Flat:
