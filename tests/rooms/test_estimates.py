@@ -14,6 +14,7 @@ from kedfem.accuracy.error_budget import Budget, Share, budget_warning, by_kind,
 from kedfem.accuracy.estimates import budget, step_errors, watcher
 from kedfem.accuracy.histories import Histories, histories, relative_errors
 from kedfem.accuracy.prepared import Prepared, meshed
+from kedfem.accuracy.step_estimate import single_errors
 from kedfem.accuracy.variants import with_steps
 from kedfem.analysis import analyse
 from kedfem.dynamics.stepping.solvers import steps_of
@@ -21,7 +22,7 @@ from kedfem.dynamics.stepping.transient import transient
 from kedfem.links.build import bare_link
 from kedfem.links.indicator import indicator
 from kedfem.links.singular_stress import re_entrant
-from kedfem.results import read_results
+from kedfem.results import Channel, read_results
 from kedfem.scene import scene_from, time_grid
 
 from ..laws.test_envelope import ROUND, SHARP, angled
@@ -147,6 +148,19 @@ def test_the_steps_error_knows_jolts_that_steps_twice_as_long_pass_over() -> Non
         true, told = relative_errors(base, fine), step_errors(ready, base)
         assert true["probes/root/stress"] > 1.0
         assert 0.3 < told["probes/root/stress"] / true["probes/root/stress"] < 1.5
+
+
+def test_what_jumps_with_a_load_is_no_jolt() -> None:
+    """Exact in both marches; with limits, which might be what jumps, half of it is told."""
+    t = np.linspace(0.0, 1.0, 41)
+    channel = Channel("joints/A/force", ("x",), "N", "", "")
+
+    def recorded(every: int) -> Histories:
+        return Histories(t[::every], {channel.name: (channel, np.where(t > 0.5, 1.0, 0.0)[::every, None])})
+
+    alike = recorded(1), recorded(2)
+    assert single_errors(*alike, stops=False)[0] == {channel.name: 0.0}
+    assert single_errors(*alike, stops=True)[0] == {channel.name: 0.5}
 
 
 def test_stiffer_by_its_mesh_is_softened_by_its_indicator() -> None:

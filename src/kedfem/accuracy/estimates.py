@@ -205,7 +205,8 @@ def step_errors(ready: Prepared, base: Histories) -> dict[str, float]:
         _beside(ready.scene, 2.0, grid.steps // 2) if longer else _beside(ready.scene, 0.5, 2 * grid.steps)
     )
     other = histories(replace(ready, scene=scene), near=base.begun)
-    return single_errors(base, other)[0] if longer else single_errors(other, base)[1]
+    fine, coarse = (base, other) if longer else (other, base)
+    return single_errors(fine, coarse, bool(ready.scene.limits))[0 if longer else 1]
 
 
 def _beside(scene: Scene, factor: float, steps: int) -> Scene:

@@ -248,12 +248,16 @@ def single_level(fast: float) -> tuple[float, float]:
     return finer, 1 + finer
 
 
-def single_errors(fine: Histories, coarse: Histories) -> tuple[dict[str, float], dict[str, float]]:
+def single_errors(
+    fine: Histories, coarse: Histories, stops: bool
+) -> tuple[dict[str, float], dict[str, float]]:
     """Channel → error of two marches by themselves: of the finer one, and of that with steps twice as long.
 
     Parameters
     ----------
     fine, coarse : from the same time on, both with all their time points
+    stops : whether there are limits, which may be met between two times of the coarse one. Elsewhere values that jump
+        are those of loads and drives.
     """
     finer, coarser = {}, {}
     for name in counted(fine):
@@ -265,7 +269,7 @@ def single_errors(fine: Histories, coarse: Histories) -> tuple[dict[str, float],
         sizes.add((4 * own - other[: len(own)]) / 3, [other[: len(own)], own])
         if sizes.peak:
             peak = _largest(every[:, which])
-            D, jolt = float(sizes.differences[0]) / peak, _jolt(every[:, which]) / peak
+            D, jolt = float(sizes.differences[0]) / peak, _jolt(every[:, which]) / peak if stops else 0.0
             finer[name], coarser[name] = (max(D * factor, jolt) for factor in single_level(sizes.fast))
     return finer, coarser
 
