@@ -40,7 +40,8 @@ ITERATIONS = 40
 RATES = 0.01  # of a step, by which a mechanism moves on for the rates of its coordinates, of fourth order
 SLOW = 0.1  # changes that do not fall faster have their tangents assembled anew
 DIVERGED = 1e9  # m: a change with which iterations will not come back; forces of beams would soon overflow
-STIFF = 0.01  # of the displacement: changes of linear steps that fall no more are rounding, beside far stiffer links
+STIFF = 0.01  # of the displacement: changes of linear steps below it are rounding, beside far stiffer links,
+STALLED = 4  # where so many in a row have not halved
 BALANCED = 1e-6  # of the largest force: what may be left of a body's balance where changes are rounding
 Column = Float[np.ndarray, " _"]
 Seen = tuple[float, np.ndarray]
@@ -134,7 +135,7 @@ class Monolithic:
         """The same; `patience` is how many changes in a row may fall slowly before tangents are assembled anew."""
         scheme, r, hard = self.scheme, len(self.system.constraints), self.hard
         now = self._guess(old, at)
-        q, size, slow = self.W.shape[0], np.inf, 0
+        q, size, slow, least, stalled = self.W.shape[0], np.inf, 0, np.inf, 0
         lam, m = np.zeros(q), np.zeros(r)
         if patience and len(old.multiplier):
             m[hard] = (1 - scheme.alpha_f) * old.multiplier[hard]
@@ -166,11 +167,14 @@ class Monolithic:
                 break
             slow = slow + 1 if size > SLOW * before else 0
             self.kept = None if slow > patience else self.kept
+            stalled, least = 0 if size < least / 2 else stalled + 1, min(least, size)
             reached = float(np.abs(now.u).max())
-            rounding = max(1e-11, STIFF * reached) if self.linear else 1e-11
-            if size <= 1e-14 * max(1.0, reached) or (size < rounding and size > 0.5 * before):
+            lost = self.linear and stalled >= STALLED and size < STIFF * reached
+            if lost or size <= 1e-14 * max(1.0, reached) or (size < 1e-11 and size > 0.5 * before):
                 borne = max(float(np.abs(x).max(initial=0.0)) for x in (self.W.T @ lam, now.F, old.F))
-                if not self.linear and float(np.abs(left[0]).max()) > BALANCED * borne:
+                if not lost and float(np.abs(left[0]).max()) > BALANCED * borne:
+                    if self.linear:
+                        continue
                     break
                 self.kept = used
                 return self._ended(now, old, at, m, lam)
