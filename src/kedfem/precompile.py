@@ -56,8 +56,8 @@ KINDS = {
     "force elements": FREE + ANALYSIS,
 }
 """Each kind of step, on the smallest scene that takes it, without constraint equations and with them."""
-LINEAR = 2
-"""How many of them take the loop of linear steps; it is compiled beside the other, which the rest take."""
+LINEAR = ("rigid-body frames", "rigid-body frames and bushings")
+"""Those that take the loop of linear steps; it is compiled beside the other, which the rest take."""
 
 
 def precompile(watch: Callable[[str, int, int], None]) -> None:
@@ -65,14 +65,14 @@ def precompile(watch: Callable[[str, int, int], None]) -> None:
     done = _all_compiled()
     if done.exists():
         return
-    kinds = list(KINDS)
-    command = [sys.executable, "-c", f"from kedfem.precompile import few_steps; few_steps(*{kinds[LINEAR:]})"]
+    others = [kind for kind in KINDS if kind not in LINEAR]
+    command = [sys.executable, "-c", f"from kedfem.precompile import few_steps; few_steps(*{others})"]
     beside = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
-        watch(kinds[0], 0, len(kinds))
-        few_steps(*kinds[:LINEAR])
+        watch(LINEAR[0], 0, len(KINDS))
+        few_steps(*LINEAR)
         _count_cycles()
-        watch(kinds[LINEAR], LINEAR, len(kinds))
+        watch(others[0], len(LINEAR), len(KINDS))
         failed = beside.wait()
     finally:
         beside.kill()

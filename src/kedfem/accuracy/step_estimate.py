@@ -275,10 +275,9 @@ def single_errors(
 
 
 def _jolt(x: Rows) -> float:
-    """How far values are from cubics through their neighbours, as where a stop is met: one step is no measure of it.
+    """How far values are from cubics through those beside them, at most: far where a stop is met within a step.
 
-    Of motion in steps that are a share ω h of its periods this is (3/8) (ω h)⁴. A march with steps twice as long has only
-    every second of these times.
+    Of a vibration at ω in steps of h, (3/8) (ω h)⁴ of its amplitude.
     """
     beside = (9 * (x[2:-4] + x[4:-2]) - x[:-6] - x[6:]) / 16
     return _largest(x[3:-3] - beside)

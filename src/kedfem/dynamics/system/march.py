@@ -141,13 +141,11 @@ def march(
     constraints = of.constraints
     if between is None or not halvings:
         constraints = constraints._replace(jumps=np.zeros_like(constraints.jumps))
-    arrays = of.bodies, of.ends, constraints
-    related: tuple[Ends, Constraints] | tuple[None, None] = of.ends, constraints
-    if not len(constraints.law):
-        related = None, None  # so that what they need is not compiled
+    none = not len(constraints.law)  # what they need is not compiled then
+    related = (None, None) if none else (of.ends, constraints)
     state, along, T, done = copied(state), driving(of, motion, loads), len(motion.t), 0
     history = empty_history(T, of.bodies, of.constraints, along.F)
-    trial, work = empty_trial(*arrays, state), room(of.bodies)
+    trial, work = empty_trial(of.bodies, of.ends, constraints, state), room(of.bodies)
     solved, marched = solver(of.parts, of.bodies.at, trial), compiled_steps(of)
     while done < T:
         left = _since(along, done), History(*(x[done:] for x in history))

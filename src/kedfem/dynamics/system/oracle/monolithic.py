@@ -172,12 +172,11 @@ class Monolithic:
             lost = self.linear and stalled >= STALLED and size < STIFF * reached
             if lost or size <= 1e-14 * max(1.0, reached) or (size < 1e-11 and size > 0.5 * before):
                 borne = max(float(np.abs(x).max(initial=0.0)) for x in (self.W.T @ lam, now.F, old.F))
-                if not lost and float(np.abs(left[0]).max()) > BALANCED * borne:
-                    if self.linear:
-                        continue
+                if lost or float(np.abs(left[0]).max()) <= BALANCED * borne:
+                    self.kept = used
+                    return self._ended(now, old, at, m, lam)
+                if not self.linear:
                     break
-                self.kept = used
-                return self._ended(now, old, at, m, lam)
         raise SolveError(
             f"analysis.solver: the iterations of the monolithic solver must converge to a balance, got none at "
             f'{float(at.t[0]):.6g} s: take solver = "condensed", or a smaller step'
