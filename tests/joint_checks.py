@@ -8,7 +8,9 @@ from scipy.interpolate import CubicSpline
 
 from kedfem.accuracy.prepared import Prepared
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.joints.ports import turned_vectors
+from kedfem.dynamics.joints.attachments import interface_matrix
+from kedfem.dynamics.joints.constraint_matrices import joint_rows
+from kedfem.dynamics.joints.ports import turned_ports, turned_vectors
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.links.record import Link, in_space
 from kedfem.motion.joint_equations import joint_axis, unit
@@ -189,6 +191,21 @@ def _left(ready: Prepared, blocks: list[Block], k: int) -> np.ndarray:
     for c, m in enumerate(ready.model.links[k].mass):
         F[:, :, c] -= (m @ a[:, :, c].T).T
     return F
+
+
+def row_values(ready: Prepared, block: Block) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """C (T, r, k) of all rows, z (T, k), and the rows' forces μ (T, r) from port forces alone: Σ Bᵀ R λ = Cᵀ μ."""
+    model, T = ready.model, len(block)
+    rows = joint_rows(model.rows, block.motion, model.interface_unknowns)
+    assert rows is not None
+    C = np.stack([rows.at(k).toarray() for k in range(T)])
+    every = list(zip(model.joints, block.links, strict=True))
+    w = [(x.weights @ own.u[:, x.nodes]).reshape(T, -1)[:, x.keep] for x, own in every]
+    p = [turned_ports(x, own.R, own.port_forces) for x, own in every]
+    B = interface_matrix(model.joints).toarray()
+    pushed = np.concatenate(p, axis=1) @ B
+    mu = np.linalg.pinv(C.transpose(0, 2, 1), rcond=1e-9) @ pushed[..., None]
+    return C, np.concatenate(w, axis=1) @ np.linalg.pinv(B).T, mu[..., 0]
 
 
 def _of_nodes(link: Link, at: Bodies, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

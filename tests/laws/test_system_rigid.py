@@ -8,10 +8,11 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from kedfem.dynamics.stepping.start import initial_rates
-from kedfem.dynamics.system.forces.supports import supports
+from kedfem.dynamics.system.forces.supports import Supports
 from kedfem.dynamics.system.march import displacements, march
 from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.dynamics.system.state import History
+from kedfem.dynamics.system.steps import multipliers_of
 from kedfem.motion.newton import cross_matrix
 from tests.laws.test_system import elements, four_bar
 from tests.moving import bar
@@ -122,7 +123,7 @@ def joint_force(of: Begun, history: History, k: int, joint: str) -> np.ndarray:
     ports = of.ready.system.model.joints[k]
     every = history.port_force @ ports.shares.T
     along = of.motion(of.ready.c.h * np.arange(1, len(every) + 1))
-    seen = supports(of.ready, history, along)
+    seen = Supports(multipliers_of(of.ready, history), along)
     every += seen.on_interface(of.ready.system.model.rows) @ ports.from_rows.T
     rows = every.reshape(len(every), len(ports.points), ports.components)
     own = [name == joint for name in ports.joints]

@@ -9,13 +9,12 @@ import pytest
 from kedfem.accuracy.prepared import Prepared
 from kedfem.analysis import analyse
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.joints.constraint_matrices import joint_rows
 from kedfem.results.audit import Account
 from kedfem.results.cross_checks import CrossChecks
-from kedfem.results.forces.constraint_forces import ConstraintForces, interface
 from kedfem.results.forces.force_elements import Measured, measured_elements
 from kedfem.results.recording import recording, rows
 from kedfem.scene import scene_from
+from tests.joint_checks import row_values
 from tests.laws.test_limits import AXES
 from tests.laws.test_moving_ground import sprung
 from tests.moving import ran
@@ -113,14 +112,12 @@ def test_what_constraints_that_vary_do_on_the_elastic_motion_is_their_forces_tim
         raw["analysis"]["step"] = step
         ready, blocks = ran(raw)
         checks, account = compared(ready, blocks)
-        model, work, forces, C, z, mu = ready.model, [], ConstraintForces(ready.model), [], [], []
+        work, seen = [], []
         for block in blocks:
             found = account.rows(block)
             work.append(found["work"][:, 1] - found["driven"][:, 0])
-            rows = joint_rows(model.rows, block.motion, model.interface_unknowns)
-            C.append([rows.at(k).toarray() for k in range(len(block))])
-            z.append(interface(model, block))
-            mu.append(forces.of(block))
+            seen.append(row_values(ready, block))
+        C, z, mu = map(list, zip(*seen, strict=True))
         rate = np.einsum("tr,trk,tk->t", means(mu), np.diff(np.concatenate(C), axis=0), means(z))
         by_rows = np.concatenate([[0.0], -np.cumsum(rate)])
         assert np.abs(by_rows).max() > part * checks.exchanged

@@ -22,19 +22,26 @@ from kedfem.dynamics.force_element import (
     TURN,
     End,
     ForceElement,
+    evaluated,
     kernel_table,
+    wrench,
 )
 from kedfem.dynamics.force_elements import force_elements, hinges
 from kedfem.dynamics.force_elements_kernel import evaluate, evaluate_all
 from kedfem.dynamics.history import Block, LinkHistory
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.system.forces.exerted import at_ends
+from kedfem.dynamics.system.forces.supports import supports
 from kedfem.errors import MeshError, SceneError
 from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.linkage import linkage
 from kedfem.motion.rigid import resting
-from kedfem.results.recording import recording, rows
+from kedfem.results.forces.force_elements import acting, measured_elements
+from kedfem.results.recording import recording
 from kedfem.scene import Factor, Pieces, Scene, pieces, scene_from
 from tests.laws.strategies import examples
+from tests.moving import ran
+from tests.rooms.test_driven_efforts import ON_CRANK, four_bar
 from tests.scenes import bar
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -429,33 +436,62 @@ def blocks(model: Model, t: np.ndarray, angle: np.ndarray, length: int) -> list[
 
 @pytest.mark.parametrize("kind", ["beam", "plane", "solid"])
 @pytest.mark.parametrize("length", [1, 7, 100])
-def test_channels_tell_how_motors_and_springs_moved(kind: str, length: int) -> None:
-    """Over a turn, in blocks; the joint's axis is −z, a motor over speed, a spring from the tip to the ground."""
+def test_a_channel_tells_how_a_hinge_turned(kind: str, length: int) -> None:
+    """Over a turn, in blocks; the joint's axis is −z."""
+    scene, model = built(arm(kind))
+    t = np.linspace(0, 2, 61)
+    angle = 2.5 * np.pi * np.sin(np.pi * t / 4) ** 2
+    wanted = [x for x in recording(scene, model) if x.channel.name == "joints/A/angle"]
+    got = np.concatenate([wanted[0].rows(block) for block in blocks(model, t, angle, length)])
+    np.testing.assert_allclose(got[:, 0], -angle, atol=1e-8)
+    again = wanted[0].rows(blocks(model, t, angle, 5)[0])  # a new run counts from zero
+    np.testing.assert_allclose(again[:, 0], -angle[:5], atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["beam", "plane", "solid", "rigid-body", "monolithic"])
+def test_channels_and_forces_are_those_of_laws_where_links_are(kind: str) -> None:
+    """The system's coordinates against the kernel's, from the links' states; the joint's axis is −z, a motor over speed.
+
+    A coupling surface turns by its rotation there and by its directions here: they differ by the square of its strain.
+    """
     motor = {"joint": "A", "torque": {"over": "speed", "at": [-20, 20], "value": [10, -10]}}
     torsion = {"kind": "torsion", "joint": "A", "stiffness": 2, "damping": 0.5, "free_angle": 1}
     tip = [1, 0] if kind == "beam" else [0.98, 0]
-    raw = arm(kind, motors={"m": motor}, springs={"t": torsion, "s": spring("arm", tip, [0, 2], damping=3)})
-    scene, model = built(raw)
-    t = np.linspace(0, 2, 61)
-    angle = 2.5 * np.pi * np.sin(np.pi * t / 4) ** 2
-    recorded = recording(scene, model)
-    assert not any(each.channel.name.startswith("drive") for each in recorded)
-    sections = ("motors", "springs")
-    wanted = [x for x in recorded if x.channel.name.split("/")[0] in sections or "angle" in x.channel.name]
-    parts = [rows(wanted, block) for block in blocks(model, t, angle, length)]
-    got = {name: np.concatenate([part[name][:, 0] for part in parts]) for name in parts[0]}
-    rate = np.gradient(angle, t)
-    place = np.linalg.norm(tip) * np.array([np.cos(angle), np.sin(angle)])
-    length_now = np.hypot(place[0], place[1] - 2)
-    stretch = rate * (place[0] * (place[1] - 2) - place[1] * place[0]) / length_now
-    pull = 10 * (length_now - np.hypot(tip[0], 2)) + 3 * stretch
-    expected = {
-        "motors/m/angle": -angle, "motors/m/speed": -rate, "motors/m/torque": np.interp(-rate, [-20, 20], [10, -10]),
-        "springs/t/angle": -angle, "springs/t/torque": -2 * (-angle - 1) + 0.5 * rate,
-        "springs/s/length": length_now, "springs/s/force": pull, "joints/A/angle": -angle,
-    }  # fmt: skip
-    assert list(got) == list(expected)
-    for name, values in expected.items():
-        np.testing.assert_allclose(got[name], values, atol=1e-8, err_msg=name)
-    again = rows(wanted, blocks(model, t, angle, 5)[0])  # a new run counts from zero
-    np.testing.assert_allclose(again["joints/A/angle"][:, 0], -angle[:5], atol=1e-9)
+    if kind in ("rigid-body", "monolithic"):
+        raw = four_bar("rigid", ON_CRANK["spring to the rocker"])
+        raw["analysis"] |= {"solver": "monolithic"} if kind == "monolithic" else {"frames": kind}
+        raw["motors"] = {"m": {"joint": "D", "torque": {"over": "angle", "at": [0, 2], "value": [5, 1]}}}
+    else:
+        raw = arm(
+            kind, motors={"m": motor}, springs={"t": torsion, "s": spring("arm", tip, [0, 2], damping=3)}
+        )
+        raw["analysis"] = {"end_time": 0.5, "step": 5e-3, "rho_inf": 0.8}
+    ready, every = ran(raw)
+    elements = force_elements(ready.scene, ready.model)
+    measured, turned, table = (
+        measured_elements(ready.scene, ready.model),
+        np.zeros(len(elements)),
+        kernel_table(elements),
+    )
+    channels = acting(ready.scene, measured)
+    assert not any(each.channel.name.startswith("drive") for each in channels)
+    for block in every:
+        here = evaluated(elements, table, turned, block.motion, block.links)
+        got = {each.channel.name: each.rows(block)[:, 0] for each in channels}
+        for i, element in enumerate(elements):
+            q, rate, Q = here.values[:, i, :3].T
+            values = {"angle": q, "length": q, "speed": rate, "torque": Q, "force": -Q}
+            for what in values.keys() & {
+                x.rpartition("/")[2] for x in got if x.startswith(f"{element.name}/")
+            }:
+                assert_near(got.pop(f"{element.name}/{what}"), values[what])
+            for e, on in enumerate(at_ends(supports(block), element.name.replace("/", "."))):
+                for x, wanted in zip(
+                    on, wrench(element.ends[e], here.x[:, i, e], here.forces[:, i, e]), strict=True
+                ):
+                    assert_near(x, wanted)
+        assert set(got) <= {"joints/A/angle"}
+
+
+def assert_near(x: np.ndarray, wanted: np.ndarray) -> None:
+    np.testing.assert_allclose(x, wanted, rtol=0, atol=1e-6 * max(np.abs(wanted).max(), 1.0))

@@ -10,17 +10,18 @@ from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.joints.constraint_matrices import joint_rows
+from kedfem.dynamics.joints.constraint_matrices import directions, joint_rows
 from kedfem.dynamics.joints.first_rows import interface_values
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
+from kedfem.dynamics.system.forces.exerted import effort, wrench
+from kedfem.dynamics.system.forces.supports import supports
 from kedfem.errors import MeshError, SceneError
 from kedfem.motion.linkage import linkage
 from kedfem.output.words import clock, moment
-from kedfem.results.forces.constraint_forces import ConstraintForces, deflections
 from kedfem.scene import scene_from
 from tests.cells import Cell, scene_of
-from tests.joint_checks import unbalanced
+from tests.joint_checks import row_values, unbalanced
 from tests.moving import (
     bar,
     cardan,
@@ -163,6 +164,31 @@ def test_the_first_rates_and_accelerations_keep_rows_closed() -> None:
     t = blocks[1].motion.t[[3, 7]]
     e = [np.abs(later.at(k) @ (z + s * z1 + s**2 / 2 * z2)).max() for k, s in zip((3, 7), t, strict=True)]
     assert_allclose(e[1] / e[0], 8, rtol=0.2)
+
+
+@pytest.mark.parametrize("kind", list(KINDS))
+def test_multipliers_of_the_system_are_what_bears_the_port_forces(kind: str) -> None:
+    """Σ Bᵀ R λ = Cᵀ μ: force and moment of each joint along its rows, and the efforts of drive and gears among them."""
+    ready, blocks = ran(KINDS[kind]())
+    for block in blocks:
+        mu, first, forces = row_values(ready, block)[2], 0, supports(block)
+        near = 1e-8 * max(np.abs(mu).max(), 1.0)
+        for row in ready.model.rows:
+            own, along = mu[:, first : first + len(row.gap)], directions(row, block.motion)
+            first += len(row.gap)
+            if row.plus:
+                assert_allclose(effort(forces, row.name), own[:, 0], rtol=0, atol=near)
+                continue
+            force, moment, point = wrench(forces, row)
+            assert_allclose(point, along.point, rtol=0, atol=1e-12)
+            for got, n in ((force, along.gap), (moment, along.turn)):
+                wanted = np.einsum("tr,trk->tk", own, n)
+                assert_allclose(got, wanted, rtol=0, atol=near)
+            if row.name in ready.scene.driven_joints:
+                axis = block.motion.R[:, row.bodies[1]] @ row.axis
+                slides = ready.scene.joints[row.name].kind == "prismatic"
+                wanted = ((force if slides else moment) * axis).sum(axis=1)
+                assert_allclose(effort(forces, row.name), wanted, rtol=0, atol=near)
 
 
 @pytest.mark.parametrize("kind", list(KINDS))
@@ -311,13 +337,11 @@ def swung(kind: str, rho_inf: float, revolutions: float) -> None:
         inverted("beam", kind, revolutions=revolutions, steps_per_revolution=720, rho_inf=rho_inf)
     )
     ready, blocks = ran(scene.model_dump())
-    forces, open_, most = ConstraintForces(ready.model), 0.0, []
-    force = []
+    open_, most, force = 0.0, [], []
     for block in blocks:
-        rows = joint_rows(ready.model.rows, block.motion, ready.model.interface_unknowns)
-        assert rows is not None
-        open_ = max(open_, float(np.abs(deflections(ready.model, block, rows)).max()))
-        force.append(forces.of(block)[:, 0])
+        C, z, mu = row_values(ready, block)
+        open_ = max(open_, float(np.abs(C @ z[..., None]).max()))
+        force.append(mu[:, 0])
         most.append(np.max([np.abs(link.u).max(axis=(1, 2)) for link in block.links], axis=0))
     every, bent = np.concatenate(force), np.concatenate(most)
     n = len(every) // 2

@@ -149,12 +149,11 @@ def rigid_vectors(end: End, motion: RigidMotion) -> Vectors:
 
 @dataclass(frozen=True, slots=True)
 class Evaluated:
-    """Force elements over time: vectors of both ends, forces on them, values as of the kernel, stiffness factors."""
+    """Force elements over time: vectors of both ends, forces on them, values as of the kernel."""
 
     x: Float[np.ndarray, "T A 2 2 3"]
     forces: Float[np.ndarray, "T A 2 2 3"]
     values: Float[np.ndarray, "T A 4"]
-    factors: Float[np.ndarray, "T A"]
 
 
 def evaluated(
@@ -180,7 +179,7 @@ def evaluated(
     factors = stiffness_factors([each.factor for each in every], motion.t, motion.phi)
     values = np.zeros((len(motion.t), len(every), 4))
     evaluate_all(motion.t, factors, x, v, turned, table, forces, values)
-    return Evaluated(x, forces, values, factors)
+    return Evaluated(x, forces, values)
 
 
 def wrench(

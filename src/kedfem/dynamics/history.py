@@ -118,43 +118,34 @@ def bent(u: Float[np.ndarray, "n d"], R: Float[np.ndarray, "d d"]) -> LinkMoment
 
 
 @dataclass(frozen=True, slots=True)
-class Exerted:
-    """What constraint equations and force laws exert over T time points, where bodies are; world components.
+class Multipliers:
+    """What a march says of its system's constraints and laws at T time points; `dynamics.system.forces` has their forces.
 
-    wrench : (T, J, 3, 3) of joints by constraint equations, in the order of the model's: force on link i, moment about
-        its point there, and that point
-    effort : (T, J) along the coordinate of a joint's drive, and of gears along that of their first joint
-    spring : (T, 2, s) deflection and force of the springs of bushings and shafts; stiffness, damping : (s,) of each
-    element : (T, 3, A) coordinate, its rate and force along it of motors and springs, in the order of `force_elements`
-    ends : (T, A, 2, 2, 3) force and moment about the world's origin at both ends of each
-    ports : (T, m) forces on interface points of joints by constraint equations, side by side
+    system : whose march that is; None where nothing was marched
+    z : (T, k) interface unknowns
+    e, rate, multiplier : (T, c) coordinates, their rates, and forces along them
     """
 
-    wrench: Float[np.ndarray, "T J 3 3"]
-    effort: Float[np.ndarray, "T J"]
-    spring: Float[np.ndarray, "T 2 s"]
-    element: Float[np.ndarray, "T 3 A"]
-    ends: Float[np.ndarray, "T A 2 2 3"]
-    ports: Float[np.ndarray, "T m"]
-    stiffness: Float[np.ndarray, " s"]
-    damping: Float[np.ndarray, " s"]
+    system: Any
+    z: Float[np.ndarray, "T k"]
+    e: Float[np.ndarray, "T c"]
+    rate: Float[np.ndarray, "T c"]
+    multiplier: Float[np.ndarray, "T c"]
 
-    def every(self, which: slice | Int[np.ndarray, " k"]) -> "Exerted":
+    def every(self, which: slice | Int[np.ndarray, " k"]) -> "Multipliers":
         """Some of the time points."""
-        return replace(self, **{name: getattr(self, name)[which] for name in OVER_TIME})
+        return multipliers_together([self], lambda each: each[0][which])
 
 
-OVER_TIME = ("wrench", "effort", "spring", "element", "ends", "ports")
+NONE = Multipliers(None, *np.zeros((4, 0, 0)))
 
 
-def exerted_together(
-    parts: Sequence[Exerted | None], how: Callable[[list[np.ndarray]], Float[np.ndarray, "..."]]
-) -> Exerted | None:
-    """One of several, each array by the same formula; None if there is none."""
-    known = [each for each in parts if each is not None]
-    if len(known) < len(parts) or not known:
-        return None
-    return replace(known[0], **{name: how([getattr(x, name) for x in known]) for name in OVER_TIME})
+def multipliers_together(
+    parts: Sequence[Multipliers], how: Callable[[list[np.ndarray]], Float[np.ndarray, "..."]]
+) -> Multipliers:
+    """One of several, each array by the same formula."""
+    names = ("z", "e", "rate", "multiplier")
+    return Multipliers(parts[0].system, *(how([getattr(x, name) for x in parts]) for name in names))
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +157,7 @@ class Block:
     links : per link
     levels : the same time points as each level has them (`dynamics.stepping.levels`), coarsest first; none of one march
     fine : whether these are not the time points of the analysis, but all those of the finest level, numbered in its steps
-    exerted : what constraint equations and force laws exert, of solvers that know it themselves
+    multipliers : of the march that took these steps
     """
 
     step: int
@@ -174,7 +165,7 @@ class Block:
     links: Sequence[LinkHistory]
     levels: tuple["Block", ...] = ()
     fine: bool = False
-    exerted: Exerted | None = None
+    multipliers: Multipliers = NONE
 
     def __len__(self) -> int:
         return len(self.motion.t)
@@ -185,8 +176,8 @@ class Block:
             return self
         links = [each.part(first, end) for each in self.links]
         levels = tuple(each.part(first, end) for each in self.levels)
-        exerted = None if self.exerted is None else self.exerted.every(slice(first, end))
-        return Block(self.step + first, self.motion.part(first, end), links, levels, self.fine, exerted)
+        multipliers = self.multipliers.every(slice(first, end))
+        return Block(self.step + first, self.motion.part(first, end), links, levels, self.fine, multipliers)
 
     def every(self, stride: int) -> "Block":
         """Some of its time points, the first and each so many further on; without products."""
@@ -195,8 +186,7 @@ class Block:
     def chosen(self, which: slice | Int[np.ndarray, " k"]) -> "Block":
         """Some of its time points; without products and levels."""
         links = [link.every(which) for link in self.links]
-        exerted = None if self.exerted is None else self.exerted.every(which)
-        return Block(self.step, self.motion.at(which), links, exerted=exerted)
+        return Block(self.step, self.motion.at(which), links, multipliers=self.multipliers.every(which))
 
     def at(self, k: int) -> "Snapshot":
         """The k-th of its time points."""

@@ -33,7 +33,7 @@ from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.dynamics.stiffening import Stiffening, StressModes, Turning
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.balance import Balance, Flow, Stress, fields_of, flow, prescribed_fields, stress
-from kedfem.results.forces.constraint_forces import ConstraintForces, row_work
+from kedfem.results.forces.constraint_forces import row_work
 from kedfem.results.forces.force_elements import Measured
 from kedfem.results.forces.moments import Constants, RigidRates, constants, rates_of_bodies
 from kedfem.results.forces.resistance import Last, last_of, products, resistance
@@ -100,7 +100,7 @@ class Account:
         self._groups = [group for k in (2, 3) for group in _grouped(self.of, k)]
         self._prescribed_groups = [group for k in (2, 3) for group in _grouped(self.prescribed, k)]
         self._block: Block | None = None
-        self._forces = ConstraintForces(model)
+        self._displaced = any(link.fit is not None for link in model.links)
         self._begin()
 
     def _begin(self) -> None:
@@ -134,7 +134,7 @@ class Account:
         """Energies and sums of one more block."""
         flow, taken = self._flows(block)
         strain = np.sum([link.strain for link in block.links], axis=0)
-        springs = row_work(self.model, block, self._mu(block), self._springs) if self.model.rows else None
+        springs = row_work(block, self._springs) if self.model.rows else None
         pushed = np.zeros(len(block))
         if springs is not None:
             # what springs push is no support's work: they store it or take it
@@ -154,7 +154,7 @@ class Account:
         neglected = neglected - (stressed.stored - self._stored)
         dissipated, drag, pushed = total.T
         driven, supports = supports - led, supports - pushed
-        if block.exerted is not None:  # constraints along directions of displaced bodies do no work in all
+        if self._displaced:  # constraints along directions of displaced bodies do no work in all
             driven = supports
         change = energy - self._start
         left = change - loads - supports + dissipated + drag + neglected
@@ -181,10 +181,6 @@ class Account:
             more = stress(of, links, made, at.of(_bodies(of), of[0].k))
             found = Stress(found.power + more.power, found.stored + more.stored)
         return found
-
-    def _mu(self, block: Block) -> Rows:
-        """Forces of rows, unless the block knows those of springs."""
-        return np.zeros((len(block), 0)) if block.exerted is not None else self._forces.of(block)
 
     def _flows(self, block: Block) -> tuple[Flow, Float[np.ndarray, "T 2"]]:
         """Of all links, and what damping takes in each step."""

@@ -47,7 +47,7 @@ def recording(
     drive = [
         channel for name in scene.driven_joints for channel in drive_channels(scene, model, name, forces)
     ]
-    gears = [gear_channel(model, name, forces) for name in scene.gears]
+    gears = [gear_channel(model, name) for name in scene.gears]
     energies = [Recorded(*each) for each in energy_channels(account)]
     if without_vibration(scene):  # sums over time steps say nothing of positions found each by itself
         energies = [each for each in energies if each.channel.name == STRAIN]

@@ -8,7 +8,7 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.frames import mean_rotations
-from kedfem.dynamics.history import Block, LinkHistory, exerted_together
+from kedfem.dynamics.history import Block, LinkHistory, multipliers_together
 from kedfem.dynamics.joints.ports import turned_vectors
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.segment import position
@@ -61,9 +61,9 @@ class Combination:
             now = [{n: x[n] - y[n] for n in LINEAR} for x, y in zip(combined, seen[-1], strict=True)]
             yield self._fine(taken[-1], strides[-1], now)
             self.corrections = [{name: x[-1:] for name, x in each.items()} for each in now]
-        exerted = exerted_together([x.exerted for x in levels], self._weighted)
+        multipliers = multipliers_together([x.multipliers for x in levels], self._weighted)
         links = [self._history(k, x, motion) for k, x in enumerate(combined)]
-        yield Block(first, motion, links, levels, exerted=exerted)
+        yield Block(first, motion, links, levels, multipliers=multipliers)
 
     def _weighted(self, parts: list[np.ndarray]) -> Float[np.ndarray, "..."]:
         """The levels' values as one."""
@@ -81,7 +81,7 @@ class Combination:
                 s = (share / stride).reshape(-1, *[1] * (x.ndim - 1))
                 own[name] = own[name] + (1 - s) * x[point] + s * x[after]
             links.append(self._history(k, own, finest.motion))
-        return Block(finest.step, finest.motion, links, fine=True, exerted=finest.exerted)
+        return Block(finest.step, finest.motion, links, fine=True, multipliers=finest.multipliers)
 
     def _history(self, k: int, x: Fields, motion: RigidMotion) -> LinkHistory:
         """A link's combined state: its frame where its positions now are, energy of its deformation now."""

@@ -22,7 +22,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.history import Block, exerted_together, joined
+from kedfem.dynamics.history import Block, joined, multipliers_together
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_links import for_steps
 from kedfem.dynamics.stepping.combined import Combination, level_weights
@@ -200,8 +200,8 @@ class _Stream:
         if len(parts) < 2:
             return parts[0] if parts else None
         motion = motions_joined([x.motion for x in parts])
-        exerted = exerted_together([x.exerted for x in parts], np.concatenate)
-        return Block(parts[0].step, motion, joined([list(x.links) for x in parts]), exerted=exerted)
+        multipliers = multipliers_together([x.multipliers for x in parts], np.concatenate)
+        return Block(parts[0].step, motion, joined([list(x.links) for x in parts]), multipliers=multipliers)
 
     def _next(self) -> Block | None:
         if self.failed is not None:

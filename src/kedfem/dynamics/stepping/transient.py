@@ -55,8 +55,8 @@ def transient(
     if state is None:
         state = started(scene, linkage, along, model, solver) if mark.start is None else mark.start
         drawn = motion_at(np.zeros(1))
-        links, exerted = solver.first(state, forcings(model, drawn), motion_at)
-        yield Block(0, drawn, links, exerted=exerted)
+        links, multipliers = solver.first(state, forcings(model, drawn), motion_at)
+        yield Block(0, drawn, links, multipliers=multipliers)
     for first, motion in motions(scene, linkage, along, since):
         for k in range(0, len(motion.t), length):
             if first + k < since:
@@ -65,14 +65,14 @@ def transient(
             part = motion.part(k, k + length)
             forcing = forcings(model, part)
             try:
-                links, exerted, state = solver.advance(state, forcing, part, motion_at)
+                links, multipliers, state = solver.advance(state, forcing, part, motion_at)
             except ConvergenceError as failed:
                 if failed.taken:
-                    links, exerted = solver.handed_on(failed.history, forcing, part)
-                    yield Block(first + k, part.part(0, failed.taken), links, exerted=exerted)
+                    links, multipliers = solver.handed_on(failed.history, forcing, part)
+                    yield Block(first + k, part.part(0, failed.taken), links, multipliers=multipliers)
                 at = _moment(linkage, part, failed.taken)
                 raise SolveError(_stuck(first + k + failed.taken, at, failed, solver)) from None
-            yield from _finite(linkage, Block(first + k, part, links, exerted=exerted))
+            yield from _finite(linkage, Block(first + k, part, links, multipliers=multipliers))
     _marched(solver, state)
 
 
@@ -94,8 +94,8 @@ def _positions(
                 state = deflection_in_motion(of, motion_at, time=t, near=state, like=shared)
         except NoBalanceError as failed:
             raise SolveError(_unbalanced(scene, _moment(linkage, motion, 0), failed.moves)) from None
-        links, exerted = solver.first(state, forcing, motion_at, shared)
-        yield from _finite(linkage, Block(k, motion, links, exerted=exerted))
+        links, multipliers = solver.first(state, forcing, motion_at, shared)
+        yield from _finite(linkage, Block(k, motion, links, multipliers=multipliers))
 
 
 def _unbalanced(scene: Scene, moment: str, moves: str) -> str:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.history import Exerted, Forcing, LinkHistory, Products
+from kedfem.dynamics.history import Forcing, LinkHistory, Multipliers, Products
 from kedfem.dynamics.joints.constraint_ports import LinkageLayout
 from kedfem.dynamics.joints.coupling import joined
 from kedfem.dynamics.joints.ports import port_columns, turned_ports
@@ -23,8 +23,8 @@ from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.dynamics.stiffening import Stiffening
 from kedfem.dynamics.system.blank import empty_history
 from kedfem.dynamics.system.build import system_of
-from kedfem.dynamics.system.forces.exerted import ELEMENTS, exerted, on_links
-from kedfem.dynamics.system.forces.supports import supports
+from kedfem.dynamics.system.forces.exerted import on_links
+from kedfem.dynamics.system.forces.supports import Supports
 from kedfem.dynamics.system.forces.turning_loads import turned, turning
 from kedfem.dynamics.system.layout import points_of
 from kedfem.dynamics.system.march import Motion, Ready, displacements, march, ready
@@ -35,7 +35,7 @@ from kedfem.dynamics.system.record import TANGENTIAL, System
 from kedfem.dynamics.system.starts.accelerations import accelerated_in_a_step, accelerations
 from kedfem.dynamics.system.starts.deflected import plucked, quasi_static
 from kedfem.dynamics.system.starts.initial_states import rest
-from kedfem.dynamics.system.starts.instant import Instant
+from kedfem.dynamics.system.starts.instant import Instant, renumbered
 from kedfem.dynamics.system.starts.internal_forces import own
 from kedfem.dynamics.system.state import History, State
 from kedfem.links.stations import Stations
@@ -112,10 +112,7 @@ class Steps:
             from kedfem.dynamics.system.oracle.monolithic import Monolithic
 
             self.oracle = Monolithic(system, scheme)
-        every = dict(
-            zip(ELEMENTS, (list(scene.motors), list(scene.springs), list(scene.limits)), strict=True)
-        )
-        self.elements = [f"{kind}{name}" for kind, names in every.items() for name in names]
+        self.elements = bool(scene.motors or scene.springs or scene.limits)
         bodies = linkage(scene).bodies
         self.riders = {bodies.index(x.name): (x.carrier, x.weights) for x in system.model.sliders}
         joints = list(zip(model.links, model.joints, system.model.joints, strict=True))
@@ -151,7 +148,7 @@ class Steps:
 
     def first(
         self, state: State, forcing: Sequence[Forcing], motion_at: Motion, like: Instant | None = None
-    ) -> tuple[list[LinkHistory], Exerted | None]:
+    ) -> tuple[list[LinkHistory], Multipliers]:
         """The time point at which a state is, as histories; `like` is another instant of the same system."""
         motion = motion_at(state.time[:1])
         found = _as_history(self.ready, state, motion)
@@ -165,7 +162,7 @@ class Steps:
         forcing: Sequence[Forcing],
         motion: RigidMotion,
         motion_at: Motion | None = None,
-    ) -> tuple[list[LinkHistory], Exerted | None, State | Now]:
+    ) -> tuple[list[LinkHistory], Multipliers, State | Now]:
         """All time points of a block, one step after the other, [KED, eq. (20)].
 
         Parameters
@@ -195,18 +192,14 @@ class Steps:
 
     def handed_on(
         self, found: History, forcing: Sequence[Forcing], motion: RigidMotion
-    ) -> tuple[list[LinkHistory], Exerted | None]:
+    ) -> tuple[list[LinkHistory], Multipliers]:
         """All links over the first time points of a block, as far as a history goes."""
         T = len(found.u)
         forcing, motion = [x.first(T) for x in forcing], motion.part(0, T)
-        if not (self.elements or self.corotational):  # nothing asks what constraints exert
-            return [self._link(k, found, each) for k, each in enumerate(forcing)], None
-        forces = supports(self.ready, found, motion)
-        acting = on_links(forces, self.riders) if self.elements else {}
+        multipliers = multipliers_of(self.ready, found)
+        acting = on_links(Supports(multipliers, motion), self.riders) if self.elements else {}
         every = [self._link(k, found, each, acting.get(k)) for k, each in enumerate(forcing)]
-        if not self.corotational:
-            return every, None
-        return self._with_turning_loads(every, motion), exerted(forces, self.elements)
+        return self._with_turning_loads(every, motion) if self.corotational else every, multipliers
 
     def _with_turning_loads(self, every: list[LinkHistory], motion: RigidMotion) -> list[LinkHistory]:
         """Forces F with those of loads that turn with links."""
@@ -261,6 +254,11 @@ class Steps:
             return Products(v, Kg, None)
         Cg = displacements(self.ready, k, found.Cg) if self.model.damping.present else None
         return Products(displacements(self.ready, k, found.Mv), Kg, Cg)
+
+
+def multipliers_of(of: Ready, found: History) -> Multipliers:
+    """Of all times of a history."""
+    return Multipliers(of.system, found.z[:, renumbered(of)], found.e, found.rate, found.multiplier)
 
 
 def _as_history(of: Ready, state: State, motion: RigidMotion) -> History:

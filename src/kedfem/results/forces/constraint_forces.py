@@ -1,6 +1,6 @@
-"""Joints enforced by constraint equations: their forces, Σ Bᵀ R λ = Cᵀ μ, and the energy of springs in them."""
+"""Joints enforced by constraint equations: which of their forces statics determine, and the energy of springs in them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -8,27 +8,19 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.joints.attachments import interface_matrix
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, in_plane
-from kedfem.dynamics.joints.constraint_matrices import (
-    JointRows,
-    RowGroup,
-    directions,
-    joint_rows,
-    port_rows,
-    row_groups,
-)
-from kedfem.dynamics.joints.ports import turned_ports
+from kedfem.dynamics.joints.constraint_matrices import RowGroup, row_groups
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.system.forces.exerted import springs, wrench
+from kedfem.dynamics.system.forces.supports import supports
 from kedfem.motion.rigid import resting
-from kedfem.results.recorded import once
 
 DEPENDENT = 1e-9  # singular values of rows of length one: below, one row says what others say
 
 
 @dataclass
 class ConstraintForces:
-    """μ of all rows over successive blocks, worked out once for each block; rows that share no unknown one by one."""
+    """Joints enforced by constraint equations over successive blocks."""
 
     model: Model
 
@@ -37,63 +29,11 @@ class ConstraintForces:
         """Joints by constraint equations that share interface unknowns."""
         return tuple(row_groups(self.model.rows))
 
-    @cached_property
-    def of(self) -> Callable[[Block], Float[np.ndarray, "T r"]]:
-        """Force of each row on link i along its gap, moment along its turn [N, N m]; none where no joint has rows."""
-        return once(self._multipliers)
-
     def wrench(
         self, name: str, block: Block
     ) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]:
         """Force of a joint on its link i, moment about its point there, and that point; world components."""
-        if block.exerted is not None:
-            force, moment, point = np.moveaxis(block.exerted.wrench[:, self._number(name)], 1, 0)
-            return force, moment, point
-        joint, rows = of_joint(self.model.rows, name)
-        along, mu = directions(joint, block.motion), self.of(block)[:, rows]
-        return np.einsum("tr,trk->tk", mu, along.gap), np.einsum("tr,trk->tk", mu, along.turn), along.point
-
-    def between_gears(self, name: str, block: Block) -> Float[np.ndarray, " T"]:
-        """Force along the coordinate of a pair of gears [N m or N]."""
-        if block.exerted is not None:
-            return np.asarray(block.exerted.effort[:, self._number(f"gears.{name}")])
-        return np.asarray(self.of(block)[:, of_joint(self.model.rows, f"gears.{name}")[1]][:, 0])
-
-    def _number(self, name: str) -> int:
-        return [joint.name for joint in self.model.rows].index(name)
-
-    def on_ports(self, block: Block) -> Float[np.ndarray, "T m"]:
-        """Forces on the ports of all rows, side by side, world components."""
-        return block.exerted.ports if block.exerted is not None else self._ports(block)
-
-    @cached_property
-    def _ports(self) -> Callable[[Block], Float[np.ndarray, "T m"]]:
-        """The same from the rows' forces, once for all joints that ask."""
-        return once(self._from_rows)
-
-    def _from_rows(self, block: Block) -> Float[np.ndarray, "T m"]:
-        mu, out, first = self.of(block), [], 0
-        for joint in self.model.rows:
-            here = mu[:, first : first + len(joint.gap)]
-            first += len(joint.gap)
-            for side, each in port_rows(joint, block.motion):
-                if side.shared:
-                    out.append(np.einsum("tr,trpd->tpd", here, each).reshape(len(here), -1))
-        return np.concatenate(out, axis=1)
-
-    def _multipliers(self, block: Block) -> Float[np.ndarray, "T r"]:
-        rows = sum(len(group.rows) for group in self.groups)
-        mu = np.zeros((len(block), rows))
-        if not rows:
-            return mu
-        p = np.zeros((len(block), self.model.interface_unknowns))
-        for joint, history in zip(self.model.joints, block.links, strict=True):
-            p[:, joint.columns] += turned_ports(joint, history.R, history.port_forces) @ joint.B
-        for group in self.groups:
-            C, size = _scaled(group.over(block.motion))
-            inverse = np.linalg.pinv(C.transpose(0, 2, 1), rcond=DEPENDENT)
-            mu[:, group.rows] = np.einsum("trk,tk->tr", inverse, p[:, group.columns]) / size
-        return mu
+        return wrench(supports(block), of_joint(self.model.rows, name)[0])
 
     def determined(self, name: str) -> tuple[bool, bool]:
         """Whether statics determine the force and the moment of a joint enforced by constraint equations.
@@ -136,15 +76,10 @@ def of_joint(joints: Sequence[ConstraintJoint], name: str) -> tuple[ConstraintJo
 def _null_space(group: RowGroup) -> tuple[Float[np.ndarray, "r c"], Float[np.ndarray, "r n"]]:
     """Rows of joints in the reference position, and the combinations of them that say nothing."""
     bodies = 1 + max(b for joint in group.joints for b in joint.bodies)
-    C = group.over(resting(bodies, np.zeros(1)))
-    U, s, _ = np.linalg.svd(_scaled(C)[0][0])
-    return C[0], U[:, int((s > DEPENDENT).sum()) :]
-
-
-def _scaled(C: Float[np.ndarray, "T r k"]) -> tuple[Float[np.ndarray, "T r k"], Float[np.ndarray, "T r"]]:
-    size = np.linalg.norm(C, axis=2)
-    size = np.where(size > 0, size, 1.0)
-    return C / size[..., None], size
+    C = group.over(resting(bodies, np.zeros(1)))[0]
+    size = np.linalg.norm(C, axis=1, keepdims=True)
+    U, s, _ = np.linalg.svd(C / np.where(size > 0, size, 1.0))
+    return C, U[:, int((s > DEPENDENT).sum()) :]
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,20 +99,17 @@ class ConstraintWork:
 
 
 def row_work(
-    model: Model, block: Block, mu: Float[np.ndarray, "T r"],
-    before: tuple[float, Float[np.ndarray, " s"], Float[np.ndarray, " s"]] | None,
-) -> ConstraintWork | None:  # fmt: skip
+    block: Block, before: tuple[float, Float[np.ndarray, " s"], Float[np.ndarray, " s"]] | None
+) -> ConstraintWork | None:
     """Of all springs in joints; None without any.
 
     Parameters
     ----------
-    mu : forces of all rows, where the block does not know what springs exert
     before : time, e and forces at the end of the block before
     """
-    found = _springs(model, block, mu)
-    if found is None:
+    (e, force, k, c), t = springs(supports(block)), block.motion.t
+    if not len(k):
         return None
-    (e, force, k, c), t = found, block.motion.t
     t0, e0, f0 = before or (float(t[0]), e[0], force[0])
     change = np.diff(e, axis=0, prepend=e0[None])
     h = np.diff(t, prepend=t0)
@@ -186,31 +118,3 @@ def row_work(
         0.5 * (e**2) @ k, (change**2) @ c / np.where(h > 0, h, np.inf), (mean * change).sum(axis=1),
         (float(t[-1]), e[-1], force[-1]),
     )  # fmt: skip
-
-
-def _springs(model: Model, block: Block, mu: Float[np.ndarray, "T r"]) -> tuple[np.ndarray, ...] | None:
-    """Deflections and forces (T, s) of springs in joints, and their stiffness and damping; None without any."""
-    if block.exerted is not None:
-        of = block.exerted
-        return (of.spring[:, 0], of.spring[:, 1], of.stiffness, of.damping) if len(of.stiffness) else None
-    springs = any(np.isfinite(joint.stiffness).any() for joint in model.rows)
-    rows = joint_rows(model.rows, block.motion, model.interface_unknowns) if springs else None
-    if rows is None:
-        return None
-    soft = rows.soft
-    return deflections(model, block, rows)[:, soft], mu[:, soft], rows.stiffness[soft], rows.damping[soft]
-
-
-def deflections(model: Model, block: Block, rows: JointRows) -> Float[np.ndarray, "T r"]:
-    """e = C z over time."""
-    z = interface(model, block)
-    return np.stack([rows.at(k) @ x for k, x in enumerate(z)])
-
-
-def interface(model: Model, block: Block) -> Float[np.ndarray, "T k"]:
-    """Interface unknowns z over time, from the displacements at all ports."""
-    w = [
-        (joint.weights @ history.u[:, joint.nodes]).reshape(len(block), -1)[:, joint.keep]
-        for joint, history in zip(model.joints, block.links, strict=True)
-    ]
-    return np.asarray(np.concatenate(w, axis=1) @ np.linalg.pinv(interface_matrix(model.joints).toarray()).T)

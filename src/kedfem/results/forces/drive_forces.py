@@ -5,6 +5,8 @@ import numpy as np
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.constraint_joints import ordered
 from kedfem.dynamics.model import Model, PrescribedBody
+from kedfem.dynamics.system.forces.exerted import effort
+from kedfem.dynamics.system.forces.supports import supports
 from kedfem.motion.joint_equations import joint_axis
 from kedfem.results.forces.constraint_forces import of_joint
 from kedfem.results.forces.hub_forces import hub_wrench, partner
@@ -17,7 +19,7 @@ from kedfem.scene import GROUND, Scene
 def drive_channels(scene: Scene, model: Model, driven: str, forces: Forces) -> list[Recorded]:
     """Torque of the drive on its link, about the driven joint's axis."""
     if any(row.name == driven for row in model.rows):
-        return [_row_drive(scene, model, driven, forces)]
+        return [_row_drive(scene, driven)]
     joint = scene.joints[driven]
     prescribed = next((x for x in model.prescribed if x.hub == driven), None)
     if prescribed is not None:
@@ -53,30 +55,21 @@ def _drive_channel(scene: Scene, driven: str, on: str) -> Channel:
     return Channel(key, (quantity,), unit, "world", f"{quantity} of the drive on link {on}")
 
 
-def gear_channel(model: Model, name: str, forces: Forces) -> Recorded:
+def gear_channel(model: Model, name: str) -> Recorded:
     """What gears exert on the first joint's link."""
     row, _ = of_joint(model.rows, f"gears.{name}")
     share = row.plus[0][0]
     text = f"torque of gears {name} on the link that the first joint's turn is of, about its axis"
     return Recorded(
         Channel(f"gears/{name}/torque", ("torque",), "N m", "world", text),
-        lambda block: share * forces.rows.between_gears(name, block)[:, None],
+        lambda block: share * effort(supports(block), f"gears.{name}")[:, None],
     )
 
 
-def _row_drive(scene: Scene, model: Model, driven: str, forces: Forces) -> Recorded:
+def _row_drive(scene: Scene, driven: str) -> Recorded:
     """Torque, of a slide force, of a drive enforced by constraint equations, along its axis in the second link."""
-    joint, (row, _) = scene.joints[driven], of_joint(model.rows, driven)
+    joint = scene.joints[driven]
     on = next(link for link in joint.links if link != GROUND)
-    sign, slide = 1.0 if ordered(joint)[0] == on else -1.0, joint.kind == "prismatic"
-    number = [each.name for each in model.rows].index(driven)
+    sign = 1.0 if ordered(joint)[0] == on else -1.0
     channel = _drive_channel(scene, driven, on)
-
-    def along(block: Block) -> Rows:
-        if block.exerted is not None:
-            return np.asarray(sign * block.exerted.effort[:, [number]])
-        axis = block.motion.R[:, row.bodies[1]] @ row.axis
-        effort = forces.rows.wrench(driven, block)[0 if slide else 1]
-        return np.asarray(sign * (effort * axis).sum(axis=1, keepdims=True))
-
-    return Recorded(channel, along)
+    return Recorded(channel, lambda block: sign * effort(supports(block), driven)[:, None])

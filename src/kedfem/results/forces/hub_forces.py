@@ -7,6 +7,8 @@ from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.constraint_joints import ordered
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model, PrescribedBody
+from kedfem.dynamics.system.forces.exerted import effort
+from kedfem.dynamics.system.forces.supports import supports
 from kedfem.links.record import in_space
 from kedfem.motion.constraints import cross
 from kedfem.results.forces.port_forces import Forces, Wrench, holder, port_wrench, resultant
@@ -66,25 +68,25 @@ def hub_wrench(
             f, m, point = forces.rows.wrench(name, block)
             sign = -1.0 if ordered(scene.joints[name])[0] == link.name else 1.0  # on the other link
             force, moment = force + sign * f, moment + sign * (m + cross(point - centre, f))
-        f, m = _geared(scene, model, prescribed, forces, block, centre)
+        f, m = _geared(scene, model, prescribed, block, centre)
         return force - f, moment - m
 
     return wrench, held
 
 
 def _geared(
-    scene: Scene, model: Model, prescribed: PrescribedBody, forces: Forces, block: Block, about: Rows
+    scene: Scene, model: Model, prescribed: PrescribedBody, block: Block, about: Rows
 ) -> tuple[Rows, Rows]:
     """Force and moment about points that gears exert on a prescribed link: along the coordinates of their joints."""
     force, moment = np.zeros((2, len(block), 3))
     rows = {row.name: row for row in model.rows}
     for gears in scene.gears:
         row = rows[f"gears.{gears}"]
-        effort = forces.rows.between_gears(gears, block)[:, None]
+        pushed = effort(supports(block), f"gears.{gears}")[:, None]
         for share, joint in ((1.0, row), *row.plus):
             i, j = joint.bodies
             sign = share * ((prescribed.body == i) - (prescribed.body == j))
-            along = sign * effort * (block.motion.R[:, j] @ joint.axis)
+            along = sign * pushed * (block.motion.R[:, j] @ joint.axis)
             if joint.gap.any():  # a rack's push goes through the point of link i
                 place = block.motion.p[:, i] + block.motion.R[:, i] @ joint.at
                 force, moment = force + along, moment + cross(place - about, along)

@@ -1,7 +1,7 @@
 """Forces and moments that the ports of a joint exert on a link, block by block."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,11 +11,13 @@ from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.ports import turned_ports
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.system.forces.exerted import on_ports
+from kedfem.dynamics.system.forces.supports import supports
 from kedfem.links.record import Link, in_space
 from kedfem.motion.constraints import cross
 from kedfem.results.forces.constraint_forces import ConstraintForces
 from kedfem.results.forces.force_elements import Measured
-from kedfem.results.recorded import Rows
+from kedfem.results.recorded import Rows, once
 
 INDETERMINATE = 1e-6  # [-, m] share of a loose port force of one that a joint would carry
 
@@ -26,6 +28,7 @@ class Forces:
 
     rows: ConstraintForces
     force_elements: Measured
+    on_ports: Callable[[Block], Rows] = field(default_factory=lambda: once(lambda x: on_ports(supports(x))))
 
 
 Wrench = Callable[[Block], tuple[Rows, Rows]]
@@ -45,7 +48,7 @@ def port_wrench(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"], fo
             history = block.links[j]
             f += turned_ports(model.joints[j], history.R, history.port_forces) @ share.T
         if from_rows.nnz:
-            f += forces.rows.on_ports(block) @ from_rows.T
+            f += forces.on_ports(block) @ from_rows.T
         return resultant(link, placed(block), f.reshape(len(f), len(arms), link.d))
 
     return wrench

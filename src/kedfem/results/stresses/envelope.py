@@ -5,13 +5,13 @@ coordinates, of a few columns; and `envelope_kernel` leaves out most of the time
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
 
 from kedfem.arrays import Float, Int
-from kedfem.dynamics.history import Block, Snapshot
+from kedfem.dynamics.history import NONE, Block, Snapshot
 from kedfem.dynamics.model import Model
 from kedfem.links.record import Link
 from kedfem.links.recovery import StressRecovery, stress_modes
@@ -157,7 +157,8 @@ class Envelope:
         first = int(np.searchsorted(block.motion.t, self.since))
         if first == len(block):
             return
-        self._waiting.append(block.part(first, len(block)))
+        # what waits may be stored: without multipliers, which know their system
+        self._waiting.append(replace(block.part(first, len(block)), multipliers=NONE))
         steps = sum(map(len, self._waiting))
         if steps >= STEPS or 9 * 8 * steps * self.model.unknowns >= WAITING:
             self.flush()

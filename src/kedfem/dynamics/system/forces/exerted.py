@@ -8,68 +8,29 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.history import Exerted
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side
 from kedfem.dynamics.system.ends import end_of, same_end
 from kedfem.dynamics.system.forces.poses import Vectors
 from kedfem.dynamics.system.forces.supports import Supports
-from kedfem.dynamics.system.record import Constraint, Driven, End, Spring
+from kedfem.dynamics.system.record import Constraint, End, Spring
 from kedfem.motion.constraints import cross
 
 ELEMENTS = ("motors.", "springs.", "limits.")
 Rows = Float[np.ndarray, "T _ _"]
 
 
-def joints_of(forces: Supports) -> list[ConstraintJoint]:
-    """Joints by constraint equations, and gears."""
-    return [row for row in forces.of.system.model.rows if not row.name.startswith((*ELEMENTS, "rigid."))]
-
-
-def exerted(forces: Supports, elements: Sequence[str]) -> Exerted:
-    """Of all constraints and laws of a march.
-
-    Parameters
-    ----------
-    elements : names of motors, springs and limits, as ``motors.NAME``, in the order that is recorded
-    """
-    T, joints, history = len(forces.z), joints_of(forces), forces.history
-    constraints = forces.of.system.constraints
-    number = {each.name: n for n, each in enumerate(constraints)}
-    which = [number[name] for name in elements]
-    e, m = history.e[:, which], history.multiplier[:, which]
-    soft = [n for n, each in enumerate(constraints)
-            if isinstance(each.law, Spring) and not each.name.startswith(ELEMENTS)]  # fmt: skip
-    laws = [constraints[n].law for n in soft]
-    return Exerted(
-        wrench=_stacked([wrench(forces, joint) for joint in joints], (T, 0, 3, 3)),
-        effort=_stacked([effort(forces, joint.name) for joint in joints], (T, 0)),
-        spring=np.stack([history.e[:, soft], history.multiplier[:, soft]], axis=1),
-        element=np.stack([e, history.rate[:, which], m], axis=1),
-        ends=_stacked([at_ends(forces, constraints[n], n) for n in which], (T, 0, 2, 2, 3)),
-        ports=_on_ports(forces, joints),
-        stiffness=np.array([law.stiffness for law in laws if isinstance(law, Spring)]),
-        damping=np.array([law.damping for law in laws if isinstance(law, Spring)]),
-    )
-
-
-def _stacked(each: Sequence[np.ndarray], empty: tuple[int, ...]) -> np.ndarray:
-    return np.stack(each, axis=1) if each else np.zeros(empty)
-
-
-def wrench(forces: Supports, joint: ConstraintJoint) -> Float[np.ndarray, "T 3 3"]:
-    """Force of a joint on its link i, moment about its point there, and that point; of gears nothing."""
-    out = np.zeros((len(forces.z), 3, 3))
-    every = enumerate(forces.of.system.constraints)
-    own = [(n, each) for n, each in every if each.name == joint.name and not joint.plus]
-    for n, each in own:
-        for term, ends in _pairs(forces, each):
+def wrench(forces: Supports, joint: ConstraintJoint) -> tuple[Vectors, Vectors, Vectors]:
+    """Force of a joint by constraint equations on its link i, moment about its point there, and that point."""
+    force, moment, point = np.zeros((3, len(forces), 3))
+    for n, each in enumerate(forces.constraints):
+        for term, ends in _pairs(forces, each) if each.name == joint.name else ():
             _, x, f, t = ends[0]
-            m = term.factor * forces.history.multiplier[:, n, None]
-            out[:, 2] = forces.point(each, term.i, joint.at)
-            out[:, 0] += m * f
-            out[:, 1] += m * (t + cross(x - out[:, 2], f))
-    return out
+            m = term.factor * forces.of.multiplier[:, n, None]
+            point = forces.point(each, term.i, joint.at)
+            force += m * f
+            moment += m * (t + cross(x - point, f))
+    return force, moment, point
 
 
 def _pairs(forces: Supports, each: Constraint) -> Iterator[tuple]:  # type: ignore[type-arg]
@@ -78,30 +39,35 @@ def _pairs(forces: Supports, each: Constraint) -> Iterator[tuple]:  # type: igno
 
 
 def effort(forces: Supports, name: str) -> Float[np.ndarray, " T"]:
-    """Along the coordinate of a joint's drive, or between gears; nothing of other joints."""
-    for n, each in enumerate(forces.of.system.constraints):
-        driven = isinstance(each.law, Driven) or (isinstance(each.law, Spring) and each.law.drive >= 0)
-        if each.name == name and (driven or name.startswith("gears.")):
-            return np.asarray(forces.history.multiplier[:, n])
-    return np.zeros(len(forces.z))
+    """Along the coordinate of a joint's drive, or of gears along that of their first joint [N or N m]."""
+    every = [(n, each) for n, each in enumerate(forces.constraints) if each.name == name]
+    driven = (n for n, each in every if len(every) == 1 or getattr(each.law, "drive", -1) >= 0)
+    return np.asarray(forces.of.multiplier[:, next(driven)])
 
 
-def at_ends(forces: Supports, each: Constraint, n: int) -> Float[np.ndarray, "T 2 2 3"]:
+def springs(forces: Supports) -> tuple[np.ndarray, ...]:
+    """Deflections and forces (T, s) of the springs of bushings and shafts, and their stiffness and damping (s,)."""
+    every = [(n, each.law) for n, each in enumerate(forces.constraints)
+             if isinstance(each.law, Spring) and not each.name.startswith(ELEMENTS)]  # fmt: skip
+    soft = [n for n, _ in every]
+    laws = np.array([(law.stiffness, law.damping) for _, law in every]).reshape(-1, 2)
+    return forces.of.e[:, soft], forces.of.multiplier[:, soft], *laws.T
+
+
+def at_ends(forces: Supports, name: str) -> Float[np.ndarray, "2 2 T 3"]:
     """Force and moment about the world's origin at both ends of a force element."""
-    out = np.zeros((len(forces.z), 2, 2, 3))
-    for term, ends in _pairs(forces, each):
+    out, n = np.zeros((2, 2, len(forces), 3)), forces.number(name)
+    for term, ends in _pairs(forces, forces.constraints[n]):
+        m = term.factor * forces.of.multiplier[:, n, None]
         for side, (_, x, f, t) in enumerate(ends):
-            m = term.factor * forces.history.multiplier[:, n, None]
-            out[:, side, 0] += m * f
-            out[:, side, 1] += m * (t + cross(x, f))
+            out[side] += m * f, m * (t + cross(x, f))
     return out
 
 
-def _on_ports(forces: Supports, joints: Sequence[ConstraintJoint]) -> Float[np.ndarray, "T m"]:
-    """Forces on the interface points of joints by constraint equations, side by side, if joint forces need them."""
-    if not any(joint.from_rows.nnz for joint in forces.of.system.model.joints):
-        return np.zeros((len(forces.z), 0))
-    return forces.on_interface(joints)
+def on_ports(forces: Supports) -> Float[np.ndarray, "T m"]:
+    """Forces on interface points of joints by constraint equations, side by side."""
+    rows = forces.of.system.model.rows
+    return forces.on_interface([row for row in rows if not row.name.startswith((*ELEMENTS, "rigid."))])
 
 
 def on_links(forces: Supports, riders: Mapping[int, tuple[int, np.ndarray]]) -> dict[int, Rows]:
@@ -128,7 +94,7 @@ def on_links(forces: Supports, riders: Mapping[int, tuple[int, np.ndarray]]) -> 
                 f = np.einsum("n,td->tnd", weights, pull)
                 nodes = np.arange(len(weights))
             link = model.links[k]
-            total = out.setdefault(k, np.zeros((len(forces.z), link.n, link.d)))
+            total = out.setdefault(k, np.zeros((len(forces), link.n, link.d)))
             total[:, nodes] += f[:, :, : link.d]
     return out
 
@@ -148,10 +114,10 @@ def _placed(
 
 def _on_rider(forces: Supports, name: str, end: End) -> Vectors:
     """Force of an element on a rigid slider."""
-    total = np.zeros((len(forces.z), 3))
-    for n, each in enumerate(forces.of.system.constraints):
+    total = np.zeros((len(forces), 3))
+    for n, each in enumerate(forces.constraints):
         for term, ends in _pairs(forces, each) if each.name == name else ():
             for other, _, f, _ in ends:
                 if same_end(other, end):
-                    total += term.factor * forces.history.multiplier[:, n, None] * f
+                    total += term.factor * forces.of.multiplier[:, n, None] * f
     return total

@@ -41,12 +41,12 @@ def turning(term: Term, Q_i: Float[np.ndarray, "T 3 3"], Q_j: Float[np.ndarray, 
 
 
 def poses(
-    end: End, motion: RigidMotion, z: Float[np.ndarray, "T k"]
+    end: End, motion: RigidMotion, z: Float[np.ndarray, "T k"] | None
 ) -> tuple[Vectors, Float[np.ndarray, "T 3 3"]]:
-    """Place and orientation of an end over time."""
+    """Place and orientation of an end over time; without z those that the rigid-body motion shows."""
     R = motion.R[:, end.body]
     x = motion.p[:, end.body] + R @ end.origin
-    if end.form == RIGID:
+    if end.form == RIGID or z is None:
         return x, R
     d = end.onto.shape[1]
     u = np.einsum("pdc,tc->tpd", end.onto, z[:, end.columns])
@@ -90,11 +90,11 @@ def _rotations(D: Float[np.ndarray, "T 3 3"], end: End) -> Float[np.ndarray, "T 
 
 
 def point_forces(
-    end: End, motion: RigidMotion, z: Float[np.ndarray, "T k"], force: Vectors, moment: Vectors
+    end: End, motion: RigidMotion, z: Float[np.ndarray, "T k"] | None, force: Vectors, moment: Vectors
 ) -> Float[np.ndarray, "T p d"]:
     """Forces at an end's interface points that do what a force and a moment on it do: q_k of `ends_kernel`."""
     p, d, _ = end.onto.shape
-    y = np.zeros((len(z), p, d))
+    y = np.zeros((len(force), p, d))
     flat = 2 if end.form == PLANAR_BEAM else d
     y[:, 0, :flat] = force[:, :flat]
     if end.line is not None:
@@ -103,9 +103,11 @@ def point_forces(
         y[:, 0, 2] = moment[:, 2]
     if end.form in (POINT, PLANAR_BEAM):
         return y
-    R, u = motion.R[:, end.body], np.einsum("pdc,tc->tpd", end.onto, z[:, end.columns])
-    D = _directions(end, R, u)
-    Q = _rotations(D, end)
+    R = motion.R[:, end.body]
+    D = _directions(
+        end, R, np.zeros_like(y) if z is None else np.einsum("pdc,tc->tpd", end.onto, z[:, end.columns])
+    )
+    Q = R if z is None else _rotations(D, end)
     U = Q.transpose(0, 2, 1) @ D.transpose(0, 2, 1) @ end.directions
     G = np.trace(U, axis1=1, axis2=2)[:, None, None] * np.eye(3) - U
     turn = np.linalg.solve(G, (Q.transpose(0, 2, 1) @ moment[:, :, None]))[:, :, 0]

@@ -9,42 +9,43 @@ from dataclasses import dataclass
 import numpy as np
 
 from kedfem.arrays import Float
+from kedfem.dynamics.history import Block, Multipliers
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
 from kedfem.dynamics.system.ends import corners, end_of, same_end
 from kedfem.dynamics.system.forces.poses import Vectors, point_forces, poses, turning
-from kedfem.dynamics.system.march import Ready
-from kedfem.dynamics.system.record import (
-    DISTANCE,
-    GAP,
-    Constraint,
-    End,
-    Term,
-)
-from kedfem.dynamics.system.starts.instant import renumbered
-from kedfem.dynamics.system.state import History
+from kedfem.dynamics.system.record import DISTANCE, GAP, Constraint, End, Term
 from kedfem.motion.constraints import cross
 from kedfem.motion.rigid import RigidMotion
 
 
 @dataclass(frozen=True, slots=True)
 class Supports:
-    """A march over T times: its history, the rigid-body motion at these, and what follows for forces.
+    """A march over T times: its multipliers, the rigid-body motion at these, and what follows for forces."""
 
-    Parameters
-    ----------
-    z : (T, k) interface unknowns in the order of the system
-    """
-
-    of: Ready
-    history: History
+    of: Multipliers
     motion: RigidMotion
-    z: Float[np.ndarray, "T k"]
+
+    def __len__(self) -> int:
+        return len(self.motion.t)
+
+    @property
+    def constraints(self) -> tuple[Constraint, ...]:
+        """Of the system, in the order of its multipliers."""
+        every: tuple[Constraint, ...] = self.of.system.constraints
+        return every
+
+    def number(self, name: str) -> int:
+        """The first constraint of a joint, gears or force element."""
+        return [each.name for each in self.constraints].index(name)
+
+    def z(self, each: Constraint) -> Float[np.ndarray, "T k"] | None:
+        """Interface unknowns that a constraint sees; None where the rigid-body motion alone shows its directions."""
+        return None if each.linear else self.of.z
 
     def exerted(self, each: Constraint, term: Term) -> list[tuple[End, Vectors, Vectors, Vectors]]:
         """Both ends of a term with their places, and force and moment there of a unit multiplier."""
         ends = [self.of.system.ends[n] for n in (term.i, term.j)]
-        z = np.zeros_like(self.z) if each.linear else self.z
-        (x_i, Q_i), (x_j, Q_j) = (poses(end, self.motion, z) for end in ends)
+        (x_i, Q_i), (x_j, Q_j) = (poses(end, self.motion, self.z(each)) for end in ends)
         if term.kind in (GAP, DISTANCE):
             a_i, a_j = Q_i @ (term.a - ends[0].origin), Q_j @ (term.a_j - ends[1].origin)
             gap = x_i + a_i - x_j - a_j
@@ -57,7 +58,7 @@ class Supports:
     def point(self, each: Constraint, n: int, at: Float[np.ndarray, "3"]) -> Vectors:
         """Where a point of the body of end n, in the reference position, is as a constraint sees it."""
         end = self.of.system.ends[n]
-        x, Q = poses(end, self.motion, np.zeros_like(self.z) if each.linear else self.z)
+        x, Q = poses(end, self.motion, self.z(each))
         return np.asarray(x + Q @ (at - end.origin))
 
     def on_interface(self, rows: Sequence[ConstraintJoint]) -> Float[np.ndarray, "T m"]:
@@ -65,7 +66,7 @@ class Supports:
 
         Both joints of gears may have one end: what is exerted there is reported once.
         """
-        out = [np.zeros((len(self.z), 0))]
+        out = [np.zeros((len(self), 0))]
         for row in rows:
             seen: list[End] = []
             for joint in (row, *(other for _, other in row.plus)):
@@ -75,28 +76,22 @@ class Supports:
                         for end in ends:
                             again = any(same_end(end, other) for other in seen)
                             on = self.on_end(row.name, end)
-                            out.append((0.0 * on if again else on).reshape(len(self.z), -1))
+                            out.append((0.0 * on if again else on).reshape(len(self), -1))
                         seen += ends
         return np.concatenate(out, axis=1)
 
     def on_end(self, name: str, end: End) -> Float[np.ndarray, "T p d"]:
         """What a joint's constraints and laws exert on the points of one of its ends."""
-        y = np.zeros((len(self.z), *end.onto.shape[:2]))
-        for n, each in enumerate(self.of.system.constraints):
+        y = np.zeros((len(self), *end.onto.shape[:2]))
+        for n, each in enumerate(self.constraints):
             for term in each.terms if each.name == name else ():
                 for other, _, f, t in self.exerted(each, term):
                     if same_end(other, end):
-                        m = term.factor * self.history.multiplier[:, n, None, None]
-                        z = np.zeros_like(self.z) if each.linear else self.z
-                        y += m * point_forces(end, self.motion, z, f, t)
+                        m = term.factor * self.of.multiplier[:, n, None, None]
+                        y += m * point_forces(end, self.motion, self.z(each), f, t)
         return y
 
 
-def supports(of: Ready, history: History, motion: RigidMotion) -> Supports:
-    """What a march says of forces.
-
-    Parameters
-    ----------
-    history, motion : over the same times
-    """
-    return Supports(of, history, motion, history.z[:, renumbered(of)])
+def supports(block: Block) -> Supports:
+    """What the march that took the steps of a block says of forces."""
+    return Supports(block.multipliers, block.motion)

@@ -144,7 +144,7 @@ class Monolithic:
             e, C = self.coordinates(now.z, now.turned, at)
             now.e[0] = e
             now.e[1], now.e[2] = self.rates(e, *old.e)
-            own = self._own_rates(now, old, at)
+            own = self.own_rates(now, old, at)
             for n, each in enumerate(self.system.constraints):
                 if n not in hard:
                     m[n] = -(1 - scheme.alpha_f) * force(each, at, now.e[0, n], own[n])[0]
@@ -261,7 +261,7 @@ class Monolithic:
                 e[n] = C[n] @ z
         return e, C
 
-    def _own_rates(self, now: Now, old: Now, at: RigidMotion) -> Column:
+    def own_rates(self, now: Now, old: Now, at: RigidMotion) -> Column:
         """Rates of all coordinates: Newmark's of linear ones and of those less a drive's travel.
 
         Of others by differences: the mechanism and z move on, and back, as their rates show.

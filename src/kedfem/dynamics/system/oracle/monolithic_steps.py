@@ -29,8 +29,10 @@ def monolithic_march(
     now = begun(of, solver, state, motion) if isinstance(state, State) else state
     history, number = empty_history(len(motion.t), of.bodies, of.constraints), renumbered(of)
     for t in range(len(motion.t)):
-        now = solver.step(now, motion.part(t, t + 1))
+        before, at = now, motion.part(t, t + 1)
+        now = solver.step(before, at)
         history.z[t, number], history.e[t], history.multiplier[t] = now.z, now.e[0], now.multiplier
+        history.rate[t] = solver.own_rates(now, before, at)
         history.port_force[t] = now.port_force
         for k, link in enumerate(of.system.model.links):
             R, here = motion.R[t, of.bodies.motion[k], : link.d, : link.d], solver.of[k]
