@@ -7,6 +7,9 @@ installation compiles once too, or beside the package where that cannot be used.
 kernels, and where it is reported that it compiles.
 """
 
+# mypy: disable-error-code="misc, no-untyped-call"
+# numba's own classes have no types
+
 import atexit
 import os
 import re
@@ -18,9 +21,10 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core import codegen, event
+from numba.core import codegen, event, types
 from numba.core.runtime.nrt import rtsys
 
+import kedfem.indexing_kernel  # noqa: F401  (numba knows its code then)
 from kedfem.folders import KERNELS, compiled_folder, drop_changed, note, noted
 
 ROOT = Path(__file__).parent
@@ -96,23 +100,35 @@ def _kept(options: dict[str, Any]) -> Callable[[Callable[..., Any]], Any]:
             with FileLock(lock):
                 save(key, code)
 
-        def loaded(types: object, context: Any) -> Any:
+        def loaded(given: object, context: Any) -> Any:
             if _NOTED:
                 drop_changed(Path(cache.cache_path), _NOTED, cache._impl.filename_base)
             rtsys.initialize(context)  # all that code needs of numba, which would prepare to compile as well
-            return cache._load_overload(types, context)
+            outside = _part.set(part)
+            try:
+                return cache._load_overload(given, context)
+            finally:
+                _part.reset(outside)
 
         file.save, cache.load_overload = alone, loaded
         begin, part = dispatcher.compile, "no_cpython_wrapper" in options
 
-        def reported(types: object) -> Any:
+        def reported(given: object) -> Any:
             outside = _part.set(part)
             try:
-                return begin(types)
+                return begin(given)
             finally:
                 _part.reset(outside)
 
-        dispatcher.compile = reported
+        dispatcher.compile, called = reported, dispatcher.get_call_template
+
+        def for_any_value(
+            given: Any, named: dict[str, Any]
+        ) -> Any:  # else for each constant that it is called with
+            plain = {name: types.unliteral(kind) for name, kind in named.items()}
+            return called(tuple(types.unliteral(kind) for kind in given), plain)
+
+        dispatcher.get_call_template = for_any_value
         return dispatcher
 
     return compiles
@@ -122,29 +138,53 @@ _part: ContextVar[bool] = ContextVar("part", default=False)
 """Whether what this thread compiles is only ever a part of other functions; another may wait to compile a whole."""
 
 
-def _optimise_wholes_only() -> None:
-    """Let numba optimise compiled loops with all that they call, and not what they call before that.
+class _Part(codegen.JITCodeLibrary):
+    """Code that is only ever a part of loops: they are optimised with all that they call, and it is not before that.
 
-    It is optimised again as a part of each loop: the loops are as fast, and compiled in 70 % of the time. What
-    numba compiles for others stays as it is.
+    The loops are as fast, and compiled in 60 % of the time. Nor is it made machine code of.
     """
-    library: Any = codegen.CPUCodeLibrary
-    if not hasattr(library, "_optimize_final_module"):
-        return
-    optimise = library._optimize_final_module
 
-    def if_whole(self: Any) -> None:
-        if not _part.get():
-            optimise(self)
+    def _optimize_final_module(self) -> None:
+        """Nothing; see above."""
 
-    library._optimize_final_module = if_whole
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """No function has an address."""
+        del name
+        return 0
+
+    def serialize_using_object_code(self) -> Any:
+        """What is kept: no machine code."""
+        return self.serialize_using_bitcode()
 
 
-_optimise_wholes_only()
-_OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+def _compile_parts_once() -> None:
+    """Let numba make a `_Part` of parts; what it compiles for others stays as it is.
+
+    Parts have no environment: what raises errors with words of the moment, or prints, would, and allocates.
+    """
+    made: Any = codegen.JITCPUCodegen
+    create, set_env = made.create_library, made.set_env
+
+    def part_or_whole(self: Any, name: str, **options: Any) -> Any:
+        return _Part(self, name) if _part.get() else create(self, name, **options)
+
+    def set_where_it_is(self: Any, name: str, environment: Any) -> None:
+        if self._engine.is_symbol_defined(name):
+            set_env(self, name, environment)
+
+    made.create_library, made.set_env = part_or_whole, set_where_it_is
+
+
+_compile_parts_once()
+_OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 _FAST: dict[str, Any] = {**_OPTIONS, "fastmath": {"reassoc", "contract", "nsz"}}
 compiled = _kept(_FAST)
-_INNER: dict[str, Any] = {**_FAST, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
+_INNER: dict[str, Any] = {**_FAST, "no_cpython_wrapper": True, "_nrt": False}
 inner = _kept(_INNER)
 """Called by compiled loops only, and allocates nothing, so that no references are counted: compiled in less time."""
 inlined = _kept({**_INNER, "inline": "always"})

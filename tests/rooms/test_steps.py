@@ -25,6 +25,7 @@ from kedfem.dynamics.system import (
     interface_kernel,
     linear_kernel,
     products_kernel,
+    reference,
     rigid_frame_kernel,
 )
 from kedfem.dynamics.system.steps import Steps, scene_system
@@ -100,7 +101,7 @@ def test_the_loop_is_the_same_without_its_compiler(monkeypatch: pytest.MonkeyPat
         for name, each in list(vars(module).items()):
             if hasattr(each, "py_func"):
                 monkeypatch.setattr(module, name, each.py_func)
-    monkeypatch.setattr(linear_kernel, "reference", lambda record: record)
+    monkeypatch.setattr(reference, "handed", lambda record: record)
     monkeypatch.setattr(linear_kernel, "marched_linear", plain)
     slow = displacements(ready, steps_of(ready.scene, ready.model))
     assert counted

@@ -7,7 +7,6 @@ from kedfem.compiled import compiled, inlined
 from kedfem.dynamics.system.algebra_kernel import copied
 from kedfem.dynamics.system.ends_kernel import unmoved
 from kedfem.dynamics.system.interface_kernel import evaluated, gathered, interface_solved, offset, pushed
-from kedfem.dynamics.system.reference import reference
 from kedfem.dynamics.system.rigid_frame_kernel import (
     constraints_end,
     interface_end,
@@ -21,14 +20,6 @@ from kedfem.dynamics.system.rigid_frame_kernel import (
 @compiled
 def marched_linear(c, bodies, ends, of, driving, state, trial, work, history, solved):  # type: ignore[no-untyped-def]
     """Take T steps in place; as `step_kernel.marched`, all of them."""
-    c, bodies, ends, of, driving = (
-        reference(c),
-        reference(bodies),
-        reference(ends),
-        reference(of),
-        reference(driving),
-    )
-    state, trial, work, history = reference(state), reference(trial), reference(work), reference(history)
     trial.z[:] = 0.0
     for t in range(len(driving.t)):
         copied(state.turned, trial.turned)

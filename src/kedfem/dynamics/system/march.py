@@ -138,6 +138,8 @@ def march(
     ConvergenceError
         If the iterations of a step do not: with its time, the body that moves most, and all that came before.
     """
+    from kedfem.dynamics.system.reference import handed
+
     constraints = of.constraints
     if between is None or not halvings:
         constraints = constraints._replace(jumps=np.zeros_like(constraints.jumps))
@@ -147,10 +149,12 @@ def march(
     history = empty_history(T, of.bodies, of.constraints, along.F)
     trial, work = empty_trial(of.bodies, of.ends, constraints, state), room(of.bodies)
     solved, marched = solver(of.parts, of.bodies.at, trial), compiled_steps(of)
+    constant, rooms = [handed(x) for x in (of.c, of.bodies, *related)], [handed(x) for x in (trial, work)]
     while done < T:
         left = _since(along, done), History(*(x[done:] for x in history))
         with solved.watched():
-            taken, worst = marched(of.c, of.bodies, *related, left[0], state, trial, work, left[1], solved)
+            now, rows = handed(left[0]), handed(left[1])
+            taken, worst = marched(*constant, now, handed(state), *rooms, rows, solved)
         solved.check()
         done += int(taken)
         if done < T:

@@ -1,37 +1,53 @@
-"""Records handed on by address: what a compiled function calls gets one pointer instead of all arrays. Arrays, too.
+"""Records handed to compiled functions by address: one pointer instead of all arrays. Arrays, too.
 
 numba takes a named tuple apart into its arrays, and each array into seven numbers, at every call: with all records of
-a system 1,100 arguments, which cost more to compile and to call than what is done with them. `reference(record)` keeps
-a record where it is made; `x.name` of it is the array, as of the record itself.
+a system 1,100 arguments, which cost more to compile and to call than what is done with them. `handed(record)` lays
+these numbers out once, as numba keeps a named tuple in memory; in compiled code `x.name` of it is the array.
 
-Used as long as the function that made it runs, and in compiled code only.
+What is handed on must be kept as long as the function runs.
 """
 # mypy: disable-error-code="misc, no-untyped-call, untyped-decorator, attr-defined, override"
 # numba's interface for new types has no types itself
 
+import struct
+import sys
+from collections.abc import Iterator
+from hashlib import sha256
 from typing import Any
 
-from numba.core import cgutils, types
+import numpy as np
+from numba import typeof
+from numba._dispatcher import compute_fingerprint
+from numba.core import types
 from numba.core.datamodel import default_manager
-from numba.core.datamodel.models import PrimitiveModel
-from numba.core.imputils import impl_ret_borrowed
+from numba.core.datamodel.models import OpaqueModel
 from numba.core.typing.templates import AttributeTemplate
-from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, register_model
+from numba.extending import (
+    NativeValue,
+    infer_getattr,
+    intrinsic,
+    lower_getattr_generic,
+    register_model,
+    unbox,
+)
 from numba.np.arrayobj import populate_array
 
 
 class Reference(types.Type):
-    """Where a record, a named tuple, is."""
+    """A record, a named tuple, by its address; its name is short, as it stands in those of all functions."""
 
     def __init__(self, record: Any) -> None:
         self.record = record
-        super().__init__(name=f"Reference({record})")
+        digest = sha256(str(record).encode()).hexdigest()[:8]
+        super().__init__(name=f"{record.instance_class.__name__}_{digest}")
+
+    @property
+    def key(self) -> Any:
+        """What tells types apart."""
+        return self.record
 
 
-@register_model(Reference)
-class _Address(PrimitiveModel):
-    def __init__(self, manager: Any, kind: Reference) -> None:
-        super().__init__(manager, kind, manager.lookup(kind.record).get_data_type().as_pointer())
+register_model(Reference)(OpaqueModel)
 
 
 @infer_getattr
@@ -46,29 +62,65 @@ class _Named(AttributeTemplate):
 
 @lower_getattr_generic(Reference)
 def _attribute(context: Any, builder: Any, kind: Reference, address: Any, name: str) -> Any:
-    """Code that loads an attribute."""
+    """Code that loads an attribute: of arrays all that numba keeps of them at once."""
     k = kind.record.fields.index(name)
-    of = kind.record.types[k]
-    place = cgutils.gep_inbounds(builder, address, 0, k)
-    value = default_manager.lookup(of).load_from_data_pointer(builder, place)
-    return impl_ret_borrowed(context, builder, of, value)
+    model = default_manager.lookup(kind.record.types[k])
+    at = context.get_constant(types.intp, 8 * sum(_length(each) for each in kind.record.types[:k]))
+    place = builder.bitcast(builder.gep(address, [at]), model.get_data_type().as_pointer())
+    if model.get_data_type() == model.get_value_type():
+        return builder.load(place)
+    return model.load_from_data_pointer(builder, place)
 
 
-def _kept(_: Any, record: Any) -> Any:
-    if isinstance(record, types.NoneType):
-        return record(record), lambda context, builder, signature, arguments: arguments[0]
-
-    def stored(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        data = default_manager.lookup(record).as_data(builder, arguments[0])
-        place = cgutils.alloca_once(builder, data.type)
-        builder.store(data, place)
-        return place
-
-    return Reference(record)(record), stored
+def _length(kind: Any) -> int:
+    """How many numbers a value has, see `_numbers`."""
+    if isinstance(kind, types.Array):
+        return 5 + 2 * int(kind.ndim)
+    return sum(_length(each) for each in kind) if isinstance(kind, types.BaseTuple) else 1
 
 
-reference: Any = intrinsic(_kept)
-"""Called in compiled code with a record: where it is kept; None stays None."""
+@unbox(Reference)
+def _unboxed(kind: Reference, handed: Any, c: Any) -> Any:
+    del kind
+    address = c.pyapi.object_getattr_string(handed, "address")
+    place = c.pyapi.long_as_voidptr(address)
+    c.pyapi.decref(address)
+    return NativeValue(place)
+
+
+class Handed:
+    """A named tuple of arrays, numbers and tuples of them, as compiled code finds it."""
+
+    __slots__ = ("_numba_type_", "address", "numbers", "record")
+
+    def __init__(self, record: Any) -> None:
+        kind = compute_fingerprint(record)
+        if kind not in _kinds:
+            _kinds[kind] = Reference(typeof(record))
+        self._numba_type_, self.record = _kinds[kind], record
+        self.numbers = np.array(list(_numbers(record)), np.int64)
+        self.address = self.numbers.ctypes.data
+
+
+_kinds: dict[bytes, Reference] = {}
+
+
+def _numbers(x: Any) -> Iterator[int]:
+    """What numba keeps of a value: of arrays owner, parent, sizes, address, shape and strides."""
+    if isinstance(x, np.ndarray):
+        yield from (0, 0, x.size, x.itemsize, x.ctypes.data, *x.shape, *x.strides)
+    elif isinstance(x, tuple):
+        for each in x:
+            yield from _numbers(each)
+    elif isinstance(x, float):
+        yield int.from_bytes(struct.pack("=d", x), sys.byteorder, signed=True)
+    else:
+        yield int(x)
+
+
+def handed(record: Any) -> Any:
+    """What compiled functions are given for a record; None stays None."""
+    return None if record is None else Handed(record)
 
 
 def _array_at(number: Any) -> Any:

@@ -36,7 +36,6 @@ from kedfem.dynamics.system.interface_kernel import (
 )
 from kedfem.dynamics.system.products_kernel import displaced, sparse_held
 from kedfem.dynamics.system.record import NOMINAL, RIGID_BODY, STRESSED
-from kedfem.dynamics.system.reference import reference
 from kedfem.dynamics.system.rigid_frame_kernel import (
     constraints_end,
     interface_end,
@@ -62,14 +61,6 @@ def marched(c, bodies, ends, of, driving, state, trial, work, history, solved): 
     ----------
     solved : called with the number of a sparse body, see `sparse.solver`
     """
-    c, bodies, ends, of, driving = (
-        reference(c),
-        reference(bodies),
-        reference(ends),
-        reference(of),
-        reference(driving),
-    )
-    state, trial, work, history = reference(state), reference(trial), reference(work), reference(history)
     for t in range(len(driving.t)):
         begin(c, bodies, ends, of, driving, t, state, trial, work, solved)
         converged, worst = passes(c, bodies, ends, of, driving, t, state, trial, work, solved)

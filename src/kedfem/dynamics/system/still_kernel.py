@@ -7,7 +7,6 @@ from kedfem.dynamics.system.bodies_kernel import internal_forces, newmark, orien
 from kedfem.dynamics.system.ends_kernel import on_lines, placed
 from kedfem.dynamics.system.interface_kernel import differentiated
 from kedfem.dynamics.system.record import RIGID_BODY
-from kedfem.dynamics.system.reference import reference
 
 
 @compiled
@@ -20,13 +19,6 @@ def still_forces(c, bodies, R, amounts, state, trial, work):  # type: ignore[no-
     R : (M, 3, 3) of the rigid-body motion; amounts : (w,) of loads that turn with bodies
     state : in the reference position
     """
-    c, bodies, state, trial, work = (
-        reference(c),
-        reference(bodies),
-        reference(state),
-        reference(trial),
-        reference(work),
-    )
     if len(bodies.beams.segment):
         begun(newmark(c), bodies.beams, R, state.strain, state.direction, trial.base, trial.resisted)
     internal_forces(c, bodies, R, amounts, state, trial, work, True)
@@ -44,7 +36,6 @@ def still_gradients(ends, of, rigid_motion, p, stations, z, trial, work):  # typ
     rigid_motion, p : R (M, 3, 3), v and ω (M, 3), and origins (M, 3) of all bodies of the linkage
     stations : weights of ends on lines
     """
-    ends, of, trial, work = reference(ends), reference(of), reference(trial), reference(work)
     on_lines(ends, stations)
     placed(ends, rigid_motion[0], p, trial.row, trial.fixed, work.end, work.vectors)
     placed(ends, rigid_motion[0], p, z, trial.moving, work.end, work.vectors)

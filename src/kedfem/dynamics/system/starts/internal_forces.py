@@ -58,11 +58,13 @@ class Still:
         R : of all bodies of the linkage in the rigid-body motion
         amounts : of loads that turn with bodies
         """
+        from kedfem.dynamics.system.reference import handed
         from kedfem.dynamics.system.still_kernel import still_forces
 
         bodies, trial = self.of.bodies, self._trial
         trial.u[:] = u
-        still_forces(self._c, bodies, R, amounts, self._state, trial, self._work)
+        c, constant, state, end, work = (handed(x) for x in (self._c, bodies, self._state, trial, self._work))
+        still_forces(c, constant, R, amounts, state, end, work)
         f, mean = trial.f.copy(), R[bodies.motion].copy()
         for k, frame in enumerate(bodies.frame):
             if frame > RIGID_BODY:
@@ -92,11 +94,13 @@ class Still:
         of = self.of.constraints
         if not len(of.law):
             return sp.csr_array((0, len(z)))
+        from kedfem.dynamics.system.reference import handed
         from kedfem.dynamics.system.still_kernel import still_gradients
 
         omega = np.ascontiguousarray(motion.omega[0])  # laid out as in steps: compiled once for both
         turning = motion.R[0], motion.v[0], omega
-        still_gradients(self.of.ends, of, turning, motion.p[0], stations, z, self._trial, self._work)
+        ends, constraints, trial, work = (handed(x) for x in (self.of.ends, of, self._trial, self._work))
+        still_gradients(ends, constraints, turning, motion.p[0], stations, z, trial, work)
         return sp.csr_array((self._trial.C.copy(), of.columns, of.column_at), (len(of.law), len(z)))
 
     def sprung(self, k: int, R: Float[np.ndarray, "3 3"], u: Flat) -> Flat:

@@ -1,0 +1,171 @@
+"""What compiled code makes of indices, records and constants is what Python makes of them."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from kedfem.compiled import compiled, inner
+from kedfem.dynamics.system.reference import handed
+
+
+@pytest.mark.parametrize("of", [np.arange(7.0), np.arange(14.0)[::2], np.zeros(0), np.arange(6) % 2 == 0])
+def test_parts_are_those_of_python(of: np.ndarray) -> None:
+    part, tail, head = (
+        numba.njit(lambda x, i, j: x[i:j]),
+        numba.njit(lambda x, i: x[i:]),
+        numba.njit(lambda x, j: x[:j]),
+    )
+    for i in range(-9, 10):
+        assert_array_equal(tail(of, i), of[i:])
+        assert_array_equal(head(of, i), of[:i])
+        for j in range(-9, 10):
+            got = part(of, i, j)
+            assert_array_equal(got, of[i:j])
+            assert got.nbytes == of[i:j].nbytes
+
+
+@pytest.mark.parametrize(
+    "of", [np.arange(60.0).reshape(3, 4, 5), np.arange(120.0).reshape(3, 4, 10)[:, :, ::2]]
+)
+def test_elements_and_parts_in_several_directions_are_those_of_python(of: np.ndarray) -> None:
+    every = numba.njit(
+        lambda x, i, j, k: (x[i], x[i, j], x[i, j, k], x[i:, j], x[i, j:, k], x[1:j, :, i:k], x[-1, j])
+    )
+    plain = every.py_func
+    for i in range(-3, 3):
+        for j in range(-4, 4):
+            for k in range(-5, 5):
+                for got, wanted in zip(every(of, i, j, k), plain(of, i, j, k), strict=True):
+                    assert_array_equal(got, wanted)
+
+
+def test_elements_are_set_where_python_sets_them() -> None:
+    def place(x: Any, y: Any, i: Any, j: Any) -> None:
+        x[i, j], x[i, -1], y[j], y[0], y[i:j] = 1, 2.5, 3, 4.0, 7.0
+
+    fast = numba.njit(place)
+    for i in range(-2, 2):
+        for j in range(-3, 3):
+            got, wanted = (np.zeros((2, 6))[:, ::2], np.zeros(3)), (np.zeros((2, 3)), np.zeros(3))
+            fast(*got, i, j)
+            place(*wanted, i, j)
+            for one, other in zip(got, wanted, strict=True):
+                assert_array_equal(one, other)
+
+
+class Inside(NamedTuple):
+    """A record in another."""
+
+    words: Any
+    numbers: Any
+
+
+class Record(NamedTuple):
+    """Of all that records have."""
+
+    a: Any
+    h: float
+    place: Any
+    whether: bool
+    inside: Inside
+    rates: Any
+    count: int
+    last: Any
+
+
+@compiled
+def read(record, which):  # type: ignore[no-untyped-def]
+    """One number of a record."""
+    total = record.h if record.whether else -record.h
+    if which == 1:
+        return total + record.a[2, 1] + record.place[1][0] + record.inside.numbers[1, 0, 1] + record.rates[2]
+    return (
+        total
+        + record.count
+        + record.last[-1]
+        + record.inside.words[1]
+        + record.place[0][3]
+        + len(record.last)
+    )
+
+
+def test_a_record_is_handed_on_as_it_is() -> None:
+    x = np.random.default_rng(1).standard_normal((8, 5))
+    for whether in (True, False):
+        inside = Inside(np.array([3, 4, 5]), x.reshape(2, 4, 5))
+        record = Record(
+            x[:4, :3], 0.5, (x[0], x[:, 1].copy()), whether, inside, (1.0, 2.0, 4.0), 7, np.arange(4.0)
+        )
+        for which in (1, 2):
+            assert read(handed(record), which) == read.py_func(record, which)
+    assert handed(None) is None
+
+
+@inner
+def scaled(x, factor, late):  # type: ignore[no-untyped-def]
+    """A part that callers give constants."""
+    return x * factor if late else x
+
+
+@compiled
+def several(x):  # type: ignore[no-untyped-def]
+    """Calls it with three."""
+    return scaled(x, 2, True) + scaled(x, 3, False) + scaled(x, len("four"), True)
+
+
+def test_a_part_is_compiled_once_for_all_constants_that_it_is_called_with() -> None:
+    assert several(1.5) == 3.0 + 1.5 + 6.0
+    assert len(scaled.signatures) == 1
+
+
+PARTS = """
+from kedfem.compiled import compiled, inner
+
+@inner
+def root(x):
+    if x < 0:
+        raise ValueError("must not be negative")
+    return x**0.5
+
+@compiled
+def one(x):
+    return root(x) + 1.0
+
+@compiled
+def other(x):
+    return root(x) + 2.0
+"""
+CALLED = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import parts_kernel
+called = getattr(parts_kernel, sys.argv[2])
+print(called(9.0))
+try:
+    called(-1.0)
+except ValueError as error:
+    print(error.args, len(parts_kernel.root.stats.cache_hits))
+"""
+
+
+def test_a_part_that_was_kept_becomes_one_of_another_loop(tmp_path: Path) -> None:
+    """It has no machine code of its own; what it raises comes out of the loop."""
+    (tmp_path / "parts_kernel.py").write_text(PARTS)
+    environment = os.environ | {"KEDFEM_CACHE": str(tmp_path / "cache")}
+    environment.pop("NUMBA_CACHE_DIR", None)
+    said = []
+    for name in ("one", "one", "other"):
+        command = [sys.executable, "-c", CALLED, str(tmp_path), name]
+        done = subprocess.run(
+            command, env=environment, capture_output=True, text=True, timeout=120, check=True
+        )
+        said.append(done.stdout.split("\n")[:2])
+    message = "('must not be negative',)"
+    assert said == [["4.0", f"{message} 0"], ["4.0", f"{message} 0"], ["5.0", f"{message} 1"]]
