@@ -23,6 +23,7 @@ from kedfem.dynamics.stepping.scheme import Scheme as Newmark
 from kedfem.dynamics.system.arrays import Coefficients
 from kedfem.dynamics.system.blank import empty_trial, room
 from kedfem.dynamics.system.march import Ready, driving, ready
+from kedfem.dynamics.system.reference import handed
 from kedfem.dynamics.system.sparse import solver
 from kedfem.dynamics.system.state import copied
 
@@ -103,7 +104,7 @@ class Corotational(Mechanism):
         trial = trial._replace(**{name: getattr(trial, name).astype(kind) for name in names})
         bodies = of.bodies._replace(**{name: getattr(of.bodies, name).astype(kind) for name in "GYS"})
         since = process_time()
-        solved_often(bodies, COUNT, trial, np.zeros(len(trial.u), kind))
+        solved_often(handed(bodies), COUNT, handed(trial), np.zeros(len(trial.u), kind))
         return (process_time() - since) / COUNT
 
     @property
@@ -127,9 +128,10 @@ class Corotational(Mechanism):
         along = driving(of, self.motion_at(((np.arange(steps)[:, None] + c) * h).clip(0.0).ravel()))
         trial = empty_trial(of.bodies, of.ends, of.constraints, state)
         solved = solver(of.parts, of.bodies.at, trial)
+        records = (own, inside, of.bodies, of.ends, of.constraints, along)
         found, passes, failed = staged(
-            own, inside, of.bodies, of.ends, of.constraints, along, (A, b, c, h), self.size, steps // SEEN,
-            state, trial, room(of.bodies), solved,
+            *map(handed, records), (A, b, c, h), self.size, steps // SEEN,
+            *map(handed, (state, trial, room(of.bodies))), solved,
         )  # fmt: skip
         return np.where(failed, np.nan, found), passes
 
@@ -179,7 +181,8 @@ class Force:
         """Applied less internal force at the time of a number."""
         self.trial.u[:] = self.state.u[:] = u
         self.state.v[:] = v
-        force_at(self.c, self.bodies, self.along, n, self.size, self.state, self.trial, self.work)
+        c, bodies, along = map(handed, (self.c, self.bodies, self.along))
+        force_at(c, bodies, along, n, self.size, *map(handed, (self.state, self.trial, self.work)))
         return np.asarray(self.along.F[n] - self.trial.f)
 
     def turns(self, n: int, u: Flat) -> Flat:

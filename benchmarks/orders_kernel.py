@@ -14,7 +14,6 @@ from kedfem.dynamics.matrices.profile_kernel import profile_solved
 from kedfem.dynamics.system.algebra_kernel import add_transposed, frame_copied, product, turned, turned_back
 from kedfem.dynamics.system.bodies_kernel import internal_forces, newmark, orientation
 from kedfem.dynamics.system.interface_kernel import gathered, offset, pushed
-from kedfem.dynamics.system.reference import reference
 from kedfem.dynamics.system.rigid_frame_kernel import ported
 from kedfem.dynamics.system.step_kernel import asked, taken
 
@@ -34,14 +33,6 @@ def staged(c, c_inside, bodies, ends, of, driving, tableau, size, seen_every, st
     size : of a body, for differences
     """
     A, b, times, h = tableau
-    c, c_inside, bodies, ends, of = (
-        reference(c),
-        reference(c_inside),
-        reference(bodies),
-        reference(ends),
-        reference(of),
-    )
-    driving, state, trial, work = reference(driving), reference(state), reference(trial), reference(work)
     s, N, k, steps = len(b), len(state.u), len(trial.z), len(driving.t) // len(b)
     x, v, base, rate = np.zeros((4, N + k))
     V, a, last = np.zeros((s, N + k)), np.zeros((s, N + k)), np.zeros((2, N + k))
@@ -189,7 +180,7 @@ def seen(c, bodies, driving, t, state, trial, work):  # type: ignore[no-untyped-
     R = driving.R[t]
     if len(bodies.beams.segment):
         begun(newmark(c), bodies.beams, R, state.strain, state.direction, trial.base, trial.resisted)
-    internal_forces(c, bodies, R, driving.amounts[t], state, trial, work)
+    internal_forces(c, bodies, R, driving.amounts[t], state, trial, work, True)
 
 
 @inner
@@ -208,8 +199,6 @@ def tangents_kept(bodies, R, seen, state):  # type: ignore[no-untyped-def]
 @compiled
 def force_at(c, bodies, driving, t, size, state, trial, work):  # type: ignore[no-untyped-def]
     """trial.f becomes the internal force at trial.u with the rates state.v, trial.Rp the bodies' orientations."""
-    c, bodies, driving = reference(c), reference(bodies), reference(driving)
-    state, trial, work = reference(state), reference(trial), reference(work)
     inside(c, c, bodies, driving, t, size, state, trial, work)
     for i in range(len(bodies.motion)):
         orientation(bodies, i, driving.R[t], trial.u, trial, trial.Rp[i])
@@ -223,7 +212,6 @@ def solved_often(bodies, count, trial, y):  # type: ignore[no-untyped-def]
     ----------
     y : (N,) room
     """
-    bodies, trial = reference(bodies), reference(trial)
     for _ in range(count):
         trial.right[:] = 0.0
         for i in range(len(bodies.motion)):

@@ -1,10 +1,10 @@
-"""What compiled code makes of indices, records and constants is what Python makes of them."""
+"""What compiled code makes of indices and constants is what Python makes of them."""
 
 import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numba
 import numpy as np
@@ -12,7 +12,6 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from kedfem.compiled import compiled, inner
-from kedfem.dynamics.system.reference import handed
 
 
 @pytest.mark.parametrize("of", [np.arange(7.0), np.arange(14.0)[::2], np.zeros(0), np.arange(6) % 2 == 0])
@@ -58,54 +57,6 @@ def test_elements_are_set_where_python_sets_them() -> None:
             place(*wanted, i, j)
             for one, other in zip(got, wanted, strict=True):
                 assert_array_equal(one, other)
-
-
-class Inside(NamedTuple):
-    """A record in another."""
-
-    words: Any
-    numbers: Any
-
-
-class Record(NamedTuple):
-    """Of all that records have."""
-
-    a: Any
-    h: float
-    place: Any
-    whether: bool
-    inside: Inside
-    rates: Any
-    count: int
-    last: Any
-
-
-@compiled
-def read(record, which):  # type: ignore[no-untyped-def]
-    """One number of a record."""
-    total = record.h if record.whether else -record.h
-    if which == 1:
-        return total + record.a[2, 1] + record.place[1][0] + record.inside.numbers[1, 0, 1] + record.rates[2]
-    return (
-        total
-        + record.count
-        + record.last[-1]
-        + record.inside.words[1]
-        + record.place[0][3]
-        + len(record.last)
-    )
-
-
-def test_a_record_is_handed_on_as_it_is() -> None:
-    x = np.random.default_rng(1).standard_normal((8, 5))
-    for whether in (True, False):
-        inside = Inside(np.array([3, 4, 5]), x.reshape(2, 4, 5))
-        record = Record(
-            x[:4, :3], 0.5, (x[0], x[:, 1].copy()), whether, inside, (1.0, 2.0, 4.0), 7, np.arange(4.0)
-        )
-        for which in (1, 2):
-            assert read(handed(record), which) == read.py_func(record, which)
-    assert handed(None) is None
 
 
 @inner
