@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_bvp
 
 from kedfem.analysis import analyse
+from kedfem.dynamics.system.starts import deflected
 from kedfem.errors import SolveError
 from kedfem.kinematics import kinematics
 from kedfem.results import read_results
@@ -245,6 +246,17 @@ def test_a_quasi_static_motion_begins_as_a_march_with_that_start_does(frames: st
         size = np.abs(marched[name]).max()
         assert_allclose(found[name][0], marched[name][0], atol=1e-7 * size)
         assert_allclose(found[name], marched[name], atol=2e-2 * size)  # it hardly vibrates
+
+
+def test_positions_of_what_rests_are_no_dearer_than_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rates that are rounding, and that no damper feels, are not looked for again: five balances a position."""
+    balances = []
+    found = deflected.equilibrium
+    monkeypatch.setattr(deflected, "equilibrium", lambda *args: balances.append(None) or found(*args))
+    raw = inverted("beam", initial=None, revolutions=None, steps_per_revolution=None)
+    raw["analysis"] = {"kind": "quasi-static", "end_time": 2e-3, "step": 1e-3}
+    values(raw | {"gravity": [0, -G], "drive": turning("1e-9 rpm")})
+    assert len(balances) == 3 * 5
 
 
 def test_a_whole_run_has_positions_without_steps(tmp_path: Path) -> None:

@@ -91,7 +91,7 @@ def _positions(
             if scene.analysis.kind == "static":
                 state = static(of, motion_at, t, near=state, like=shared)
             else:
-                state = deflection_in_motion(of, motion_at, time=t, near=state, like=shared)
+                state = deflection_in_motion(of, motion_at, time=t, near=state, like=shared, marched=False)
         except NoBalanceError as failed:
             raise SolveError(_unbalanced(scene, _moment(linkage, motion, 0), failed.moves)) from None
         links, multipliers = solver.first(state, forcing, motion_at, shared)

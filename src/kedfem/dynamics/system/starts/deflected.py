@@ -43,7 +43,7 @@ Rows = Sequence[Float[np.ndarray, "_ _"]]
 
 def quasi_static(
     of: Ready, motion_at: Motion, rates: Rows | None = None, time: float = 0.0,
-    near: State | None = None, like: Instant | None = None,
+    near: State | None = None, like: Instant | None = None, marched: bool = True,
 ) -> State:  # fmt: skip
     """The state at a time with the deflection that its links have as they move on without vibrating.
 
@@ -53,6 +53,7 @@ def quasi_static(
     rates : per body (n, d) δ' of rigid motions, world components, where nothing drives the system; none if not given
     near : a state before, from which turns are counted on
     like : another instant, with what does not depend on time
+    marched : whether a march begins here, which rounding of rates would make vibrate
 
     Raises
     ------
@@ -62,7 +63,7 @@ def quasi_static(
     now = Instant(of, motion_at, time, like, None if near is None else near.turned)
     if not now.motion.drives.shape[1]:
         return begun(now, *_relieved(now, as_coordinates(of, rates or [])))
-    u, v = _moving(now, motion_at)
+    u, v = _moving(now, motion_at, WIDER if marched or _feels_rates(of) else 0)
     return begun(now, u, v)
 
 
@@ -136,11 +137,12 @@ def as_work(of: Ready, forces: Rows) -> Flat:
     return np.concatenate([work_on(part, each).ravel() for part, each in zip(of.parts, forces, strict=True)])
 
 
-def _moving(first: Instant, motion_at: Motion) -> tuple[Flat, Flat]:
-    """Deflection and rate with the rigid-body motion, from instants as close as their rounding allows."""
+def _moving(first: Instant, motion_at: Motion, widenings: int = WIDER) -> tuple[Flat, Flat]:
+    """Deflection and rate with the rigid-body motion, from instants as close as their rounding allows, put farther apart
+    so many times at most."""
     h = first.of.c.h / 4
     found, left = _differenced(first, motion_at, h)
-    for _ in range(WIDER):
+    for _ in range(widenings):
         if left <= ENOUGH * np.linalg.norm(found[1]):
             break
         h *= 4
