@@ -14,8 +14,7 @@ from kedfem.dynamics.stepping.marks import Mark
 from kedfem.dynamics.stepping.solvers import block_length
 from kedfem.dynamics.system.march import HALVINGS, ConvergenceError
 from kedfem.dynamics.system.period.search import residual_of
-from kedfem.dynamics.system.starts.deflected import quasi_static as deflection_in_motion
-from kedfem.dynamics.system.starts.deflected import static
+from kedfem.dynamics.system.starts.deflected import quasi_static_position, static
 from kedfem.dynamics.system.starts.instant import Instant
 from kedfem.dynamics.system.starts.modified_newton import NoBalanceError
 from kedfem.dynamics.system.state import State
@@ -91,7 +90,7 @@ def _positions(
             if scene.analysis.kind == "static":
                 state = static(of, motion_at, t, near=state, like=shared)
             else:
-                state = deflection_in_motion(of, motion_at, time=t, near=state, like=shared, marched=False)
+                state = quasi_static_position(of, motion_at, t, near=state, like=shared)
         except NoBalanceError as failed:
             raise SolveError(_unbalanced(scene, _moment(linkage, motion, 0), failed.moves)) from None
         links, multipliers = solver.first(state, forcing, motion_at, shared)

@@ -41,19 +41,34 @@ THIRD, FOURTH = np.array([[-1, 3, -3, 1, 0], [1, -4, 6, -4, 1]])  # third and fo
 Rows = Sequence[Float[np.ndarray, "_ _"]]
 
 
-def quasi_static(
-    of: Ready, motion_at: Motion, rates: Rows | None = None, time: float = 0.0,
-    near: State | None = None, like: Instant | None = None, marched: bool = True,
-) -> State:  # fmt: skip
+def quasi_static(of: Ready, motion_at: Motion, rates: Rows | None = None, time: float = 0.0) -> State:
     """The state at a time with the deflection that its links have as they move on without vibrating.
 
     Parameters
     ----------
     motion_at : rigid-body motion at given times; of a system with a drive over a step from `time` on
     rates : per body (n, d) δ' of rigid motions, world components, where nothing drives the system; none if not given
+
+    Raises
+    ------
+    NoBalanceError
+        If no deflection is found.
+    """
+    now = Instant(of, motion_at, time)
+    if not now.motion.drives.shape[1]:
+        return begun(now, *_relieved(now, as_coordinates(of, rates or [])))
+    return begun(now, *_moving(now, motion_at))
+
+
+def quasi_static_position(
+    of: Ready, motion_at: Motion, time: float, near: State | None = None, like: Instant | None = None
+) -> State:
+    """The same of a driven system where no march begins: its rates may be rounding, unless dampers feel them.
+
+    Parameters
+    ----------
     near : a state before, from which turns are counted on
     like : another instant, with what does not depend on time
-    marched : whether a march begins here, which rounding of rates would make vibrate
 
     Raises
     ------
@@ -61,10 +76,7 @@ def quasi_static(
         If no deflection is found.
     """
     now = Instant(of, motion_at, time, like, None if near is None else near.turned)
-    if not now.motion.drives.shape[1]:
-        return begun(now, *_relieved(now, as_coordinates(of, rates or [])))
-    u, v = _moving(now, motion_at, WIDER if marched or _feels_rates(of) else 0)
-    return begun(now, u, v)
+    return begun(now, *_moving(now, motion_at, WIDER if _feels_rates(of) else 0))
 
 
 def static(
