@@ -14,7 +14,7 @@ import atexit
 import os
 import re
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from hashlib import sha256
 from pathlib import Path
@@ -30,6 +30,10 @@ from kedfem.folders import KERNELS, compiled_folder, drop_changed, note, noted
 ROOT = Path(__file__).parent
 RECORDS = ("dynamics/system/arrays.py", "dynamics/system/state.py", "dynamics/metric.py")
 """Where the named tuples stand that kernels are given: numba's cache names them by their modules."""
+
+PATIENCE = (
+    120.0  # s, with a process that compiles a function; one that was stopped would be waited for for ever
+)
 
 
 def kernel_folder(root: Path) -> Path:
@@ -85,7 +89,8 @@ def _kept(options: dict[str, Any]) -> Callable[[Callable[..., Any]], Any]:
     """What compiles a function by numba, and keeps it while no other process does.
 
     Numba writes the list of what is kept of a function, then the code: of two processes that compile it for different
-    types at once, one could find the other's code under its own types.
+    types at once, one could find the other's code under its own types. Of two that compile it for the same types, one
+    waits for the other.
     """
 
     def compiles(function: Callable[..., Any]) -> Any:
@@ -100,7 +105,7 @@ def _kept(options: dict[str, Any]) -> Callable[[Callable[..., Any]], Any]:
             with FileLock(lock):
                 save(key, code)
 
-        def loaded(given: object, context: Any) -> Any:
+        def read(given: object, context: Any) -> Any:
             if _NOTED:
                 drop_changed(Path(cache.cache_path), _NOTED, cache._impl.filename_base)
             rtsys.initialize(context)  # all that code needs of numba, which would prepare to compile as well
@@ -110,8 +115,15 @@ def _kept(options: dict[str, Any]) -> Callable[[Callable[..., Any]], Any]:
             finally:
                 _part.reset(outside)
 
+        def loaded(given: object, context: Any) -> Any:
+            found = read(given, context)
+            if found is None and dispatcher._can_compile:
+                claims.append(_claimed(lock.with_name(f"{cache._impl.filename_base}.lock"), dispatcher))
+                found = read(given, context)
+            return found
+
         file.save, cache.load_overload = alone, loaded
-        begin, part = dispatcher.compile, "no_cpython_wrapper" in options
+        begin, part, claims = dispatcher.compile, "no_cpython_wrapper" in options, list[Any]()
 
         def reported(given: object) -> Any:
             outside = _part.set(part)
@@ -119,12 +131,13 @@ def _kept(options: dict[str, Any]) -> Callable[[Callable[..., Any]], Any]:
                 return begin(given)
             finally:
                 _part.reset(outside)
+                while claims:
+                    claims.pop().release()
 
         dispatcher.compile, called = reported, dispatcher.get_call_template
 
-        def for_any_value(
-            given: Any, named: dict[str, Any]
-        ) -> Any:  # else for each constant that it is called with
+        def for_any_value(given: Any, named: dict[str, Any]) -> Any:
+            # else it is compiled for each constant that it is called with
             plain = {name: types.unliteral(kind) for name, kind in named.items()}
             return called(tuple(types.unliteral(kind) for kind in given), plain)
 
@@ -132,6 +145,20 @@ def _kept(options: dict[str, Any]) -> Callable[[Callable[..., Any]], Any]:
         return dispatcher
 
     return compiles
+
+
+def _claimed(file: Path, dispatcher: Any) -> Any:
+    """A lock of what this process compiles; another that is at it is waited for, which is reported as compiling."""
+    from filelock import FileLock, Timeout
+
+    lock = FileLock(file)
+    with suppress(OSError):  # where nothing can be kept each process compiles
+        try:
+            lock.acquire(timeout=0)
+        except Timeout:
+            with event.trigger_event("numba:compile", data={"dispatcher": dispatcher}), suppress(Timeout):
+                lock.acquire(timeout=PATIENCE)
+    return lock
 
 
 _part: ContextVar[bool] = ContextVar("part", default=False)

@@ -105,3 +105,32 @@ def test_a_part_that_was_kept_becomes_one_of_another_loop_and_takes_its_constant
     assert said == [["4.0", f"{message} 0"], ["4.0", f"{message} 0"], ["15.0", f"{message} 1"]]
     kept = list((tmp_path / "cache").rglob("parts_kernel.root*.nbc"))
     assert len(kept) == 1  # for all constants that it is called with
+
+
+AT_ONCE = """
+import sys, time
+sys.path.insert(0, sys.argv[1])
+from kedfem.compiled import compiling
+import parts_kernel
+one = parts_kernel.one
+begin = one._compiler.compile
+def slowly(*given):
+    time.sleep(4.0)
+    return begin(*given)
+one._compiler.compile = slowly
+told = []
+with compiling(told.append):
+    one(9.0)
+assert told == [True, False]
+print(len(one.stats.cache_misses), len(parts_kernel.root.stats.cache_misses))
+"""
+
+
+def test_of_two_processes_that_need_the_same_loop_one_waits_for_the_other(tmp_path: Path) -> None:
+    """Both say that it is compiled."""
+    (tmp_path / "parts_kernel.py").write_text(PARTS)
+    environment = os.environ | {"KEDFEM_CACHE": str(tmp_path / "cache")}
+    environment.pop("NUMBA_CACHE_DIR", None)
+    command = [sys.executable, "-c", AT_ONCE, str(tmp_path)]
+    both = [subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    assert sorted(each.communicate(timeout=120)[0] for each in both) == ["0 0\n", "1 1\n"]
