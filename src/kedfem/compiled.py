@@ -168,7 +168,7 @@ _part: ContextVar[bool] = ContextVar("part", default=False)
 class _Part(codegen.JITCodeLibrary):
     """Code that is only ever a part of loops: they are optimised with all that they call, and it is not before that.
 
-    The loops are as fast, and compiled in 60 % of the time. Nor is it made machine code of.
+    The loops are as fast, and compiled in less time. Nor is it made machine code of.
     """
 
     def _optimize_final_module(self) -> None:
