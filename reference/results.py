@@ -65,7 +65,7 @@ CHANNELS: dict[str, tuple[Told, ...]] = {
         Told("probes/NAME/deflection", XYZ, "m", "either",
              f"From the chord of the link's joints, which goes with them, or the link's mean rigid motion, as the description says; {FLAT}."),
         Told("probes/NAME/stress", STRESS, "Pa", "link",
-             "Axes of the link in the reference position; tension is positive. xy, yz, zx are shear stresses, not twice; von_mises is never negative."),
+             "Axes of the link in the reference position, of a beam those of its section: x along it, y along its width, z along its thickness. Tension is positive; xy, yz, zx are shear stresses, not twice; von_mises is never negative. Of beams in space shear stresses are those of torsion, of planar ones there are none: none knows those of a shear force."),
     ),
     "Joints": (
         Told("joints/NAME/force|rigid_force", XYZ, "N", "world",

@@ -67,7 +67,7 @@ def test_speeds_that_nobody_asked_for_are_the_same_in_a_scene_that_is_turned(tur
     )
     one, other = (scene_from(each) for each in (raw, turned(raw, R, shift)))
     (v, omega), (v2, omega2) = (initial_twists(scene, linkage(scene)) for scene in (one, other))
-    assert np.abs(omega).max() > 1.0
+    assert np.abs(omega).max() > 0.5
     assert_allclose(omega2, omega @ R.T, atol=1e-12)
     assert_allclose(v2 + np.cross(omega2, shift), v @ R.T, atol=1e-12)
 

@@ -319,7 +319,13 @@ def test_everything_on_a_link_goes_with_it(shift: Shift) -> None:
         bodies={"wheel": body},
         springs={"spring": {"kind": "spring", "between": ends, "stiffness": 1.0}},
     )
-    raw["output"]["probes"] = {"tip": {"link": "arm", "at": [0.4, 0], "quantity": "displacement"}}
+    chord = [[0, 0], [0.4, 0]]
+    raw["output"]["probes"] = {
+        "tip": {"link": "arm", "at": [0.4, 0], "quantity": "displacement"},
+        "sag": {"link": "arm", "at": [0.4, 0], "quantity": "deflection", "chord": chord},
+    }
+    pluck = {"link": "arm", "at": [0.4, 0], "force": [1.0, 2.0]}
+    raw["analysis"] |= {"initial": "quasi-static", "initial_deflection": {"pluck": pluck}}
     scene = closed_scene(scene_from(raw), {"arm": shift})
     R, tip = Rotation.from_rotvec(shift.theta).as_matrix(), moved(shift, [0.4, 0, 0])
     for load in scene.loads.values():
@@ -335,6 +341,9 @@ def test_everything_on_a_link_goes_with_it(shift: Shift) -> None:
     assert there.at == (0.4, 1.0, 0.0)
     assert_allclose(scene.output.probes["tip"].at, tip, rtol=0, atol=1e-15)
     assert_allclose(points_of(scene, "arm")[1], tip, rtol=0, atol=1e-15)
+    assert_allclose(scene.output.probes["sag"].chord, [moved(shift, [0, 0, 0]), tip], rtol=0, atol=1e-15)
+    assert_allclose(scene.analysis.initial_deflection["pluck"].at, tip, rtol=0, atol=1e-15)
+    assert scene.analysis.initial_deflection["pluck"].force == (1.0, 2.0, 0.0)
 
 
 def test_plates_go_with_their_outline_and_holes() -> None:

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from kedfem.accuracy.prepared import moving
-from kedfem.errors import MotionError
+from kedfem.errors import MotionError, SceneError
 from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path
 from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import Scene, scene_from
+from tests.laws.test_limits import AXES
 from tests.linkages import (
     JointTable,
     Z,
@@ -151,6 +152,54 @@ def test_a_slider_set_going_turns_the_crank() -> None:
     h = 1e-6
     x = [r * np.cos(a) + np.sqrt(rod**2 - (r * np.sin(a)) ** 2) for a in (phi - h, phi + h)]
     assert omega[1, 2] == pytest.approx(speed / ((x[1] - x[0]) / (2 * h)), rel=1e-8)
+
+
+@pytest.mark.parametrize("axis", AXES.values(), ids=list(AXES))
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize(
+    ("kind", "turns", "travels"),
+    [
+        ("revolute", 3.0, 0.0),
+        ("screw", 3.0, -0.3 * 3.0 / (2 * np.pi)),
+        ("prismatic", 0.0, 3.0),
+        ("cylindrical", 0.0, 3.0),
+    ],
+)
+def test_a_speed_is_that_of_its_joint(
+    kind: str, turns: float, travels: float, swapped: bool, axis: np.ndarray
+) -> None:
+    """Of the first link against the other, about its axis or along it; a cylindrical joint does not turn then."""
+    at = np.array([0.7, 0.1, 0.3])
+    pair = ("one", "two") if swapped else ("two", "one")
+    more = ({"lead": -0.3},) if kind == "screw" else ()
+    joints: JointTable = {
+        "A": ("revolute", "ground", "one", (0.2, 0.1, 0.0), (1.0, 2.0, -1.0)),
+        "J": (kind, *pair, at, axis, *more),
+    }
+    _, v, omega = twists(joints, initial_speeds={"J": 3.0})
+    sign = -1 if swapped else 1
+    apart = velocity(v, omega, 2, at) - velocity(v, omega, 1, at)
+    np.testing.assert_allclose((omega[2] - omega[1]), sign * turns * axis, atol=1e-9)
+    np.testing.assert_allclose(apart, sign * travels * axis, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["universal", "planar", "slot", "spherical", "weld"])
+def test_a_joint_without_one_speed_is_asked_for_none(kind: str) -> None:
+    axis = {"universal": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))}.get(kind, (1.0, 0.0, 0.0))
+    with pytest.raises(
+        SceneError, match=r"initial_speeds\.J: must be of a revolute, prismatic, cylindrical or screw"
+    ):
+        twists({"J": (kind, "ground", "one", (0, 0, 0), axis)}, initial_speeds={"J": 1.0})
+
+
+@pytest.mark.parametrize(("kind", "given"), [("screw", "1 m/s"), ("cylindrical", "60 rpm")])
+def test_a_speed_of_another_kind_is_refused(kind: str, given: str) -> None:
+    """A screw's is a rotational speed, as its angle is its coordinate; a cylindrical joint's is along its axis."""
+    with pytest.raises(SceneError, match=rf"initial_speeds\.J: must be .* for a {kind} joint, got '{given}'"):
+        twists(
+            {"J": (kind, "ground", "one", (0, 0, 0), (1.0, 0, 0), {"lead": 0.1} if kind == "screw" else {})},
+            initial_speeds={"J": given},
+        )
 
 
 def test_speeds_that_contradict_each_other_are_refused() -> None:

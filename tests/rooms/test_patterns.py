@@ -148,6 +148,8 @@ def test_a_shift_moves_points_of_the_pattern_and_leaves_those_of_the_scene() -> 
         ({"links": {"a": {**BEAM, "shape": {**SHAPE, "between": [[0, 0], [0, 0, 1]]}}}}, r"p\.links\.a: .* `up`"),
         ({"joints": {"j": {"bushing": {"stiffness": [1, 2, 3]}}}}, r"patterns\.p\.joints\.j: must have a bushing alike"),
         ({"points": {"P": {"from": [0, 0], "distance": 1, "angle": 1}}, "about": "x"}, r"p\.points\.P: .*angle"),
+        ({"points": {"P": {"between": [[0, 0], [0, 1]], "offset": 0.1}}, "about": "x"}, r"p\.points\.P: .*offset"),
+        ({"points": {"P": {"from": [[0, 0], [0, 1]], "distances": [1, 1]}}, "about": "y"}, r"\.P: .*distances"),
         ({"links": {"a": {**BEAM, "shape": {**SHAPE, "between": [[0, 0], [1, 0]]}}}, "about": "x"}, r"links\.a: .* `up`"),
     ],
 )  # fmt: skip

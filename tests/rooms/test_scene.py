@@ -101,6 +101,24 @@ def test_a_number_with_a_unit_becomes_si(text, unit, number):
     assert_allclose(si_number(text, unit), number, rtol=1e-14)  # rounding of one product
 
 
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [(f"2 {prefix}Hz", "rad/s") for prefix in ("", "k", "m", "M")]
+    + [(f"2 {speed}", "Hz") for speed in ("rpm", "krpm", "mrad/s", "turn/s", "gon/s")]
+    + [(f"5 {length}", "m") for length in ("mm/turn", "mm/rad", "mm/deg", "m*rad")]
+    + [("600 rpm", "1/s"), ("90 deg", "1"), ("3 N*m/deg", "N*m"), ("1 m*rad/s", "m/s")],
+)
+def test_what_is_off_by_an_angle_or_a_turn_is_refused(text, unit):
+    """A lead of 5 mm/turn was 0.8 mm, a speed of 1 kHz 1000 rad/s."""
+    with pytest.raises(ValueError, match=r"turns or radians per second|is of another kind"):
+        si_number(text, unit)
+
+
+@pytest.mark.parametrize(("text", "unit"), [("3 N*m", "N*m/rad"), ("3 N*m*s", "N*m*s/rad")])
+def test_radians_may_be_left_out(text, unit):
+    assert si_number(text, unit) == 3.0
+
+
 def test_four_bar_is_drawn_from_its_four_lengths():
     # the crank of Nath and Ghosh (1980) at 60 degrees: distances of the constructed points are the lengths
     points = with_points(

@@ -26,6 +26,7 @@ from kedfem.scene import (
     Part,
     PlateLink,
     Polyline,
+    Probe,
     RigidBody,
     Scene,
     Spring,
@@ -107,7 +108,11 @@ def closed_scene(scene: Scene, shifts: Mapping[str, Shift]) -> Scene:
                     "initial_motions": {
                         name: _moved(motion, shifts[name])
                         for name, motion in scene.analysis.initial_motions.items()
-                    }
+                    },
+                    "initial_deflection": {
+                        name: _moved(force, shifts[force.link])
+                        for name, force in scene.analysis.initial_deflection.items()
+                    },
                 }
             ),
         }
@@ -123,6 +128,8 @@ def _moved(record: AnyRecord, shift: Shift) -> AnyRecord:
     }
     if getattr(record, "frame", None) == "link" and hasattr(record, "vector"):
         change["vector"] = shift.turned(record.vector)
+    if isinstance(record, Probe) and record.chord is not None:
+        change["chord"] = tuple(shift.point(x) for x in record.chord)
     if isinstance(record, RigidBody):
         J = shift.R @ inertia_tensor(record.inertia) @ shift.R.T
         change["inertia"] = moments_of_inertia(J)

@@ -8,7 +8,7 @@ import scipy.linalg
 
 from kedfem.arrays import Float
 from kedfem.errors import MotionError
-from kedfem.motion.constraints import cross
+from kedfem.motion.constraints import ANGLE, cross
 from kedfem.motion.joint_equations import joint_axis, joint_free_rows, moving_pair
 from kedfem.motion.linkage import Linkage, drawn_jacobian, resting_poses
 from kedfem.motion.newton import cross_matrix
@@ -16,6 +16,7 @@ from kedfem.motion.released_motions import RANK_TOLERANCE
 from kedfem.motion.values import features, jacobian
 from kedfem.scene import Scene
 
+TURNING = {"revolute", "screw"}  # joints whose speed is a rotation, of the others it is along the axis
 REACHED = 1e-6  # of the fastest speed: velocities that far off are not what was asked for
 AXES = "xyz"
 
@@ -61,8 +62,9 @@ def initial_twists(
         A, b = np.array([each.row[6:] * column for each in asked]), np.array([each.value for each in asked])
         sizes = np.linalg.norm(A, axis=1)
         free = _allowed(linkage)
-        other = [row for name in scene.joints if name not in scene.analysis.initial_speeds
-                 for row in joint_free_rows(scene, name, linkage.bodies)]  # fmt: skip
+        given = scene.analysis.initial_speeds
+        other = [row for name, joint in scene.joints.items() for row in joint_free_rows(scene, name, linkage.bodies)
+                 if name not in given or (row.kind == ANGLE and joint.kind not in TURNING)]  # fmt: skip
         q = free @ _least(A / sizes[:, None] @ free, b / sizes, drawn_jacobian(other, bodies, size) @ free)
         _check_reached(asked, A @ q)
         twists[1:] = (q * column).reshape(-1, 6)
@@ -102,12 +104,12 @@ def _wanted(scene: Scene, linkage: Linkage) -> Iterator[Wanted]:
         moving, other = moving_pair(joint)
         i, j = linkage.bodies.index(moving), linkage.bodies.index(other)
         row, axis = np.zeros((len(linkage.bodies), 2, 3)), joint_axis(joint)
-        if joint.kind == "revolute":
+        if joint.kind in TURNING:
             row[i, 1], row[j, 1] = axis, -axis
-        else:  # bodies of a slide do not turn against each other
+        else:
             arm = cross(np.asarray(joint.at) - linkage.centre, axis)
             row[i], row[j] = (axis, arm), (-axis, -arm)
-        unit = "rad/s" if joint.kind == "revolute" else "m/s"
+        unit = "rad/s" if joint.kind in TURNING else "m/s"
         yield Wanted(f"analysis.initial_speeds.{name}", unit, row.ravel(), value)
     for name, motion in scene.analysis.initial_motions.items():
         k = linkage.bodies.index(name)

@@ -102,7 +102,8 @@ def _stress(scene: Scene, model: Model, where: str, name: str, probe: Probe) -> 
         s = block.links[k].g[:, nodes, components] @ dense.T
         return np.column_stack([s, von_mises(s)])
 
-    text = f"stress {_place(probe.link, at.X)}"
+    axes = "" if model.links[k].meshed else " in the axes of its section (x along the beam)"
+    text = f"stress{axes} {_place(probe.link, at.X)}"
     return Recorded(Channel(f"probes/{name}/stress", STRESS, "Pa", "link", text), stress)
 
 

@@ -17,6 +17,7 @@ from kedfem.scene.records.units import Quantity, si_number
 
 ROUGH = 0.05  # share of a table's acceleration that may be noise
 AXES = {"revolute": TURNING, "prismatic": SLIDING}  # joints with one motion, and its speed
+STARTED = {**AXES, "cylindrical": SLIDING, "screw": TURNING}  # joints that a speed at the start may be of
 
 
 def drive_faults(parts: Parts) -> Iterator[Fault]:
@@ -165,15 +166,15 @@ def initial_faults(parts: Parts) -> Iterator[Fault]:
 def speed_faults(parts: Parts, joint: Entry, given: Any) -> Iterator[Fault]:
     """A speed of a joint that has none, that the drive moves, or in a unit of another kind."""
     kind = joint.word("kind")
-    if kind in {"spherical", "weld"}:
+    if joint.record is not None and kind not in STARTED:
         got = f"got {joint.name!r}, which is {kind}"
-        message = f"must be of a revolute or prismatic joint, {got}"
+        message = f"must be of a revolute, prismatic, cylindrical or screw joint, {got}; take initial_motions"
         yield parts.analysis.fault("initial_speeds", message, joint.name)
     elif joint.name in parts.driven_joints:
         message = f"must be of a joint that the drive does not move, got {joint.name!r}"
         yield parts.analysis.fault("initial_speeds", message, joint.name)
-    elif kind in AXES and isinstance(given, str) and not in_unit(given, AXES[kind]):
-        message = f"must be {AXES[kind].kind} for a {kind} joint, got {given!r}"
+    elif kind in STARTED and isinstance(given, str) and not in_unit(given, STARTED[kind]):
+        message = f"must be {STARTED[kind].kind} for a {kind} joint, got {given!r}"
         yield parts.analysis.fault("initial_speeds", message, joint.name)
 
 

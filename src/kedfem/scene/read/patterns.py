@@ -25,6 +25,7 @@ from kedfem.scene.records.units import Quantity
 
 BY_LINK = ("at", "coupling", "faces")  # keys of joints that may hold a table by links
 FLAT = ("plate_link", "extrusion", "part")  # shapes whose thickness is along z
+LEVEL = {"angle": "an angle", "distances": "distances", "offset": "an offset"}  # of points, in the xy plane
 PLACED, LINES = ("cad", "mesh"), ("bar", "polyline")
 ANGLE, INERTIA = Quantity("rad"), Quantity("kg*m^2")
 Tables = dict[str, Any]
@@ -64,11 +65,13 @@ class _Copy:
             self.called("links", name) if key in BY_LINK else name: self.of(x, below(hint, name, value), name)
             for name, x in value.items()
         }
-        if unit == "m" and "angle" in value and "from" in value:
-            if self.pattern.turn and self.pattern.about != (0.0, 0.0, 1.0):
+        if unit == "m":
+            level = [key for key in LEVEL if key in value]
+            if level and self.pattern.turn and self.pattern.about != (0.0, 0.0, 1.0):
                 wanted = "must be coordinates in a pattern turned about another axis than z"
-                raise ValueError(f"{wanted}, got an angle")
-            made["angle"] = ANGLE.number(value["angle"]) + self.number * self.pattern.turn
+                raise ValueError(f"{wanted}, got {LEVEL[level[0]]}")
+            if "angle" in value:
+                made["angle"] = ANGLE.number(value["angle"]) + self.number * self.pattern.turn
         if key in ("factor", "stiffness_factor") and self.pattern.phase and value.get("over") == "angle":
             if "at" not in value:
                 raise ValueError("must have its angles in a list in a pattern with a phase, got a file")

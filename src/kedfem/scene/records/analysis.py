@@ -116,7 +116,8 @@ class Analysis(Record):
     co-rotational"""
     initial_speeds: dict[JointName, JointSpeed] = Field(default_factory=dict)
     """speeds of joints at the start, by name of the joint, of what the drive does not move: of its first link that is not
-    the ground against the other, about or along its axis; other joints then move as little as they can"""
+    the ground against the other, of a hinge and a screw about its axis [rad/s], of a slide and a cylindrical joint along
+    it [m/s]; all else then moves as little as it can"""
     initial_motions: dict[LinkName, InitialMotion] = Field(default_factory=dict)
     """velocities of links at the start, by name of the link"""
     initial_deflection: dict[str, InitialForce] = Field(default_factory=dict)
@@ -173,8 +174,8 @@ class Probe(Record):
     """of a deflection: two points of the link, between which the chord is; if not given its two joints farthest apart. A
     link with fewer than two joints deflects from its mean rigid motion"""
     frame: Literal["link", "world"] | None = None
-    """axes of the components: those of the link (x along it) or the world's. The link's if not given, and of a stress; of
-    position, travel and total motions the world's"""
+    """axes of the components: those of the link (x along it) or the world's. The link's if not given, and of a stress (in
+    a beam those of its section there); of position, travel and total motions the world's"""
 
     @model_validator(mode="after")
     def _in_a_frame(self) -> Self:

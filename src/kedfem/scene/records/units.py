@@ -75,10 +75,7 @@ USUAL = {
 """Units as they are usually written, in SI: for hints, and read without pint, whose start takes half a second."""
 HUGE = 1e30  # a number beyond, or a positive one below 1 / HUGE, is no machine's: its powers would overflow
 OVERFLOW = 10**308  # whole numbers in TOML have no end
-CYCLES = {"hertz"}
-TURNING = {
-    "radian", "degree", "arcminute", "arcsecond", "turn", "revolutions_per_minute", "revolutions_per_second",
-}  # fmt: skip
+CYCLES = "hertz"  # how names of frequencies end, kilohertz too
 
 
 def fault(message: str) -> PydanticCustomError:
@@ -119,7 +116,8 @@ def si_number(text: str, unit: str) -> float:
     ------
     ValueError
         Not a number with a unit, an unknown unit or a unit of another dimension. Hertz are not accepted
-        for a rotational speed nor turns for a frequency: the factor 2π between them would be a guess.
+        for a rotational speed nor turns for a frequency: the factor 2π between them would be a guess. So it would be of
+        a length per turn, for a lead or a radius: only expressions may leave an angle over, as v = ω r does.
     """
     if isinstance(text, Evaluated):
         quantity = text.quantity
@@ -137,7 +135,8 @@ def si_number(text: str, unit: str) -> float:
         raise ValueError(
             f"turns or radians per second? give it in {'rpm or rad/s' if unit == 'rad/s' else 'Hz'}"
         )
-    if got.dimensionality != wanted.dimensionality:
+    turns = 0.0 if isinstance(text, Evaluated) else revolutions(got._units)
+    if got.dimensionality != wanted.dimensionality or turns not in (0.0, revolutions(wanted._units)):
         raise ValueError(f"the unit {given!r} is of another kind{meant(given, unit)}" if given else "no unit")
     return float(quantity.m_as(wanted))
 
@@ -169,14 +168,15 @@ def unit_of(given: str, wanted: str = "") -> Any:
 
 def revolutions(unit: Mapping[str, float]) -> float:
     """The power of an angle in a unit, given as powers of names: 1 of rpm or rad/s, 0 of Hz."""
-    return float(sum(power for name, power in unit.items() if name in TURNING))
+    root = unit_registry().get_root_units(unit_registry().UnitsContainer(unit))[1]
+    return float(root._units.get("radian", 0))
 
 
 def crossed(given: Mapping[str, float], unit: str) -> bool:
     """Whether a unit counts cycles where rad/s is wanted, or turns where Hz is: the factor 2π would be a guess."""
     if unit == "Hz":
         return revolutions(given) != 0.0
-    return unit == "rad/s" and not CYCLES.isdisjoint(given) and revolutions(given) == 0.0
+    return unit == "rad/s" and any(name.endswith(CYCLES) for name in given) and revolutions(given) == 0.0
 
 
 def meant(given: str, unit: str) -> str:
