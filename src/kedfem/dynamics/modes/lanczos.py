@@ -47,17 +47,26 @@ def lanczos(
 
 
 def _beside(V: Block, MV: Block, x: Block, momentum: Product) -> tuple[Block, Float[np.ndarray, "_ _"]]:
-    """An orthonormal basis Q of what columns x have beside those of V, and R with x = V (…) + Q R."""
-    size = np.sqrt(np.maximum((x * momentum(x)).sum(axis=0), 0.0)).max(initial=0.0)
-    R = np.eye(x.shape[1])
-    for _ in range(2):
-        x = x - V @ (MV.T @ x)
-        values, vectors = np.linalg.eigh(x.T @ momentum(x))
-        kept = values > (REPEATED * size) ** 2
-        root = np.sqrt(values[kept])
-        R = (vectors[:, kept] * root).T @ R
-        x, size = x @ (vectors[:, kept] / root), 1.0
-    return x, R
+    """An orthonormal basis Q of what columns x have beside those of V, and R with x = V (…) + Q R.
+
+    Column by column, each of its own size: of columns together, whose products show sizes to 1e-8 only, rounding that
+    is left where no further direction exists would be taken for one.
+    """
+    Q, MQ = np.zeros((len(x), 0)), np.zeros((len(x), 0))
+    for column in x.T[:, :, None]:
+        size, new = _norm(column, momentum(column)), column
+        for _ in range(2):
+            new = new - V @ (MV.T @ new) - Q @ (MQ.T @ new)
+        momentum_of = momentum(new)
+        left = _norm(new, momentum_of)
+        if left > REPEATED * size:
+            Q, MQ = np.hstack([Q, new / left]), np.hstack([MQ, momentum_of / left])
+    return Q, MQ.T @ x
+
+
+def _norm(x: Block, momentum_of: Block) -> float:
+    """√(xᵀ M x) of one column."""
+    return float(np.sqrt(max((x * momentum_of).sum(), 0.0)))
 
 
 def _converged(

@@ -130,7 +130,8 @@ def si_number(text: str, unit: str) -> float:
         quantity = unit_registry().Quantity(float(match[1]), unit_of(given, unit))
     else:
         raise ValueError("not a number with a unit; an expression begins with '='")
-    wanted, got = unit_registry().parse_units(unit), quantity.units
+    wanted: Any = unit_registry().parse_units(unit)
+    got = quantity.units
     if crossed(quantity._units, unit):
         raise ValueError(
             f"turns or radians per second? give it in {'rpm or rad/s' if unit == 'rad/s' else 'Hz'}"
@@ -168,8 +169,8 @@ def unit_of(given: str, wanted: str = "") -> Any:
 
 def revolutions(unit: Mapping[str, float]) -> float:
     """The power of an angle in a unit, given as powers of names: 1 of rpm or rad/s, 0 of Hz."""
-    root = unit_registry().get_root_units(unit_registry().UnitsContainer(unit))[1]
-    return float(root._units.get("radian", 0))
+    registry: Any = unit_registry()
+    return float(registry.get_root_units(registry.UnitsContainer(unit))[1]._units.get("radian", 0))
 
 
 def crossed(given: Mapping[str, float], unit: str) -> bool:
