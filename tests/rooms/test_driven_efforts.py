@@ -206,3 +206,13 @@ def test_the_pin_of_a_slider_bears_springs_and_motors_on_the_slider(on: dict[str
             elastic, rigid[:, :2], atol=0.01 * np.abs(got["joints/P/rigid_force"]).max(), err_msg=name
         )
     assert np.abs(got["joints/P/rigid_force"]).max() > 100.0  # N
+
+
+def test_a_spring_whose_ends_meet_pulls_nowhere() -> None:
+    """From a point of the driven crank to the ground there, of no length: at the start it has no direction."""
+    ends = [{"link": link, "at": [0.05, 0.0866]} for link in ("crank", "ground")]
+    got = channels(*ran(four_bar("rigid", {"springs": {"k": SPRING | {"free_length": 0, "between": ends}}})))
+    assert got["springs/k/length"][0] == 0
+    for name, values in got.items():
+        assert np.isfinite(values).all(), name
+    assert_allclose(got["springs/k/force"], 1e4 * got["springs/k/length"], rtol=1e-12)

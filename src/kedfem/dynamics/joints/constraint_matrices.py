@@ -100,11 +100,10 @@ def rows_over(
 class RowGroup:
     """Joints whose rows share no interface unknown with those of others.
 
-    rows, columns : where the joints' rows are among all, and the interface unknowns that these touch
+    columns : the interface unknowns that the joints touch
     """
 
     joints: tuple[ConstraintJoint, ...]
-    rows: Int[np.ndarray, " r"]
     columns: Int[np.ndarray, " c"]
 
     def over(self, motion: RigidMotion) -> Float[np.ndarray, "T r c"]:
@@ -120,12 +119,10 @@ def row_groups(joints: Sequence[ConstraintJoint]) -> Iterator[RowGroup]:
     n, k = len(joints), int(every.max(initial=-1)) + 1
     graph = sp.coo_array((np.ones(len(every)), (number, n + every)), (n + k, n + k))
     label = connected_components(graph, directed=False)[1]
-    ends = np.cumsum([0, *(len(joint.gap) for joint in joints)])
     for group in dict.fromkeys(label[:n].tolist()):
         here = np.flatnonzero(label[:n] == group)
-        rows = np.concatenate([np.arange(ends[j], ends[j + 1]) for j in here])
         columns = np.unique(np.concatenate([touched[j] for j in here]))
-        yield RowGroup(tuple(joints[int(j)] for j in here), rows, columns)
+        yield RowGroup(tuple(joints[int(j)] for j in here), columns)
 
 
 def _columns(joint: ConstraintJoint) -> Int[np.ndarray, " c"]:

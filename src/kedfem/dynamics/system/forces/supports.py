@@ -49,7 +49,8 @@ class Supports:
         if term.kind in (GAP, DISTANCE):
             a_i, a_j = Q_i @ (term.a - ends[0].origin), Q_j @ (term.a_j - ends[1].origin)
             gap = x_i + a_i - x_j - a_j
-            n = Q_j @ term.b if term.kind == GAP else gap / np.linalg.norm(gap, axis=1)[:, None]
+            size = np.linalg.norm(gap, axis=1)[:, None]  # zero where ends meet: no direction, as in the steps
+            n = Q_j @ term.b if term.kind == GAP else gap / np.where(size > 0, size, 1.0)
             reach = a_j + gap if term.kind == GAP else a_j
             return [(ends[0], x_i, n, cross(a_i, n)), (ends[1], x_j, -n, cross(n, reach))]
         turn = turning(term, Q_i, Q_j)

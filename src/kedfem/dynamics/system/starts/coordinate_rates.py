@@ -269,8 +269,10 @@ def product(of: Callable[..., np.ndarray], a: Series, b: Series) -> Series:
 
 
 def root(x: Series) -> Series:
-    """Square root of a series (3,)."""
+    """Square root of a series (3,); of a distance of none nothing, as it has no direction in the steps either."""
     r = np.sqrt(x[0])
+    if r == 0:
+        return np.zeros(3)
     first = x[1] / (2 * r)
     return np.array([r, first, (x[2] / 2 - first**2) / r])
 
