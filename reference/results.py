@@ -75,10 +75,12 @@ CHANNELS: dict[str, tuple[Told, ...]] = {
              "On the same link, about the joint's point as it moves with the rigid-body motion, of a slot about the pin. "
              "The torque of a drive on a hinge is in it, as the force of one on a slide is in the joint's force."),
         Told("joints/NAME/angle|angle_about_NAME", ("angle",), "rad", "",
-             "Of the link named first against the other, from the reference position, by the right hand about the joint's axis, of "
-             "a universal joint about the axis in the link named; counted on over turns."),
+             "Of the link that the description names first against the other, from the reference position, by the right hand about "
+             "the joint's axis; of a universal joint about the axis of link NAME, of the other link against this one; counted on "
+             "over turns."),
         Told("joints/NAME/travel|travel_1|travel_2|travel_3", ("travel",), "m", "",
-             "Of the link named first against the other along the joint's axis, from the reference position."),
+             "Of the link that the description names first against the other along the joint's axis, of a planar joint along the two "
+             "directions across it that the description names, from the reference position."),
     ),
     "Drive": (
         Told("drive/torque|rigid_torque|force|rigid_force", ("*",), "N m|N m|N|N", "world",

@@ -22,9 +22,10 @@ from kedfem.motion.linkage import linkage
 from kedfem.motion.transmission import transmissions
 from kedfem.output.frames import rigid_fields, sights
 from kedfem.results import read_results
-from kedfem.results.kinematic import kinematics_of, plane_normal
+from kedfem.results.kinematic import coordinate_channel, kinematics_of, plane_normal
 from kedfem.scene import Scene, drive_angle, scene_from
 from tests.frames import frames
+from tests.laws.test_limits import AXES
 
 from ..linkages import (
     RISE,
@@ -461,3 +462,22 @@ def test_frames_show_velocities_of_bodies_and_a_dot_for_a_slider() -> None:
 def test_the_angle_furthest_from_square_is_the_worst() -> None:
     angle, drive = np.radians([60.0, 100.0, 150.0]), np.array([0.0, 1.0, 2.0])
     assert worst_angle(angle, drive) == pytest.approx((np.radians(150.0), 2.0))
+
+
+@pytest.mark.parametrize("axis", AXES.values(), ids=list(AXES))
+def test_travels_of_a_planar_joint_are_along_the_directions_that_are_told(axis: np.ndarray) -> None:
+    """A crank whose point on a plane across its axis goes round: (R − I) X along both directions."""
+    at = np.array([0.3, -0.2, 0.4])
+    scene = linkage_scene(
+        {"A": ("revolute", "ground", "crank", (0, 0, 0), axis), "P": ("planar", "ground", "crank", at, axis)}
+    )
+    linked, motion = linkage(scene), motion_at(scene, np.linspace(0, 1, 5))
+    gone = motion.R[:, 1] @ at - at
+    directions = []
+    for each in coordinates(scene, linked)[-2:]:
+        channel, rows = coordinate_channel(each, linked)
+        told = re.search(r"along \((.*)\) there$", channel.description)
+        assert told is not None
+        directions.append(np.array(told[1].split(", "), float))
+        assert_allclose(rows(motion)[:, 0], gone @ directions[-1], atol=1e-4)
+    assert_allclose(np.cross(*directions), axis, atol=1e-3)

@@ -1,7 +1,7 @@
 """Coordinates of joints: how far a hinge has turned and a slide has travelled, from the reference position.
 
 They are of the joint's first link that is not the ground, against the other, about or along the joint's axis; of a slot,
-of the link with the pin along the line of the other.
+of the link with the pin along the line of the other; of a cross, about each axis, against the link that has this axis.
 """
 
 from dataclasses import dataclass

@@ -67,7 +67,7 @@ def kinematics_of(scene: Scene, linkage: Linkage, along: Path, inertias: Inertia
         text = f"of probe {name} on link {probe.link}"
         every += _point(f"probes/{name}", linkage.bodies.index(probe.link), np.asarray(probe.at), text)
     joints, couplers = coordinates(scene, linkage), transmissions(scene, linkage)
-    every += [_coordinate(each, linkage) for each in joints]
+    every += [coordinate_channel(each, linkage) for each in joints]
     every += [_transmission(each) for each in couplers]
     turning = [
         channel.name for channel, _ in every
@@ -144,11 +144,14 @@ def _turn(
     ]
 
 
-def _coordinate(each: Coordinate, linkage: Linkage) -> tuple[Channel, Callable[[RigidMotion], Rows]]:
+def coordinate_channel(each: Coordinate, linkage: Linkage) -> tuple[Channel, Callable[[RigidMotion], Rows]]:
+    """The channel of a joint's coordinate, and its values of a rigid motion."""
     one, other = linkage.bodies[each.body], linkage.bodies[each.other]
     column, unit = ("angle", "rad") if each.kind == "angle" else ("travel", "m")
     verb = "turn" if each.kind == "angle" else "travel"
     text = f"{verb} of joint {each.joint}: link {one} against {other}, from the reference position"
+    if each.name.startswith("travel_"):  # of a planar joint, whose axis does not say along what
+        text += f", along ({', '.join(f'{round(x, 9) + 0.0:.4g}' for x in each.axis)}) there"
     channel = Channel(f"joints/{each.joint}/{each.name}", (column,), unit, "", text)
     return channel, lambda motion: each.values(motion)[:, None]
 
