@@ -24,10 +24,12 @@ import numba
 from numba.core import codegen, event, types
 from numba.core.runtime.nrt import rtsys
 
-import kedfem.indexing_kernel  # noqa: F401  (numba knows its code then)
 from kedfem.folders import KERNELS, compiled_folder, drop_changed, note, noted
+from kedfem.indexing_kernel import compact
 
 ROOT = Path(__file__).parent
+KNOWN = numba.version_info.short <= (0, 68)
+"""Whether numba's insides are those that compiling in less time was written for; later ones compile as they are."""
 RECORDS = ("dynamics/system/arrays.py", "dynamics/system/state.py", "dynamics/metric.py")
 """Where the named tuples stand that kernels are given: numba's cache names them by their modules."""
 
@@ -126,11 +128,12 @@ def _kept(options: dict[str, Any]) -> Callable[[Callable[..., Any]], Any]:
         begin, part, claims = dispatcher.compile, "no_cpython_wrapper" in options, list[Any]()
 
         def reported(given: object) -> Any:
-            outside = _part.set(part)
+            outside, indices = _part.set(part), compact.set(KNOWN)
             try:
                 return begin(given)
             finally:
                 _part.reset(outside)
+                compact.reset(indices)
                 while claims:
                     claims.pop().release()
 
@@ -207,7 +210,8 @@ def _compile_parts_once() -> None:
     made.create_library, made.set_env = part_or_whole, set_where_it_is
 
 
-_compile_parts_once()
+if KNOWN:
+    _compile_parts_once()
 _OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 _FAST: dict[str, Any] = {**_OPTIONS, "fastmath": {"reassoc", "contract", "nsz"}}
 compiled = _kept(_FAST)

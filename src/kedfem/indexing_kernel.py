@@ -1,13 +1,15 @@
 """Elements and parts of arrays in compiled code, by a third of numba's instructions: compiling takes its time for each.
 
 numba makes code for slices of any step, and keeps each array in memory to ask for its shape. What an index means is the
-same: negative ones count from the end, slices end where the array does. All other indices are left to numba.
+same: negative ones count from the end, slices end where the array does. All other indices are left to numba, and so is
+all that it compiles for others.
 """
 # mypy: disable-error-code="attr-defined, no-untyped-call, untyped-decorator"
 # numba's interface for code of its own types has no types itself
 
 import operator
 from collections.abc import Sequence
+from contextvars import ContextVar
 from typing import Any
 
 from llvmlite import ir
@@ -17,9 +19,14 @@ from numba.core.imputils import impl_ret_borrowed
 from numba.extending import lower_builtin
 from numba.np import arrayobj
 
+compact: ContextVar[bool] = ContextVar("compact", default=False)
+"""Whether this thread compiles code whose indices are made here."""
+
 
 def _plain(context: Any, array: Any, index: Any) -> tuple[Any, ...] | None:
     """The types of one or several indices; None if there are others than integers and slices without a step."""
+    if not compact.get():
+        return None
     kinds = index.types if isinstance(index, types.BaseTuple) else (index,)
     slices = [kind for kind in kinds if isinstance(kind, types.SliceType)]
     integers = [kind for kind in kinds if isinstance(kind, types.Integer)]

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-import kedfem.indexing_kernel  # noqa: F401  (under test: numba knows its code then)
+from kedfem.indexing_kernel import compact
 
 
+@pytest.fixture
+def indices() -> Iterator[None]:
+    """As in kedfem's own code."""
+    outside = compact.set(True)
+    yield
+    compact.reset(outside)
+
+
+@pytest.mark.usefixtures("indices")
 @pytest.mark.parametrize("of", [np.arange(7.0), np.arange(14.0)[::2], np.zeros(0), np.arange(6) % 2 == 0])
 def test_parts_are_those_of_python(of: np.ndarray) -> None:
     part, tail, head = (
@@ -30,6 +40,7 @@ def test_parts_are_those_of_python(of: np.ndarray) -> None:
             assert got.nbytes == of[i:j].nbytes
 
 
+@pytest.mark.usefixtures("indices")
 @pytest.mark.parametrize(
     "of", [np.arange(60.0).reshape(3, 4, 5), np.arange(120.0).reshape(3, 4, 10)[:, :, ::2]]
 )
@@ -45,6 +56,7 @@ def test_elements_and_parts_in_several_directions_are_those_of_python(of: np.nda
                     assert_array_equal(got, wanted)
 
 
+@pytest.mark.usefixtures("indices")
 def test_elements_are_set_where_python_sets_them() -> None:
     def place(x: Any, y: Any, i: Any, j: Any) -> None:
         x[i, j], x[i, -1], y[j], y[0], y[i:j] = 1, 2.5, 3, 4.0, 7.0
@@ -105,6 +117,25 @@ def test_a_part_that_was_kept_becomes_one_of_another_loop_and_takes_its_constant
     assert said == [["4.0", f"{message} 0"], ["4.0", f"{message} 0"], ["15.0", f"{message} 1"]]
     kept = list((tmp_path / "cache").rglob("parts_kernel.root*.nbc"))
     assert len(kept) == 1  # for all constants that it is called with
+
+
+LATER = """
+import numba
+numba.version_info = numba.version_info._replace(short=(99, 0))
+"""
+
+
+def test_another_numba_compiles_in_its_own_way(tmp_path: Path) -> None:
+    """A later one, whose insides may be others."""
+    (tmp_path / "parts_kernel.py").write_text(PARTS)
+    environment = os.environ | {"KEDFEM_CACHE": str(tmp_path / "cache")}
+    environment.pop("NUMBA_CACHE_DIR", None)
+    command = [sys.executable, "-c", LATER + CALLED, str(tmp_path), "other"]
+    for _ in ("compiled", "kept"):
+        done = subprocess.run(
+            command, env=environment, capture_output=True, text=True, timeout=120, check=True
+        )
+        assert done.stdout.split("\n")[:2] == ["15.0", "('must not be negative',) 0"]
 
 
 AT_ONCE = """
