@@ -29,7 +29,7 @@ def rotation(theta: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 3 3"]:
 
 def cross_matrix(w: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 3 3"]:
     """[w]×, so that [w]× x = w × x."""
-    out = np.zeros((*w.shape, 3))
+    out = np.zeros((*w.shape, 3), np.result_type(w, float))
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -w[..., 2], w[..., 1], -w[..., 0]
     return out - np.swapaxes(out, -1, -2)
 

@@ -85,14 +85,16 @@ def travels(system: System, at: Places) -> Float[np.ndarray, "3 r"]:
     return np.array([_summed(system, each, poses) for each in system.constraints]).reshape(-1, 3).T
 
 
-def term_values(system: System, at: Places, z: Float[np.ndarray, " k"]) -> Float[np.ndarray, " t"]:
-    """Values of all terms of all constraints, without their factors; of those linear in z at z = 0."""
+def angles(system: System, at: Places, z: Float[np.ndarray, " k"]) -> Float[np.ndarray, " t"]:
+    """Angles of all terms of all constraints, without their factors, zero of others; of those linear in z at z = 0."""
     none = np.zeros((3, len(z)))
     rest, bent = _Poses(system, at, none), _Poses(system, at, np.stack([z, 0 * z, 0 * z]))
-    return np.array([
-        value(system, term, *(((rest if each.linear else bent)(n)) for n in (term.i, term.j)))[0]
-        for each in system.constraints for term in each.terms
-    ])  # fmt: skip
+
+    def angle(each: Constraint, term: Term) -> float:
+        poses = rest if each.linear else bent
+        return float(value(system, term, poses(term.i), poses(term.j))[0]) if term.kind == ANGLE else 0.0
+
+    return np.array([angle(each, term) for each in system.constraints for term in each.terms])
 
 
 def moved_by(system: System, terms: Sequence[Term]) -> set[int]:
@@ -159,10 +161,10 @@ def _at_pin(end: End, line: Line, at: Places, u: Series) -> Series:
 
 def _about_z(psi: Series) -> Series:
     """Turns by ψ about z."""
-    w = psi[1] * _skew(np.array([0, 0, 1.0]))
+    w = psi[1] * cross_matrix(np.array([0, 0, 1.0]))
     c, s, zero = np.cos(psi[0]), np.sin(psi[0]), 0 * psi[0]
     Q = np.array([[c, -s, zero], [s, c, zero], [zero, zero, 1 + zero]])
-    return np.stack([Q, Q @ w, Q @ (w @ w + psi[2] * _skew(np.array([0, 0, 1.0])))])
+    return np.stack([Q, Q @ w, Q @ (w @ w + psi[2] * cross_matrix(np.array([0, 0, 1.0])))])
 
 
 def _directions(end: End, R: Series, u: Series) -> Series:
@@ -190,24 +192,21 @@ def _rotation(A: Series) -> Series:
     for _ in range(2):
         Q = Q @ rotation(_turn(Q.T @ A[0].real))
     if np.iscomplexobj(A):  # one step more is exact to first order
-        Q = Q @ (np.eye(3) + _skew(_turn(Q.T @ A[0])))
+        Q = Q @ (np.eye(3) + cross_matrix(_turn(Q.T @ A[0])))
     B = Q.T @ A
     w = _turn(B[0], B[1])
-    W = _skew(w)
+    W = cross_matrix(w)
     b = _turn(B[0], B[2] - 2 * W @ B[1] + W @ W @ B[0])
-    return np.stack([Q, Q @ W, Q @ (W @ W + _skew(b))])
-
-
-def _skew(w: np.ndarray) -> np.ndarray:
-    """[w]×, of complex numbers too."""
-    return np.cross(np.eye(3), w)
+    return np.stack([Q, Q @ W, Q @ (W @ W + cross_matrix(b))])
 
 
 def _turn(U: np.ndarray, B: np.ndarray | None = None) -> np.ndarray:
     """θ of G θ = axial(B), B = U if not given."""
     B = U if B is None else B
     axial = np.array([B[2, 1] - B[1, 2], B[0, 2] - B[2, 0], B[1, 0] - B[0, 1]])
-    return np.asarray(np.linalg.solve(np.trace(U) * np.eye(3) - (U + U.T) / 2, axial))
+    G = -(U + U.T) / 2
+    G[[0, 1, 2], [0, 1, 2]] += U[0, 0] + U[1, 1] + U[2, 2]
+    return np.asarray(np.linalg.solve(G, axial))
 
 
 def value(system: System, term: Term, one: tuple[Series, Series], other: tuple[Series, Series]) -> Series:

@@ -29,7 +29,7 @@ from kedfem.dynamics.system.record import (
     law_at,
 )
 from kedfem.dynamics.system.sparse import SparsePart, softening
-from kedfem.dynamics.system.starts.coordinate_rates import coordinates, places, term_values, travels
+from kedfem.dynamics.system.starts.coordinate_rates import angles, coordinates, places, travels
 from kedfem.dynamics.system.starts.internal_forces import Inside, Still, inside, own, rows
 from kedfem.dynamics.system.starts.linear_equations import HeldBody, mass_body, sparse_body
 from kedfem.motion.newton import cross_matrix
@@ -140,7 +140,8 @@ class Instant:
     def _whole_turns(self, z: Flat) -> Float[np.ndarray, " r"]:
         """What coordinates gain by the whole turns that their terms have made; none where they are linear in z."""
         system, out, place = self.of.system, np.zeros(len(self.of.system.constraints)), 0
-        more = turned(self, z) - term_values(system, self.at, z)
+        found = angles(system, self.at, z)
+        more = _counted(self, found) - found
         for n, each in enumerate(system.constraints):
             for term in each.terms:
                 out[n] += 0.0 if each.linear or term.kind != ANGLE else term.factor * more[place]
@@ -230,11 +231,15 @@ def renumbered(of: Ready) -> Int[np.ndarray, " k"]:
 
 def turned(now: Instant, z: Flat) -> Flat:
     """Angles of all terms, within half a turn of what they are near; of drives of what these ask."""
-    found = term_values(now.of.system, now.at, z)
+    return _counted(now, angles(now.of.system, now.at, z))
+
+
+def _counted(now: Instant, found: Flat) -> Flat:
+    """The same of angles to within whole turns."""
     near, place = np.zeros(len(found)) if now.near is None else now.near.copy(), 0
     for each in now.of.system.constraints:
         drive = getattr(each.law, "drive", -1)
         near[place] = now.motion.drives[0, drive] if drive >= 0 else near[place]
         place += len(each.terms)
-    angles = np.array([x.kind == ANGLE for each in now.of.system.constraints for x in each.terms], bool)
-    return np.asarray(np.where(angles, found + TURN * np.round((near - found) / TURN), 0.0))
+    of_angles = np.array([x.kind == ANGLE for each in now.of.system.constraints for x in each.terms], bool)
+    return np.asarray(np.where(of_angles, found + TURN * np.round((near - found) / TURN), 0.0))
