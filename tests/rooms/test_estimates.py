@@ -13,6 +13,7 @@ from kedfem.accuracy import estimates
 from kedfem.accuracy.error_budget import Budget, Share, budget_warning, by_kind, meaningless
 from kedfem.accuracy.estimates import budget, step_errors, watcher
 from kedfem.accuracy.histories import Histories, histories, relative_errors
+from kedfem.accuracy.positions import missed
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.step_estimate import single_errors
 from kedfem.accuracy.variants import with_steps
@@ -24,6 +25,7 @@ from kedfem.links.indicator import indicator
 from kedfem.links.singular_stress import re_entrant
 from kedfem.results import Channel, read_results
 from kedfem.scene import scene_from, time_grid
+from tests.moving import bar
 
 from ..laws.test_envelope import ROUND, SHARP, angled
 from .test_audit import example
@@ -211,6 +213,38 @@ def test_a_run_with_errors_over_its_results_is_doubtful_in_its_file(
     assert meaningless(lost(mesh=0.6, step=0.39), None, 0.0) == ""
     assert meaningless(lost(mesh=0.02, step=2.0), None, 0.0) == ""  # a phase
     assert meaningless(lost(mesh=0.02, step=3.1), None, 0.0) != ""
+
+
+def pressed(**analysis: Any) -> Any:
+    """A crank that lifts a weight which comes at 36° to 38° of its turn: between two of the positions, 5° apart."""
+    return {
+        "links": {"crank": bar("beam", (0, 0), (0.1, 0), 1)},
+        "joints": {"A": {"kind": "revolute", "links": ["ground", "crank"], "at": [0, 0]}},
+        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 0.1}},
+        "loads": {"weight": {
+            "kind": "force", "link": "crank", "at": [0.1, 0], "vector": [0, -1000.0],
+            "factor": {"over": "angle", "at": ["36 deg", "38 deg"], "value": [0, 1]},
+        }},
+        "analysis": {"kind": "quasi-static", "revolutions": 0.25, **analysis},
+        "output": {"probes": {"tip": {"link": "crank", "at": [0.1, 0], "quantity": "displacement"}}},
+    }  # fmt: skip
+
+
+def test_what_is_missed_between_positions_is_part_of_the_error() -> None:
+    """The torque F r cos φ is highest where all the weight has come, at 38°; the position after that is at 40°."""
+    least = np.cos(np.radians(38)) / np.cos(np.radians(40)) - 1  # 2.9 %
+    found = estimated(pressed())[0].error_of("positions")
+    assert found is not None
+    assert least < found < 2 * least
+    assert estimated(pressed(steps_per_revolution=72))[0].of("positions") is None  # asked for as they are
+
+
+def test_a_smooth_curve_between_positions_is_missed_by_an_eighth_of_its_second_difference() -> None:
+    """Of sin φ at most 1 − cos(h/2), where its crest lies in the middle between two positions."""
+    h = np.radians(5)
+    crest = np.sin(np.pi / 2 + h * (np.arange(20) - 9.5))
+    assert_allclose(missed(crest), 1 - np.cos(h / 2), rtol=2e-2)  # rows up to 12.5° off the crest
+    assert missed(np.array([0.0] * 3 + [1.0] * 4)) == 0.0
 
 
 def test_a_step_that_the_accuracy_chose_is_not_told_to_be_left_out() -> None:

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import prepared
+from kedfem.accuracy.variants import with_analysis
 from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.constraint_matrices import directions, joint_rows
@@ -443,8 +444,12 @@ def test_a_solid_block_on_a_planar_beam_tells_its_force() -> None:
 
 
 def test_moments_are_told_by_what_the_drive_does() -> None:
-    told = [
-        (clock(scene), moment(scene, 0.0123, 0.01))
-        for scene in map(scene_from, (inverted(), driven_slide(), two_drives()))
-    ]
-    assert told == [("drive angle", "0.6°"), ("drive travel", "10 mm"), ("time", "12.3 ms")]
+    """Where it comes back or stops, its place is no moment, but for the positions of a static analysis."""
+    rising, stopped = driven_slide(), driven_slide()
+    rising["analysis"]["end_time"] = 0.1
+    static = with_analysis(scene_from(stopped), kind="static")
+    scenes = [*map(scene_from, (inverted(), rising, stopped, two_drives())), static]
+    told = [(clock(scene), moment(scene, 0.0123, 0.01)) for scene in scenes]
+    slid, timed = ("drive travel", "10 mm"), ("time", "12.3 ms")
+    assert told == [("drive angle", "0.6°"), slid, timed, timed, slid]
+    assert clock(scenes[2], frozen=True) == "drive travel"

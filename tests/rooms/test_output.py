@@ -28,6 +28,7 @@ from kedfem.output.views import hidden, labels, sight, view
 from kedfem.output.vtu import write_frame
 from kedfem.output.words import prefixed
 from kedfem.results import Channel, Results
+from kedfem.tables.run import largest_of
 from tests.moving import ran
 from tests.spatial_joints import G, P, Q, pushed
 
@@ -664,3 +665,13 @@ def test_gravity_points_down_the_page_unless_it_is_looked_along() -> None:
     )  # fmt: skip
     for gravity, up in (((0, 0, 0), (0, 1, 0)), ((-9.8, 0, 0), (1, 0, 0)), ((0, 0, -9.8), (0, 1, 0))):
         assert view(grid, np.array(gravity, float)).up @ up > 0.9
+
+
+def test_the_largest_of_a_vector_is_its_magnitude_where_that_tells_more() -> None:
+    """A bearing force of 3 and 4 kN is one of 5 kN, at the row where it is; a travel is told by its component."""
+    values = np.array([[0.0, 4.5e3, 0.0], [3e3, -4e3, 0.0]])
+    force = Channel("joints/B/force", ("x", "y", "z"), "N", "world", "")
+    assert largest_of(force, values) == (1, "magnitude", 5e3)
+    assert largest_of(force, values[:1]) == (0, "y", 4.5e3)
+    assert largest_of(replace(force, name="probes/tip/travel"), values) == (0, "y", 4.5e3)
+    assert largest_of(replace(force, columns=("strain", "x", "y")), values) == (0, "x", 4.5e3)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from kedfem.results.balance import Balance
 
 KINDS = ("displacement", "stress", "joint forces", "drive")
-SOURCES = ("mesh", "step", "reduction", "frames", "rounding")
+SOURCES = ("mesh", "step", "positions", "reduction", "frames", "rounding")
 WARNED = 0.05  # an error that no run leaves without a warning
 TWICE = 2.0  # of the accuracy asked for: estimates are no better than that
 WHOLE = 1.0  # an error as large as the result
@@ -21,7 +21,7 @@ OF_SOURCE, TOGETHER, UNKNOWN = "error of ", "error together, ", "no estimate "  
 class Share:
     """One part of the error.
 
-    source : mesh, step, reduction, frames or rounding
+    source : mesh, step, positions, reduction, frames or rounding
     errors : kind of channel → estimated error, of the channel's largest value, at the worst instant of the worst channel
     how : what the estimate was made from, in words
     remedy : what would lower it, in words; what usually does if not given
@@ -170,6 +170,7 @@ REMEDIES = {
     f"{UNKNOWNS:,} unknowns in all",
     "step": "take a shorter step, or leave it out so that analysis.accuracy chooses it; a sudden start or load that "
     "excites vibration beyond any step needs a smoother one, or damping",
+    "positions": "take more of them, analysis.steps_per_revolution (or step), and let loads come and go over several",
     "reduction": "a smaller analysis.reduction_tolerance, or links that are not reduced",
     "frames": 'analysis.frames = "co-rotational" is right at any deflection; with it, more segments or elements',
     "rounding": 'links that are much stiffer than all others as model = "rigid"',

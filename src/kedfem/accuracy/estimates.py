@@ -4,6 +4,7 @@ Small models are run again as they are; of large links a companion on a few mode
 takes a fraction. Their channels are compared as `histories` does: what two steps, two meshes differ by, in every channel.
 
 * **Step**: of a single level, the run's step against twice that one, as levels in time are (`accuracy.step_estimate`).
+* **Positions** that the scene leaves open: what may be missed between them (`accuracy.positions`).
 * **Mesh of beams**: twice the elements, in the same step.
 * **Rounding**: what a link's matrices leave of its rigid motion (`accuracy.rounding`).
 * **Meshes of solid and plane links**: their indicator η (`links.indicator`). Compliance errs by about 2 η², so the
@@ -22,6 +23,7 @@ from kedfem.accuracy.geometric import GeometricError, bent, geometric_warning
 from kedfem.accuracy.given import Given
 from kedfem.accuracy.histories import Histories, counted, extent, histories
 from kedfem.accuracy.mesh_estimate import FUNCTIONS, link_errors, mesh_share, plain_mesh_share
+from kedfem.accuracy.positions import positions_share
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, first_reduced
 from kedfem.accuracy.resolution import StepError, fewest_steps, step_error
@@ -153,10 +155,17 @@ def budget(
         if seen.steps:
             known = known or step_errors(small, base)
             shares.append(_step_share({n: error for n, error in known.items() if n in sizes}))
+        elif open_positions(ready.scene):
+            shares.append(positions_share(base, sizes))
         shares.append(mesh_share(small, base, eta))
     except KedfemError as fault:
         limits.append(f"step and mesh: a run beside this one failed ({str(fault).splitlines()[0]})")
     return Budget(joined(shares), tuple(limits), eta, known)
+
+
+def open_positions(scene: Scene) -> bool:
+    """Whether a scene of positions leaves open how many there are: those that it states are wanted there."""
+    return scene.analysis.step is None and scene.analysis.steps_per_revolution is None
 
 
 def wanted(ready: Prepared) -> tuple[str, ...]:

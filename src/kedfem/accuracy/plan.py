@@ -216,7 +216,7 @@ def _limits(plan: Plan) -> Iterator[str]:
         limit = max(plan.shares, key=lambda share: share.error)
         yield (
             f"the accuracy of {100 * plan.asked:.3g} % could not be reached: {limit.what} limits it, "
-            f"{percent(plan.error)} is expected"
+            f"{percent(plan.error) if plan.error > 2 * plan.asked else f'{100 * plan.error:.3g} %'} is expected"
         )
 
 

@@ -139,7 +139,7 @@ def frequencies(
         if wanted.shapes:
             watch("mode shapes", 0, 0)
             where = [
-                f" at {clock(scene)} {moment(scene, *x)}" if scene.driven else ""
+                f" at {clock(scene, frozen=True)} {moment(scene, *x, frozen=True)}" if scene.driven else ""
                 for x in zip(t, angle, strict=True)
             ]
             write_shapes(target, _shapes(scene, system, motion, every, where, wanted.shapes), scene.gravity)

@@ -5,13 +5,15 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from kedfem.output.plots.abscissa import abscissa
 from kedfem.results import Peak
-from kedfem.scene import Scene
+from kedfem.scene import Scene, drive_angle, time_grid
 
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
 
 PLAIN = frozenset({"", "-", "1", "rad", "deg", "°", "°/s", "°/s²", "kg", "%"})  # units that take no prefix
 NOTHING = 1e-9  # of the largest value of the same unit: rounding errors
+SAMPLES = 500  # of a drive's motion, that show whether it turns back
 UNITS = tuple((10.0**k, prefix) for k, prefix in reversed(PREFIXES.items()) if abs(k) <= 9)
 
 
@@ -74,17 +76,30 @@ def with_prefix(value: float, unit: str) -> str:
     return f"{value / factor:.4g} {prefix}{unit}"
 
 
-def clock(scene: Scene) -> str:
-    """What shows a moment: the only drive's angle or travel; without one, or with several, the time."""
-    if len(scene.driven_joints) != 1:
+def clock(scene: Scene, frozen: bool = False) -> str:
+    """What shows a moment: the only drive's angle or travel where it keeps on in one direction; else the time.
+
+    Parameters
+    ----------
+    frozen : whether the mechanism is frozen at positions of its drive, wherever that goes from there
+    """
+    if len(scene.driven_joints) != 1 or not (frozen or _keeps_on(scene)):
         return "time"
     (name,) = scene.driven_joints
     return "drive travel" if scene.joints[name].kind == "prismatic" else "drive angle"
 
 
-def moment(scene: Scene, time: float, angle: float) -> str:
+def _keeps_on(scene: Scene) -> bool:
+    """Whether its drive is at one place but once, so that this says when; positions of a static analysis have no time."""
+    if scene.analysis.kind == "static":
+        return True
+    t = np.linspace(0.0, time_grid(scene).end, SAMPLES)
+    return not abscissa(t, drive_angle(scene.motion, t)[0]).over_time
+
+
+def moment(scene: Scene, time: float, angle: float, frozen: bool = False) -> str:
     """A drive angle [rad] in degrees, a drive's travel [m], or the time [s], as `clock` says."""
-    match clock(scene):
+    match clock(scene, frozen):
         case "time":
             return with_prefix(time, "s")
         case "drive travel":

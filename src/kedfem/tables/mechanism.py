@@ -130,7 +130,9 @@ def frequencies_tables(scene: Scene, found: Frequencies) -> list[Table]:
     stiffened = ", stiffened by its motion" if scene.analysis.stiffening else ""
     title = Text(f"Natural frequencies of the frozen linkage{stiffened} [Hz]{still}")
     places = [
-        "in the reference position" if scene.driven is None else moment(scene, float(t), float(angle))
+        "in the reference position"
+        if scene.driven is None
+        else moment(scene, float(t), float(angle), frozen=True)
         for t, angle in zip(found.time, found.angle, strict=True)
     ]
     out = []

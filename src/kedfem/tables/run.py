@@ -12,13 +12,15 @@ from kedfem.accuracy.plan import Plan
 from kedfem.accuracy.reduction import Reduction
 from kedfem.accuracy.steady import Steady
 from kedfem.analysis import Run
+from kedfem.arrays import Float
+from kedfem.output.plots.groups import ALONE, SIGNED
 from kedfem.output.words import clock, moment, place_of, with_prefix
 from kedfem.report.facts import peak_rows
 from kedfem.report.fatigue_facts import ENDLESS, fatigue_notes
-from kedfem.results import Fatigue, Peak
+from kedfem.results import Channel, Fatigue, Peak
 from kedfem.results.balance import Balance
-from kedfem.results.records import rounding
-from kedfem.scene import LinkScene, Scene, time_grid, without_vibration
+from kedfem.results.records import XYZ, rounding
+from kedfem.scene import Cad, LinkScene, MeshFile, Scene, time_grid, without_vibration
 from kedfem.tables.layout import facts, left, listed, right
 from kedfem.tables.mechanism import seconds_table
 
@@ -56,9 +58,14 @@ def _step(scene: Scene) -> str:
 def _chosen(link: LinkScene) -> str:
     """Fidelity and mesh in words."""
     sizes = ((key, value) for key, value in link.mesh if value is not None)
+    if link.model == "rigid":
+        return "rigid"
     mesh = ", ".join(f"{key} {_size(key, value)}" for key, value in sizes) if link.shape else ""
     segments = "" if link.segments is None else f", {link.segments} segments"
-    kind = f"{link.element} " if link.element and link.model != "rigid" else ""
+    open_kind = isinstance(link.shape, Cad | MeshFile) and "element" not in link.model_fields_set
+    kind = (
+        f"{link.element} " if link.element and not open_kind else ""
+    )  # what a file is meshed with its shape says
     return f"{'reduced ' * link.reduced}{kind}{link.model}" + (f" ({mesh})" if mesh else "") + segments
 
 
@@ -98,13 +105,24 @@ def channel_table(scene: Scene, done: Run) -> Table:
     table = listed(Text(scene.title or "Largest values"), columns)
     least = rounding(done.results)
     for channel, values in done.results.channels.values():
-        k, c = np.unravel_index(np.abs(values).argmax(), values.shape)
-        if abs(value := float(values[k, c])) <= least[channel.unit]:
+        k, component, value = largest_of(channel, values)
+        if abs(value) <= least[channel.unit]:
             table.add_row(channel.name, "", "≈ 0", "")
             continue
         at = moment(scene, float(done.results.time[k]), float(done.results.angle[k]))
-        table.add_row(channel.name, channel.columns[c], with_prefix(value, channel.unit), at)
+        table.add_row(channel.name, component, with_prefix(value, channel.unit), at)
     return table
+
+
+def largest_of(channel: Channel, values: Float[np.ndarray, "n c"]) -> tuple[int, str, float]:
+    """Row, component and value of the largest one; of vectors the magnitude where that tells more, as in plots."""
+    k, c = (int(x) for x in np.unravel_index(np.abs(values).argmax(), values.shape))
+    value, vector = float(values[k, c]), len(channel.columns) > 1 and set(channel.columns) <= set(XYZ)
+    if vector and channel.name.rsplit("/", 1)[-1] not in SIGNED:
+        size = np.linalg.norm(values, axis=1)
+        if (longest := float(size.max())) > ALONE * abs(value):
+            return int(size.argmax()), "magnitude", longest
+    return k, channel.columns[c], value
 
 
 def steady_table(found: Steady) -> Table:
