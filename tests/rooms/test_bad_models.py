@@ -72,18 +72,23 @@ def test_hinge_across_a_flat_face() -> None:
     )
 
 
+MATERIAL = ": take a point of its material"
+
+
 @pytest.mark.parametrize("quantity", ["stress", "displacement"])
 @pytest.mark.parametrize("model", ["solid", "beam"])
 def test_probe_outside_its_link(model: str, quantity: str) -> None:
     raw = arm(model)
     raw["output"] = {"probes": {"tip": {"link": "arm", "at": [0.5, 0.05], "quantity": quantity}}}
-    assert fault(raw) == "output.probes.tip.at: must lie in link 'arm', got (0.5, 0.05, 0), 0.04 m outside it"
+    at = "output.probes.tip.at: must lie in link 'arm', got (0.5, 0.05, 0), 0.04 m outside it"
+    bore = ", or for a motion the centre of a bore that a joint holds" * (model == "solid")
+    assert fault(raw) == at + MATERIAL + bore
 
 
 def test_force_outside_its_link() -> None:
     raw = arm()
     raw["loads"] = {"push": {"kind": "force", "link": "arm", "at": [0.6, 0], "vector": [0, 1]}}
-    assert fault(raw) == "loads.push.at: must lie in link 'arm', got (0.6, 0, 0), 0.1 m outside it"
+    assert fault(raw) == "loads.push.at: must lie in link 'arm', got (0.6, 0, 0), 0.1 m outside it" + MATERIAL
 
 
 def test_force_beside_a_beams_axis() -> None:
@@ -109,7 +114,8 @@ def test_surface_force_on_no_face() -> None:
 def test_body_on_no_coupling_surface() -> None:
     raw = arm()
     raw["bodies"] = {"lump": {"kind": "point_mass", "link": "arm", "at": [0.25, 0.5], "mass": 1}}
-    assert fault(raw) == "bodies.lump.at: must lie in link 'arm', got (0.25, 0.5, 0), 0.49 m outside it"
+    outside = "bodies.lump.at: must lie in link 'arm', got (0.25, 0.5, 0), 0.49 m outside it"
+    assert fault(raw) == outside + MATERIAL
 
 
 def body() -> dict[str, Any]:

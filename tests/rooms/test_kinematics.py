@@ -299,6 +299,38 @@ def test_a_sketch_of_joints_alone_is_enough(run_kedfem: Command, tmp_path: Path)
     assert run_kedfem("run", path).code == USER_ERROR  # which needs shapes
 
 
+def test_the_angle_of_a_drive_between_links_says_of_which_against_which(
+    run_kedfem: Command, tmp_path: Path
+) -> None:
+    """An elbow: that of the link named first, which is easily taken the other way round."""
+    path = tmp_path / "robot.toml"
+    path.write_text(ROBOT, encoding="utf-8")
+    said = run_kedfem("kinematics", path)
+    assert re.search(r"S +│ angle \(driven\) +│", said.out)
+    assert re.search(r"E +│ angle of fore against upper \(driven\) +│", said.out)
+
+
+ROBOT = """
+[links]
+upper = {}
+fore = {}
+
+[joints]
+S = { kind = "revolute", links = ["ground", "upper"], at = [0, 0] }
+E = { kind = "revolute", links = ["fore", "upper"], at = [0.6, 0] }
+
+[drives]
+S = { joint = "S", motion = { kind = "cycloidal", angle = "90 deg", rise = 1 } }
+E = { joint = "E", motion = { kind = "cycloidal", angle = "60 deg", rise = 1 } }
+
+[analysis]
+end_time = 1
+
+[output]
+plots = false
+"""
+
+
 BLOCK = """
 [points]
 A = [0, 0]

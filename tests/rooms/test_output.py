@@ -14,13 +14,13 @@ import pytest
 from kedfem.errors import OutputError
 from kedfem.links.recovery import stress_recovery
 from kedfem.output import frames
+from kedfem.output.abscissa import abscissa
 from kedfem.output.animation import AnimationWriter, read_collection, remove_animation
 from kedfem.output.bars import SECTION, THINNEST, bars, heights, shape_functions
 from kedfem.output.fields import DISPLACEMENT, LARGEST, SMALLEST, STRESS, VON_MISES, JointField, LinkField
 from kedfem.output.frames import link_fields
 from kedfem.output.picture import write_picture
 from kedfem.output.plots import write_plots
-from kedfem.output.plots.abscissa import abscissa
 from kedfem.output.plots.drawing import drawn_over, envelope
 from kedfem.output.plots.files import shown
 from kedfem.output.plots.groups import pictures

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from kedfem.output.plots.abscissa import Abscissa, draw_abscissa
+from kedfem.output.abscissa import Abscissa, draw_abscissa
 from kedfem.output.plots.drawing import draw_curves, drawn_over, worth_drawing
 from kedfem.output.plots.files import shown
 from kedfem.output.plots.groups import STIFF, Picture
@@ -125,3 +125,20 @@ def test_magnitudes_are_drawn_where_they_tell_more_than_a_component(
     (page,) = worth_drawing(Results(time, time, {channel.name: (channel, values)}, "complete", "{}"))
     assert ("magnitude" in page.panels[0].curves) == told
     assert {"x", "y", "z"} <= set(page.panels[0].curves)
+
+
+def test_rotations_that_are_rounding_are_not_drawn_and_titles_name_what_is_shown() -> None:
+    """The guided ram of a press: 1e-38° filled its panel, under a title that promised velocities too."""
+    time = np.linspace(0.0, 1.0, 5)
+    kinds = {"rotation": "rad", "angular_velocity": "rad/s", "angular_acceleration": "rad/s^2"}
+    sizes = {"crank": 1.0, "ram": 1e-38}
+    channels = {
+        f"links/{link}/{kind}": (
+            Channel(f"links/{link}/{kind}", ("z",), unit, "", f"{kind} of link {link}"),
+            size * time[:, None],
+        )
+        for link, size in sizes.items() for kind, unit in kinds.items()
+    }  # fmt: skip
+    pages = worth_drawing(Results(time, time, channels, "complete", "{}"))
+    assert [each.title for each in pages] == ["rotation and its rates of link crank"]
+    assert shown(pages[0])[0] == "rotation of link crank"

@@ -242,3 +242,30 @@ def test_what_is_against_the_rigid_motion_needs_a_drive(quantity: str, instead: 
     wanted = f"output.probes.p.quantity: must be {instead} without a drive"
     with pytest.raises(SceneError, match=wanted):
         scene_from(raw)
+
+
+@pytest.mark.parametrize("frames", FRAMES)
+@pytest.mark.parametrize(
+    "kind", [{"model": "plane"}, {"element": "hex20"}, {"element": "hex20", "reduction": "modal"}],
+    ids=["plane", "solid", "reduced"],
+)  # fmt: skip
+def test_the_centre_of_a_bore_goes_with_the_pin_that_holds_it(kind: dict[str, Any], frames: str) -> None:
+    """There is no material: the bore's mean motion is that of the joint, as the rigid crank's point shows it."""
+    pins = {"B": ("coupler", "crank"), "C": ("coupler", "rocker")}
+    probes = {
+        f"{link} {at} {quantity}": probe(link, at, quantity)
+        for at, links in pins.items() for link in links for quantity in ("position", "total_velocity")
+    }  # fmt: skip
+    raw = four_bar("solid", frames, probes, step=2e-4)
+    shape = {"kind": "plate_link", "between": ["B", "C"], "width": WIDTH, "thickness": WIDTH,
+             "eye_diameter": 2 * WIDTH, "bore_diameter": WIDTH}  # fmt: skip
+    raw["links"]["coupler"] = {"material": "steel", "shape": shape, **kind}
+    _, read = probed(raw)
+    for quantity, size in (("position", L), ("total_velocity", 2.0)):  # m, and m/s of the crank's pin
+        for at, links in pins.items():
+            bore, pin = (values(read, f"{link} {at} {quantity}", quantity) for link in links)
+            n = min(bore.shape[1], pin.shape[1])
+            np.testing.assert_allclose(bore[:, :n], pin[:, :n], atol=1e-7 * size)  # joints close to rounding
+    raw["output"]["probes"] = {"off": probe("coupler", [0.002, 0.1], "position")}
+    with pytest.raises(SceneError, match=r"must lie in link 'coupler'.* the centre of a bore"):
+        probed(raw)

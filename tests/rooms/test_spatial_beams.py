@@ -256,7 +256,8 @@ def test_a_rigid_body_beside_the_axis_of_a_spatial_beam(at: list[float]) -> None
 def test_a_probe_outside_a_spatial_beam(quantity: str) -> None:
     raw = simple(link={"beam": "spatial"})
     raw["output"] = {"probes": {"tip": {"link": "arm", "at": [0.5, 0.0, 0.05], "quantity": quantity}}}
-    assert fault(raw) == "output.probes.tip.at: must lie in link 'arm', got (0.5, 0, 0.05), 0.04 m outside it"
+    outside = "output.probes.tip.at: must lie in link 'arm', got (0.5, 0, 0.05), 0.04 m outside it"
+    assert fault(raw) == f"{outside}: take a point of its material"
 
 
 # -- axes, stresses, drawing --------------------------------------------------------------------------------

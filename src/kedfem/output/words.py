@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from kedfem.output.plots.abscissa import abscissa
+from kedfem.output.abscissa import abscissa
 from kedfem.results import Peak
 from kedfem.scene import Scene, drive_angle, time_grid
 

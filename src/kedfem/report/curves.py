@@ -7,8 +7,8 @@ from functools import partial
 import numpy as np
 
 from kedfem.arrays import Bool, Float
+from kedfem.output.abscissa import Abscissa
 from kedfem.output.load_files import draw_polar, has_polar, polar_title
-from kedfem.output.plots.abscissa import Abscissa
 from kedfem.output.plots.drawing import draw_panels, drawn_over, figure_svg, heading, worth_drawing
 from kedfem.results import Results
 from kedfem.results.forces.loads import JointLoad

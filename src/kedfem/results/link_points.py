@@ -14,6 +14,7 @@ from kedfem.links.record import Link, in_space
 from kedfem.motion.linkage import Linkage
 from kedfem.results.recorded import Rows
 
+HELD = 1e-6  # of a link's size: a point as near to where a joint holds it is that one
 Drawn = Float[np.ndarray, "3"]
 
 
@@ -59,9 +60,31 @@ def link_point(model: Model, linked: Linkage, where: str, name: str, at: Drawn) 
         return LinkPoint(linked.bodies.index(name), at, moved, np.eye(3), planar)
     if all(link.name != name for link in model.links):
         raise SceneError(f"{where.removesuffix('.at')}.link: must name a link with a shape, got {name!r}")
-    k, (value, X) = on_segment(model, name, at, lambda link: _value(link, where, at))
+    try:
+        k, (value, X) = on_segment(model, name, at, lambda link: _value(link, where, at))
+    except SceneError:
+        held = _held(model, name, at)
+        if held is None:
+            raise
+        k, value, X = *held, at
     link = model.links[k]
     return LinkPoint(model.bodies[k], X, _read(k, link, value), link.axes, link.planar)
+
+
+def _held(model: Model, name: str, at: Drawn) -> tuple[int, Float[np.ndarray, " n"]] | None:
+    """The number of a link, or of its segment, that a joint holds about a point by a bore or face, and values of its
+    functions whose sum is the mean motion there; None where no joint does."""
+    for k, (link, joint) in enumerate(zip(model.links, model.joints, strict=True)):
+        for each in dict.fromkeys(joint.joints) if link.name == name else ():
+            ports = np.flatnonzero(np.array(joint.joints) == each)
+            known = np.column_stack([np.ones(len(ports)), joint.points[ports] / link.size])
+            wanted = np.array([1.0, *at / link.size])
+            share = np.linalg.lstsq(known.T, wanted, rcond=HELD)[0]
+            if np.abs(share @ known - wanted).max() <= HELD and share.min() >= -HELD:  # between the ports
+                value = np.zeros(link.n)
+                value[joint.nodes] = share @ joint.weights[ports]
+                return k, value
+    return None
 
 
 def _at_rest(block: Block, field: str) -> Rows:

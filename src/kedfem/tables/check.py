@@ -40,6 +40,7 @@ from kedfem.tables.model import link_tables, mobility_table
 from kedfem.tables.run import plan_tables, reduction_table
 
 PARALLEL = 1e-6  # of the largest: turns about other axes that rounding leaves
+STILL = 1e-9  # rad, and of the linkage's size: motions below are rounding
 NEARLY = 0.01  # deg: of a full revolution, by rounding
 
 
@@ -126,8 +127,27 @@ def _motion(ready: Prepared) -> Table:
     drive = f"{of_joints(names)}, {_over(ready)}" if names else "none: the mechanism moves by itself"
     table = facts("Rigid motion", [("drive", drive), *_initial_speeds(ready)])
     for k, name in enumerate(ready.linkage.bodies[1:] if names else (), start=1):
-        table.add_row(f"link {name}", _turns(along.R[:, k]))
+        words = _moves(along.R[:, k], along.p[:, k], ready.linkage.size)
+        table.add_row(f"link {name}", words)
+    if names and ready.linkage.mobility:
+        table.caption = "by the drives alone; what they leave free is held in the reference position here"
     return table
+
+
+def _moves(R: Float[np.ndarray, "T 3 3"], p: Float[np.ndarray, "T 3"], size: float) -> str:
+    """How far a link turns, or slides where it does not turn, in words.
+
+    Parameters
+    ----------
+    R, p : its poses: a link that does not turn is p off the reference position [m]
+    size : of the linkage [m]
+    """
+    if np.abs(R - np.eye(3)).max() > STILL:
+        return _turns(R)
+    slid = float(np.linalg.norm(p, axis=1).max())
+    if slid <= STILL * size:
+        return "does not move"
+    return f"slides up to {with_prefix(slid, 'm')} from the reference position"
 
 
 def _turns(R: Float[np.ndarray, "T 3 3"]) -> str:

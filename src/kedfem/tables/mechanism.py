@@ -54,7 +54,9 @@ def _coordinates(scene: Scene, moved: Moved) -> Iterator[tuple[str, ...]]:
         words = [
             _length(x) if each.kind == "length" else f"{np.degrees(x):.2f}°" for x in (low, high, high - low)
         ]
-        driven = " (driven)" if each.joint in scene.driven_joints else ""
+        driven, links = "", scene.joints[each.joint].links
+        if each.joint in scene.driven_joints:  # between moving links it is easily taken the other way round
+            driven = " (driven)" if "ground" in links else f" of {links[0]} against {links[1]} (driven)"
         yield each.joint, each.name.replace("_", " ") + driven, *words
 
 

@@ -15,7 +15,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 
 from kedfem.arrays import Float, Int
-from kedfem.output.plots.abscissa import Abscissa, abscissa, draw_abscissa, over_positions
+from kedfem.output.abscissa import Abscissa, abscissa, draw_abscissa, over_positions
 from kedfem.output.plots.groups import FAINT, STIFF, Panel, Picture, largest, pictures
 from kedfem.output.words import prefixed
 from kedfem.results import Channel, Results, replacing

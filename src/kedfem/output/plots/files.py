@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from kedfem.output.plots.abscissa import Abscissa, draw_abscissa
+from kedfem.output.abscissa import Abscissa, draw_abscissa
 from kedfem.output.plots.drawing import (
     MARK,
     draw_curves,
@@ -16,7 +16,7 @@ from kedfem.output.plots.drawing import (
     heading,
     worth_drawing,
 )
-from kedfem.output.plots.groups import CURVES, FAINT, STIFF, Panel, Picture, largest
+from kedfem.output.plots.groups import ALL, CURVES, FAINT, STIFF, Panel, Picture, largest
 from kedfem.results import Results, ready_folder
 
 COLUMNS, MOST = 2, 14  # of panels on a page, and how many it takes
@@ -133,6 +133,8 @@ def shown(picture: Picture) -> tuple[str, Panel]:
     """What a panel is of, as short as results name it, and its curves: no more than have a place in its legend."""
     title = picture.channel.name if picture.channel else picture.title
     panel = picture.panels[0]
+    for first, words in ALL.items() if len(picture.panels) > 1 else ():
+        title = first + title.removeprefix(words) if title.startswith(words) else title
     every = {name: largest(y) for name, y in panel.curves.items() if not name.endswith(STIFF)}
     peaks = {name: peak for name, peak in every.items() if peak > FAINT * max(every.values())}
     if len(peaks) <= CURVES:

@@ -26,6 +26,9 @@ MOTIONS = {
 }
 """Channels of one thing that are drawn above each other."""
 
+ALL = {"position": "position, velocity and acceleration", "rotation": "rotation and its rates"}
+"""What their titles say of them, by the first."""
+
 COORDINATES = {"angle": "Turns of the joints", "travel": "Travels of the joints"}
 
 
@@ -67,13 +70,17 @@ class Picture:
 
 def pictures(results: Results) -> Iterator[Picture]:
     """All pictures of a results file."""
-    channels = results.channels
+    channels, least = results.channels, rounding(results)
     grouped: set[str] = set()
     for prefix in dict.fromkeys(name.rpartition("/")[0] for name in channels):
         for what, kinds in MOTIONS.items():
             names = [f"{prefix}/{kind}" for kind in kinds if f"{prefix}/{kind}" in channels]
             if len(names) > 1:
                 grouped |= set(names)
+                if all(
+                    largest(channels[name][1]) <= least.get(channels[name][0].unit, 0.0) for name in names
+                ):
+                    continue  # a slide that turns by rounding
                 yield Picture(_file(f"{prefix}/{what}"), _shared(channels[names[0]][0], kinds[0]), None,
                               [panel for name in names for panel in _single(*channels[name])])  # fmt: skip
     for kind, title in COORDINATES.items():
@@ -164,11 +171,10 @@ def _file(name: str) -> str:
 
 def _shared(channel: Channel, kind: str) -> str:
     """What a description of the first says of all: ``position of the joint …`` → ``motion of the joint …``."""
-    words = {"position": "position, velocity and acceleration", "rotation": "rotation and its rates"}
     title = channel.description
     for beginning in ("rotation vector", "turn", kind):
         if title.startswith(beginning):
-            return words[kind] + title.removeprefix(beginning)
+            return ALL[kind] + title.removeprefix(beginning)
     return title
 
 

@@ -146,7 +146,8 @@ def drive_table_faults(parts: Parts, drive: Entry) -> Iterator[Fault]:
     end = parts.analysis.record.end_time if parts.analysis.record is not None else None
     if end is not None and end > motion.time[-1] * (1.0 + 1e-9):
         wanted = f"must reach the end of the analysis {end:.6g} [s]"
-        yield drive.fault("motion", f"{wanted}, got {motion.time[-1]:.6g}", "time")
+        remedy = "let it end there, or go on with rows of the last value where the joint is to stay"
+        yield drive.fault("motion", f"{wanted}, got {motion.time[-1]:.6g}: {remedy}", "time")
     noise, share = table_noise(motion)
     if motion.smooth is None and share > ROUGH:
         key, unit = ("travel", "m") if motion.travel else ("angle", "rad")

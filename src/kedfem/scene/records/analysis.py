@@ -161,8 +161,9 @@ class Probe(Record):
     link: LinkName
     """the link; a rigid one for motions only"""
     at: Point
-    """where, in the reference position; of a rigid link anywhere. Of a stress in a beam anywhere in its section: on the
-    axis there is none of bending"""
+    """where, in the reference position; of a rigid link anywhere, and for a motion in the centre of a bore that a joint
+    holds: the mean motion of the bore. Of a stress in a beam anywhere in its section: on the axis there is none of
+    bending"""
     quantity: Literal[
         "displacement", "velocity", "acceleration", "deflection", "position", "travel", "total_velocity",
         "total_acceleration", "stress",
