@@ -130,7 +130,7 @@ def _motion(ready: Prepared) -> Table:
         words = _moves(along.R[:, k], along.p[:, k], ready.linkage.size)
         table.add_row(f"link {name}", words)
     if names and ready.linkage.mobility:
-        table.caption = "by the drives alone; what they leave free is held in the reference position here"
+        table.caption = "by the drives alone: free motions are held in the reference position here"
     return table
 
 
