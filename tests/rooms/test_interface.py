@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from kedfem.dynamics.matrices import bordered
-from kedfem.dynamics.matrices.bordered import MANY, Bordered, independent_rows, multipliers
+from kedfem.dynamics.matrices.bordered import MANY, independent_rows, multipliers
 from kedfem.dynamics.matrices.interface import Tie, solved
-from kedfem.errors import SolveError
 
 
 def chain(n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -73,25 +71,3 @@ def test_least_multipliers_of_many_constraints_are_those_of_few() -> None:
     p = random.standard_normal(4 * MANY)
     wanted = np.linalg.lstsq(C.T.toarray(), p)[0]
     assert multipliers(C, p) == pytest.approx(wanted, rel=1e-9, abs=1e-12 * np.abs(wanted).max())
-
-
-def test_few_unknowns_have_the_solution_of_the_sparse_factor(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A constraint, one that repeats it, a law: by a dense factor as by a sparse one; what moves freely is refused."""
-    random = np.random.default_rng(5)
-    root = random.standard_normal((9, 9))
-    H, C = sp.coo_array(root @ root.T), random.standard_normal((4, 9))
-    C[2] = 2 * C[0]
-    compliance, f = np.array([0.0, 0.0, 0.0, 0.3]), random.standard_normal(9)
-    target = np.array([1.0, -1.0, 2.0, 0.5])
-    dense = Bordered(H, sp.csr_array(C), compliance).solved(f, target)
-    free = sp.csr_array((9, 9)), sp.csr_array(C), compliance
-    with pytest.raises(SolveError, match="move freely"):
-        Bordered(*free)
-    monkeypatch.setattr(bordered, "FEW", 0)
-    sparse = Bordered(H, sp.csr_array(C), compliance).solved(f, target)
-    for one, other in zip(dense, sparse, strict=True):
-        assert one == pytest.approx(other, rel=1e-9, abs=1e-12)  # rounding of 12 unknowns
-    assert C @ dense[0] + compliance * dense[1] == pytest.approx(target, abs=1e-12)
-    assert root @ root.T @ dense[0] == pytest.approx(f + C.T @ dense[1], abs=1e-11)
-    with pytest.raises(SolveError, match="move freely"):
-        Bordered(*free)

@@ -1,13 +1,10 @@
-"""Unknowns under constraints and laws, by one factor of both, dense of few: H z = f + Cᵀ m, C z + m / κ = target."""
+"""Unknowns under constraints and laws, by one sparse factor of both: H z = f + Cᵀ m, C z + m / κ = target."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
-from scipy.linalg.lapack import dgetrf as getrf
-from scipy.linalg.lapack import dgetrs as getrs
 from scipy.sparse.linalg import splu
 
 from kedfem.arrays import Float, Int
@@ -16,7 +13,6 @@ from kedfem.errors import SolveError
 
 DEPENDENT = 1e-9  # what is left of a constraint of unit size where others constrain the same
 INDEPENDENT = 1e-10  # least eigenvalue of products of constraints of unit size: above, none repeats others
-FEW = 200  # unknowns and constraints up to which a dense factor takes less time than to assemble a sparse one
 MANY = 100  # constraints from which that is asked first: a dense decomposition takes the time of their cube
 
 Flat = Float[np.ndarray, " _"]
@@ -38,23 +34,24 @@ class Bordered:
     """
 
     def __init__(self, H: Any, C: sp.csr_array, compliance: Flat) -> None:
-        few = sum(C.shape) <= FEW
-        H, C = (H.toarray(), C.toarray()) if few else (H, C)
         self.kept = independent_rows(C, compliance)
         self.count = len(compliance)
         rows = C[self.kept]
         usual = np.abs(H.diagonal()).mean() if rows.shape[1] else 1.0
         size = row_sizes(rows)
         self.scale = usual / np.where(size > 0, size, 1.0)  # so that both parts are about as large
-        compliant = self.scale**2 * compliance[self.kept]
-        if few:
-            rows = self.scale[:, None] * rows
-            self.matrix = np.block([[H, -rows.T], [rows, np.diag(compliant)]])
-        else:
-            rows = sp.diags_array(self.scale) @ rows
-            self.matrix = sp.csc_array(sp.block_array([[H, -rows.T], [rows, sp.diags_array(compliant)]]))
-        if self.matrix.shape[0]:
-            self.solution = _factored(self.matrix)
+        rows = sp.diags_array(self.scale) @ rows
+        self.matrix = sp.csc_array(
+            sp.block_array([[H, -rows.T], [rows, sp.diags_array(self.scale**2 * compliance[self.kept])]])
+        )
+        if not self.matrix.shape[0]:
+            return
+        try:
+            self.factor = splu(self.matrix)
+        except RuntimeError as error:
+            raise SolveError(
+                "joints: bodies must be held by joints or springs, got some that move freely"
+            ) from error
 
     def solved(self, f: Flat, target: Flat, closes: bool = False) -> tuple[Flat, Flat]:
         """z and m, refined once.
@@ -66,37 +63,22 @@ class Bordered:
         """
         right, m = np.concatenate([f, self.scale * target[self.kept]]), np.zeros(self.count)
         if len(right):
-            found = self.solution(right)
+            found = self.factor.solve(right)
             left = right - self.matrix @ found
             left[: len(f) if closes else 0] = 0.0
-            right = found + self.solution(left)
+            right = found + self.factor.solve(left)
         m[self.kept] = self.scale * right[len(f) :]
         return right[: len(f)], m
 
 
-def _factored(matrix: Any) -> Callable[[Flat], Flat]:
-    """Solutions of a sparse or a dense matrix."""
-    freely = SolveError("joints: bodies must be held by joints or springs, got some that move freely")
-    if isinstance(matrix, np.ndarray):
-        factor, pivots, zero_pivot = getrf(matrix)
-        if zero_pivot:
-            raise freely
-        return lambda right: np.asarray(getrs(factor, pivots, right)[0])
-    try:
-        return splu(matrix).solve  # type: ignore[no-any-return]
-    except RuntimeError as error:
-        raise freely from error
-
-
-def independent_rows(C: Any, compliance: Flat) -> Int[np.ndarray, " q"]:
+def independent_rows(C: sp.csr_array, compliance: Flat) -> Int[np.ndarray, " q"]:
     """Numbers of laws, and of constraints that do not repeat others."""
     size = row_sizes(C)
     hard = np.flatnonzero((compliance == 0.0) & (size > DEPENDENT))
     soft = np.flatnonzero(compliance != 0.0)
-    unit = C[hard] * (1 / size[hard])[:, None]
+    unit = sp.csr_array(sp.diags_array(1 / size[hard]) @ C[hard])
     if len(hard) and not _independent(unit):
-        unit = unit if isinstance(unit, np.ndarray) else unit.toarray()
-        _, upper, order = scipy.linalg.qr(unit.T, mode="economic", pivoting=True)
+        _, upper, order = scipy.linalg.qr(unit.T.toarray(), mode="economic", pivoting=True)
         hard = hard[order[: int((np.abs(np.diag(upper)) > DEPENDENT).sum())]]
     return np.sort(np.concatenate([hard, soft]))
 
@@ -109,17 +91,16 @@ def multipliers(C: sp.csr_array, p: Flat) -> Flat:
     return np.asarray(np.linalg.lstsq(C.T.toarray(), p, rcond=DEPENDENT)[0])
 
 
-def row_sizes(C: Any) -> Flat:
+def row_sizes(C: sp.csr_array) -> Flat:
     """Length of each row."""
     return np.asarray(np.sqrt((C * C).sum(axis=1)))
 
 
-def _independent(unit: Any) -> bool:
+def _independent(unit: sp.csr_array) -> bool:
     """Whether many rows of length one are surely independent, by a sparse factor of their products."""
     if unit.shape[0] < MANY:
         return False
     try:
-        unit = sp.csr_array(unit)
         Cholesky(sp.csr_array(unit @ unit.T - INDEPENDENT * sp.eye_array(unit.shape[0])), "constraints")
     except SolveError:
         return False
