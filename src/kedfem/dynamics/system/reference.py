@@ -11,7 +11,6 @@ What is handed on must be kept as long as the function runs.
 
 import struct
 import sys
-from collections.abc import Iterator
 from hashlib import sha256
 from typing import Any
 
@@ -73,7 +72,7 @@ def _attribute(context: Any, builder: Any, kind: Reference, address: Any, name: 
 
 
 def _length(kind: Any) -> int:
-    """How many numbers a value has, see `_numbers`."""
+    """How many numbers a value has, see `_lay_out`."""
     if isinstance(kind, types.Array):
         return 5 + 2 * int(kind.ndim)
     return sum(_length(each) for each in kind) if isinstance(kind, types.BaseTuple) else 1
@@ -98,24 +97,26 @@ class Handed:
         if kind not in _kinds:
             _kinds[kind] = Reference(typeof(record))
         self._numba_type_, self.record = _kinds[kind], record
-        self.numbers = np.array(list(_numbers(record)), np.int64)
+        numbers: list[int] = []
+        _lay_out(record, numbers)
+        self.numbers = np.array(numbers, np.int64)
         self.address = self.numbers.ctypes.data
 
 
 _kinds: dict[bytes, Reference] = {}
 
 
-def _numbers(x: Any) -> Iterator[int]:
-    """What numba keeps of a value: of arrays owner, parent, sizes, address, shape and strides."""
+def _lay_out(x: Any, numbers: list[int]) -> None:
+    """Append what numba keeps of a value: of arrays owner, parent, sizes, address, shape and strides."""
     if isinstance(x, np.ndarray):
-        yield from (0, 0, x.size, x.itemsize, x.ctypes.data, *x.shape, *x.strides)
+        numbers += (0, 0, x.size, x.itemsize, x.__array_interface__["data"][0], *x.shape, *x.strides)
     elif isinstance(x, tuple):
         for each in x:
-            yield from _numbers(each)
+            _lay_out(each, numbers)
     elif isinstance(x, float):
-        yield int.from_bytes(struct.pack("=d", x), sys.byteorder, signed=True)
+        numbers.append(int.from_bytes(struct.pack("=d", x), sys.byteorder, signed=True))
     else:
-        yield int(x)
+        numbers.append(int(x))
 
 
 def handed(record: Any) -> Any:

@@ -9,6 +9,7 @@ import ctypes
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -190,9 +191,6 @@ def solver(parts: Sequence[Part], at: Int[np.ndarray, " _"], trial: Trial) -> An
 
     It must be kept as long as the step runs.
     """
-    from numba.core import types
-    from numba.experimental import function_type  # noqa: F401  (makes numba know such arguments)
-
     every = {
         k: (part, slice(at[k], at[k + 1]))
         for k, part in enumerate(parts) if isinstance(part, SparsePart) and not part.arrays[0].size
@@ -210,8 +208,27 @@ def solver(parts: Sequence[Part], at: Int[np.ndarray, " _"], trial: Trial) -> An
                 failed.append(error)
         return 0
 
+    watched = partial(caught_in, solved.__code__, failed.append) if every else nullcontext
+    return _kind_of_call()(solved, failed, watched)
+
+
+@cache
+def _kind_of_call() -> Any:
+    """The class of functions that compiled steps call, one for all: numba takes a while to know another."""
+    from numba.core import types
+    from numba.experimental import function_type  # noqa: F401  (makes numba know such arguments)
+
     class Called(types.WrapperAddressProtocol):
-        kept = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(solved)
+        def __init__(
+            self,
+            solved: Callable[[int], int],
+            failed: list[BaseException],
+            watched: Callable[[], AbstractContextManager[None]],
+        ) -> None:
+            self.kept = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(solved)
+            self.failed = failed
+            self.watched = watched
+            """What a signal raises as a call begins or ends counts as raised within it."""
 
         def __wrapper_address__(self) -> int:
             return int(ctypes.cast(self.kept, ctypes.c_void_p).value or 0)
@@ -221,11 +238,7 @@ def solver(parts: Sequence[Part], at: Int[np.ndarray, " _"], trial: Trial) -> An
 
         def check(self) -> None:
             """Raise what was raised within a call."""
-            if failed:
-                raise failed[0]
+            if self.failed:
+                raise self.failed[0]
 
-        def watched(self) -> AbstractContextManager[None]:
-            """What a signal raises as a call begins or ends counts as raised within it."""
-            return caught_in(solved.__code__, failed.append) if every else nullcontext()
-
-    return Called()
+    return Called
