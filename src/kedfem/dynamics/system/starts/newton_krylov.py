@@ -39,6 +39,9 @@ KRYLOV = 40
 OPEN = 1e-4  # of the largest link: what joints may be open in a balance; found ones are at 1e-9
 LEFT = 1e-3  # of a residual by GMRES: an iteration leaves about as much of the error
 ROUNDING = 1e-8  # of the deflection: changes below it that do not fall
+LEAST = (
+    1e-6  # the same where nothing is left to rounding and no part of the change lessens it: soft directions
+)
 DIFFERENCE = 1e-9  # of the size of bodies: displacements along which forces are differenced
 
 Frames = Float[np.ndarray, "L 3 3"]
@@ -283,6 +286,8 @@ def solution(problem: Equilibrium, u: Flat) -> Found:
         settled = stalls or (part == 1.0 and size <= CONVERGED * reached + now.of.c.floor)
         short = short + 1 if part <= SHORTEST else 0
         if short == IN_A_ROW:
+            if size <= LEAST * reached and float(np.linalg.norm(first.x)) <= CONVERGED * reached:
+                return Found(at.u)
             break
         at, last = new, size
     return Found(at.u, problem.moves(at, new, change))
