@@ -7,7 +7,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING or "jaxtyping" in sys.modules:
-    from jaxtyping import Bool, Complex, Float, Int, UInt8
+    from jaxtyping import Bool, Complex, Float, Inexact, Int, UInt8
 else:
 
     class _Unchecked:
@@ -16,6 +16,6 @@ else:
         def __class_getitem__(cls, kind: tuple[type, str]) -> Any:
             return kind[0]
 
-    Bool = Complex = Float = Int = UInt8 = _Unchecked
+    Bool = Complex = Float = Inexact = Int = UInt8 = _Unchecked
 
-__all__ = ["Bool", "Complex", "Float", "Int", "UInt8"]
+__all__ = ["Bool", "Complex", "Float", "Inexact", "Int", "UInt8"]

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kedfem.arrays import Bool, Float
+from kedfem.arrays import Bool, Float, Inexact
 from kedfem.motion.blocks import Blocks
 from kedfem.motion.constraints import Rows
 from kedfem.motion.linkage import Linkage
@@ -27,7 +27,7 @@ def rotation(theta: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 3 3"]:
     return np.asarray(np.eye(3) + s * W + c * (W @ W))
 
 
-def cross_matrix(w: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 3 3"]:
+def cross_matrix(w: Inexact[np.ndarray, "... 3"]) -> Inexact[np.ndarray, "... 3 3"]:
     """[w]×, so that [w]× x = w × x."""
     out = np.zeros((*w.shape, 3), np.result_type(w, float))
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -w[..., 2], w[..., 1], -w[..., 0]
