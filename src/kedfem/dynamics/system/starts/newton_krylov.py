@@ -278,15 +278,15 @@ def solution(problem: Equilibrium, u: Flat) -> Found:
         if not np.isfinite(change).all():
             break
         size, reached = float(np.linalg.norm(change)), float(np.linalg.norm(at.u))
-        tiny = size <= ROUNDING * reached
-        new, part = problem.stepped(at, m, balance, change, float(np.linalg.norm(first.x)), tiny)
+        left, tiny = float(np.linalg.norm(first.x)), size <= ROUNDING * reached
+        new, part = problem.stepped(at, m, balance, change, left, tiny)
         if settled:
             return Found(new.u)
         stalls = size > last / 2 and tiny
         settled = stalls or (part == 1.0 and size <= CONVERGED * reached + now.of.c.floor)
         short = short + 1 if part <= SHORTEST else 0
         if short == IN_A_ROW:
-            if size <= LEAST * reached and float(np.linalg.norm(first.x)) <= CONVERGED * reached:
+            if size <= LEAST * reached and left <= CONVERGED * reached:
                 return Found(at.u)
             break
         at, last = new, size
