@@ -104,9 +104,8 @@ def point_forces(
     if end.form in (POINT, PLANAR_BEAM):
         return y
     R = motion.R[:, end.body]
-    D = _directions(
-        end, R, np.zeros_like(y) if z is None else np.einsum("pdc,tc->tpd", end.onto, z[:, end.columns])
-    )
+    u = np.zeros_like(y) if z is None else np.einsum("pdc,tc->tpd", end.onto, z[:, end.columns])
+    D = _directions(end, R, u)
     Q = R if z is None else _rotations(D, end)
     U = Q.transpose(0, 2, 1) @ D.transpose(0, 2, 1) @ end.directions
     G = np.trace(U, axis1=1, axis2=2)[:, None, None] * np.eye(3) - U

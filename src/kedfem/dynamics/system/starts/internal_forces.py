@@ -1,6 +1,7 @@
 """What a body is inside where a march begins: internal force, frames and damped quantities from u and u'."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -58,12 +59,11 @@ class Still:
         R : of all bodies of the linkage in the rigid-body motion
         amounts : of loads that turn with bodies
         """
-        from kedfem.dynamics.system.reference import handed
         from kedfem.dynamics.system.still_kernel import still_forces
 
         bodies, trial = self.of.bodies, self._trial
         trial.u[:] = u
-        c, constant, state, end, work = (handed(x) for x in (self._c, bodies, self._state, trial, self._work))
+        c, constant, state, end, work = self._of_forces
         still_forces(c, constant, R, amounts, state, end, work)
         f, mean = trial.f.copy(), R[bodies.motion].copy()
         for k, frame in enumerate(bodies.frame):
@@ -73,6 +73,20 @@ class Still:
                 here = own(self.of, k)
                 f[here] = self.sprung(k, mean[k], u[here])
         return f, mean
+
+    @cached_property
+    def _of_forces(self) -> list[Any]:
+        """Records as compiled code is handed them, once: their arrays stay where they are."""
+        from kedfem.dynamics.system.reference import handed
+
+        return [handed(x) for x in (self._c, self.of.bodies, self._state, self._trial, self._work)]
+
+    @cached_property
+    def _of_gradients(self) -> list[Any]:
+        """The same for gradients."""
+        from kedfem.dynamics.system.reference import handed
+
+        return [handed(x) for x in (self.of.ends, self.of.constraints, self._trial, self._work)]
 
     def frames(self) -> Frames:
         """The bodies' frames as they were last found, from which they are sought again."""
@@ -94,12 +108,11 @@ class Still:
         of = self.of.constraints
         if not len(of.law):
             return sp.csr_array((0, len(z)))
-        from kedfem.dynamics.system.reference import handed
         from kedfem.dynamics.system.still_kernel import still_gradients
 
         omega = np.ascontiguousarray(motion.omega[0])  # laid out as in steps: compiled once for both
         turning = motion.R[0], motion.v[0], omega
-        ends, constraints, trial, work = (handed(x) for x in (self.of.ends, of, self._trial, self._work))
+        ends, constraints, trial, work = self._of_gradients
         still_gradients(ends, constraints, turning, motion.p[0], stations, z, trial, work)
         return sp.csr_array((self._trial.C.copy(), of.columns, of.column_at), (len(of.law), len(z)))
 

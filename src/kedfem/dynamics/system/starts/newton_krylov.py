@@ -39,9 +39,7 @@ KRYLOV = 40
 OPEN = 1e-4  # of the largest link: what joints may be open in a balance; found ones are at 1e-9
 LEFT = 1e-3  # of a residual by GMRES: an iteration leaves about as much of the error
 ROUNDING = 1e-8  # of the deflection: changes below it that do not fall
-LEAST = (
-    1e-6  # the same where nothing is left to rounding and no part of the change lessens it: soft directions
-)
+LEAST = 1e-6  # the same of soft directions, where nothing is left to rounding and no step lessens it
 DIFFERENCE = 1e-9  # of the size of bodies: displacements along which forces are differenced
 
 Frames = Float[np.ndarray, "L 3 3"]
