@@ -4,12 +4,16 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
+from numpy.testing import assert_allclose
 
+from kedfem.dynamics.history import bent
 from kedfem.links.beams.beam import beam_link
 from kedfem.links.beams.beam_recovery import straight_run
 from kedfem.links.beams.section import rectangle
 from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
+from kedfem.links.recovery import stress_recovery
+from kedfem.output.frames import link_field
 from tests.laws.strategies import MATERIAL
 
 LENGTH, HEIGHT, THICKNESS = 2.0, 0.05, 0.02
@@ -69,6 +73,21 @@ def test_stress_on_a_straight_run_converges_at_nodes_with_the_fourth_power(at: f
     assert errors[0] < (4e-3 if at == 0 else 5e-4)
     assert np.log2(errors[0] / errors[2]) / 2 > order  # at 0.13 the coarsest error passes zero
     assert errors[2] < 5e-5
+
+
+def test_a_frame_of_a_bent_beam_shows_tension_and_compression() -> None:
+    """A force F across the end of a cantilever and a pull N along it: σ = N/A ± F L h/2I at the wall, N/A at the end."""
+    link, F, N = beam(8), 50.0, 2000.0
+    root, end = (int(np.argmin(np.linalg.norm(link.X[:, :2] - TURN @ [x, 0], axis=1))) for x in (0, LENGTH))
+    forces = np.zeros((link.n, 3))
+    forces[end, :2] = TURN @ [N, F]
+    g = held_still(link, [root], forces).reshape(-1, 3)
+    moment, place_of_link = bent(g, np.eye(3)), (np.zeros(3), np.eye(3))
+    field = link_field(link, stress_recovery(link), place_of_link, moment, 1.0)
+    direct, bending = N / SECTION.area, F * LENGTH * HEIGHT / 2 / SECTION.second_moment
+    assert_allclose(field.principal[root], [direct - bending, direct + bending], rtol=1e-6)
+    assert_allclose(field.von_mises[root], direct + bending, rtol=1e-6)
+    assert_allclose(field.principal[end], [0.0, direct], atol=1e-6 * bending)
 
 
 def test_a_run_ends_at_kinks_corners_and_ends() -> None:

@@ -141,6 +141,22 @@ def nodal_stress(recovery: StressRecovery, g: Float[np.ndarray, "n d"]) -> Float
     return out
 
 
+def extreme_stresses(
+    recovery: StressRecovery, g: Float[np.ndarray, "n d"]
+) -> tuple[Float[np.ndarray, " p"], Float[np.ndarray, "p 2"]]:
+    """Von Mises stress, smallest and largest principal stress [Pa]; at a node of a planar beam of its two outer fibres.
+
+    Parameters
+    ----------
+    g : (n, d) as for `nodal_stress`
+    """
+    stress = nodal_stress(recovery, g)
+    if recovery.link.kind != "beam":
+        return von_mises(stress), principal_stresses(stress)
+    fibres = np.stack([m @ g.ravel() for m in recovery.matrices] + [np.zeros(len(stress))])
+    return von_mises(stress), np.stack([fibres.min(axis=0), fibres.max(axis=0)], axis=1)
+
+
 def stress_modes(
     recovery: StressRecovery, link: Link, modes: Float[np.ndarray, "r k"]
 ) -> Float[np.ndarray, "p 6 r"]:

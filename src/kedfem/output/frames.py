@@ -15,11 +15,10 @@ from kedfem.links.beams.spatial_recovery import drawn
 from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import (
     StressRecovery,
+    extreme_stresses,
     nodal_state,
     nodal_stress,
-    principal_stresses,
     turned_stress,
-    von_mises,
 )
 from kedfem.mesh.cad.sides import boundary_sides, side_corners
 from kedfem.mesh.elements.shape_functions import HEX8
@@ -113,12 +112,12 @@ def link_field(
     """
     shown, (p, R) = link.full or link, place
     displacement = recovery.at_points(in_space(shown, nodal_state(link, moment.u)))
-    stress = nodal_stress(recovery, nodal_state(link, moment.g))
+    g = nodal_state(link, moment.g)
+    stress, von, least_and_most = nodal_stress(recovery, g), *extreme_stresses(recovery, g)
     if link.rigid:
-        stress = np.full_like(stress, np.nan)
+        stress, von, least_and_most = (np.full_like(of, np.nan) for of in (stress, von, least_and_most))
     points = p + recovery.at_points(shown.X) @ R.T + deformation_scale * displacement
     kind, cells = recovery.cell_type, recovery.cells
-    von, least_and_most = von_mises(stress), principal_stresses(stress)
     stress = _in_world(shown, moment, stress)
     return LinkField(
         link.name, kind, cells, points, displacement, stress, von, least_and_most, _section(link)
