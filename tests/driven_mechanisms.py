@@ -77,7 +77,7 @@ def limit(raw: Raw) -> dict[str, float]:
 
 
 def by_both_solvers(raw: Raw) -> dict[str, float]:
-    """How far a vibrating mechanism is from the monolithic solver, which knows no limits, nor co-rotational frames."""
+    """How far a vibrating mechanism is from the monolithic solver, which is refused with limits."""
     raw = raw | {"limits": {}}
     got, other = (recorded(raw, solver=solver) for solver in ("condensed", "monolithic"))
     return {name: x / ALIKE for name, x in differences(got, other).items() if not name.startswith("energy/")}

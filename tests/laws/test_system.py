@@ -1,5 +1,6 @@
 """One system, one step: equal to the oracle and to the monolithic step of scenes, and right where that knows less."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -14,7 +15,7 @@ from kedfem.dynamics.system.march import displacements, march, ready
 from kedfem.dynamics.system.record import COROTATIONAL, TANGENTIAL, Driven, Held, Spring, Stop
 from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.scene import Gear, Motor
-from tests.moving import bar, beam_in_space, rising, turned
+from tests.moving import bar, beam_in_space, cardan, channels, geared, inverted, ran, rising, screwed, turned
 from tests.spatial_joints import BEAMS
 from tests.systems import Begun, against_oracle, begun, by_oracle, marched, rows
 
@@ -120,6 +121,42 @@ def test_planar_beams_move_as_by_other_steps(frames: str, within: float) -> None
     wanted = monolithic_displacements(of) if frames == "rigid-body" else by_oracle(of, count)[0]
     _, history = marched(of, count)
     assert np.abs(rows(of.ready, history.u) - wanted).max() < within * np.abs(wanted).max()
+
+
+def corotational(name: str) -> Raw:
+    """Mechanisms whose frames follow their links, driven and not, that begin at rest or quasi-statically."""
+    made: dict[str, Callable[[], Raw]] = {
+        "planar beams": four_bar, "springs and motor": lambda: four_bar(**elements()),
+        "loads that turn": lambda: four_bar(loads={"f": PUSH}), "slide": lambda: inverted("beam"),
+        "solids": lambda: inverted("solid"), "screw": screwed, "gears": geared, "cardan": cardan,
+    }  # fmt: skip
+    raw = four_bar(**elements()) if name == "no drive" else made[name]()
+    given = dict(raw["analysis"]) | {"frames": "co-rotational", "end_time": 0.003, "step": 5e-4}
+    given["initial"] = "quasi-static" if name in {"slide", "gears"} else "rest"
+    analysis = {key: x for key, x in given.items() if key not in {"revolutions", "steps_per_revolution"}}
+    if name == "no drive":
+        del raw["drive"]
+        analysis["initial_speeds"] = {"A": 5.0}
+    return {**raw, "analysis": analysis}
+
+
+PUSH = {"kind": "force", "link": "coupler", "at": [0.35, 0.2], "vector": [50.0, 20.0], "frame": "link"}
+CHEAP = ("planar beams", "springs and motor", "loads that turn", "slide", "no drive")
+DEAR = ("solids", "screw", "gears", "cardan")
+
+
+@pytest.mark.parametrize("name", [*CHEAP, *(pytest.param(x, marks=pytest.mark.long) for x in DEAR)])
+def test_all_channels_of_corotational_scenes_are_those_of_the_monolithic_solver(name: str) -> None:
+    """By its own tangents, from the first time point on: forces, moments, energies, elements, what probes show."""
+    raw, found = corotational(name), []
+    for solver in ("condensed", "monolithic"):
+        found.append(channels(*ran({**raw, "analysis": {**raw["analysis"], "solver": solver}})))
+    got, wanted = found
+    for what in {each.split("/")[-1] for each in wanted} - {"residual"}:
+        names = [each for each in wanted if each.split("/")[-1] == what]
+        size = max(np.abs(wanted[each]).max() for each in names)
+        for each in names:
+            assert_allclose(got[each], wanted[each], atol=5e-7 * size, err_msg=each)
 
 
 CELLS = [("rigid-body", True, 1e-8), ("co-rotational", True, 1e-7), ("co-rotational", False, 1e-7)]

@@ -69,12 +69,3 @@ def test_stiffening_beside_frames_that_follow() -> None:
         "analysis.stiffening: must be combined with rigid-body frames (co-rotational ones know all of it), "
         "got it with co-rotational frames: leave stiffening out"
     )
-
-
-def test_the_monolithic_solver_with_frames_that_follow() -> None:
-    said = fault(arm(solver="monolithic"))
-    assert said == (
-        "analysis.solver: must be 'condensed' for co-rotational frames (the monolithic solver of scenes "
-        "knows rigid-body ones "
-        "alone), got 'monolithic': leave it out, or take frames = \"rigid-body\""
-    )

@@ -116,7 +116,6 @@ SCENES: list[Raw] = [
          "extrapolation_levels": 2}),
     slid("prismatic", analysis={**inverted()["analysis"], "stiffening": True, "rho_inf": 1.0}),
     slid("prismatic", analysis={**inverted()["analysis"], "stiffening": True, "frames": "co-rotational"}),
-    slid("prismatic", analysis={**inverted()["analysis"], "solver": "monolithic", "frames": "co-rotational"}),
     slid("prismatic", springs=BOTH, motors={"m": {"joint": "S", "torque": 1.0}, "n": {"joint": "A", "force": 1.0}}),
     slid("prismatic", motors={"n": {"joint": "S", "force": 1.0}},
          springs={"s": {"kind": "spring", "joint": "S", "stiffness": 1.0}},

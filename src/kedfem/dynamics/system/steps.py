@@ -180,7 +180,8 @@ class Steps:
         if self.oracle is not None:
             from kedfem.dynamics.system.oracle.monolithic_steps import monolithic_march
 
-            later, found = monolithic_march(self.ready, self.oracle, state, motion)
+            frames = motion_at if self.corotational else None
+            later, found = monolithic_march(self.ready, self.oracle, state, motion, frames)
         elif not isinstance(state, State):
             raise ValueError("a march must begin with a state of the system, got one of the oracle")
         else:

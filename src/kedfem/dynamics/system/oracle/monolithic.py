@@ -43,6 +43,7 @@ DIVERGED = 1e9  # m: a change with which iterations will not come back; forces o
 STIFF = 0.01  # of the displacement: changes of linear steps below it are rounding, beside far stiffer links,
 STALLED = 4  # where so many in a row have not halved
 BALANCED = 1e-6  # of the largest force: what may be left of a body's balance where changes are rounding
+ROUNDING = 1e-14  # of stiffness times size: what positions leave of forces
 Column = Float[np.ndarray, " _"]
 Seen = tuple[float, np.ndarray]
 """Angle of a frame, and g, g', g'' (3, n, d) seen from it."""
@@ -94,6 +95,8 @@ class Monolithic:
         self.linear = all(link.fit is None for link in model.links) and all(
             x.linear for x in self.system.constraints
         )
+        sizes = [float(abs(link.K0).max()) * link.size for link in model.links]
+        self.rounding = 0.0 if self.linear else ROUNDING * max(sizes)
         self.masses = [sp.csr_array(mass_matrix(link)) for link in model.links]
         self.M = sp.csr_array(sp.block_diag(self.masses))
         self.W = sp.csr_array(sp.block_diag([port_columns(joint, link.n).T for link, joint in every]))
@@ -172,7 +175,7 @@ class Monolithic:
             lost = self.linear and stalled >= STALLED and size < STIFF * reached
             if lost or size <= 1e-14 * max(1.0, reached) or (size < 1e-11 and size > 0.5 * before):
                 borne = max(float(np.abs(x).max(initial=0.0)) for x in (self.W.T @ lam, now.F, old.F))
-                if lost or float(np.abs(left[0]).max()) <= BALANCED * borne:
+                if lost or float(np.abs(left[0]).max()) <= max(BALANCED * borne, self.rounding):
                     self.kept = used
                     return self._ended(now, old, at, m, lam)
                 if not self.linear:

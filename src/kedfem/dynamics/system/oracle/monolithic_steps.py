@@ -1,15 +1,18 @@
-"""Steps of a system by the oracle, as a march hands them on: what `solver = "monolithic"` takes with force elements."""
+"""Steps of a system by the oracle, as a march hands them on: what `solver = "monolithic"` takes."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from kedfem.arrays import Float
+from kedfem.dynamics.frames import frames_of
 from kedfem.dynamics.matrices.dense import coordinates
+from kedfem.dynamics.segment import mean_orientation
 from kedfem.dynamics.system.blank import empty_history
-from kedfem.dynamics.system.march import Ready, displacements
-from kedfem.dynamics.system.oracle.monolithic import Monolithic, Now
-from kedfem.dynamics.system.starts.instant import renumbered
+from kedfem.dynamics.system.layout import points_of
+from kedfem.dynamics.system.march import Motion, Ready, displacements
+from kedfem.dynamics.system.oracle.monolithic import Monolithic, Now, Seen
+from kedfem.dynamics.system.starts.instant import Instant, renumbered
 from kedfem.dynamics.system.starts.internal_forces import own
 from kedfem.dynamics.system.state import History, State
 from kedfem.links.record import Link
@@ -17,16 +20,20 @@ from kedfem.motion.rigid import RigidMotion
 
 
 def monolithic_march(
-    of: Ready, solver: Monolithic, state: State | Now, motion: RigidMotion
+    of: Ready, solver: Monolithic, state: State | Now, motion: RigidMotion, motion_at: Motion | None = None
 ) -> tuple[Now, History]:
     """All steps to the times of a motion; see `march`.
+
+    Parameters
+    ----------
+    motion_at : rigid-body motion at any times, which co-rotational frames of a state need
 
     Raises
     ------
     SolveError
         If the iterations of a step do not converge.
     """
-    now = begun(of, solver, state, motion) if isinstance(state, State) else state
+    now = begun(of, state, motion_at) if isinstance(state, State) else state
     history, number = empty_history(len(motion.t), of.bodies, of.constraints), renumbered(of)
     for t in range(len(motion.t)):
         before, at = now, motion.part(t, t + 1)
@@ -35,21 +42,30 @@ def monolithic_march(
         history.rate[t] = solver.own_rates(now, before, at)
         history.port_force[t] = now.port_force
         for k, link in enumerate(of.system.model.links):
-            R, here = motion.R[t, of.bodies.motion[k], : link.d, : link.d], solver.of[k]
-            g = now.u[here].reshape(link.n, link.d) @ R
+            whole, here = motion.R[t, of.bodies.motion[k]], solver.of[k]
             for out, x in ((history.u, now.u), (history.v, now.v), (history.a, now.a)):
                 out[t, own(of, k)] = _coordinates(of, k, link, x[here].reshape(link.n, link.d))
-            history.g[t, own(of, k)] = _coordinates(of, k, link, g)
-            history.energy[t, k] = 0.5 * float(g.ravel() @ (link.K0 @ g.ravel()))
+            u, R = now.u[here].reshape(link.n, link.d), whole[: link.d, : link.d]
+            g = [x[0] for _, x in now.g[k]] or [u @ R]
+            history.R[t, k] = whole
+            history.R[t, k, : link.d, : link.d] = mean_orientation(link, u, R)
+            history.g[t, own(of, k)] = _coordinates(of, k, link, g[0])
+            K0 = [frame.K0 for frame in frames_of(link)] or [link.K0]
+            history.energy[t, k] = sum(
+                0.5 * float(x.ravel() @ (K @ x.ravel())) for K, x in zip(K0, g, strict=True)
+            )
+            b = np.searchsorted(of.bodies.beams.segment, k)
+            for e, (point, x) in enumerate(zip(points_of(link), g, strict=False)):
+                history.strain[t, b, :, e] = point.strains @ x.ravel()
     return now, history
 
 
-def begun(of: Ready, solver: Monolithic, state: State, motion: RigidMotion) -> Now:
-    """A state in nodal rows; its frames are rigid-body ones.
+def begun(of: Ready, state: State, motion_at: Motion | None) -> Now:
+    """A state in nodal rows.
 
     Parameters
     ----------
-    motion : any, for its bodies
+    motion_at : rigid-body motion at any times, for its co-rotational frames; these are rigid-body ones without it
     """
     links = of.system.model.links
     u, v, a = (
@@ -63,8 +79,12 @@ def begun(of: Ready, solver: Monolithic, state: State, motion: RigidMotion) -> N
         here = own(of, k)
         rates = np.split(state.damped[3 * here.start : 3 * here.stop], 3)
         damped.append(np.stack([nodal_forces(of, k, x) for x in rates]))
+    seen: list[list[Seen]] = [[] for _ in links]
+    if motion_at is not None:
+        inside = Instant(of, motion_at, float(state.time[0])).inside(state.u, state.v)
+        seen = [[(x.angle, np.stack([x.g, x.g1, x.g2])) for x in each.frames] for each in inside]
     return Now(
-        u, v, a, f, F, [[] for _ in links], state.z[0, number], state.e.copy(), state.turned.copy(),
+        u, v, a, f, F, seen, state.z[0, number], state.e.copy(), state.turned.copy(),
         state.bearing[number], damped, state.z[:, number], state.multiplier.copy(), state.port_force.copy(),
     )  # fmt: skip
 
