@@ -73,12 +73,18 @@ def swept(
 
 
 def test_a_range_a_list_and_their_grid() -> None:
-    speeds, lengths = axes_of(["drive.speed=100rpm:300:3", "L=0.4,500 mm"], arm())
+    speeds, lengths = axes_of(["drive.speed=100rpm:300:3", "L=400,500 mm"], arm())
     assert speeds.key == "drive.motion.speed"
     assert speeds.values == ("100 rpm", "100 rpm", "200 rpm", "200 rpm", "300 rpm", "300 rpm")
     assert_array_equal(speeds.numbers, [100, 100, 200, 200, 300, 300])
     assert (lengths.key, lengths.unit) == ("parameters.L", "mm")
-    assert lengths.values == (0.4, "500 mm") * 3
+    assert lengths.values == ("400 mm", "500 mm") * 3  # numbers without a unit take that of the others
+    assert_array_equal(lengths.numbers, [400, 500] * 3)
+    (mixed,) = axes_of(["L=0.4 m,500mm,0.6"], arm())
+    assert mixed.values == ("0.4 m", "500mm", "0.6 m")
+    assert_allclose(mixed.numbers, [0.4, 0.5, 0.6], rtol=1e-15)
+    (plain,) = axes_of(["damping.ratio=0.01,1"], arm())
+    assert plain.values == (0.01, 1)
     (steps,) = axes_of(["analysis.steps_per_revolution=60:120:3"], arm())
     assert steps.values == (60, 90, 120)
     assert all(isinstance(value, int) for value in steps.values)
