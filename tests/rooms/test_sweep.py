@@ -20,7 +20,7 @@ from kedfem.analysis import analyse
 from kedfem.errors import SceneError
 from kedfem.scene import scene_from
 from kedfem.sweep import Asked, Base, Swept, axes_of, sweep
-from kedfem.sweep.points import GROWTH, Chosen, Job, finished
+from kedfem.sweep.points import GROWTH, Chosen, Job, extremes, finished
 from tests import scenes
 from tests.scenes import bar, constant_speed, material
 
@@ -154,6 +154,22 @@ def test_the_joint_of_a_turning_arm_holds_its_centripetal_force_and_its_weight(t
         assert 60 / n[k] < when <= 120 / n[k] * (1 + 1e-9)
     assert {"sweep.h5", "sweep.csv"} <= {x.name for x in (tmp_path / "out").iterdir()}
     assert not (tmp_path / "out" / "sweep.png").exists()  # of two keys
+
+
+def test_vectors_in_a_plane_have_a_magnitude_too(tmp_path: Path) -> None:
+    """The displacement of a planar beam has x and y alone."""
+    raw = arm(kind="static", revolutions=1, steps_per_revolution=4)
+    raw["output"]["probes"] = {
+        "tip": {"link": "arm", "at": [L, 0], "quantity": "displacement", "frame": "world"}
+    }
+    found = analyse(scene_from(raw, tmp_path))
+    tip = found.results.channels["probes/tip/displacement"][1]
+    assert tip.shape[1] == 2
+    unit, (most, _, rms, when) = extremes(found.results, -1.0)["probes/tip/displacement/magnitude"]
+    size = np.linalg.norm(tip, axis=1)
+    assert unit == "m"
+    assert_allclose([most, rms], [size.max(), np.sqrt(np.mean(size**2))], rtol=1e-12)
+    assert when == found.results.time[size.argmax()]
 
 
 def test_what_counts_is_the_last_turns(tmp_path: Path) -> None:

@@ -30,6 +30,11 @@ class Channel:
     frame: str
     description: str
 
+    @property
+    def vector(self) -> bool:
+        """Whether columns are components along axes: three, or two of what is planar or of what statics leave open."""
+        return len(self.columns) > 1 and set(self.columns) <= set(XYZ)
+
 
 NOTHING = 1e-9  # of the largest value of the same unit: rounding
 XYZ = ("x", "y", "z")

@@ -241,7 +241,7 @@ def columns(results: Results, some: np.ndarray) -> Iterator[tuple[str, str, Floa
             continue
         for k, column in enumerate(channel.columns):
             yield f"{name}/{column}", channel.unit, rows[:, k]
-        if channel.columns == ("x", "y", "z"):
+        if channel.vector:
             yield f"{name}/{MAGNITUDE}", channel.unit, np.sqrt((rows**2).sum(axis=1))
 
 

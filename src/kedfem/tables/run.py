@@ -19,7 +19,7 @@ from kedfem.report.facts import peak_rows
 from kedfem.report.fatigue_facts import ENDLESS, fatigue_notes
 from kedfem.results import Channel, Fatigue, Peak
 from kedfem.results.balance import Balance
-from kedfem.results.records import XYZ, rounding
+from kedfem.results.records import rounding
 from kedfem.scene import Cad, LinkScene, MeshFile, Scene, time_grid, without_vibration
 from kedfem.tables.layout import facts, left, listed, right
 from kedfem.tables.mechanism import seconds_table
@@ -117,8 +117,8 @@ def channel_table(scene: Scene, done: Run) -> Table:
 def largest_of(channel: Channel, values: Float[np.ndarray, "n c"]) -> tuple[int, str, float]:
     """Row, component and value of the largest one; of vectors the magnitude where that tells more, as in plots."""
     k, c = (int(x) for x in np.unravel_index(np.abs(values).argmax(), values.shape))
-    value, vector = float(values[k, c]), len(channel.columns) > 1 and set(channel.columns) <= set(XYZ)
-    if vector and channel.name.rsplit("/", 1)[-1] not in SIGNED:
+    value = float(values[k, c])
+    if channel.vector and channel.name.rsplit("/", 1)[-1] not in SIGNED:
         size = np.linalg.norm(values, axis=1)
         if (longest := float(size.max())) > ALONE * abs(value):
             return int(size.argmax()), "magnitude", longest
