@@ -8,17 +8,15 @@ import numpy as np
 
 from kedfem.accuracy.prepared import Prepared, moving
 from kedfem.dynamics.elastic_model import elastic_model
-from kedfem.dynamics.frames import frames_of
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.start import initial_rates
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.layout import profile
 from kedfem.dynamics.system.march import Ready, displacements, march, ready
-from kedfem.dynamics.system.oracle.monolithic import Monolithic, Now
-from kedfem.dynamics.system.oracle.monolithic_steps import nodal_forces
+from kedfem.dynamics.system.oracle.monolithic import Monolithic
+from kedfem.dynamics.system.oracle.monolithic_steps import begun as as_the_oracle_begins
 from kedfem.dynamics.system.starts.initial_states import rest
-from kedfem.dynamics.system.starts.internal_forces import own
 from kedfem.dynamics.system.state import History, State
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.scene import path_parameter, scene_from, time_grid
@@ -96,21 +94,8 @@ def by_oracle(of: Begun, count: int, keeps: bool = False) -> tuple[np.ndarray, n
 
     keeps : see `Monolithic`; where forces bend sharply it may find another solution
     """
-    solver, start = Monolithic(of.ready.system, of.ready.scheme, keeps), of.state
-    links = of.ready.system.model.links
-    u, v, a = (rows(of.ready, x[None])[0] for x in (start.u, start.v, start.a))
-    at = of.motion(np.zeros(1))
-    none = [np.zeros((3, link.n, link.d)) for link in links]
-    internal = np.concatenate(
-        [nodal_forces(of.ready, k, start.f[own(of.ready, k)]).ravel() for k in range(len(links))]
-    )
-    seen = [[(0.0, x.copy()) for _ in frames_of(link)] for link, x in zip(links, none, strict=True)]
-    z = np.linalg.lstsq(solver.B.toarray(), solver.W @ u, rcond=None)[0]
-    C = solver.coordinates(z, start.turned.copy(), at)[1]
-    now = Now(
-        u, v, a, internal, solver.applied(at), seen, z, start.e.copy(), start.turned.copy(),
-        C.T @ start.multiplier, none, in_order(of.ready, start.z),
-    )  # fmt: skip
+    solver = Monolithic(of.ready.system, of.ready.scheme, keeps)
+    now = as_the_oracle_begins(of.ready, of.state, of.motion)
     along, out = of.steps(count), []
     for k in range(count):
         now = solver.step(now, along.part(k, k + 1))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from tests.moving import ran, state
+from tests.moving import channels, ran, state
 from tests.rooms.test_initial_deflection import BENDING, LENGTH, MASS
 
 from .test_turning_loads import ASKEW, arm
@@ -55,6 +55,19 @@ def test_an_arm_that_is_released_is_bent_at_once_and_does_not_ring(kind: str, R:
     assert_allclose(found[0], energy, rtol=0.02)
     assert np.abs(found / found[0] - 1).max() < 0.03
     assert strain(released(kind, R, elements)).max() > 2 * energy
+
+
+@pytest.mark.parametrize(("kind", "R", "elements"), CASES[:6])
+def test_damping_in_proportion_to_mass_slows_what_nothing_drives(kind: str, R: Any, elements: int) -> None:
+    """Its force is −α M v, of a rigid motion −α times its momentum: ω = ω₀ exp(−α t); the energy is dissipated."""
+    alpha, end = 8.0, 0.1
+    raw = released(kind, R, 2, end_time=end, step=1e-3, rho_inf=0.8, initial_speeds={"A": 4.0})
+    found = channels(*ran({**raw, "gravity": [0.0] * len(raw["gravity"]), "damping": {"alpha": alpha}}))
+    t = np.linspace(0, end, len(found["energy/kinetic"]))
+    kinetic, dissipated = found["energy/kinetic"][:, 0], found["energy/dissipated"][:, 0]
+    assert_allclose(kinetic, kinetic[0] * np.exp(-2 * alpha * t), rtol=1e-4)
+    assert_allclose(dissipated, kinetic[0] - kinetic, atol=1e-4 * kinetic[0])
+    assert np.abs(found["energy/residual"]).max() < 1e-4 * kinetic[0]
 
 
 def test_an_arm_that_spins_freely_begins_stretched() -> None:

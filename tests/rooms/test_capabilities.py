@@ -131,7 +131,7 @@ SCENES: list[Raw] = [
     {**inverted(), **over("angle"), "drive": None, "drives": {"a": turning(), "b": {**turning(), "joint": "B"}}},
     changed(BASES["free"], {
         "analysis/frames": "rigid-body", "links/arm/frames": "rigid-body", "analysis/initial": "quasi-static",
-        "analysis/revolutions": 1, "analysis/steps_per_revolution": 10, "damping": {"alpha": 1.0, "beta": 1e-5},
+        "analysis/revolutions": 1, "analysis/steps_per_revolution": 10,
         "loads/p": {"kind": "force", "link": "arm", "at": [1, 0], "vector": [0, 1],
                     "factor": {"over": "angle", "at": [0], "value": [1]}},
         "springs/s": {"kind": "spring", "between": [{"link": "arm", "at": [1, 0]}, {"link": "ground", "at": [1, 1]}],

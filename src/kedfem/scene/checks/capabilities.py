@@ -157,9 +157,6 @@ REFUSALS = (
     *(Refusal("analysis", {"drive": ("none",), "time": (key,)}, f"{{where}}.{key}", "be combined with a drive",
         "it counts the drive's revolutions", "a scene without one", f"take {instead} [s]")
         for key, instead in (("revolutions", "end_time"), ("steps_per_revolution", "step"))),
-    Refusal("damping", {"drive": ("none",), "damping": ("in proportion to mass",)}, "{where}.{key}",
-        "be given as beta alone in a scene without a drive, such as beta = {beta} [s]",
-        "alpha resists the motion as a whole", "alpha = {alpha} 1/s", "leave alpha out"),
     Refusal("fatigue", {"drive": ("none",), "period": ("none",)}, "{where}.period", "be given without a drive",
         "nothing else says after which time stresses repeat", "nothing", "give it [s], or a drive, or leave fatigue out"),
     *(Refusal("loads", {"element": (kind,), "link": ("beam", "slider")}, "{where}.link",

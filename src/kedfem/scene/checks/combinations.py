@@ -9,7 +9,6 @@ from kedfem.scene.checks.capabilities import CONSTRAINED, MIXED, SHARED, Facts, 
 from kedfem.scene.checks.parts import Entry, Parts, category, link_names
 from kedfem.scene.questions.modelling import default_frames, enforced_by_equations
 from kedfem.scene.questions.planes import spatial_beams
-from kedfem.scene.records.materials import rayleigh
 from kedfem.scene.records.wording import NOUNS, shown
 
 Told = tuple[str, Facts, Where, Mapping[str, str]]
@@ -143,8 +142,8 @@ def elements(parts: Parts) -> Iterator[Told]:
 
 
 def analysis(parts: Parts) -> Iterator[Told]:
-    """The analysis with its start and times, and damping."""
-    entry, damping = parts.analysis, parts.damping
+    """The analysis with its start and times."""
+    entry = parts.analysis
     at = entry.where
     if parts.limits:
         limits = {"elements": shown(list(parts.limits))}
@@ -170,11 +169,6 @@ def analysis(parts: Parts) -> Iterator[Told]:
         for each in (*(["speeds"] if speeds else []), entry.word("initial") or "rest"):
             facts = {"start": "initial_deflection", "beside": each, "frames": "", "solver": ""}
             yield "analysis", facts, at, {"given": shown(list(forces))}
-    alpha, beta = (0.0, 0.0) if damping.record is None else rayleigh(damping.record)
-    if alpha:
-        words = {"alpha": f"{alpha:.3g}", "beta": f"{beta:.3g}"}
-        words["key"] = "ratio" if damping.has("ratio") else "alpha"
-        yield "damping", {"damping": "in proportion to mass"}, damping.where, words
 
 
 def kinds(parts: Parts) -> Iterator[Told]:
