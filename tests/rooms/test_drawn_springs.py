@@ -21,6 +21,8 @@ from kedfem.stepping import frame_steps
 from tests.frames import frames
 from tests.rooms.test_gltf import reader_of, shown
 from tests.rooms.test_output import pixels
+from tests.rooms.test_vtkhdf import frame
+from tests.rooms.test_vtkhdf import reader_of as hdf_reader
 from tests.scenes import arm, bar, constant_speed
 
 TIP, TO = [0.5, 0, 0], [0.3, 0.7, 0.1]
@@ -31,7 +33,7 @@ def scene(**spring: Any) -> dict[str, Any]:
     ends = [{"link": "arm", "at": TIP}, {"link": "ground", "at": TO}]
     pull = {"kind": "spring", "between": ends, "stiffness": 100, "damping": 1, **spring}
     link = bar(0.5, 0.02, 0.02, mesh={"elements": [4, 1, 1]})
-    output = {"plots": False, "animation": {"frames_per_revolution": 8}}
+    output = {"plots": False, "animation": {"frames_per_revolution": 8, "vtkhdf": True}}
     analysis = {"revolutions": 1, "steps_per_revolution": 72, "accuracy": "quick", "initial": "quasi-static"}
     return arm(link, constant_speed(10.0), springs={"pull": pull}, analysis=analysis, output=output)
 
@@ -87,6 +89,15 @@ def test_frames_have_them_as_long_as_their_channel(folder: Path) -> None:
         assert np.linalg.norm(tip - x[np.linalg.norm(x - TO, axis=1).argmax()], axis=1).min() < 0.03
         assert np.linalg.norm(x - TO, axis=1).max() == pytest.approx(length[k], abs=1e-4)
         assert np.linalg.norm(x - TO, axis=1).min() < 0.003  # radius of the wire
+
+
+def test_the_animation_in_one_file_has_them_too(folder: Path) -> None:
+    reader = hdf_reader(folder / "animation.vtkhdf")
+    assert reader.GetNumberOfSteps() == 9
+    for grid, time in zip(frames(folder), np.linspace(0, 2 * np.pi / 10.0, 9), strict=True):
+        spring, other = cells_of(frame(reader, time)), cells_of(grid)
+        assert_allclose(spring.points, other.points, atol=2e-3)  # there with the deflection of the tip
+        assert_allclose(spring["displacement [m]"], other["displacement [m]"], atol=1e-12)
 
 
 def test_the_picture_has_them_and_they_hide_no_stress(folder: Path, tmp_path: Path) -> None:

@@ -18,8 +18,8 @@ VERSION = (2, 3)  # of the format: field data over time
 
 Blocks = Sequence[LinkField | JointField]
 TYPES = {
-    "vertex": 1, "line": 3, "hexahedron": 12, "line3": 21, "tetra10": 24, "hexahedron20": 25, "quad9": 28,
-    "hexahedron27": 29,
+    "vertex": 1, "line": 3, "quad": 9, "hexahedron": 12, "line3": 21, "tetra10": 24, "hexahedron20": 25,
+    "quad9": 28, "hexahedron27": 29,
 }  # fmt: skip
 """VTK's numbers of meshio's names."""
 
