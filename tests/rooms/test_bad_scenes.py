@@ -392,6 +392,23 @@ def test_a_part_that_fits_is_no_fault(tmp_path):
             "t [s], phi [mm]\n0, 0\n",
             "motion.csv, line 1: must have units of time and angle, got: the unit 'mm' is of another kind",
         ),
+        (
+            "t_ms, phi_deg\n0, 0\n",
+            "motion.csv, line 1: must have units of time and angle, got: 't_ms'; units stand in brackets, as in [ms]",
+        ),
+        (
+            "t in s, phi/deg\n0, 0\n",
+            "motion.csv, line 1: must have units of time and angle, got: 'phi/deg'; units stand in brackets, as in [deg]",
+        ),
+        (
+            "angle, time\n0, 0\n",
+            "motion.csv, line 1: must head two columns, time and angle, got 'angle, time'",
+        ),
+        (
+            "time, speed\n0, 0\n",
+            "motion.csv, line 1: must head two columns, time and angle, got 'time, speed'",
+        ),
+        ("0, O\n1, 1\n", "motion.csv, line 1: must be two numbers, time and angle, got '0, O'"),
     ],
 )
 def test_a_motion_table_that_cannot_be_read(tmp_path, table, message):

@@ -104,6 +104,7 @@ def test_a_number_with_a_unit_becomes_si(text, unit, number):
 @pytest.mark.parametrize(
     ("text", "unit"),
     [(f"2 {prefix}Hz", "rad/s") for prefix in ("", "k", "m", "M")]
+    + [("2 cps", "rad/s"), ("2 Bq", "rad/s"), ("2 count/s", "rad/s")]
     + [(f"2 {speed}", "Hz") for speed in ("rpm", "krpm", "mrad/s", "turn/s", "gon/s")]
     + [(f"5 {length}", "m") for length in ("mm/turn", "mm/rad", "mm/deg", "m*rad")]
     + [("600 rpm", "1/s"), ("90 deg", "1"), ("3 N*m/deg", "N*m"), ("1 m*rad/s", "m/s")],
@@ -286,8 +287,9 @@ def test_a_byte_order_mark_is_no_fault(tmp_path):
     assert read_scene(path).links
 
 
-def test_a_motion_table_comes_from_a_file_with_units(tmp_path):
-    (tmp_path / "motion.csv").write_text("time [ms], angle [deg]\n0, 0\n500, 90\n\n1000, 180\n")
+@pytest.mark.parametrize("heading", ["time [ms], angle [deg]", "t (ms),crank angle (deg)"])
+def test_a_motion_table_comes_from_a_file_with_units(tmp_path, heading):
+    (tmp_path / "motion.csv").write_text(f"{heading}\n0, 0\n500, 90\n\n1000, 180\n")
     raw = read_raw()
     raw["drive"]["motion"] = {"kind": "table", "file": "motion.csv"}
     raw["analysis"] = {"end_time": 1.0, "step": 0.01}

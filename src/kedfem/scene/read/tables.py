@@ -12,23 +12,24 @@ from kedfem.scene.checks.hints import models, replaced
 from kedfem.scene.read.files import file_text
 from kedfem.scene.records.curves import Curve
 from kedfem.scene.records.drives import Table
-from kedfem.scene.records.units import si_number
+from kedfem.scene.records.units import USUAL, si_number
+
+NAMES = {"time", "speed", "angle", "travel", "length", "torque", "force", "factor"}  # of columns
 
 
 def two_columns(path: Path, names: tuple[str, str], si: tuple[str, str]) -> tuple[list[float], list[float]]:
     """Two columns of a CSV file, by what they are, in SI units, under an optional heading with units."""
     rows = [(i, row.split(",")) for i, row in enumerate(file_text(path).splitlines(), start=1) if row.strip()]
     factors = (1.0, 1.0)
-    if rows and not _numbers(rows[0][1]):
+    if rows and not any(map(_is_number, rows[0][1])):
         factors = _heading_factors(path, rows[0][1], names, si)
         rows = rows[1:]
     pairs = []
     for i, row in rows:
-        numbers = _numbers(row)
-        if numbers is None:
+        if len(row) != 2 or not all(map(_is_number, row)):
             wanted = f"must be two numbers, {names[0]} and {names[1]}"
             raise SceneError(f"{path.name}, line {i}: {wanted}, got {','.join(row)!r}")
-        pairs.append(numbers)
+        pairs.append((float(row[0]), float(row[1])))
     return [at * factors[0] for at, _ in pairs], [value * factors[1] for _, value in pairs]
 
 
@@ -40,30 +41,49 @@ def motion_table(path: Path) -> tuple[list[float], str, list[float]]:
     return time, key, values
 
 
-def _numbers(row: list[str]) -> tuple[float, float] | None:
+def _is_number(cell: str) -> bool:
     try:
-        time, angle = (float(cell) for cell in row)
+        float(cell)
     except ValueError:
-        return None
-    return time, angle
+        return False
+    return True
 
 
 def _heading_factors(
     path: Path, row: list[str], names: tuple[str, str], si: tuple[str, str]
 ) -> tuple[float, float]:
-    """SI units per unit of each column, from a heading such as 'time [ms], angle [deg]'."""
-    units = [re.search(r"\[(.*)\]", cell) for cell in row]
-    if len(units) != 2:
+    """SI units per unit of each column, from a heading such as 'time [ms], angle (deg)'."""
+    said = [NAMES & set(re.split(r"[^a-z]+", cell.lower())) for cell in row]
+    if len(row) != 2 or any(words and name not in words for words, name in zip(said, names, strict=True)):
         wanted = f"must head two columns, {names[0]} and {names[1]}"
         raise SceneError(f"{path.name}, line 1: {wanted}, got {','.join(row)!r}")
     try:
-        one, other = (
-            si_number(f"1 {unit[1]}", of) if unit else 1.0 for unit, of in zip(units, si, strict=True)
-        )
+        one, other = (_factor(cell, of) for cell, of in zip(row, si, strict=True))
     except ValueError as reason:
         wanted = f"must have units of {names[0]} and {names[1]}"
         raise SceneError(f"{path.name}, line 1: {wanted}, got: {reason}") from None
     return one, other
+
+
+def _factor(cell: str, of: str) -> float:
+    """The SI unit per unit of a column; 1 where its heading gives none."""
+    if unit := re.search(r"\[(.*)\]|\((.*)\)", cell):
+        return si_number(f"1 {unit[1] or unit[2]}", of)
+    last = re.split(r"[\s_]", cell.strip())[-1]
+    for word in (last, last.partition("/")[2]):  # n_rpm, n/rpm
+        if len(word) > 1 and _is_unit(word, of):
+            raise ValueError(f"{cell.strip()!r}; units stand in brackets, as in [{word}]")
+    return 1.0
+
+
+def _is_unit(word: str, of: str) -> bool:
+    """Whether a word is another unit than the SI unit of a column: a usual one, or any of its kind."""
+    if word in USUAL:
+        return USUAL[word] != (of, 1.0)
+    try:
+        return si_number(f"1 {word}", of) != 1.0
+    except ValueError:
+        return False
 
 
 def with_tables(raw: Mapping[str, Any], folder: Path, hint: Any) -> tuple[dict[str, Any], list[Fault]]:

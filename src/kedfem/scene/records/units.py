@@ -75,7 +75,8 @@ USUAL = {
 """Units as they are usually written, in SI: for hints, and read without pint, whose start takes half a second."""
 HUGE = 1e30  # a number beyond, or a positive one below 1 / HUGE, is no machine's: its powers would overflow
 OVERFLOW = 10**308  # whole numbers in TOML have no end
-CYCLES = "hertz"  # how names of frequencies end, kilohertz too
+CYCLES = "hertz", "count", "counts_per_second", "baud", "becquerel", "curie", "rutherford"
+"""How names of frequencies end, kilohertz too."""
 
 
 def fault(message: str) -> PydanticCustomError:
@@ -181,10 +182,10 @@ def crossed(given: Mapping[str, float], unit: str) -> bool:
 
 
 def meant(given: str, unit: str) -> str:
-    """A hint at a unit of the kind that is wanted, if one is written like what was given but for upper and lower case."""
+    """A hint at a unit of the kind that is wanted, if one is written like what was given but for capitals or a *."""
     wanted = unit_registry().parse_units(unit).dimensionality
     for name in USUAL:
-        same = name.casefold() == given.casefold() and name != given
+        same = name.casefold().replace("*", "") == given.casefold().replace("*", "") and name != given
         if same and unit_registry().parse_units(name).dimensionality == wanted:
             return f", did you mean {name!r}?"
     return ""
