@@ -2,17 +2,19 @@
 
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from kedfem.errors import MotionError
+from kedfem.motion.batch import Choice, Moving, settled
 from kedfem.motion.constraints import ConstraintEquation, coupled, joint_rows, stacked, travel_row, turn_row
-from kedfem.motion.linkage import linkage
-from kedfem.motion.path import path
+from kedfem.motion.linkage import Linkage, linkage
+from kedfem.motion.path import continuation, path
 from kedfem.motion.rigid import rigid_motion
-from kedfem.motion.values import convective, features, jacobian, residuals
+from kedfem.motion.values import Poses, convective, features, jacobian, residuals
 from tests.linkages import (
     RISE,
     UNIT_SPEED,
@@ -297,6 +299,21 @@ def test_the_path_knows_that_a_turn_closes_and_where_the_linkage_is_weakest() ->
     # the extremes of the transmission angle are at crank angles 0 and 180°: cosine rule, diagonals d ∓ a
     assert min(crank, 2 * np.pi - crank, abs(crank - np.pi)) < 0.25
     assert not path(link, -0.5, 0.5).periodic
+
+
+def test_a_turn_is_followed_a_few_grid_points_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A drag link: 31 steps of 12° and smaller ones at first; the last point, predicted from far, is the first again."""
+    followed = []
+
+    def counted(link: Linkage, chosen: Choice, guess: Poses, *more: Any) -> Moving:
+        followed.append(len(guess[1]))
+        return settled(link, chosen, guess, *more)
+
+    monkeypatch.setattr(continuation, "settled", counted)
+    along = path(linkage(linkage_scene(four_bar(0.92, 0.82, 0.89, 0.57, 5.75))), 0.0, 6.3)
+    assert along.periodic
+    assert len(followed) <= 16
+    assert 33 <= sum(followed) <= 45  # few are predicted in vain
 
 
 def test_an_arm_alone_turns_with_its_drive() -> None:

@@ -5,7 +5,7 @@ rows; the others are only checked to be closed.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.linalg
@@ -22,10 +22,11 @@ from kedfem.motion.newton import (
     factored,
     moved,
     remainder,
+    scaled,
     stride,
     twists,
 )
-from kedfem.motion.values import Poses, Twists, convective, features
+from kedfem.motion.values import Features, Poses, Twists, convective, features
 
 EXACT = 1e-13  # a Newton step, of the linkage's size: rates at the poses before it are those after it
 QUADRATIC = 1e-7  # after such a step the next one would be rounding
@@ -42,11 +43,12 @@ Rates = tuple[Float[np.ndarray, "T D"], Float[np.ndarray, "T D"]]
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """Some rows of a linkage, or all, with the numbers of their constraints and angles."""
+    """Rows to be solved, all or some of a linkage, with numbers of their constraints and angles; rest : to be checked."""
 
     rows: Rows
-    which: Int[np.ndarray, " k"] | slice
-    angles: Int[np.ndarray, " a"] | slice
+    which: Int[np.ndarray, " k"] | slice = field(default_factory=lambda: slice(None))
+    angles: Int[np.ndarray, " a"] | slice = field(default_factory=lambda: slice(None))
+    rest: "Choice | None" = None
 
     def target(self, aim: Target) -> Target:
         """What these rows shall be."""
@@ -55,9 +57,10 @@ class Choice:
 
 
 def choice(rows: Rows, which: Int[np.ndarray, " k"]) -> Choice:
-    """Constraints picked by their numbers."""
-    part, angles = rows.part(which)
-    return Choice(part, which, angles)
+    """Constraints picked by their numbers, all others to be checked."""
+    others = np.setdiff1d(np.arange(rows.count), which)
+    (chosen, angles), (left, their) = rows.part(which), rows.part(others)
+    return Choice(chosen, which, angles, Choice(left, others, their) if len(others) else None)
 
 
 def independent(J: Float[np.ndarray, "G m k"], least: Float[np.ndarray, " G"]) -> Int[np.ndarray, " i"]:
@@ -104,86 +107,77 @@ class Moving:
     factor: Factor | BlockFactor | None = None
 
 
-def moving(link: Linkage, which: Int[np.ndarray, " k"], guess: Poses, aim: Target, rates: Rates) -> Moving:
+def moving(link: Linkage, chosen: Choice, guess: Poses, aim: Target, rates: Rates) -> Moving:
     """Poses that close all joints next to a guess, and the bodies' rates at given speeds and accelerations of the drives.
 
-    which : constraints to solve, square or in least squares; the others are checked
+    chosen : constraints to solve, square or in least squares
     """
-    chosen = choice(link.rows, which)
-    rest = choice(link.rows, np.setdiff1d(np.arange(link.rows.count), which))
     few = max(POINTS * USUAL // max(USUAL, len(link.bodies)), 1)
-    blocks = [slice(k, k + few) for k in range(0, max(len(aim), 1), few)]
-    parts = [
-        _block(link, chosen, rest, (guess[0][b], guess[1][b]), aim.at(b), (rates[0][b], rates[1][b]))
-        for b in blocks
-    ]
-    return parts[0] if len(parts) == 1 else _joined(parts)
+    return _in_parts(link, chosen, guess, aim, rates, few)
 
 
-def settled(link: Linkage, guess: Poses, aim: Target, rates: Rates) -> Moving:
-    """The same of all constraints, in the least squares, all points together."""
-    return _block(link, Choice(link.rows, slice(None), slice(None)), None, guess, aim, rates)
-
-
-def _block(
-    link: Linkage, chosen: Choice, rest: Choice | None, poses: Poses, aim: Target, rates: Rates
+def settled(
+    link: Linkage,
+    chosen: Choice,
+    guess: Poses,
+    aim: Target,
+    rates: Rates,
+    limits: tuple[float, float] = (EXACT, np.inf),
 ) -> Moving:
-    rows, own, steps = chosen.rows, chosen.target(aim), []
+    """The same of all points together, with the factored rows.
+
+    limits : the least step of Newton to take; a first one that is farther is not followed up
+    """
+    rows, poses, steps = chosen.rows, guess, []
     scale = rows.scale(link.size)[: rows.count]
     rhs = np.empty((len(aim), rows.count, 3))
     rhs[..., 1] = driven_rows(rows, rates[0]) * scale
     rhs[..., 2] = (rows.drive == 0) * scale
     step = before = np.full(len(aim), np.inf)
     for _ in range(ITERATIONS):
-        f = features(rows, poses, own.near)
-        rhs[..., 0] = -scale * remainder(rows, f, own)
+        f, gaps = _gaps(link, chosen, poses, aim)
+        rhs[..., 0] = -gaps
         try:
             factor = factored(link, f, rows)
             x = factor.solve(rhs)
         except np.linalg.LinAlgError:
-            return _one_by_one(link, chosen, rest, poses, aim, rates)
+            if len(aim) > 1:
+                return _in_parts(link, chosen, poses, aim, rates, 1)
+            none = np.zeros_like(poses[1]), np.zeros_like(poses[1])
+            return Moving(poses, none, none, none, np.full(1, np.inf))
         change = twists(link, x[..., 0])
         before, step = step, stride(link, change)
         steps.append(step)
         poses = moved(poses, change)
-        if not (step > EXACT).any() or not (before > QUADRATIC).any() or not (step < 1).any():
+        unsettled = (step > limits[0]) & (before > QUADRATIC) & (steps[0] <= limits[1])
+        if not unsettled.any() or not (step < 1).any():
             break
-    if not (step <= SETTLED).all():
-        return _failed(poses, step)
     first = twists(link, x[..., 1])
     bent = scale * (driven_rows(rows, rates[1]) - convective(rows, f, first))
     second = twists(link, factor.solve(bent[..., None])[..., 0])
-    gap = np.maximum(np.abs(rhs[..., 0]).max(axis=1, initial=0.0), _gap(link, rest, poses, aim))
+    if chosen.rest is not None:
+        gaps = np.concatenate([gaps, _gaps(link, chosen.rest, poses, aim)[1]], axis=1)
+    gap = np.where(step <= SETTLED, np.abs(gaps).max(axis=1, initial=0.0), np.inf)
     return Moving(poses, first, second, twists(link, x[..., 2]), gap, steps, factor)
 
 
-def _gap(link: Linkage, rest: Choice | None, poses: Poses, aim: Target) -> Float[np.ndarray, " T"]:
-    """The largest gap of rows that were not solved for."""
-    if rest is None or not rest.rows.count:
-        return np.zeros(len(aim))
-    own = rest.target(aim)
-    left = remainder(rest.rows, features(rest.rows, poses, own.near), own)
-    return np.asarray(np.abs(left * rest.rows.scale(link.size)[: rest.rows.count]).max(axis=1))
+def _gaps(
+    link: Linkage, chosen: Choice, poses: Poses, aim: Target
+) -> tuple[Features, Float[np.ndarray, "T m"]]:
+    """How far rows are from what they shall be, in units of size, and what they are made of."""
+    own = chosen.target(aim)
+    f = features(chosen.rows, poses, own.near)
+    return f, scaled(link, chosen.rows, remainder(chosen.rows, f, own))
 
 
-def _one_by_one(
-    link: Linkage, chosen: Choice, rest: Choice | None, poses: Poses, aim: Target, rates: Rates
-) -> Moving:
-    """Time points apart from each other, as the system of one is singular."""
-    if len(aim) == 1:
-        return _failed(poses, np.full(1, np.inf))
-    each = [slice(k, k + 1) for k in range(len(aim))]
-    return _joined([
-        _block(link, chosen, rest, (poses[0][k], poses[1][k]), aim.at(k), (rates[0][k], rates[1][k]))
-        for k in each
-    ])  # fmt: skip
-
-
-def _failed(poses: Poses, step: Float[np.ndarray, " T"]) -> Moving:
-    """Points of which some have not settled; without rates."""
-    nothing = np.zeros_like(poses[1])
-    twist, gap = (nothing, nothing), np.where(step <= SETTLED, 0.0, np.inf)
-    return Moving(poses, twist, twist, twist, gap)
+def _in_parts(link: Linkage, chosen: Choice, guess: Poses, aim: Target, rates: Rates, few: int) -> Moving:
+    """A few points at a time."""
+    blocks = [slice(k, k + few) for k in range(0, max(len(aim), 1), few)]
+    parts = [
+        settled(link, chosen, (guess[0][b], guess[1][b]), aim.at(b), (rates[0][b], rates[1][b]))
+        for b in blocks
+    ]
+    return parts[0] if len(parts) == 1 else _joined(parts)
 
 
 def _joined(parts: list[Moving]) -> Moving:

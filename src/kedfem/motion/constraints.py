@@ -10,7 +10,7 @@ A body's point is at p + R X (X: reference position, R = I there). Three kinds o
 A constraint is an elementary row, plus further ones with constant coefficients, less the value of a drive: zero.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -142,6 +142,8 @@ class Rows:
     plus : (constraint, elementary row, coefficient) of each further term
     drive : (m,) number of the drive whose value a constraint takes; -1: none
     gaps, angles : numbers of elementary rows of these kinds
+    driven : numbers of constraints that take a drive's value
+    body, vector : (3 E + A,), (3 E + A, 3) all vectors that turn with a body: a, a_j, b, and b × a of angles
     """
 
     kind: np.ndarray
@@ -152,8 +154,23 @@ class Rows:
     b: np.ndarray
     plus: tuple[tuple[int, int, float], ...]
     drive: np.ndarray
-    gaps: np.ndarray
-    angles: np.ndarray
+    gaps: np.ndarray = field(init=False)
+    angles: np.ndarray = field(init=False)
+    driven: np.ndarray = field(init=False)
+    body: np.ndarray = field(init=False)
+    vector: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        k = np.flatnonzero(self.kind == ANGLE)
+        derived = {
+            "gaps": np.flatnonzero(self.kind == GAP),
+            "angles": k,
+            "driven": np.flatnonzero(self.drive >= 0),
+            "body": np.concatenate([self.i, self.j, self.j, self.i[k]]),
+            "vector": np.concatenate([self.a, self.a_j, self.b, cross(self.b[k], self.a[k])]),
+        }
+        for name, value in derived.items():
+            object.__setattr__(self, name, value)
 
     @property
     def count(self) -> int:
@@ -170,28 +187,24 @@ class Rows:
         plus = [(renumbered[k], row, c) for k, row, c in self.plus if k in renumbered]
         every = np.array([*which, *(row for _, row, _ in plus)], int)
         terms = tuple((k, len(which) + n, c) for n, (k, _, c) in enumerate(plus))
-        kind = self.kind[every]
-        gaps, angles = np.flatnonzero(kind == GAP), np.flatnonzero(kind == ANGLE)
         part = Rows(
-            kind, self.i[every], self.j[every], self.a[every], self.a_j[every], self.b[every],
-            terms, self.drive[which], gaps, angles,
+            self.kind[every], self.i[every], self.j[every], self.a[every], self.a_j[every], self.b[every],
+            terms, self.drive[which],
         )  # fmt: skip
-        return part, np.searchsorted(self.angles, every[angles])
+        return part, np.searchsorted(self.angles, every[part.angles])
 
 
 def stacked(rows: list[ConstraintEquation]) -> Rows:
     """Constraints as arrays, for evaluation all at once."""
     terms = [(k, c, each) for k, row in enumerate(rows) for c, each in row.plus]
     every = rows + [each for _, _, each in terms]
-    kind = np.array([r.kind for r in every], int)
     return Rows(
-        kind=kind,
+        kind=np.array([r.kind for r in every], int),
         i=np.array([r.i for r in every], int), j=np.array([r.j for r in every], int),
         a=np.array([r.a for r in every]).reshape(-1, 3), b=np.array([r.b for r in every]).reshape(-1, 3),
         a_j=np.array([r.a if r.a_j is None else r.a_j for r in every]).reshape(-1, 3),
         plus=tuple((k, len(rows) + n, c) for n, (k, c, _) in enumerate(terms)),
         drive=np.array([-1 if r.drive is None else r.drive for r in rows], int),
-        gaps=np.flatnonzero(kind == GAP), angles=np.flatnonzero(kind == ANGLE),
     )  # fmt: skip
 
 

@@ -1,6 +1,7 @@
 """Poses that close all joints, and their derivatives by the path's parameter, at many of its values at once."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -12,19 +13,16 @@ from kedfem.motion.values import Features, Poses, Twists, features, jacobian, re
 
 SETTLED = 1e-9  # a Newton step, of the linkage's size [-, rad]: the next one would be rounding
 NEARLY = 1e-8  # what is as far from a rotation is one to rounding after a step
+I3 = np.eye(3)
+TINY = 1e-100  # rad: sin x / x is 1 there
 OPEN = 1e-6  # of the size: what joints of a redundant linkage may be out of true, far below any bearing's clearance
 
 
 def rotation(theta: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 3 3"]:
     """exp([θ]×), Rodrigues' formula, for stacks of rotation vectors [rad]."""
-    angle2 = np.einsum("...k,...k->...", theta, theta)[..., None, None]
-    angle = np.sqrt(angle2)
-    W = cross_matrix(theta)
-    small = angle2 < 1e-8
-    safe = np.where(small, 1.0, angle)
-    s = np.where(small, 1 - angle2 / 6, np.sin(safe) / safe)
-    c = np.where(small, 0.5 - angle2 / 24, (1 - np.cos(safe)) / safe**2)
-    return np.asarray(np.eye(3) + s * W + c * (W @ W))
+    angle = np.sqrt(np.einsum("...k,...k->...", theta, theta))[..., None, None]
+    angle, W = np.maximum(angle, TINY), cross_matrix(theta)
+    return np.asarray(I3 + np.sin(angle) / angle * W + 2 * (np.sin(angle / 2) / angle) ** 2 * (W @ W))
 
 
 def cross_matrix(w: Inexact[np.ndarray, "... 3"]) -> Inexact[np.ndarray, "... 3 3"]:
@@ -97,7 +95,7 @@ class BlockFactor:
 
     def __init__(self, link: Linkage, f: Features, blocks: Blocks) -> None:
         self.f, self.blocks = f, blocks
-        self.values = blocks.values(link.rows, f, link.size)
+        self.J = self.values = blocks.values(link.rows, f, link.size)
 
     def solve(self, rhs: Float[np.ndarray, "T m c"]) -> Float[np.ndarray, "T k c"]:
         """x that leaves least of J x = rhs."""
@@ -113,13 +111,11 @@ def factored(link: Linkage, f: Features, rows: Rows | None = None) -> Factor | B
     return Factor(link, f, rows) if link.blocks is None else BlockFactor(link, f, link.blocks)
 
 
-def agree(here: Factor | BlockFactor, there: Factor | BlockFactor) -> bool:
-    """Whether no singular position lies between the first poses of two that are close by: det J₁ᵀ J₂ > 0."""
-    if isinstance(here, BlockFactor) and isinstance(there, BlockFactor):
-        return here.blocks.agree(here.values[0], there.values[0])
-    if isinstance(here, Factor) and isinstance(there, Factor):
-        return bool(np.linalg.slogdet(here.J[0].T @ there.J[0])[0] > 0)
-    raise TypeError("both must be of one linkage")
+def agree(link: Linkage, J: Float[np.ndarray, "T ..."]) -> Bool[np.ndarray, " I"]:
+    """Whether no singular position lies between poses that are close by, from one to the next: det J₁ᵀ J₂ > 0."""
+    if link.blocks is not None:
+        return np.array([link.blocks.agree(*pair) for pair in pairwise(J)])
+    return np.asarray(np.linalg.slogdet(np.swapaxes(J[:-1], 1, 2) @ J[1:])[0] > 0)
 
 
 def twists(
@@ -134,8 +130,7 @@ def twists(
 def driven_rows(rows: Rows, rates: Float[np.ndarray, "T D"]) -> Float[np.ndarray, "T m"]:
     """Right-hand sides of the rows for rates of the drives."""
     out = np.zeros((len(rates), rows.count))
-    driven = np.flatnonzero(rows.drive >= 0)
-    out[:, driven] = rates[:, rows.drive[driven]]
+    out[:, rows.driven] = rates[:, rows.drive[rows.driven]]
     return out
 
 
@@ -146,10 +141,12 @@ def moved(poses: Poses, change: Twists) -> Poses:
 
 
 def orthonormal(R: Float[np.ndarray, "... 3 3"]) -> Float[np.ndarray, "... 3 3"]:
-    """The rotation next to a matrix that almost is one: Newton steps R (3 − Rᵀ R)/2 to it, one or two."""
-    for _ in range(2):
-        off = np.swapaxes(R, -1, -2) @ R - np.eye(3)
-        R = R - 0.5 * (R @ off)
+    """The rotation next to a matrix that almost is one: Newton steps R (3 − Rᵀ R)/2 to it, one or a few."""
+    for _ in range(5):
+        off = np.swapaxes(R, -1, -2) @ R - I3
+        R = R - 0.5 * (
+            R @ np.clip(off, -1.0, 1.0)
+        )  # of what is far from one it shall not grow beyond measure
         if np.abs(off).max(initial=0.0) < NEARLY:
             break
     return np.asarray(R)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.motion.constraints import Rows, cross
+from kedfem.motion.constraints import Rows
 
 Poses = tuple[Float[np.ndarray, "T B 3 3"], Float[np.ndarray, "T B 3"]]
 Twists = tuple[Float[np.ndarray, "T B 3"], Float[np.ndarray, "T B 3"]]
@@ -23,9 +23,9 @@ class Features:
     w : (3, E, T) b in world components
     arm_i, arm_j : (3, E, T) R_i a and R_j a_j
     value : (E, T) [m, -, rad]
-    along, across : (A, T) of angles: a · a_j + e · e_j and a · e_j − e · a_j; their ratio is the tangent
-    e, e_j : (3, A, T) of angles: b × a in body i and b × a_j in body j, world components
-    about : (3, A, T) of angles: derivative by ω_i − ω_j; the axis itself where the hinge is closed
+    hand_i, hand_j : (3, A, T) of angles: a − i b × a in body i and a_j + i b × a_j in body j, world components, complex
+    product : (A, T) of angles: hand_i · hand_j, r exp(i angle)
+    rate : (3, A, T) of angles: hand_i × hand_j by their product; ω_i − ω_j times it is the rate of ln r + i angle
     """
 
     u: np.ndarray
@@ -33,28 +33,35 @@ class Features:
     arm_i: np.ndarray
     arm_j: np.ndarray
     value: np.ndarray
-    along: np.ndarray
-    across: np.ndarray
-    e: np.ndarray
-    e_j: np.ndarray
-    about: np.ndarray
+    hand_i: np.ndarray
+    hand_j: np.ndarray
+    product: np.ndarray
+    rate: np.ndarray
+
+    @property
+    def about(self) -> np.ndarray:
+        """Of angles: derivative by ω_i − ω_j (3, A, T); the axis itself where the hinge is closed."""
+        return self.rate.imag
 
 
 def features(rows: Rows, poses: Poses, near: Float[np.ndarray, "T A"]) -> Features:
     """Evaluate elementary rows; `near` holds the turn of each angle row to within half a turn [rad]."""
-    R, p = np.ascontiguousarray(poses[0].transpose(2, 3, 1, 0)), np.ascontiguousarray(poses[1].T)
-    Ri, Rj = np.take(R, rows.i, axis=2), np.take(R, rows.j, axis=2)
-    arm_i, arm_j, w = _turned(Ri, rows.a), _turned(Rj, rows.a_j), _turned(Rj, rows.b)
-    u, g, k = arm_i.copy(), rows.gaps, rows.angles
+    R, p = np.ascontiguousarray(poses[0].transpose(3, 2, 1, 0)), np.ascontiguousarray(poses[1].T)
+    turned = R[0].take(rows.body, axis=1) * rows.vector[:, 0, None]
+    for c in (1, 2):
+        turned += R[c].take(rows.body, axis=1) * rows.vector[:, c, None]
+    E, g, k = len(rows.kind), rows.gaps, rows.angles
+    arm_i, arm_j, w, e = turned[:, :E], turned[:, E : 2 * E], turned[:, 2 * E : 3 * E], turned[:, 3 * E :]
+    u = arm_i.copy()
     u[:, g] += p[:, rows.i[g]] - p[:, rows.j[g]] - arm_j[:, g]
     value = _dot(u, w)
-    a, a_j = arm_i[:, k], arm_j[:, k]
-    e, e_j = _turned(Ri[:, :, k], cross(rows.b[k], rows.a[k])), _cross(w[:, k], a_j)
-    along, across = _dot(a, a_j) + _dot(e, e_j), _dot(a, e_j) - _dot(e, a_j)
-    cos, sin = np.cos(near.T), np.sin(near.T)  # sines of large angles are reduced without loss
-    value[k] = near.T + np.arctan2(across * cos - along * sin, along * cos + across * sin)
-    about = _cross(a, along * e_j - across * a_j) - _cross(e, along * a_j + across * e_j)
-    return Features(u, w, arm_i, arm_j, value, along, across, e, e_j, about / (along**2 + across**2))
+    a_j = arm_j[:, k]
+    hand_i, hand_j = arm_i[:, k] - 1j * e, a_j + 1j * _cross(w[:, k], a_j)
+    product = _dot(hand_i, hand_j)
+    value[k] = near.T + np.angle(
+        product * np.exp(-1j * near.T)
+    )  # sines of large angles are reduced without loss
+    return Features(u, w, arm_i, arm_j, value, hand_i, hand_j, product, _cross(hand_i, hand_j) / product)
 
 
 def residuals(rows: Rows, f: Features, q: Float[np.ndarray, "T D"]) -> Float[np.ndarray, "T m"]:
@@ -62,8 +69,7 @@ def residuals(rows: Rows, f: Features, q: Float[np.ndarray, "T D"]) -> Float[np.
     out = f.value[: rows.count].T.copy()
     for k, row, c in rows.plus:
         out[:, k] += c * f.value[row]
-    driven = np.flatnonzero(rows.drive >= 0)
-    out[:, driven] -= q[:, rows.drive[driven]]
+    out[:, rows.driven] -= q[:, rows.drive[rows.driven]]
     return out
 
 
@@ -113,36 +119,24 @@ def convective(rows: Rows, f: Features, twists: Twists) -> Float[np.ndarray, "T 
     v, omega = (np.ascontiguousarray(x.T) for x in twists)
     wi, wj = np.take(omega, rows.i, axis=1), np.take(omega, rows.j, axis=1)
     g, k = rows.gaps, rows.angles
+    # u · w, w fixed in body j, changes with u'' − ω_j × (2 u' − ω_j × u)
     rate_i, rate_j = _cross(wi, f.arm_i), _cross(wj[:, g], f.arm_j[:, g])
-    u1, u2 = rate_i.copy(), _cross(wi, rate_i)
-    u1[:, g] += v[:, rows.i[g]] - v[:, rows.j[g]] - rate_j
-    u2[:, g] -= _cross(wj[:, g], rate_j)
-    w1 = _cross(wj, f.w)
-    out = _dot(u2, f.w) + 2 * _dot(u1, w1) + _dot(f.u, _cross(wj, w1))
+    seen = _cross(wj, f.u) - 2 * rate_i
+    seen[:, g] += rate_j - 2 * (v[:, rows.i[g]] - v[:, rows.j[g]])
+    out = _dot(_cross(wi, rate_i) + _cross(wj, seen), f.w)
     if len(k):
-        out[k] = _angle_convective(f, k, wi[:, k], wj[:, k])
+        out[k] = _angle_convective(f, wi[:, k], wj[:, k])
     total: np.ndarray = out[: rows.count].T.copy()
     for row, other, c in rows.plus:
         total[:, row] += c * out[other]
     return total
 
 
-def _angle_convective(f: Features, k: np.ndarray, wi: np.ndarray, wj: np.ndarray) -> np.ndarray:
-    """Of angles: second derivative of the arc tangent of y / x, sums of products of directions of both bodies."""
-    a, a_j, square = f.arm_i[:, k], f.arm_j[:, k], f.along**2 + f.across**2
-    x1, y1, x2, y2 = np.zeros((4, *square.shape))
-    for u, along, across in ((a, a_j, f.e_j), (f.e, f.e_j, -a_j)):
-        u1 = _cross(wi, u)
-        u2, u1j, u2j = _cross(wi, u1), _cross(wj, u1), _cross(wj, _cross(wj, u))
-        # of u · f, f fixed in body j: u2 · f + 2 u1 · (ω_j × f) + u · (ω_j × (ω_j × f))
-        bent, rate = u2 - 2 * u1j + u2j, u1 - _cross(wj, u)
-        x1 += _dot(rate, along)
-        y1 += _dot(rate, across)
-        x2 += _dot(bent, along)
-        y2 += _dot(bent, across)
-    spin = (f.along * y1 - f.across * x1) / square
-    swing = (f.along * x1 + f.across * y1) / square
-    return np.asarray((f.along * y2 - f.across * x2) / square - 2 * swing * spin)
+def _angle_convective(f: Features, wi: np.ndarray, wj: np.ndarray) -> np.ndarray:
+    """Of angles: second derivative of Im ln z, z the product of both hands; real multiples of z left out."""
+    apart = wi - wj
+    z2 = _dot(wi, f.hand_j) * _dot(apart, f.hand_i) - _dot(wj, f.hand_i) * _dot(apart, f.hand_j)
+    return np.asarray((z2 / f.product - _dot(apart, f.rate) ** 2).imag)
 
 
 def turning(rows: Rows, f: Features, twists: Twists) -> Float[np.ndarray, "T A"]:
@@ -151,25 +145,16 @@ def turning(rows: Rows, f: Features, twists: Twists) -> Float[np.ndarray, "T A"]
     return np.asarray(_dot(f.about, omega[:, rows.i[k]] - omega[:, rows.j[k]]).T)
 
 
-def _turned(R: Float[np.ndarray, "3 3 E T"], x: Float[np.ndarray, "E 3"]) -> Float[np.ndarray, "3 E T"]:
-    """R x of each row."""
-    out = R[:, 0] * x[:, 0, None]
-    out += R[:, 1] * x[:, 1, None]
-    out += R[:, 2] * x[:, 2, None]
-    return np.asarray(out)
-
-
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """a · b over the first axis."""
-    out = a[0] * b[0]
-    out += a[1] * b[1]
-    out += a[2] * b[2]
-    return np.asarray(out)
+    return np.asarray(np.einsum("k...,k...", a, b))
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """a × b over the first axis."""
-    out = np.empty(a.shape)
-    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
-        np.subtract(a[i] * b[j], a[j] * b[i], out=out[k])
-    return out
+    out = a.take(NEXT, axis=0) * b.take(LAST, axis=0)
+    out -= a.take(LAST, axis=0) * b.take(NEXT, axis=0)
+    return np.asarray(out)
+
+
+NEXT, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])

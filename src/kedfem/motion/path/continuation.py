@@ -1,74 +1,61 @@
-"""Continuation along the drives: grid points one after the other, each predicted from those before and closed by Newton.
+"""Continuation along the drives: a few grid points at once, predicted from those before and closed by Newton.
 
-A step is halved until Newton converges at once and no singular position lies between both points, so that the assembly
+A step is halved until Newton converges at once and no singular position lies between two points, so that the assembly
 branch never jumps.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.errors import MotionError
-from kedfem.motion.batch import settled
+from kedfem.motion.batch import Choice, Moving, settled
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.messages import stopped
-from kedfem.motion.newton import (
-    OPEN,
-    SETTLED,
-    BlockFactor,
-    Factor,
-    agree,
-    cross_matrix,
-    moved,
-    orthonormal,
-    target,
-)
-from kedfem.motion.values import Poses, Twists, features, turning
+from kedfem.motion.newton import OPEN, SETTLED, TINY, agree, cross_matrix, orthonormal, target
+from kedfem.motion.values import Poses, features, turning
 
 JUMP = 0.02  # of the size [-, rad]: a prediction that far off may lead to another branch
 CONTRACTION = 0.1  # Newton's second step against its first: well within the branch's own basin
 SMALLEST_STEP = 1e-6  # of a usual step
-FIRST_STEP, GROWTH, AHEAD = (
-    0.25,
-    1.5,
-    2.5,
-)  # of a usual step; of the last one; farthest extrapolation, of the last one
-FARTHEST = 0.8  # turn of a body between grid points [rad]
+FIRST_STEP, GROWTH = 0.25, 1.5  # of a usual step; of the last one
+AHEAD = 6  # most grid points that are predicted together
+SAFE = 0.5  # of JUMP: so far off may the last of them be expected to be
+FARTHEST, QUARTER = 0.8, np.pi / 2  # turn of a body between grid points, and in a prediction [rad]
 ROUNDING = 1e-12  # of τ against a usual step
 
 
 @dataclass(frozen=True, slots=True)
 class Stand:
-    """One grid point: τ, poses and turns of angle rows (1, A) there, the rates of both by τ, the factored rows.
+    """One grid point.
 
+    tau : τ there
     shape : (3, 12 B) R and p of all bodies, and their two derivatives by τ
+    near, turning : (A,) turns of angle rows, and their rates by τ
+    fastest : turn of the body that turns fastest, by τ
+    missed : how far its prediction was off, in units of size and radians
+    J : scaled rows
     """
 
     tau: float
-    poses: Poses
-    near: Float[np.ndarray, "1 A"]
-    first: Twists
-    second: Twists
-    factor: Factor | BlockFactor
-    turning: Float[np.ndarray, "1 A"]
     shape: Float[np.ndarray, "3 C"]
-
-    def farthest(self) -> float:
-        """The largest step in which no body turns far."""
-        fastest = float(np.abs(self.first[1]).max())
-        return FARTHEST / fastest if fastest > 0 else np.inf
+    near: Float[np.ndarray, " A"]
+    turning: Float[np.ndarray, " A"]
+    fastest: float
+    missed: float
+    J: Float[np.ndarray, "m k"]
 
 
 def started(link: Linkage) -> Stand:
     """The grid point at the reference position."""
     f = features(link.rows, link.start, np.zeros((1, len(link.rows.angles))))
-    found = _settled(link, 0.0, link.start, f.value[link.rows.angles].T)
-    if found is None:
-        raise MotionError(
-            stopped(link, link.start, 0.0, target(link, np.zeros(1), f.value[link.rows.angles].T))
-        )
-    return found
+    near = f.value[link.rows.angles].T
+    found = _settled(link, np.zeros(1), link.start, near)
+    if not found:
+        raise MotionError(stopped(link, link.start, 0.0, target(link, np.zeros(1), near)))
+    return found[0]
 
 
 def continued(link: Linkage, grid: list[Stand], usual: float, end: float) -> list[Stand]:
@@ -79,68 +66,94 @@ def continued(link: Linkage, grid: list[Stand], usual: float, end: float) -> lis
     MotionError
         Naming the joint and the place where the linkage locks or cannot be assembled.
     """
-    out, step = list(grid), usual if len(grid) > 1 else FIRST_STEP * usual
+    out, step, ahead = list(grid), usual if len(grid) > 1 else FIRST_STEP * usual, 3
     while abs(end - out[-1].tau) > ROUNDING * usual:
-        left = end - out[-1].tau
-        out.append(
-            _next(link, out, float(np.sign(left)) * min(step, usual, out[-1].farthest(), abs(left)), usual)
-        )
+        found = _next(link, out, step, ahead, usual, end)
+        out, missed = out + found, max(found[-1].missed, TINY)
+        ahead = int(np.clip(len(found) * min((SAFE * JUMP / missed) ** (1 / 6), 2), 1, AHEAD))
         step = GROWTH * abs(out[-1].tau - out[-2].tau)
     return out
 
 
-def _next(link: Linkage, grid: list[Stand], step: float, usual: float) -> Stand:
-    """The next grid point, the step halved until Newton converges fast and the orientation stays."""
-    here, least = grid[-1], min(SMALLEST_STEP * usual, abs(step))
-    while abs(step) >= least:
-        near = here.near + step * here.turning
-        there = _settled(link, here.tau + step, _predicted(grid, step), near, JUMP)
-        if there is not None and agree(here.factor, there.factor):  # else a singular position lies between
-            return there
-        step /= 2
-    at = np.array([here.tau])
-    raise MotionError(stopped(link, here.poses, here.tau, target(link, at, here.near)))
+def _next(link: Linkage, grid: list[Stand], step: float, ahead: int, usual: float, end: float) -> list[Stand]:
+    """The next grid points, the step halved until Newton converges fast and the orientation stays."""
+    here = grid[-1]
+    left = abs(end - here.tau)
+    step = min(step, usual, left, FARTHEST / max(here.fastest, TINY))
+    least = min(SMALLEST_STEP * usual, step)
+    while step >= least:
+        to = np.minimum(step * GROWTH ** np.arange(ahead), usual).cumsum()
+        to = np.unique(np.where(to > left - ROUNDING * usual, left, to))
+        to = np.sign(end - here.tau) * to[: max(int((here.fastest * to <= QUARTER).sum()), 1)]
+        near = here.near + to[:, None] * here.turning
+        if found := _settled(link, here.tau + to, _predicted(grid, to), near, here):
+            return found
+        step, ahead = step / 2, 1
+    poses, at = split(here.shape[:1]), np.array([here.tau])
+    raise MotionError(stopped(link, poses, here.tau, target(link, at, here.near[None])))
 
 
 def _settled(
-    link: Linkage, tau: float, guess: Poses, near: Float[np.ndarray, "1 A"], jump: float = np.inf
-) -> Stand | None:
-    """The grid point next to a guess; None if that is too far off, or Newton converges slowly."""
-    at = np.array([tau])
-    _, q1, q2 = link.drives.at(at)
-    got = settled(link, guess, target(link, at, near), (q1, q2))
+    link: Linkage,
+    tau: Float[np.ndarray, " T"],
+    guess: Poses,
+    near: Float[np.ndarray, "T A"],
+    before: Stand | None = None,
+) -> list[Stand]:
+    """Grid points next to guesses, up to one that is too far off, converges slowly or lies behind a singular position."""
+    rates, jump = link.drives.at(tau)[1:], np.inf if before is None else JUMP
+    got = settled(link, Choice(link.rows), guess, target(link, tau, near), rates, (SETTLED, jump))
     steps, factor = got.steps, got.factor
-    if factor is None or not got.gap[0] <= OPEN or steps[0][0] > jump:
-        return None
-    if len(steps) > 1 and steps[1][0] > CONTRACTION * steps[0][0] + SETTLED:
-        return None
-    R, p = orthonormal(got.poses[0]), got.poses[1]
-    rates = turning(link.rows, factor.f, got.first)
-    shape = shapes(R, p, got.first, got.second)[:, 0]
-    return Stand(tau, (R, p), factor.f.value[link.rows.angles].T, got.first, got.second, factor, rates, shape)
+    if factor is None:
+        return []
+    good, fastest = (got.gap <= OPEN) & (steps[0] <= jump), np.abs(got.first[1]).max(axis=(1, 2))
+    if before is not None:
+        good &= agree(link, np.concatenate([before.J[None], factor.J]))
+        good[1:] &= np.abs(np.diff(tau)) * fastest[:-1] <= FARTHEST
+    if len(steps) > 1:
+        good &= steps[1] <= CONTRACTION * steps[0] + SETTLED
+    shape, near, turns = (
+        shapes(got),
+        factor.f.value[link.rows.angles].T,
+        turning(link.rows, factor.f, got.first),
+    )
+    return [
+        Stand(float(tau[k]), shape[:, k], near[k], turns[k], fastest[k], steps[0][k], factor.J[k])
+        for k in range(len(tau) if good.all() else int(good.argmin()))
+    ]
 
 
-def _predicted(grid: list[Stand], step: float) -> Poses:
-    """Poses a step on: by the quintic through the last two grid points, of the first one by Taylor."""
+def _predicted(grid: list[Stand], step: Float[np.ndarray, " T"]) -> Poses:
+    """Poses some steps on: by the quintic through the last two grid points, of the first one by Taylor."""
     here = grid[-1]
-    h = here.tau - grid[-2].tau if len(grid) > 1 else 0.0
-    if h * step <= 0.0 or step / h > AHEAD:
-        v, omega = (a * step + b * step**2 / 2 for a, b in zip(here.first, here.second, strict=True))
-        return moved(here.poses, (v, omega))
-    c, s = quintics(np.stack([grid[-2].shape, here.shape], axis=1), np.array([h]))[0], 1 + step / h
-    x = c[5]
-    for power in range(4, -1, -1):
-        x = x * s + c[power]
-    B = here.poses[1].shape[1]
-    return orthonormal(x[: 9 * B].reshape(1, B, 3, 3)), x[9 * B :].reshape(1, B, 3)
+    if len(grid) == 1:
+        return on_curves(iter(here.shape[::-1] / np.array([[2.0], [1.0], [1.0]])), step)
+    h = here.tau - grid[-2].tau
+    c = quintics(np.stack([grid[-2].shape, here.shape], axis=1), np.array([h]))[0]
+    return on_curves(iter(c[::-1]), 1 + step / h)
 
 
-def shapes(
-    R: Float[np.ndarray, "G B 3 3"], p: Float[np.ndarray, "G B 3"], first: Twists, second: Twists
-) -> Float[np.ndarray, "3 G C"]:
-    """R and p of all bodies (C = 12 B numbers), and their two derivatives by τ."""
-    W, A = cross_matrix(first[1]), cross_matrix(second[1])
-    parts = ((R, p), (W @ R, first[0]), ((A + W @ W) @ R, second[0]))
+def on_curves(c: Iterator[Float[np.ndarray, "... C"]], s: Float[np.ndarray, " T"]) -> Poses:
+    """Poses by polynomials of R and p at places s, highest coefficients first, R made a rotation again."""
+    x = next(c) + 0 * s[:, None]
+    for each in c:
+        x *= s[:, None]
+        x += each
+    R, p = split(x)
+    return orthonormal(R), p
+
+
+def split(x: Float[np.ndarray, "T C"]) -> Poses:
+    """R and p of all bodies, from C = 12 B numbers."""
+    B = x.shape[1] // 12
+    return x[:, : 9 * B].reshape(-1, B, 3, 3), x[:, 9 * B :].reshape(-1, B, 3)
+
+
+def shapes(got: Moving) -> Float[np.ndarray, "3 G C"]:
+    """R and p of all bodies (C = 12 B numbers), and their two derivatives."""
+    (R, p), W, A = got.poses, cross_matrix(got.first[1]), cross_matrix(got.second[1])
+    R = orthonormal(R)
+    parts = ((R, p), (W @ R, got.first[0]), ((A + W @ W) @ R, got.second[0]))
     return np.stack([
         np.concatenate([r.reshape(len(p), -1), q.reshape(len(p), -1)], axis=1) for r, q in parts
     ])  # fmt: skip

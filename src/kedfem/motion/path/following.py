@@ -7,10 +7,19 @@ from hashlib import sha256
 import numpy as np
 
 from kedfem.arrays import Float
+from kedfem.motion.batch import Choice, Moving
 from kedfem.motion.constraints import ANGLE
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import OPEN
-from kedfem.motion.path.continuation import ROUNDING, Stand, continued, quintics, shapes, started
+from kedfem.motion.path.continuation import (
+    ROUNDING,
+    Stand,
+    continued,
+    quintics,
+    shapes,
+    split,
+    started,
+)
 from kedfem.motion.path.record import Path
 from kedfem.motion.path.refinement import halved, refined
 from kedfem.motion.path.weakest import checked
@@ -32,11 +41,10 @@ def path(link: Linkage, low: float, high: float) -> Path:
         Naming the joint and the place where the linkage locks or cannot be assembled.
     """
     if link.drive is None:
-        none, A = np.zeros((1, len(link.bodies), 3)), len(link.rows.angles)
-        return Path(
-            np.zeros(1), *link.start, (none, none), (none, none), np.zeros((1, A)), np.inf,
-            np.zeros(link.rows.count), (1.0, 0.0), np.arange(link.rows.count), np.zeros((0, 6, 12)),
-        )  # fmt: skip
+        R, p = link.start
+        none = np.zeros_like(p), np.zeros_like(p)
+        shape = shapes(Moving((R, p), none, none, none, np.zeros(1)))
+        return _through(link, np.zeros(1), shape, np.zeros((1, len(link.rows.angles))), np.inf)
     period = link.drives.period()
     low, high = _on_periods(low, period), _on_periods(high, period)
     name = _named(link, low, high)
@@ -69,10 +77,12 @@ def _followed(link: Linkage, low: float, high: float, period: float) -> Path:
     """By usual steps, or by finer ones where a position between two of these cannot be closed."""
     usual = link.drives.step(low, high)
     for step in (usual, FINER * usual):
-        along, closes = halved(link, _assembled(link, *_grid(link, low, high, period, step)))
+        grid, period = _grid(link, low, high, period, step)
+        phi, shape, near = (np.stack([getattr(g, x) for g in grid]) for x in ("tau", "shape", "near"))
+        along, closes, factor = halved(link, _through(link, phi, shape.transpose(1, 0, 2), near, period))
         if closes:
             break
-    return refined(link, checked(link, along))
+    return refined(link, checked(link, along, factor))
 
 
 def _grid(link: Linkage, low: float, high: float, period: float, step: float) -> tuple[list[Stand], float]:
@@ -106,23 +116,22 @@ def _returned(link: Linkage, start: Stand, here: Stand) -> bool:
     """Whether a linkage is in its first pose again."""
     one = len(link.drives) == 1 and not link.rows.plus
     apart = (
-        np.abs(start.poses[0] - here.poses[0]).max(),
-        np.abs(start.poses[1] - here.poses[1]).max() / link.size,
+        np.abs(one - other).max() / unit
+        for one, other, unit in zip(
+            split(start.shape[:1]), split(here.shape[:1]), (1.0, link.size), strict=True
+        )
     )
     return bool(max(apart) < (OPEN if one else RETURNED))
 
 
-def _assembled(link: Linkage, grid: list[Stand], period: float) -> Path:
+def _through(
+    link: Linkage, phi: Float[np.ndarray, " G"], shape: Float[np.ndarray, "3 G C"], near: Float[np.ndarray, "G A"],
+    period: float,
+) -> Path:  # fmt: skip
     """The path through grid points, not examined yet."""
-    phi = np.array([g.tau for g in grid])
-    R, p, near = (np.concatenate(x) for x in zip(*((*g.poses, g.near) for g in grid), strict=True))
-    first, second = (
-        (np.concatenate([x[0] for x in rates]), np.concatenate([x[1] for x in rates]))
-        for rates in ([g.first for g in grid], [g.second for g in grid])
-    )
     return Path(
-        phi, R, p, first, second, near, period, _gathered(link, near, period), (1.0, float(phi[0])),
-        np.arange(link.rows.count), quintics(shapes(R, p, first, second), np.diff(phi)),
+        phi, shape, near, period, _gathered(link, near, period), (1.0, float(phi[0])),
+        Choice(link.rows), quintics(shape, np.diff(phi)),
     )  # fmt: skip
 
 

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kedfem.arrays import Float, Int
+from kedfem.motion.batch import Choice
 from kedfem.motion.linkage import Linkage
-from kedfem.motion.newton import Target, orthonormal, target
-from kedfem.motion.path.continuation import ROUNDING
+from kedfem.motion.newton import Target, target
+from kedfem.motion.path.continuation import ROUNDING, on_curves, quintics, split
 from kedfem.motion.values import Poses, Twists
 
 
@@ -19,27 +20,40 @@ class Path:
     """Poses on a grid of τ, with derivatives by τ.
 
     phi : (G,) τ, increasing [rad or m; s with several drives]
-    R, p : (G, B, 3, 3), (G, B, 3) poses of all bodies, ground first
-    first, second : twists (v, ω) and their derivatives by τ, each a pair of (G, B, 3)
+    shape : (3, G, 12 B) R and p of all bodies, ground first, and their two derivatives by τ
     near : (G, A) turns of the angle rows, counted on from the start [rad]
     period : τ after which the linkage returns to its pose; infinite if it does not
     over : (m,) what the rows gather over a period: gears whose ratio is not quite that of whole turns
     weakest : smallest singular value met on the way, relative, and τ there
-    rows : numbers of rows that hold all motions, well conditioned all along
+    rows : those that hold all motions, well conditioned all along
     curve : (G - 1, 6, 12 B) coefficients of the quintics between grid points, of R and p
     """
 
     phi: Float[np.ndarray, " G"]
-    R: Float[np.ndarray, "G B 3 3"]
-    p: Float[np.ndarray, "G B 3"]
-    first: Twists
-    second: Twists
+    shape: Float[np.ndarray, "3 G C"]
     near: Float[np.ndarray, "G A"]
     period: float
     over: Float[np.ndarray, " m"]
     weakest: tuple[float, float]
-    rows: Int[np.ndarray, " k"]
+    rows: Choice
     curve: Float[np.ndarray, "I 6 C"]
+
+    @property
+    def R(self) -> Float[np.ndarray, "G B 3 3"]:
+        """Orientations."""
+        return split(self.shape[0])[0]
+
+    @property
+    def p(self) -> Float[np.ndarray, "G B 3"]:
+        """Displacements."""
+        return split(self.shape[0])[1]
+
+    @property
+    def first(self) -> Twists:
+        """Twists (v, ω) by τ, each (G, B, 3)."""
+        W, v = split(self.shape[1])
+        W = W @ np.swapaxes(self.R, -1, -2)
+        return v, np.stack([W[..., 2, 1], W[..., 0, 2], W[..., 1, 0]], axis=-1)
 
     @property
     def periodic(self) -> bool:
@@ -50,6 +64,20 @@ class Path:
         """Whether it reaches so far, up to rounding."""
         slack = ROUNDING * (1 + self.phi[-1] - self.phi[0])
         return self.periodic or bool(self.phi[0] - slack <= low and high <= self.phi[-1] + slack)
+
+
+def with_points(
+    along: Path,
+    phi: Float[np.ndarray, " T"],
+    shape: Float[np.ndarray, "3 T C"],
+    near: Float[np.ndarray, "T A"],
+) -> tuple[Path, Int[np.ndarray, " G"]]:
+    """The path with some further grid points, and numbers of its points among the old ones with these behind."""
+    order = np.argsort(np.concatenate([along.phi, phi]))
+    phi = np.concatenate([along.phi, phi])[order]
+    shape = np.concatenate([along.shape, shape], axis=1)[:, order]
+    near = np.concatenate([along.near, near])[order]
+    return replace(along, phi=phi, shape=shape, near=near, curve=quintics(shape, np.diff(phi))), order
 
 
 def place_on(along: Path, tau: Float[np.ndarray, " T"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -67,14 +95,9 @@ def place_on(along: Path, tau: Float[np.ndarray, " T"]) -> tuple[np.ndarray, np.
 def predicted(along: Path, tau: Float[np.ndarray, " T"]) -> Poses:
     """Poses between grid points: quintic Hermite interpolation of R and p, R made a rotation again."""
     k, s, _ = place_on(along, tau)
-    B = along.p.shape[1]
     if not len(along.curve):
         return np.tile(along.R, (len(tau), 1, 1, 1)), np.tile(along.p, (len(tau), 1, 1))
-    x, s = along.curve[k, 5], s[:, None]
-    for power in range(4, -1, -1):
-        x *= s
-        x += along.curve[k, power]
-    return orthonormal(x[:, : 9 * B].reshape(-1, B, 3, 3)), x[:, 9 * B :].reshape(-1, B, 3)
+    return on_curves((along.curve[k, power] for power in range(5, -1, -1)), s)
 
 
 def aimed(link: Linkage, along: Path, tau: Float[np.ndarray, " T"]) -> Target:

@@ -4,26 +4,37 @@ from dataclasses import replace
 
 import numpy as np
 
-from kedfem.arrays import Bool, Float
-from kedfem.motion.batch import Moving, moving
+from kedfem.motion.batch import Choice, moving, settled
 from kedfem.motion.linkage import Linkage
-from kedfem.motion.newton import OPEN, Target, orthonormal
-from kedfem.motion.path.continuation import quintics, shapes
-from kedfem.motion.path.record import Path, aimed, predicted
+from kedfem.motion.newton import OPEN, BlockFactor, Factor, target
+from kedfem.motion.path.continuation import shapes
+from kedfem.motion.path.record import Path, aimed, predicted, with_points
 
 FINE = 3e-14  # of the size: error of a prediction from which rates can be taken
 NEAR = 1e-8  # of large linkages: one more iteration of Newton costs less than a finer grid
+HALVES = 64  # quintics between points half as far apart are so many times as close
 REFINEMENTS, MOST_POINTS = 5, 20_000
 
 
-def halved(link: Linkage, along: Path) -> tuple[Path, bool]:
-    """The path with a grid point more in each interval, and whether all of these can be closed."""
-    middle = (along.phi[:-1] + along.phi[1:]) / 2
-    if not len(middle):
-        return along, True
-    got, aim = _between(link, along, middle)
+def halved(link: Linkage, along: Path) -> tuple[Path, bool, Factor | BlockFactor | None]:
+    """The path with a grid point more in each interval, whether all of these can be closed, and then its rows, if known.
+
+    Points of small linkages are all closed to rounding; between those of large ones rates need not be known as closely.
+    """
+    middles = np.arange(1, len(along.phi))
+    phi, near = (np.insert(x, middles, (x[:-1] + x[1:]) / 2, axis=0) for x in (along.phi, along.near))
+    if link.blocks is not None:
+        phi, near, old = phi[1::2], near[1::2], along
+    else:
+        old = replace(along, phi=phi[:0], shape=along.shape[:, :0], near=near[:0])
+    got = settled(
+        link, Choice(link.rows), predicted(along, phi), target(link, phi, near), link.drives.at(phi)[1:]
+    )
     fine = got.gap <= OPEN
-    return _inserted(along, fine, middle, aim, got)[0], bool(fine.all())
+    kept = fine | np.isin(phi, along.phi)
+    closes = bool(fine.all())
+    whole = got.factor if closes and old is not along else None
+    return with_points(old, phi[kept], shapes(got)[:, kept], near[kept])[0], closes, whole
 
 
 def refined(link: Linkage, along: Path) -> Path:
@@ -33,41 +44,14 @@ def refined(link: Linkage, along: Path) -> Path:
         middle = (along.phi[:-1] + along.phi[1:])[fresh] / 2
         if not len(middle) or len(along.phi) + len(middle) > MOST_POINTS:
             break
-        got, aim = _between(link, along, middle)
-        R, p = predicted(along, middle)
+        aim, (R, p) = aimed(link, along, middle), predicted(along, middle)
+        got = moving(link, along.rows, (R, p), aim, link.drives.at(middle)[1:])
         apart = np.maximum(
             np.abs(got.poses[0] - R).max(axis=(1, 2, 3)),
             np.abs(got.poses[1] - p).max(axis=(1, 2)) / link.size,
         )
         off = np.isfinite(got.gap) & (apart > enough)
-        if not off.any():
-            break
-        along, fresh = _inserted(along, off, middle, aim, got)
+        still = np.append(np.zeros(len(along.phi), bool), (apart > HALVES * enough)[off])
+        along, order = with_points(along, middle[off], shapes(got)[:, off], aim.near[off])
+        fresh = still[order][:-1] | still[order][1:]
     return along
-
-
-def _between(link: Linkage, along: Path, tau: Float[np.ndarray, " T"]) -> tuple[Moving, Target]:
-    """Poses and rates by τ at places of the path, and what the rows were to be."""
-    aim, (_, q1, q2) = aimed(link, along, tau), link.drives.at(tau)
-    return moving(link, along.rows, predicted(along, tau), aim, (q1, q2)), aim
-
-
-def _inserted(
-    along: Path, which: Bool[np.ndarray, " T"], tau: Float[np.ndarray, " T"], aim: Target, got: Moving
-) -> tuple[Path, Bool[np.ndarray, " I"]]:
-    """The path with some further grid points, and which of its intervals end or begin at one of these."""
-    at = np.searchsorted(along.phi, tau[which])
-
-    def both(old: np.ndarray, more: np.ndarray) -> np.ndarray:
-        return np.insert(old, at, more[which], axis=0)
-
-    phi, near = both(along.phi, tau), both(along.near, aim.near)
-    R, p = both(along.R, orthonormal(got.poses[0])), both(along.p, got.poses[1])
-    first, second = (
-        (both(old[0], more[0]), both(old[1], more[1]))
-        for old, more in ((along.first, got.first), (along.second, got.second))
-    )
-    added = np.insert(np.zeros(len(along.phi), bool), at, True)
-    curve = quintics(shapes(R, p, first, second), np.diff(phi))
-    along = replace(along, phi=phi, R=R, p=p, first=first, second=second, near=near, curve=curve)
-    return along, added[:-1] | added[1:]

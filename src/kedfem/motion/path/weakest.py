@@ -6,7 +6,7 @@ import numpy as np
 
 from kedfem.arrays import Float, Int
 from kedfem.errors import MotionError
-from kedfem.motion.batch import independent
+from kedfem.motion.batch import choice, independent
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.messages import stopped
 from kedfem.motion.newton import BlockFactor, Factor, closed, factored
@@ -17,13 +17,17 @@ WEAK, SINGULAR = 0.05, 1e-7  # relative singular values: worth a closer look; a 
 LEVEL = 0.999  # of its values beside it: a least one that does not vanish, found well enough
 
 
-def checked(link: Linkage, along: Path) -> Path:
-    """The path with the rows to solve for, refused if it passes a dead point, on the grid or between."""
-    factor = factored(link, features(link.rows, (along.R, along.p), along.near))
+def checked(link: Linkage, along: Path, factor: Factor | BlockFactor | None) -> Path:
+    """The path with the rows to solve for, refused if it passes a dead point, on the grid or between.
+
+    factor : its rows, if known
+    """
+    factor = factor or factored(link, features(link.rows, (along.R, along.p), along.near))
     weakness, singular = _weakness(factor)
     phi, least = along.phi, int(weakness.argmin())
-    rows = independent(factor.J, singular) if isinstance(factor, Factor) else along.rows
-    along = replace(along, rows=rows, weakest=(float(weakness[least]), float(phi[least])))
+    if isinstance(factor, Factor):
+        along = replace(along, rows=choice(link.rows, independent(factor.J, singular)))
+    along = replace(along, weakest=(float(weakness[least]), float(phi[least])))
     dips = _dips(weakness)
     for k in dips[np.argsort(np.abs(phi[dips]), kind="stable")]:  # the first met is named
         along = _closer(link, along, float(phi[max(k - 1, 0)]), float(phi[min(k + 1, len(phi) - 1)]))
