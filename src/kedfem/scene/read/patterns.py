@@ -27,6 +27,7 @@ BY_LINK = ("at", "coupling", "faces")  # keys of joints that may hold a table by
 FLAT = ("plate_link", "extrusion", "part")  # shapes whose thickness is along z
 LEVEL = {"angle": "an angle", "distances": "distances", "offset": "an offset"}  # of points, in the xy plane
 PLACED, LINES = ("cad", "mesh"), ("bar", "polyline")
+FACTORS = ("factor", "stiffness_factor")
 ANGLE, INERTIA = Quantity("rad"), Quantity("kg*m^2")
 Tables = dict[str, Any]
 
@@ -72,7 +73,7 @@ class _Copy:
                 raise ValueError(f"{wanted}, got {LEVEL[level[0]]}")
             if "angle" in value:
                 made["angle"] = ANGLE.number(value["angle"]) + self.number * self.pattern.turn
-        if key in ("factor", "stiffness_factor") and self.pattern.phase and value.get("over") == "angle":
+        if key in FACTORS and self.pattern.phase and value.get("over") == "angle":
             if "at" not in value:
                 raise ValueError("must have its angles in a list in a pattern with a phase, got a file")
             made["at"] = [ANGLE.number(x) + self.number * self.pattern.phase for x in value["at"]]
@@ -97,7 +98,14 @@ class _Copy:
 
     def completed(self, section: str, raw: Any, made: Any) -> Any:
         """An entry with what it leaves open and does not move by itself; what cannot be moved is a ValueError."""
-        if not isinstance(raw, Mapping) or not self.pattern.turn:
+        if not isinstance(raw, Mapping):
+            return made
+        shape = spelt_out(raw).get("shape") if section == "links" else None
+        kind = shape.get("kind") if isinstance(shape, Mapping) else None
+        if not self.pattern.turn:
+            if kind in PLACED and "origin" not in (shape or {}):  # drawn in its place, which is shifted
+                whole = {key: x for key, x in spelt_out(made).items() if key != "file"}
+                made = {**whole, "shape": {**whole["shape"], "origin": self._vector([0.0, 0.0, 0.0], "m")}}
             return made
         tilted = not np.allclose(self.R[:, 2], [0, 0, 1])
         if section == "joints":
@@ -111,8 +119,6 @@ class _Copy:
         if isinstance(inertia, list) and len(inertia) == 6:
             J = inertia_tensor([INERTIA.number(x) for x in inertia])
             made = {**made, "inertia": list(moments_of_inertia(self.R @ J @ self.R.T))}
-        shape = spelt_out(raw).get("shape") if section == "links" else None
-        kind = shape.get("kind") if isinstance(shape, Mapping) else None
         about = "in a pattern turned about another axis than z"
         if kind in PLACED:
             raise ValueError(
@@ -152,10 +158,20 @@ def with_patterns(raw: Mapping[str, Any], hint: Any) -> tuple[Tables, list[Fault
         except ValidationError as error:
             faults += record_faults(error, Pattern, each, where)
             continue
+        if pattern.phase and not _phased(pattern):
+            wanted = "must be of factors over the drive's angle, of loads or springs"
+            faults.append(Fault((*where, "phase"), f"{wanted}, got none of these"))
         for section in SECTIONS:
             for entry, value in getattr(pattern, section).items():
                 faults += _repeated(out, origins, pattern, (*where, section, entry), value, hint)
     return out, faults, origins
+
+
+def _phased(pattern: Pattern) -> bool:
+    """Whether a pattern has a factor that its phase moves."""
+    entries = [x for x in (*pattern.loads.values(), *pattern.springs.values()) if isinstance(x, Mapping)]
+    factors = [x.get(key) for x in entries for key in FACTORS]
+    return any(isinstance(x, Mapping) and x.get("over") == "angle" for x in factors)
 
 
 def _repeated(

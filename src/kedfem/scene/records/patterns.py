@@ -32,7 +32,7 @@ class Pattern(Record):
     centre: Point = (0.0, 0.0, 0.0)
     """a point of this axis, by its coordinates"""
     shift: tuple[Length, Length, Length] = (0.0, 0.0, 0.0)
-    """from each to the next"""
+    """from each to the next, after the turn: in the scene's axes, which no turn changes"""
     phase: Angle = 0.0
     """from each to the next: by how much later on the drive's angle the factors of loads and springs are"""
     points: Entries = Field(default_factory=dict)
