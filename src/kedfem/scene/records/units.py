@@ -137,7 +137,11 @@ def si_number(text: str, unit: str) -> float:
         raise ValueError(
             f"turns or radians per second? give it in {'rpm or rad/s' if unit == 'rad/s' else 'Hz'}"
         )
-    turns = 0.0 if isinstance(text, Evaluated) else revolutions(got._units)
+    turns = revolutions(got._units)
+    if isinstance(text, Evaluated) and not (
+        unit == "rad" and turns < 0.0
+    ):  # 1/6 turn is 1/(6 turn), no angle
+        turns = 0.0
     if got.dimensionality != wanted.dimensionality or turns not in (0.0, revolutions(wanted._units)):
         raise ValueError(f"the unit {given!r} is of another kind{meant(given, unit)}" if given else "no unit")
     return float(quantity.m_as(wanted))
