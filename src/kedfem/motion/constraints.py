@@ -143,7 +143,7 @@ class Rows:
     drive : (m,) number of the drive whose value a constraint takes; -1: none
     gaps, angles : numbers of elementary rows of these kinds
     driven : numbers of constraints that take a drive's value
-    body, vector : (3 E + A,), (3 E + A, 3) all vectors that turn with a body: a, a_j, b, and b × a of angles
+    body, vector : (3 E + 4 A,), (3 E + 4 A, 3) vectors that turn with bodies: a, a_j, b; of angles a, b × a, a_j, b × a_j
     """
 
     kind: np.ndarray
@@ -162,12 +162,13 @@ class Rows:
 
     def __post_init__(self) -> None:
         k = np.flatnonzero(self.kind == ANGLE)
+        i, j, a, a_j, b = self.i[k], self.j[k], self.a[k], self.a_j[k], self.b[k]
         derived = {
             "gaps": np.flatnonzero(self.kind == GAP),
             "angles": k,
             "driven": np.flatnonzero(self.drive >= 0),
-            "body": np.concatenate([self.i, self.j, self.j, self.i[k]]),
-            "vector": np.concatenate([self.a, self.a_j, self.b, cross(self.b[k], self.a[k])]),
+            "body": np.concatenate([self.i, self.j, self.j, i, i, j, j]),
+            "vector": np.concatenate([self.a, self.a_j, self.b, a, cross(b, a), a_j, cross(b, a_j)]),
         }
         for name, value in derived.items():
             object.__setattr__(self, name, value)

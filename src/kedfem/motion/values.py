@@ -50,13 +50,13 @@ def features(rows: Rows, poses: Poses, near: Float[np.ndarray, "T A"]) -> Featur
     turned = R[0].take(rows.body, axis=1) * rows.vector[:, 0, None]
     for c in (1, 2):
         turned += R[c].take(rows.body, axis=1) * rows.vector[:, c, None]
-    E, g, k = len(rows.kind), rows.gaps, rows.angles
-    arm_i, arm_j, w, e = turned[:, :E], turned[:, E : 2 * E], turned[:, 2 * E : 3 * E], turned[:, 3 * E :]
+    E, A, g, k = len(rows.kind), len(rows.angles), rows.gaps, rows.angles
+    arm_i, arm_j, w = turned[:, :E], turned[:, E : 2 * E], turned[:, 2 * E : 3 * E]
+    hands = turned[:, 3 * E :].reshape(3, 4, A, turned.shape[2])
+    hand_i, hand_j = hands[:, 0] - 1j * hands[:, 1], hands[:, 2] + 1j * hands[:, 3]
     u = arm_i.copy()
     u[:, g] += p[:, rows.i[g]] - p[:, rows.j[g]] - arm_j[:, g]
     value = _dot(u, w)
-    a_j = arm_j[:, k]
-    hand_i, hand_j = arm_i[:, k] - 1j * e, a_j + 1j * _cross(w[:, k], a_j)
     product = _dot(hand_i, hand_j)
     value[k] = near.T + np.angle(
         product * np.exp(-1j * near.T)

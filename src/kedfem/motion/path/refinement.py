@@ -10,7 +10,7 @@ from kedfem.motion.newton import OPEN, BlockFactor, Factor, target
 from kedfem.motion.path.continuation import shapes
 from kedfem.motion.path.record import Path, aimed, predicted, with_points
 
-FINE = 3e-14  # of the size: error of a prediction from which rates can be taken
+FINE = 6e-14  # of the size: error of a prediction from which rates can be taken
 NEAR = 1e-8  # of large linkages: one more iteration of Newton costs less than a finer grid
 HALVES = 64  # quintics between points half as far apart are so many times as close
 REFINEMENTS, MOST_POINTS = 5, 20_000
