@@ -220,7 +220,7 @@ def _analysed(
     if period:
         damaged = clock.timed("fatigue", lambda: _damaged(ready, folder, envelope, doubts, period))
         results = replace(results, fatigue=damaged)
-    notices += [*peak_warning(peak), *fatigue_warning(results.fatigue)]
+    notices += [*peak_warning(peak, since), *fatigue_warning(results.fatigue)]
     _stress_files(ready, folder, results.drive, envelope, doubts)
     notices += clock.timed("pictures", lambda: write_derived(scene, results, peak, folder))
     _mesh_field(seen.strained, folder / MESH)

@@ -34,13 +34,22 @@ WHOLE = (
 """Files of a run that the next one replaces."""
 
 
-def peak_warning(peak: Peak | None) -> tuple[str, ...]:
-    """A warning where the highest stress is not what it seems, with the highest one elsewhere."""
-    if peak is None or not peak.near:
+def peak_warning(peak: Peak | None, since: float) -> tuple[str, ...]:
+    """Warnings where the highest stress is not what it seems, with the highest one elsewhere, and not of all steps.
+
+    Parameters
+    ----------
+    since : time [s] before which stresses do not count
+    """
+    if peak is None:
         return ()
+    which = "highest stresses, here and in all files, are those of the revolutions that the sweep counts"
+    late = (f"{which}, after {since:.4g} s",) if since > 0 else ()
+    if not peak.near:
+        return late
     message = f"the highest stress, {stress_at(peak)}, is at {peak.near}: {reason(peak.near)}"
     away = f"; away from {AWAY} it is {stress_at(peak.away)}" if peak.away else ""
-    return (message + away,)
+    return (message + away, *late)
 
 
 def fatigue_warning(found: Fatigue | None) -> tuple[str, ...]:
