@@ -487,7 +487,7 @@ def test_a_table_rounded_to_whole_degrees_is_refused_with_its_place_and_remedy(t
 
 
 def test_a_table_of_travel_is_read_in_its_unit(tmp_path):
-    (tmp_path / "motion.csv").write_text("time [ms],travel [mm]\n0,0\n500,3\n1000,20\n")
+    (tmp_path / "motion.csv").write_text("Time (ms),Travel (mm)\n0,0\n500,3\n1000,20\n")
     change = {"drive": {"joint": "S", "motion": {"kind": "table", "file": "motion.csv"}}}
     motion = scene_from(changed(BEAMS, change), tmp_path).motion
     assert motion.time == (0.0, 0.5, 1.0)

@@ -36,7 +36,7 @@ def two_columns(path: Path, names: tuple[str, str], si: tuple[str, str]) -> tupl
 def motion_table(path: Path) -> tuple[list[float], str, list[float]]:
     """Times [s], and `angle` [rad] or `travel` [m], as the heading says, of a CSV file."""
     first = next((row for row in file_text(path).splitlines() if row.strip()), "")
-    key, unit = ("travel", "m") if "travel" in first else ("angle", "rad")
+    key, unit = ("travel", "m") if "travel" in first.lower() else ("angle", "rad")
     time, values = two_columns(path, ("time", key), ("s", unit))
     return time, key, values
 
