@@ -48,7 +48,8 @@ WHOLE = "import sys; from kedfem.cli import main; sys.argv = ['kedfem', 'run', s
 
 
 def bench_start(folder: Path, quick: bool) -> None:
-    """Median wall times, in processes of their own, which load everything anew."""
+    """Median wall times, in processes of their own, which load everything anew, compiled by Python before."""
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     rows = []
     for name, arguments in COMMANDS.items():
         code = "from kedfem.cli import main; main()"
