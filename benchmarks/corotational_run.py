@@ -13,8 +13,8 @@ from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.history import Forcing
 from kedfem.dynamics.rigid_body import forcings, motions
-from kedfem.dynamics.stepping.first_state import started
 from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.start import started
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.march import Motion
 from kedfem.dynamics.system.steps import Steps

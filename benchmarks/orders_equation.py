@@ -21,9 +21,9 @@ from benchmarks.orders_schemes import RHO
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.matrices.substructure import mass_matrix
 from kedfem.dynamics.rigid_body import forcings
-from kedfem.dynamics.stepping.first_state import motion_of, started
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.start import motion_of, started
 from kedfem.dynamics.system.march import displacements, march, ready
 from kedfem.dynamics.system.starts.instant import Instant
 from kedfem.dynamics.system.state import State

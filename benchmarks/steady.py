@@ -13,9 +13,9 @@ from typing import Any
 
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import prepared
-from kedfem.dynamics.stepping.first_state import coarse_map, started
 from kedfem.dynamics.stepping.levels import level_steps
 from kedfem.dynamics.stepping.solvers import block_length
+from kedfem.dynamics.stepping.start import coarse_map, started
 from kedfem.dynamics.system.period.map import PeriodMap
 from kedfem.dynamics.system.period.search import Periodic, periodic
 from kedfem.motion.period import over_one_period

@@ -11,8 +11,8 @@ from benchmarks.scenes import bar_four_bar
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.dynamics.history import LinkMoment
 from kedfem.dynamics.matrices.substructure import factored
-from kedfem.dynamics.stepping.first_state import motion_of
 from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.start import motion_of
 from kedfem.dynamics.stepping.transient import snapshots
 from kedfem.dynamics.system.sparse import SparsePart
 from kedfem.dynamics.system.steps import Steps

@@ -1,5 +1,6 @@
 """What joints hold and what balances, from ports, nodes and the rigid motion alone: not by the rows that hold them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,9 +9,9 @@ from scipy.interpolate import CubicSpline
 
 from kedfem.accuracy.prepared import Prepared
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.joints.attachments import interface_matrix
+from kedfem.dynamics.joints.attachments import Attachment, interface_matrix
 from kedfem.dynamics.joints.constraint_matrices import joint_rows
-from kedfem.dynamics.joints.ports import turned_ports, turned_vectors
+from kedfem.dynamics.joints.ports import port_values, turned_ports, turned_vectors
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.links.record import Link, in_space
 from kedfem.motion.joint_equations import joint_axis, unit
@@ -191,6 +192,12 @@ def _left(ready: Prepared, blocks: list[Block], k: int) -> np.ndarray:
     for c, m in enumerate(ready.model.links[k].mass):
         F[:, :, c] -= (m @ a[:, :, c].T).T
     return F
+
+
+def interface_values(joints: Sequence[Attachment], u: Sequence[np.ndarray]) -> np.ndarray:
+    """z (k,) from states (n, d) with joints closed, world components: W u = B z."""
+    w = np.concatenate([port_values(joint, x) for joint, x in zip(joints, u, strict=True)])
+    return np.asarray(np.linalg.lstsq(interface_matrix(joints).toarray(), w)[0])
 
 
 def row_values(ready: Prepared, block: Block) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

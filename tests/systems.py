@@ -5,9 +5,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from kedfem.accuracy.prepared import Prepared, moving
 from kedfem.dynamics.elastic_model import elastic_model
+from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.start import initial_rates
@@ -16,8 +18,11 @@ from kedfem.dynamics.system.layout import profile
 from kedfem.dynamics.system.march import Ready, displacements, march, ready
 from kedfem.dynamics.system.oracle.monolithic import Monolithic
 from kedfem.dynamics.system.oracle.monolithic_steps import begun as as_the_oracle_begins
+from kedfem.dynamics.system.oracle.monolithic_tangent import inverse, rotated_stiffness
 from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.dynamics.system.state import History, State
+from kedfem.links.record import mass_times
+from kedfem.motion.newton import cross_matrix
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.scene import path_parameter, scene_from, time_grid
 
@@ -113,3 +118,36 @@ def against_oracle(of: Begun, count: int = 3, keeps: bool = False) -> float:
 def marched(of: Begun, count: int) -> tuple[State, History]:
     """The first steps."""
     return march(of.ready, of.state, of.steps(count))
+
+
+def assembled_deflection(of: Ready, at: RigidMotion) -> np.ndarray:
+    """Quasi-static u (N,) of rigid-body frames at one time, all equations in one matrix, with what stresses stiffen.
+
+    K u + M ([α]× + [ω]×²) u − Wᵀ λ = F, W u = B z, Bᵀ λ = Cᵀ m − Cᵀ k C z, C z = −e(0); dampers are left out.
+    """
+    solver, system, model = Monolithic(of.system, of.scheme), of.system, of.system.model
+    K = [
+        rotated_stiffness(x.K0, at.R[0, body, : x.d, : x.d])
+        for x, body in zip(model.links, model.bodies, strict=True)
+    ]
+    if system.stiffening is not None:
+        found = system.stiffening.over(forcings(model, at), at)
+        stressed = system.stiffening.stiffness([each.at(0) for each in found])
+        K = [own + more for own, more in zip(K, stressed, strict=True)]
+    turning = []
+    for link, body in zip(model.links, model.bodies, strict=True):
+        W = cross_matrix(at.omega[0, body])
+        spin = (cross_matrix(at.alpha[0, body]) + W @ W)[: link.d, : link.d]
+        every = np.eye(link.unknowns).reshape(-1, link.n, link.d)
+        turning.append(np.array([mass_times(link.mass, x @ spin.T).ravel() for x in every]).T)
+    e, C = solver.coordinates(np.zeros(solver.k), np.zeros(sum(len(x.terms) for x in system.constraints)), at)
+    hard, k = np.array(solver.hard, int), [getattr(x.law, "stiffness", 0.0) for x in system.constraints]
+    springs = sp.csr_array(C.T @ (np.array(k)[:, None] * C)) if k else None
+    rows_of = sp.csr_array(C[hard])
+    equations = sp.block_array([
+        [sp.block_diag(K) + sp.block_diag(turning), None, -solver.W.T, None], [solver.W, -solver.B, None, None],
+        [None, springs, solver.B.T, -rows_of.T], [None, rows_of, None, None],
+    ])  # fmt: skip
+    right = np.zeros(equations.shape[0])
+    right[: solver.N], right[len(right) - len(hard) :] = solver.applied(at), -e[hard]
+    return inverse(sp.csr_array(equations), C[hard])(right)[: solver.N]

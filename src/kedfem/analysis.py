@@ -23,9 +23,9 @@ from kedfem.accuracy.steady import Steady, steady_of, steady_warning, unstable
 from kedfem.accuracy.step_estimate import StepEstimate
 from kedfem.dynamics.loads import coarse_steps
 from kedfem.dynamics.stepping.cost import factor_words
-from kedfem.dynamics.stepping.first_state import period_map
 from kedfem.dynamics.stepping.levels import level_steps
 from kedfem.dynamics.stepping.solvers import eased_warning, stresses_in
+from kedfem.dynamics.stepping.start import period_map
 from kedfem.dynamics.system.period.map import Carried
 from kedfem.dynamics.system.steps import Steps
 from kedfem.dynamics.vibration import Vibration, vibration

@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from kedfem.accuracy.prepared import meshed
-from kedfem.dynamics.stepping.first_state import motion_of
 from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.start import motion_of
 from kedfem.dynamics.system.march import Motion, march
 from kedfem.dynamics.system.starts.deflected import static
 from kedfem.dynamics.system.starts.instant import Instant

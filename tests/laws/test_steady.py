@@ -21,8 +21,8 @@ from kedfem.accuracy.reduction import prepared
 from kedfem.accuracy.steady import Steady, steady_of, steady_warning
 from kedfem.analysis import analyse
 from kedfem.dynamics.modes.frozen import Frozen
-from kedfem.dynamics.stepping.first_state import coarse_map, started
 from kedfem.dynamics.stepping.levels import level_steps, leveled
+from kedfem.dynamics.stepping.start import coarse_map, started
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.period.krylov import Watched
 from kedfem.dynamics.system.period.multipliers import multipliers

@@ -9,12 +9,16 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy.prepared import meshed
 from kedfem.dynamics.rigid_body import forcings
+from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.start import motion_of
 from kedfem.dynamics.stiffening import stiffening
+from kedfem.dynamics.system.starts.deflected import quasi_static, quasi_static_position
 from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import path_parameter, scene_from
 from tests.laws.test_joint_partners import TURNS, named
 from tests.moving import channels, inverted, ran
 from tests.partners import axis_of, chain
+from tests.systems import assembled_deflection, rows
 
 Raw = dict[str, Any]
 Turn = Callable[[np.ndarray], np.ndarray]
@@ -80,18 +84,22 @@ def test_stresses_of_constrained_joints_turn_with_the_scene(cell: tuple[str, tup
 @pytest.mark.parametrize(
     "cell", [*EVERY, ("revolute", ("planar beam", "planar beam"), False), ("slot", ("plane", "plane"), False)], ids=named
 )  # fmt: skip
-def test_quasi_static_positions_are_those_that_a_march_begins_with(
+def test_quasi_static_starts_and_positions_solve_the_assembled_equations(
     cell: tuple[str, tuple[str, str], bool],
 ) -> None:
-    """The start is found in nodal rows, positions by the system: neither knows the other."""
+    """With what stresses of the rigid-body motion stiffen."""
     kind, partners, driven = cell
-    plane, found = partners[0].startswith("plan"), []
-    for more in ({"initial": "quasi-static"}, {"kind": "quasi-static"}):
-        raw = fast(chain(kind, partners, driven, plane), speed=10.0 if plane else SPEED)
-        del raw["analysis"]["initial"]
-        raw["analysis"] |= {"step": 1e-4, "end_time": 4e-4, **more}
-        found.append(np.concatenate([link.u[0].ravel() for link in ran(raw)[1][0].links]))
-    assert_allclose(found[1], found[0], rtol=0, atol=1e-6 * np.abs(found[0]).max())  # stiff hubs: 2e-7
+    plane = partners[0].startswith("plan")
+    raw = fast(chain(kind, partners, driven, plane), speed=10.0 if plane else SPEED)
+    del raw["analysis"]["initial"]
+    ready = meshed(scene_from({**raw, "analysis": {**raw["analysis"], "initial": "quasi-static"}}))
+    of, motion_at = (
+        steps_of(ready.scene, ready.model).ready,
+        motion_of(ready.scene, ready.linkage, ready.path),
+    )
+    wanted = assembled_deflection(of, motion_at(np.zeros(1)))
+    for found in (quasi_static(of, motion_at), quasi_static_position(of, motion_at, 0.0)):
+        assert_allclose(rows(of, found.u[None])[0], wanted, rtol=0, atol=1e-6 * np.abs(wanted).max())
 
 
 def stress_factors(raw: Raw) -> list[np.ndarray]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from kedfem.dynamics.matrices.bordered import MANY, independent_rows, multipliers
+from kedfem.dynamics.matrices.bordered import MANY, independent_rows
 from kedfem.dynamics.matrices.interface import Tie, solved
 
 
@@ -60,14 +60,3 @@ def test_many_constraints_are_independent_but_for_those_that_repeat_others(repea
     assert len(kept) == MANY + 2 - repeated
     assert MANY + 1 in kept
     assert np.linalg.matrix_rank(C.toarray()[kept[:-1]]) == len(kept) - 1
-
-
-def test_least_multipliers_of_many_constraints_are_those_of_few() -> None:
-    """By the bordered system as by dense least squares; forces that no constraint exerts are left."""
-    random = np.random.default_rng(4)
-    C = sp.csr_array(
-        sp.random_array((MANY + 20, 4 * MANY), density=0.03, rng=random) + sp.eye_array(MANY + 20, 4 * MANY)
-    )
-    p = random.standard_normal(4 * MANY)
-    wanted = np.linalg.lstsq(C.T.toarray(), p)[0]
-    assert multipliers(C, p) == pytest.approx(wanted, rel=1e-9, abs=1e-12 * np.abs(wanted).max())

@@ -12,7 +12,6 @@ from kedfem.accuracy.variants import with_analysis
 from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.constraint_matrices import directions, joint_rows
-from kedfem.dynamics.joints.first_rows import interface_values
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.forces.exerted import effort, wrench
@@ -22,7 +21,7 @@ from kedfem.motion.linkage import linkage
 from kedfem.output.words import clock, moment
 from kedfem.scene import scene_from
 from tests.cells import Cell, scene_of
-from tests.joint_checks import row_values, unbalanced
+from tests.joint_checks import interface_values, row_values, unbalanced
 from tests.moving import (
     bar,
     cardan,

@@ -13,9 +13,9 @@ from numpy.testing import assert_allclose
 from kedfem.accuracy.histories import Histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.dynamics.rigid_body import motions
-from kedfem.dynamics.stepping.first_state import started
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.start import started
 from kedfem.dynamics.stepping.transient import snapshots, transient
 from kedfem.dynamics.system import (
     algebra_kernel,

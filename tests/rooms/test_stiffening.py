@@ -14,8 +14,8 @@ from kedfem.dynamics import stiffening
 from kedfem.dynamics.joints.ports import add_port_forces
 from kedfem.dynamics.matrices.closed import coupled
 from kedfem.dynamics.rigid_body import forcings, motions
-from kedfem.dynamics.stepping.first_state import started
 from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.start import started
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.march import march
 from kedfem.dynamics.system.state import State

@@ -10,11 +10,10 @@ from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.scheme import Scheme, generalised_alpha
-from kedfem.dynamics.stepping.start import Deflected, initial_states
-from kedfem.dynamics.stepping.state import ForcingAt, Rayleigh
+from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.dynamics.system.march import displacements, march, ready
 from kedfem.dynamics.system.record import System
-from kedfem.dynamics.system.starts.initial_states import from_links
+from kedfem.dynamics.system.starts.initial_states import as_coordinates, begun
 from kedfem.dynamics.system.starts.instant import Instant
 from kedfem.links.record import Link
 from kedfem.motion.rigid import RigidMotion, resting
@@ -75,11 +74,13 @@ def history(run: Run, steps: int) -> Iterator[Moving]:
     link, joint = run.link, run.joint
     model = Model((link,), (0,), (joint,), ((),), (), run.damping)
     of = ready(System(("link",), (), (), joint.unknowns, model), run.scheme)
-    begin = Deflected(*(run.start or [np.zeros((link.n, 3))] * 3))
-    states = initial_states([link], [joint], [ForcingAt(run.R(0.0), run.forces(0.0))], run.damping, [begin])
-    state = from_links(Instant(of, lambda t: motion_of(run, t), 0.0), states)
-    state.F[:] = work_on(of.parts[0], run.forces(0.0)).ravel()
-    yield Moving(states[0].u, states[0].v)
+    u, v, g1 = run.start or [np.zeros((link.n, 3))] * 3
+    now = Instant(of, lambda t: motion_of(run, t), 0.0)
+    now.F[:] = work_on(of.parts[0], run.forces(0.0)).ravel()
+    state = begun(
+        now, *(as_coordinates(of, [x]) for x in (u, v)), strained=as_coordinates(of, [g1 @ run.R(0.0).T])
+    )
+    yield Moving(u, v)
     for first in range(1, steps + 1, BLOCK):
         t = run.scheme.h * np.arange(first, min(first + BLOCK, steps + 1))
         state, found = march(of, state, motion_of(run, t), loads=[np.stack([run.forces(x) for x in t])])

@@ -1,28 +1,24 @@
 """The rigid-body motion of a model over time: blocks of it, loads along it, what starts and estimates ask of instants."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Forcing
 from kedfem.dynamics.joints.constraint_matrices import joint_rows
-from kedfem.dynamics.joints.first_rows import INSTANTS, FirstRows, first_rows
 from kedfem.dynamics.loads import applied
-from kedfem.dynamics.matrices.interface import static_tie
+from kedfem.dynamics.matrices.interface import Tie, static_tie
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.stepping.start import Instant
-from kedfem.dynamics.stiffening import Stiffening
+from kedfem.dynamics.stepping.state import ForcingAt
 from kedfem.motion.linkage import Linkage
-from kedfem.motion.newton import cross_matrix
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, joined, rigid_motion
 from kedfem.scene import ConstantSpeed, Scene, path_parameter, time_grid, turn_steps
 
 POINTS = 1024  # time points of rigid motion found together
 KEPT = 20_000  # time points of a turn whose rigid motion is kept
-FINER = 8  # instants in a step, from whose differences the rates of constraints at the start are
 
 
 def all_motions(scene: Scene, linkage: Linkage, along: Path) -> Iterator[tuple[int, RigidMotion]]:
@@ -84,37 +80,21 @@ def forcing_of(
     return [Forcing(motion.R[:, body, : link.d, : link.d], F) for link, body, F in every]
 
 
-def instants(model: Model, motion: RigidMotion, stresses: Stiffening | None = None) -> list[Instant]:
-    """Orientation, load, spin and, if given, stress stiffness of all links at each time point."""
-    forcing = forcings(model, motion)
-    if stresses is not None:
-        forcing = stresses.over(forcing, motion)
-    ties = (
-        joint_rows(model.rows, motion.part(k, k + 1), model.interface_unknowns) for k in range(len(motion.t))
-    )  # of many links each is large
-    W = cross_matrix(motion.omega)
-    spin = cross_matrix(motion.alpha) + W @ W
-    return [
-        Instant(
-            [each.at(k) for each in forcing],
-            [spin[k, body, : link.d, : link.d] for link, body in zip(model.links, model.bodies, strict=True)],
-            None if stresses is None else stresses.turnings([each.at(k) for each in forcing]),
-            None if rows is None else static_tie(rows, 0),
-        )
-        for k, rows in enumerate(ties)
-    ]
+@dataclass(frozen=True, slots=True)
+class Instant:
+    """A linkage frozen at one time: per link R and F = P − M R0''; tie: of joints enforced by constraint equations."""
+
+    at: Sequence[ForcingAt]
+    tie: Tie | None = None
 
 
-def rows_at_start(scene: Scene, linkage: Linkage, along: Path, model: Model) -> FirstRows | None:
-    """Rows of joints at t = 0 with their derivatives in time; None without any."""
-    if not model.rows:
-        return None
-    grid = time_grid(scene)
-    h = min(grid.step, grid.end / (INSTANTS - 1)) / FINER
-    t = h * np.arange(INSTANTS)
-    motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
-    rows = joint_rows(model.rows, motion, model.interface_unknowns)
-    return None if rows is None else first_rows(rows, h)
+def instants(model: Model, motion: RigidMotion) -> list[Instant]:
+    """The linkage at each time point."""
+    forcing, out = forcings(model, motion), []
+    for k in range(len(motion.t)):
+        rows = joint_rows(model.rows, motion.part(k, k + 1), model.interface_unknowns)
+        out.append(Instant([each.at(k) for each in forcing], None if rows is None else static_tie(rows, 0)))
+    return out
 
 
 def drive_range(scene: Scene) -> tuple[float, float]:

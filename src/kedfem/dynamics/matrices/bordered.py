@@ -83,14 +83,6 @@ def independent_rows(C: sp.csr_array, compliance: Flat) -> Int[np.ndarray, " q"]
     return np.sort(np.concatenate([hard, soft]))
 
 
-def multipliers(C: sp.csr_array, p: Flat) -> Flat:
-    """The least m whose Cᵀ m is nearest to p."""
-    none = np.zeros(C.shape[0])
-    if len(none) > MANY and len(independent_rows(C, none)) == len(none):
-        return -Bordered(sp.eye_array(len(p)), C, none).solved(p, none)[1]
-    return np.asarray(np.linalg.lstsq(C.T.toarray(), p, rcond=DEPENDENT)[0])
-
-
 def row_sizes(C: sp.csr_array) -> Flat:
     """Length of each row."""
     return np.asarray(np.sqrt((C * C).sum(axis=1)))

@@ -7,8 +7,7 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.reduction import Basis, energy_sorted, excited, port_functions, static_parts
 from kedfem.dynamics.modes.segment_modes import segment_basis
 from kedfem.dynamics.reduced_model import reduced_model
-from kedfem.dynamics.rigid_body import instants
-from kedfem.dynamics.stepping.start import Instant
+from kedfem.dynamics.rigid_body import Instant, instants
 from kedfem.dynamics.stepping.state import NodalOf
 from kedfem.links.record import Link
 from kedfem.motion.rigid import RigidMotion

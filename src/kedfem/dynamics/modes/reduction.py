@@ -16,7 +16,7 @@ from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.matrices.closed import closed, coupled_all
 from kedfem.dynamics.matrices.substructure import Substructure, factored
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.stepping.start import Instant
+from kedfem.dynamics.rigid_body import Instant
 from kedfem.dynamics.stepping.state import NodalOf
 from kedfem.links.record import Link, mass_times
 from kedfem.links.reduced import (

@@ -13,8 +13,7 @@ from kedfem.dynamics.matrices.interface import static_tie
 from kedfem.dynamics.matrices.substructure import Substructure
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_body import forcings
-from kedfem.dynamics.stepping.start import damping_times
-from kedfem.dynamics.stepping.state import NodalOf, Rayleigh
+from kedfem.dynamics.stepping.state import NodalOf, Rayleigh, damping_times
 from kedfem.links.record import Link, mass_times
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.rigid import RigidMotion

@@ -26,10 +26,10 @@ from kedfem.dynamics.history import Block, joined, multipliers_together
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_links import for_steps
 from kedfem.dynamics.stepping.combined import Combination, level_weights
-from kedfem.dynamics.stepping.first_state import started
 from kedfem.dynamics.stepping.marks import Mark, Marks
 from kedfem.dynamics.stepping.scheme import Scheme, generalised_alpha
 from kedfem.dynamics.stepping.solvers import block_length, steps_of
+from kedfem.dynamics.stepping.start import started
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.steps import Steps
 from kedfem.errors import SolveError

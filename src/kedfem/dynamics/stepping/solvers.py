@@ -49,11 +49,6 @@ def stresses_in(solvers: Sequence[Steps]) -> Stiffening | None:
     return found
 
 
-def dampers_count(model: Model) -> bool:
-    """Whether quasi-static starts feel dampers of bushings, which starts in nodal rows do not."""
-    return any(row.damping.any() for row in model.rows)
-
-
 def eased_warning(solvers: Sequence[Steps]) -> tuple[str, ...]:
     """A warning where iterations of steps were taken as converged at an eased tolerance."""
     eased = sum(each.eased for each in solvers)

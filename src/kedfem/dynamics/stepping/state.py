@@ -1,10 +1,11 @@
-"""What acts on a link at a time, its damping, and its state where a march begins."""
+"""What acts on a link at a time, and its damping."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from kedfem.arrays import Float
+from kedfem.links.record import Link, mass_times
 
 Nodal = Float[np.ndarray, "n d"]
 NodalOf = Float[np.ndarray, "_ _"]  # of several links, each with its own n
@@ -37,25 +38,7 @@ class ForcingAt:
     stress: Float[np.ndarray, " m"] | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class LinkState:
-    """Elastic state of one link where a march begins; all (n, d).
-
-    u, v, a : δ, δ', δ'', world components [m, m/s, m/s²; third row of a beam: ψ]
-    Mu, Mv, Ma : the same times the mass
-    R : (d, d) the link's orientation
-    f : internal force K0 g + C0 g', link frame [N], with g = δ there
-    C : (3, n, d) C0 times (g, g', g''), link frame, None without damping
-    port_forces : (q,) λ on the link at its ports, link frame [N]
-    """
-
-    u: Nodal
-    v: Nodal
-    a: Nodal
-    Mu: Nodal
-    Mv: Nodal
-    Ma: Nodal
-    R: Float[np.ndarray, "d d"]
-    f: Nodal
-    C: Float[np.ndarray, "3 n d"] | None
-    port_forces: Float[np.ndarray, " q"]
+def damping_times(link: Link, damping: Rayleigh, g: Nodal) -> Nodal:
+    """C0 g = α M g + β K0 g, link frame."""
+    Kg = (link.K0 @ g.ravel()).reshape(g.shape)
+    return np.asarray(damping.alpha * mass_times(link.mass, g) + damping.beta * Kg)

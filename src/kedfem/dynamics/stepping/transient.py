@@ -9,9 +9,9 @@ import numpy as np
 from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_body import forcings, motions
-from kedfem.dynamics.stepping.first_state import motion_of, started
 from kedfem.dynamics.stepping.marks import Mark
 from kedfem.dynamics.stepping.solvers import block_length
+from kedfem.dynamics.stepping.start import motion_of, started
 from kedfem.dynamics.system.march import HALVINGS, ConvergenceError
 from kedfem.dynamics.system.period.search import residual_of
 from kedfem.dynamics.system.starts.deflected import quasi_static_position, static

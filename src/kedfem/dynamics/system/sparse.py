@@ -21,7 +21,7 @@ from kedfem.dynamics.joints.ports import port_columns
 from kedfem.dynamics.matrices.cholesky import Cholesky
 from kedfem.dynamics.matrices.dense import DensePart
 from kedfem.dynamics.matrices.held import held_substructure
-from kedfem.dynamics.matrices.substructure import Substructure, mass_matrix
+from kedfem.dynamics.matrices.substructure import Substructure
 from kedfem.dynamics.stepping.state import Nodal
 from kedfem.dynamics.system.arrays import Masses, ends_of
 from kedfem.dynamics.system.state import Trial
@@ -138,7 +138,7 @@ def momentum(link: Link, x: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
 
 def softening(link: Link) -> float:
     """What of its mass makes the stiffness of a free link definite, a share of the mean eigenvalue [1/s²]."""
-    return SHIFT * float(link.K0.diagonal().sum() / mass_matrix(link).diagonal().sum())
+    return SHIFT * float(link.K0.diagonal().sum() / sum(m.diagonal().sum() for m in link.mass))
 
 
 def mass_of(link: Link) -> float:

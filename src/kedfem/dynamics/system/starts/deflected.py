@@ -9,6 +9,7 @@ Without a drive links accelerate as rigid bodies where they are, and K Î´ = P âˆ
 
 from collections.abc import Callable, Sequence
 from copy import copy
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,6 +42,18 @@ THIRD, FOURTH = np.array([[-1, 3, -3, 1, 0], [1, -4, 6, -4, 1]])  # third and fo
 Rows = Sequence[Float[np.ndarray, "_ _"]]
 
 
+class Moved(NamedTuple):
+    """A deflection u with its rate v, (N,) world components.
+
+    strained : the rate again, by differences of what rigid-body frames see, for what damps deformations: the error of v
+        strains a link that moves as a rigid one, and what a stiff one is damped by would be that error
+    """
+
+    u: Flat
+    v: Flat
+    strained: Flat
+
+
 def quasi_static(of: Ready, motion_at: Motion, rates: Rows | None = None, time: float = 0.0) -> State:
     """The state at a time with the deflection that its links have as they move on without vibrating.
 
@@ -57,7 +70,8 @@ def quasi_static(of: Ready, motion_at: Motion, rates: Rows | None = None, time: 
     now = Instant(of, motion_at, time)
     if not now.motion.drives.shape[1]:
         return begun(now, *_relieved(now, as_coordinates(of, rates or [])))
-    return begun(now, *_moving(now, motion_at))
+    found = _moving(now, motion_at)
+    return begun(now, found.u, found.v, strained=found.strained)
 
 
 def quasi_static_position(
@@ -76,7 +90,8 @@ def quasi_static_position(
         If no deflection is found.
     """
     now = Instant(of, motion_at, time, like, None if near is None else near.turned)
-    return begun(now, *_moving(now, motion_at, WIDER if _feels_rates(of) else 0))
+    found = _moving(now, motion_at, WIDER if _feels_rates(of) else 0)
+    return begun(now, found.u, found.v, strained=found.strained)
 
 
 def static(
@@ -139,9 +154,10 @@ def plucked(of: Ready, motion_at: Motion, forces: Rows, time: float = 0.0) -> St
     now = Instant(of, motion_at, time)
     if not now.motion.drives.shape[1]:
         return static(of, motion_at, time, forces)
-    u, v = _moving(now, motion_at)
+    found = _moving(now, motion_at)
     pull = as_work(of, forces)
-    return begun(now, equilibrium(now, u, _constant(pull), _spins(now), now.interface(v)), v)
+    u = equilibrium(now, found.u, _constant(pull), _spins(now), now.interface(found.v))
+    return begun(now, u, found.v, strained=found.strained)
 
 
 def as_work(of: Ready, forces: Rows) -> Flat:
@@ -149,27 +165,27 @@ def as_work(of: Ready, forces: Rows) -> Flat:
     return np.concatenate([work_on(part, each).ravel() for part, each in zip(of.parts, forces, strict=True)])
 
 
-def _moving(first: Instant, motion_at: Motion, widenings: int = WIDER) -> tuple[Flat, Flat]:
+def _moving(first: Instant, motion_at: Motion, widenings: int = WIDER) -> Moved:
     """Deflection and rate with the rigid-body motion, from instants as close as their rounding allows, put farther apart
     so many times at most."""
     h = first.of.c.h / 4
     found, left = _differenced(first, motion_at, h)
     for _ in range(widenings):
-        if left <= ENOUGH * np.linalg.norm(found[1]):
+        if left <= ENOUGH * np.linalg.norm(found.v):
             break
         h *= 4
         try:
             wider, rest = _differenced(first, motion_at, h)
         except (SolveError, MotionError):
             break
-        if np.linalg.norm(wider[1] - found[1]) > SAME * left:  # the motion bends within
+        if np.linalg.norm(wider.v - found.v) > SAME * left:  # the motion bends within
             break
         if rest < left:
             found, left = wider, rest
     return found
 
 
-def _differenced(first: Instant, motion_at: Motion, h: float) -> tuple[tuple[Flat, Flat], float]:
+def _differenced(first: Instant, motion_at: Motion, h: float) -> tuple[Moved, float]:
     """Deflection and rate from five instants, h after each other, and by how much rates are open where rounding ends what
     dampers feel of them."""
     of = first.of
@@ -191,16 +207,30 @@ def _differenced(first: Instant, motion_at: Motion, h: float) -> tuple[tuple[Fla
         except SolveError:
             if again < 2:  # rounding has not grown yet
                 raise
-            return (before[0], earlier[0]), np.inf
+            return _moved(instants, before, earlier, h), np.inf
         v, last, change = LATER @ u / h, change, float(np.linalg.norm(u[0] - before[0]))
         rest, left = left, float(np.linalg.norm(v[0] - felt[0])) if again else 0.0
         if again > 1 and change > last:  # rounding of rates; changes that only fall unevenly go on
-            return (before[0], earlier[0]), max(left, rest)
+            return _moved(instants, before, earlier, h), max(left, rest)
         if again and change <= CONVERGED * float(np.linalg.norm(u[0])):
-            return (u[0], felt[0]), 0.0
+            return _moved(instants, u, felt, h), 0.0
     if again == 0:
-        return (u[0], v[0]), _scatter(u) / h
-    return (u[0], felt[0]), left  # the rates that dampers have felt: u balances these
+        return _moved(instants, u, v, h), _scatter(u) / h
+    return _moved(instants, u, felt, h), left  # the rates that dampers have felt: u balances these
+
+
+def _moved(
+    instants: Sequence[Instant], u: Float[np.ndarray, "5 N"], v: Float[np.ndarray, "5 N"], h: float
+) -> Moved:
+    """At the first of five instants, h after each other."""
+    now, strained = instants[0], np.empty(u.shape[1])
+    for k, link in enumerate(now.of.system.model.links):
+        here, d = own(now.of, k), link.d
+        x = u[:, here].reshape(len(u), d, -1)
+        g = np.stack([each.R[k][:d, :d].T @ y for each, y in zip(instants, x, strict=True)])
+        rate = now.R[k][:d, :d] @ (np.tensordot(LATER[0], g, 1) / h)
+        strained[here] = (rate + cross_matrix(now.omega[k])[:d, :d] @ x[0]).ravel()
+    return Moved(u[0], v[0], strained)
 
 
 def _scatter(u: Float[np.ndarray, "5 N"]) -> float:

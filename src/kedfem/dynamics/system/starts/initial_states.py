@@ -8,14 +8,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import scipy.sparse as sp
 
-from kedfem.dynamics.joints.first_rows import interface_forces
-from kedfem.dynamics.joints.ports import turned_ports
-from kedfem.dynamics.matrices.bordered import multipliers
-from kedfem.dynamics.matrices.dense import coordinates, work_on
-from kedfem.dynamics.stepping.state import LinkState
+from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.system.blank import empty_state
 from kedfem.dynamics.system.march import Ready
-from kedfem.dynamics.system.sparse import SparsePart
 from kedfem.dynamics.system.starts.accelerations import accelerations
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
 from kedfem.dynamics.system.starts.internal_forces import own, put_momenta, remembered
@@ -43,42 +38,6 @@ def rest(
     return begun(now, np.zeros_like(v), v, accelerated)
 
 
-def from_links(now: Instant, links: Sequence[LinkState]) -> State:
-    """The state whose displacements, rates, accelerations and forces are those of links in nodal rows.
-
-    Nodal rows know internal forces of rigid cross-section nodes to more digits than coordinates do, where no joint is
-    enforced by constraint equations.
-    """
-    of, joints = now.of, now.of.system.model.joints
-    u, v = (as_coordinates(of, [getattr(x, name) for x in links]) for name in "uv")
-    state = begun(now, u, v)
-    state.a[:] = as_coordinates(of, [x.a for x in links])
-    z = np.stack([now.interface(x) for x in (u, v, state.a)])
-    state.z[:, now.always.number], state.e[:] = z, now.coordinates(z)
-    if len(state.multiplier):
-        _multiplied(now, z[0], interface_forces(joints, links), state)
-    for k, (part, joint, x) in enumerate(zip(of.parts, joints, links, strict=True)):
-        here, ports = own(of, k), slice(int(of.bodies.port_at[k]), int(of.bodies.port_at[k + 1]))
-        N = here.stop - here.start
-        state.f[here] = work_on(part, x.f @ x.R.T).ravel()
-        state.port_force[ports] = turned_ports(joint, x.R[None], x.port_forces[None])[0]
-        for m, each in enumerate(x.C if x.C is not None else ()):
-            state.damped[3 * here.start + m * N : 3 * here.start + (m + 1) * N] = work_on(part, each).ravel()
-        if isinstance(part, SparsePart):
-            moved = [each.T.ravel() for each in (x.Mu, x.Mv, x.Ma)]
-            state.momentum[3 * here.start : 3 * here.stop] = np.concatenate(moved)
-    return state
-
-
-def _multiplied(now: Instant, z: Flat, p: Flat, state: State) -> None:
-    """Multipliers of a state whose constraints and laws exert p on the interface unknowns together."""
-    C = now.gradients(z)
-    hard = now.hard(C)
-    left = p - C[~hard].T @ state.multiplier[~hard]
-    state.multiplier[hard] = multipliers(C[hard], left)
-    state.bearing[now.always.number] = p
-
-
 def as_coordinates(of: Ready, given: Sequence[np.ndarray]) -> Flat:
     """Nodal rows (n, d) of all bodies as coordinates; zero if not given."""
     out = np.zeros(int(of.bodies.at[-1]))
@@ -87,18 +46,26 @@ def as_coordinates(of: Ready, given: Sequence[np.ndarray]) -> Flat:
     return out
 
 
-def begun(now: Instant, u: Flat, v: Flat, accelerated: Accelerated = accelerations) -> State:
-    """The state with given displacements, and rates that are made to keep all constraints."""
+def begun(
+    now: Instant, u: Flat, v: Flat, accelerated: Accelerated = accelerations, strained: Flat | None = None
+) -> State:
+    """The state with given displacements, and rates that are made to keep all constraints.
+
+    Parameters
+    ----------
+    strained : the rates as bodies are strained by them, if these are known to more digits
+    """
     of = now.of
     z, none = now.interface(u), np.zeros(of.system.unknowns)
     C = now.gradients(z)
     hard = now.hard(C)
-    v = v + _closing(now, C[hard], now.coordinates(np.stack([z, now.interface(v), none]))[1, hard])
+    closing = _closing(now, C[hard], now.coordinates(np.stack([z, now.interface(v), none]))[1, hard])
+    strained, v = (v if strained is None else strained) + closing, v + closing
     z1 = now.interface(v)
     e = now.coordinates(np.stack([z, z1, none]))
     m = np.where(hard, 0.0, now.forces(e)[:, 0])
     asked = Asked(C[hard], -e[2, hard], np.zeros(int(hard.sum())), C.T @ m)
-    inside = now.inside(u, v)
+    inside = now.inside(u, strained)
     found = accelerated(now, now.F - np.concatenate([x.f for x in inside]), u, v, asked)
     m[hard] = found.m
     e[2] += C @ found.z

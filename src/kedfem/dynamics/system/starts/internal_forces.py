@@ -59,12 +59,13 @@ class Still:
         R : of all bodies of the linkage in the rigid-body motion
         amounts : of loads that turn with bodies
         """
-        from kedfem.dynamics.system.still_kernel import still_forces
-
         bodies, trial = self.of.bodies, self._trial
         trial.u[:] = u
-        c, constant, state, end, work = self._of_forces
-        still_forces(c, constant, R, amounts, state, end, work)
+        if (bodies.frame > RIGID_BODY).any():  # else nothing has to be compiled
+            from kedfem.dynamics.system.still_kernel import still_forces
+
+            c, constant, state, end, work = self._of_forces
+            still_forces(c, constant, R, amounts, state, end, work)
         f, mean = trial.f.copy(), R[bodies.motion].copy()
         for k, frame in enumerate(bodies.frame):
             if frame > RIGID_BODY:

@@ -17,6 +17,7 @@ DIRECT = 2  # iterations of a linear system of dense bodies before mass leaves i
 ROUNDING, LINEAR = 1e-8, 1e-3  # of the deflection: changes below it that do not fall are rounding
 STALLED, IN_A_ROW = 1e-5, 3  # the same of so many changes that do not fall, by matrices without mass
 FREE = 1e-3  # as ROUNDING where nothing drives the links: rounding moves them, held by next to nothing, as rigid ones
+TOO_STIFF = 1e9  # times the softest: from some 1e12 on no balance is found beside such a link
 DIVERGED = 1e3  # times the first change: iterations that Newton's method takes over
 
 
@@ -24,16 +25,20 @@ class NoBalanceError(SolveError):
     """No deflection is found at which all forces balance.
 
     moves : what changed most where the search ended, in words; empty if that is not known
+    cause : why there is none and what to do, if that is known
     """
 
-    def __init__(self, moves: str = "") -> None:
+    def __init__(self, moves: str = "", cause: str = "") -> None:
         seen = f"; {moves}" * bool(moves)
-        super().__init__(
-            "analysis.initial: the start must be a deflection that can be found, got none: links that nothing holds but "
-            "their weight, springs whose preload is far from what they bear there, or a drive at a natural frequency"
-            f'{seen}; give springs preload or free_length near that, take initial = "rest", a slower drive, stiffer links'
+        usual = (
+            "links that nothing holds but their weight, springs whose preload is far from what they bear there, or a "
+            f'drive at a natural frequency{seen}; give springs preload or free_length near that, take initial = "rest", '
+            "a slower drive, stiffer links"
         )
-        self.moves = moves
+        super().__init__(
+            f"analysis.initial: the start must be a deflection that can be found, got none: {cause or usual}"
+        )
+        self.moves = moves or cause
 
 
 def equilibrium(
@@ -64,21 +69,25 @@ def _iterated(
     of, mixing, bodies, settled, last = now.of, Mixing(), TurningBodies(now, spins), False, np.inf
     linear, slow, start, first = of.c.single, 0, u, 0.0
     exact = now.slow or (linear and any(bodies.sparse))
-    frames = bodies.still.frames()
+    frames, balance = bodies.still.frames(), None
     for n in range(ITERATIONS):
         sure = exact or rounding == FREE  # its small changes are not those of mass in the matrices
         exact = exact or (linear and n >= DIRECT) or (settled and not sure)
         f, R = bodies.still.forces(now.motion.R[0], u, now.amounts)
         r = now.F - f + more(u, f) - bodies.inertia(u) - now.stress(u)
         try:
-            balance = LinearEquations(of, bodies.held(R), R, _asked(now, u, z1))
+            if balance is None or not linear:
+                balance = LinearEquations(of, bodies.held(R), R, _asked(now, u, z1))
+            else:  # of a linear system they differ in what constraints are open by
+                balance.asked = _asked(now, u, z1)
             change = bodies.change(balance, r, exact)
         except (SolveError, np.linalg.LinAlgError):
             break
         if not np.isfinite(change).all():
             break
         size, reached = float(np.linalg.norm(change)), float(np.linalg.norm(u))
-        if settled and (sure or size <= ROUNDING * reached + of.c.floor):
+        done = linear and exact and size <= CONVERGED * reached
+        if done or (settled and (sure or size <= ROUNDING * reached + of.c.floor)):
             return np.asarray(u + change)  # what was left of stiff hubs would be large accelerations
         if settled:  # small changes were those of mass in the matrices
             mixing, last, first, now.slow = Mixing(), np.inf, size, True
@@ -97,9 +106,21 @@ def _iterated(
         stalls = stalls or slow >= IN_A_ROW
         settled, last = stalls or size <= CONVERGED * reached + of.c.floor, size
     if linear or rounding == FREE:  # what nothing drives has rigid motions without stiffness
-        raise NoBalanceError()
+        raise NoBalanceError(cause=_too_stiff(now))
     bodies.still.seek_from(frames)
     return _by_newton(now, start, more, spins, z1)
+
+
+def _too_stiff(now: Instant) -> str:
+    """The link beside whose stiffness rounding leaves nothing of a balance, in words; empty if there is none."""
+    of = now.of.system
+    links = zip(of.model.links, of.names, strict=True)
+    every = [(float(abs(link.K0).max()), name) for link, name in links if not link.rigid]
+    (most, stiff), (least, soft) = max(every, default=(0.0, "")), min(every, default=(0.0, ""))
+    if most < TOO_STIFF * least or not least:
+        return ""
+    ratio = f"{most / least:.0e} times as stiff as link '{soft}'"
+    return f"link '{stiff}' is {ratio}: give it model = 'rigid', or take initial = 'rest'"
 
 
 def _by_newton(
