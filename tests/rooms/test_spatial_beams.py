@@ -16,6 +16,7 @@ from kedfem.dynamics.stepping.transient import Snapshot
 from kedfem.links.beams.beam_axis import smooth_axis, straight_axis
 from kedfem.links.beams.section import rectangle, tube
 from kedfem.links.beams.spatial_beam import spatial_beam_link
+from kedfem.links.build import bare_link, link_axes
 from kedfem.links.point_rows import point_rows
 from kedfem.links.recovery import nodal_stress, stress_recovery
 from kedfem.scene import Material, scene_from, spatial_beams
@@ -222,6 +223,39 @@ def test_a_beam_welded_to_a_spatial_beam_or_a_solid_is_spatial() -> None:
 
 
 # -- faults that the model reveals --------------------------------------------------------------------------
+
+
+BENT = [[0.0, 0.0, 0.0], [0.3, 0.1, 0.05], [0.1, 0.4, 0.0]]
+SHAPES: dict[str, dict[str, Any]] = {
+    "bent": {"kind": "polyline", "points": BENT, "width": 0.02, "thickness": 0.01},
+    "closed": {"kind": "polyline", "points": [*BENT, BENT[0]], "width": 0.02, "thickness": 0.01},
+    "smooth": {"kind": "polyline", "points": BENT, "smooth": True, "width": 0.02, "thickness": 0.01},
+    "file": {"kind": "mesh", "file": "a.vtu", "towards": BENT[1]},
+}
+
+
+@pytest.mark.parametrize("kind", SHAPES)
+def test_link_axes_turn_with_the_shape(kind: str, tmp_path: Path) -> None:
+    """z as near to `up` as x allows, which is along the chord, of a closed line along its first segment."""
+    (tmp_path / "a.vtu").write_text("")
+    up = np.array([0.2, -0.1, 1.0])
+    x = np.subtract(BENT[1 if kind in {"closed", "file"} else 2], BENT[0])
+    x /= np.linalg.norm(x)
+    z = up - (up @ x) * x
+    z /= np.linalg.norm(z)
+    axes = np.stack([x, np.cross(z, x), z], axis=1)
+    for R in (np.eye(3), *Rotation.random(4, rng=3).as_matrix()):
+        shape = SHAPES[kind] | {("z" if kind == "file" else "up"): (R @ up).tolist()}
+        shape |= {key: (np.array(shape[key]) @ R.T).tolist() for key in ("points", "towards") if key in shape}
+        beam = {} if kind == "file" else {"model": "beam", "beam": "spatial"}
+        raw = {
+            "links": {"a": {"material": "steel", "shape": shape, **beam}},
+            "analysis": {"end_time": 1, "step": 0.1},
+        }
+        scene = scene_from(raw, tmp_path)
+        assert_allclose(link_axes(scene.links["a"]), R @ axes, atol=1e-12)
+        if beam:
+            assert_allclose(bare_link(scene, "a", frozenset("a")).axes, R @ axes, atol=1e-12)
 
 
 def test_a_hinge_along_a_beam_needs_an_end_or_a_corner() -> None:

@@ -10,8 +10,8 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.errors import MeshError
-from kedfem.links.beams.beam import line_axes, polyline_axes
-from kedfem.links.beams.beam_axis import directions
+from kedfem.links.beams.beam import line_axes
+from kedfem.links.beams.beam_axis import chord_axes, directions
 from kedfem.links.beams.beam_segments import beam_segments, space_segments
 from kedfem.links.beams.of_scene import scene_axis, scene_beam
 from kedfem.links.plane import plane_link
@@ -80,10 +80,10 @@ def link_axes(link: LinkScene) -> Float[np.ndarray, "3 3"]:
             return directions(np.subtract(b, a), np.array(bar.upward)).T
         case PlateLink(between=(a, b)) | Part(between=(a, b)):
             return line_axes(np.asarray(a), np.asarray(b))
-        case Cad(origin=a, towards=b) | MeshFile(origin=a, towards=b) if b is not None:
-            return line_axes(np.asarray(a), np.asarray(b))
-        case Polyline(points=points):
-            return polyline_axes(np.asarray(points))
+        case Cad(origin=a, towards=b, z=z) | MeshFile(origin=a, towards=b, z=z) if b is not None:
+            return chord_axes(np.array([a, b]), None if z is None else np.array(z))
+        case Polyline(points=points, up=up):
+            return chord_axes(np.asarray(points), None if up is None else np.array(up))
         case _:
             return np.eye(3)
 

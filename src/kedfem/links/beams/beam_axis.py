@@ -6,7 +6,9 @@ from itertools import pairwise
 import numpy as np
 
 from kedfem.arrays import Bool, Float, Int
-from kedfem.links.beams.beam import closes, line_axes, line_cells, spaced
+from kedfem.links.beams.beam import closes, line_axes, line_cells, polyline_axes, spaced
+
+LEVEL = 1e-6  # least sine between a chord and what its z is to be near to
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,12 +19,14 @@ class Axis:
     node : (s,) number of the station's node, ascending, but for the last of a closed line, which is the first again
     cells : (e, m) stations of each element, ends first
     hub : (k,) which nodes carry a full affine field: where segments meet and at the ends
+    up : what the section's z is near to; None where `line_axes` chooses
     """
 
     frame: Float[np.ndarray, "s 4 3"]
     node: Int[np.ndarray, " s"]
     cells: Int[np.ndarray, "e m"]
     hub: Bool[np.ndarray, " k"]
+    up: Float[np.ndarray, "3"] | None = None
 
 
 def straight_axis(
@@ -48,7 +52,8 @@ def straight_axis(
     node = (steps * np.arange(count)[:, None] + np.arange(steps + 1)).ravel()
     first = ((steps + 1) * np.arange(count)[:, None] + (nodes - 1) * np.arange(elements)).ravel()
     many = count * steps + (not closes(points))
-    return Axis(np.concatenate(segments), node % many, line_cells(first, nodes), np.arange(many) % steps == 0)
+    hub = np.arange(many) % steps == 0
+    return Axis(np.concatenate(segments), node % many, line_cells(first, nodes), hub, up)
 
 
 def smooth_axis(
@@ -77,7 +82,7 @@ def smooth_axis(
     for k in range(1, len(s)):
         frame[k, 2] = transported(frame[k - 1, 2], frame[k - 1, 1], frame[k, 1])
         frame[k, 3] = np.cross(frame[k, 1], frame[k, 2])
-    return Axis(frame, number, line_cells(number[: -1 : nodes - 1], nodes), number % steps == 0)
+    return Axis(frame, number, line_cells(number[: -1 : nodes - 1], nodes), number % steps == 0, up)
 
 
 def directions(along: Float[np.ndarray, "3"], up: Float[np.ndarray, "3"] | None) -> Float[np.ndarray, "3 3"]:
@@ -88,6 +93,15 @@ def directions(along: Float[np.ndarray, "3"], up: Float[np.ndarray, "3"] | None)
     y = np.cross(up, x)
     y /= np.linalg.norm(y)
     return np.stack([x, y, np.cross(x, y)])
+
+
+def chord_axes(
+    points: Float[np.ndarray, "p 3"], up: Float[np.ndarray, "3"] | None
+) -> Float[np.ndarray, "3 3"]:
+    """Link axes of a line through points as columns, x as of `polyline_axes`, z as near to `up` as can be, if given."""
+    axes = polyline_axes(points)
+    level = up is not None and np.linalg.norm(np.cross(up, axes[:, 0])) > LEVEL * np.linalg.norm(up)
+    return directions(axes[:, 0], up).T if level else axes
 
 
 def transported(

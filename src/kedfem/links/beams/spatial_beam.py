@@ -14,10 +14,9 @@ from kedfem.links.beams.beam import (
     cell_type,
     parent_nodes,
     parent_weights,
-    polyline_axes,
     shape_functions,
 )
-from kedfem.links.beams.beam_axis import Axis
+from kedfem.links.beams.beam_axis import Axis, chord_axes
 from kedfem.links.beams.section import Section
 from kedfem.links.record import Link, mass_constants, read_only
 from kedfem.scene import Material
@@ -164,7 +163,7 @@ def spatial_beam_link(
 
 def _link_axes(axis: Axis) -> Float[np.ndarray, "3 3"]:
     """Of a straight beam those of its section, else x between its ends; of a closed one along its first element."""
-    chord = polyline_axes(axis.frame[[0, axis.cells[0][1], -1], 0])
+    chord = chord_axes(axis.frame[[0, axis.cells[0][1], -1], 0], axis.up)
     straight = np.abs(axis.frame[:, 1] - chord[:, 0]).max() < STRAIGHT
     return np.asarray(axis.frame[0, 1:].T) if straight else chord
 
