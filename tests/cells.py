@@ -128,7 +128,7 @@ def scene_of(cell: Cell) -> Raw:
     for link in raw["links"].values():
         if "mesh" in link:
             counts = link["mesh"]["elements"]
-            along = 2 if cell.joint == "slot" else 1
+            along = 1 if cell.joint != "slot" else 3 if cell.frames == "co-rotational" else 2
             link["mesh"] = {
                 "elements": along if isinstance(counts, int) else [along] + [1] * (len(counts) - 1)
             }

@@ -39,11 +39,7 @@ def hops(d: Drawing) -> list[str]:
     freedoms = FREEDOMS_IN_PLANE if d.plane else FREEDOMS
     left, out = 3 if d.plane else 6, []
     while left:
-        fit = [
-            kind
-            for kind, n in freedoms.items()
-            if 0 < n <= left and (kind != "slot" or d.frames == "rigid-body")
-        ]
+        fit = [kind for kind, n in freedoms.items() if 0 < n <= left]
         out.append(str(d.one(fit)))
         left -= freedoms[out[-1]]
     d.random.shuffle(out)

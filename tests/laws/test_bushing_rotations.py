@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from kedfem.dynamics.system.forces import rotations
 from kedfem.dynamics.system.march import march
+from kedfem.dynamics.system.measures_kernel import rotation_along, tilt_along
 from kedfem.dynamics.system.oracle import monolithic_places as oracle
 from kedfem.dynamics.system.record import ROTATION, TILT, Term
-from kedfem.dynamics.system.rotations_kernel import rotation_along, tilt_along
 from kedfem.dynamics.system.starts.coordinate_rates import value
 from kedfem.motion.newton import cross_matrix
 from tests.moving import channels, ran

@@ -34,6 +34,7 @@ CELLS = [
         ("revolute", "rigid-body", True, "planar beams", "loads"),
         ("prismatic", "co-rotational", False, "planar beams", "loads"),
         ("slot", "rigid-body", True, "planar beams", "loads"),
+        ("slot", "co-rotational", False, "planar beams", "loads"),
         ("revolute", "co-rotational", False, "beams in space", "loads"),
         ("screw", "co-rotational", False, "beams in space", "loads"),
         ("universal", "co-rotational", True, "rigid", "loads"),

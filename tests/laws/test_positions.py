@@ -180,7 +180,7 @@ KINDS = [
     for model in ("beam", "plane", "solid")
     for kind in ("prismatic", "slot")
     for frames in ("rigid-body", "co-rotational")
-    if kind == "prismatic" or (model == "beam" and frames == "rigid-body")
+    if kind == "prismatic" or model == "beam"
 ]
 
 

@@ -31,10 +31,9 @@ def at(raw: Raw, frames: str | None = None, **more: Any) -> Begun:
 
 @pytest.mark.parametrize(
     ("kind", "frames"),
-    [("slot", "rigid-body")]
-    + [
+    [
         (kind, frames)
-        for kind in ("screw", "gears, rack", "springs")
+        for kind in ("slot", "screw", "gears, rack", "springs")
         for frames in ("rigid-body", "co-rotational")
     ],
 )

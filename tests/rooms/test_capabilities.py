@@ -101,11 +101,21 @@ STOPS = {
     "c": {"kind": "travel", "joint": "S", "upper": 1.0, "stiffness": 1.0},
     "d": {"kind": "angle", "joint": "A", "upper": 1.0, "stiffness": 1.0},
 }
+
+
+def unlike_across(model: str = "beam", driven: bool = False) -> Raw:
+    """A slot whose bushing gives way in one direction across its line more than in the other."""
+    raw = chain("slot", (model, model), plane=model != "beam")
+    raw["analysis"] |= {"initial": "rest", "frames": "co-rotational"}
+    raw["joints"]["J"]["bushing"] = {"stiffness": [1e6, 2e6, 1e6]}
+    return raw if driven else {key: x for key, x in raw.items() if key != "drive"}
+
+
 SCENES: list[Raw] = [
     slid("prismatic", limits=STOPS, analysis={**inverted()["analysis"], "solver": "monolithic", "stiffening": True,
          "initial_deflection": {"d": {**AT, "link": "arm", "force": [0, 1]}}}),
     slid("prismatic", limits=STOPS, analysis={**inverted()["analysis"], "extrapolation_levels": 2}),
-    slid("slot", analysis={**inverted()["analysis"], "frames": "co-rotational"}),
+    unlike_across(),
     slid("prismatic", analysis={**inverted()["analysis"], "kind": "steady", "solver": "monolithic", "rho_inf": 1.0,
          "initial_speeds": {"B": 1.0}, "initial_motions": {"arm": {**AT, "velocity": [0, 1]}},
          "initial_deflection": {"d": {**AT, "link": "arm", "force": [0, 1]}}}),
@@ -166,18 +176,27 @@ def test_a_joint_stands_with_frames_as_its_page_says(kind: str, column: str) -> 
 
 
 def test_a_line_that_is_taken_out_refuses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """To lift a refusal is to change one line: of slots with co-rotational frames."""
-    raw = slid("slot", analysis={**inverted()["analysis"], "frames": "co-rotational"})
-    assert any("must be another than slot" in fault for fault in faults(raw))
-    monkeypatch.setattr(capabilities, "REFUSALS", tuple(x for x in REFUSALS if x is not capabilities.SLOTS))
+    """To lift a refusal is to change one line: of bushings in slots that nothing drives."""
+    raw = unlike_across()
+    assert any("must be alike" in fault for fault in faults(raw))
+    monkeypatch.setattr(capabilities, "REFUSALS", tuple(x for x in REFUSALS if x is not capabilities.UNLIKE))
+    assert not faults(raw)
+
+
+@pytest.mark.parametrize("case", ["alike", "driven", "in a plane"])
+def test_bushings_of_slots_are_alike_across_only_where_nothing_shows_how_these_turn(case: str) -> None:
+    raw = unlike_across("planar beam" if case == "in a plane" else "beam", driven=case == "driven")
+    if case == "alike":
+        raw["joints"]["J"]["bushing"]["stiffness"] = [1e6, 1e6, 1.0]
     assert not faults(raw)
 
 
 def test_a_message_says_what_was_wanted_why_what_was_got_and_what_to_take() -> None:
-    (said,) = faults(slid("slot", analysis={**inverted()["analysis"], "frames": "co-rotational"}))
+    (said,) = faults(unlike_across())
     assert said == (
-        'joints.S.kind: must be another than slot with frames = "co-rotational" (the pin of a slot slides as the '
-        'rigid-body motion shows), got a slot: take frames = "rigid-body", or a slide with a hinge'
+        "joints.J.bushing: must be alike in all directions across the line of a slot in space that no drive moves (its "
+        "stations do not show how the line turns about itself), got one that is not: give it one stiffness and one "
+        "damping, or take a drive"
     )
 
 

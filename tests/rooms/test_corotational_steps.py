@@ -109,7 +109,7 @@ def off_its_surface(raw: Raw) -> Raw:
 
 
 DRIVEN = {
-    **{kind: make for kind, make in BEAMS.items() if kind not in {"slot", "bushings"}},
+    **{kind: make for kind, make in BEAMS.items() if kind != "bushings"},
     "sliding block": inverted,
     "sliding block of plane links": lambda: off_its_surface(
         with_analysis(inverted("plane"), revolutions=0.02)

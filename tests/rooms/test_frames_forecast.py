@@ -94,16 +94,20 @@ def ran(raw: dict[str, Any]) -> tuple[Histories, float]:
 def test_a_forecast_of_rigid_body_frames_is_what_the_run_says() -> None:
     """The trial's links are reduced, the slopes of the platform too; 740 % had been forecast of 1 %."""
     raw = lift(slot=True, end_time=4.5)
-    scene, forecast = chosen_frames(Trials(0.01, lambda name: None), scene_from(raw))
-    assert scene.analysis.frames == "rigid-body"  # a slot has no others
+    scene, forecast = chosen_frames(Trials(0.1, lambda name: None), scene_from(raw))
+    assert scene.analysis.frames == "rigid-body"
     _, estimate = ran(lift(slot=True, end_time=4.5, step=0.0125))
     assert_allclose(forecast, estimate, rtol=0.05)
 
 
 @pytest.mark.long
 def test_rigid_body_frames_of_a_lift_are_off_by_what_is_estimated() -> None:
-    """With a slot as with a slide and a hinge, of which co-rotational frames know the truth: 0.6 %."""
+    """With a slot as with a slide and a hinge, of which co-rotational frames know the truth: 0.6 %.
+
+    These find the same with both: 0.06 %.
+    """
     truth, _ = ran(lift(slot=False, frames="co-rotational", step=0.005))
+    assert worst(relative_errors(ran(lift(slot=True, frames="co-rotational", step=0.005))[0], truth)) < 1e-3
     for slot in (True, False):
         found, estimate = ran(lift(slot, frames="rigid-body", step=0.005))
         assert 0.5 < estimate / worst(relative_errors(found, truth)) < 2

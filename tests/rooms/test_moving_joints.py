@@ -379,10 +379,6 @@ def test_what_does_not_suit_such_joints_is_refused() -> None:
     wanted = r"analysis\.rho_inf: must be less than 1 with joints\.S .*, got 1: take 0\.95"
     with pytest.raises(SceneError, match=wanted):
         scene_from(inverted(rho_inf=1.0))
-    with pytest.raises(
-        SceneError, match=r"joints\.S\.kind: must be .* with frames = .co-rotational. .*, got a slot"
-    ):
-        scene_from(inverted(kind="slot", frames="co-rotational"))
     raw = driven_slide()
     raw["drive"]["shaft_stiffness"] = 1.0
     with pytest.raises(SceneError, match=r"drive\.shaft_stiffness: must be given for a hinge .*, got 'A'"):

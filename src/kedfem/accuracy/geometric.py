@@ -237,11 +237,6 @@ def bent(found: GeometricError) -> str:
 
 def _remedy(found: GeometricError, error: float) -> str:
     """What is right where the linear equation is not."""
-    rows = found.model.rows
-    slots = [row.name for row in rows if any(side and side.stations for side in row.sides)]
-    if slots:
-        names = ", ".join(f"joints.{name}" for name in slots)
-        return f"stiffer links or a slower drive help (co-rotational frames do not know {names} yet)"
     corotational = 'analysis.frames = "co-rotational"'
     if error >= MODERATE:
         return f"take {corotational}, which is right at any deflection"

@@ -144,22 +144,31 @@ def parted(scene: Scene, name: str, link: Link) -> Segments:
         case "spatial_beam":
             return space_segments(link, scene_axis(scene, name), material)
         case _:
-            ends = _ends(scene, name)
+            ends = _ends(scene, name, link)
             whole = _whole(scene, name, link, along(link, ends))
             if given.segments is not None:
                 return segmented(link, material, given.segments, ends, whole)
             return _usual_segments(link, material, ends, whole)
 
 
-def _ends(scene: Scene, name: str) -> Float[np.ndarray, "p 3"]:
-    """Joints of a link, in the reference position [m]."""
-    return np.array([x.at for x in scene.joints.values() if name in x.links]).reshape(-1, 3)
+def _ends(scene: Scene, name: str, link: Link) -> Float[np.ndarray, "p 3"]:
+    """Joints of a link, in the reference position [m]; of a line along which a pin slides its ends on the link."""
+    out = []
+    for joint in scene.joints.values():
+        at = np.asarray(joint.at)
+        if joint.kind == "slot" and joint.links[1] == name:
+            axis = np.asarray(joint.axis) / np.linalg.norm(np.asarray(joint.axis))
+            s = (link.X - at) @ axis
+            out += [at + s.min() * axis, at + s.max() * axis]
+        elif name in joint.links:
+            out.append(at)
+    return np.array(out).reshape(-1, 3)
 
 
 def most_segments(scene: Scene, name: str) -> int:
     """How many segments of a solid or plane link do not soften it: none shorter than the link is wide."""
     link = bare_link(scene, name)
-    return most_slices(link.X, along(link, _ends(scene, name)))
+    return most_slices(link.X, along(link, _ends(scene, name, link)))
 
 
 def _usual_segments(
@@ -186,7 +195,7 @@ def _whole(scene: Scene, name: str, link: Link, e: Float[np.ndarray, "3"]) -> li
     places = [
         (joint.at, joint.axis if joint.kind != "prismatic" else None, joint.face_names(name))
         for joint in scene.joints.values()
-        if name in joint.links
+        if name in joint.links and not (joint.kind == "slot" and joint.links[1] == name)  # a line is cut
     ]
     for at, axis, faces in places:
         about = None if axis is None else np.asarray(axis) / np.linalg.norm(axis)

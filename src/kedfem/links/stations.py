@@ -6,7 +6,8 @@ displacement of a point under a point force grows without bounds as the mesh is 
 mean of the material in a ball about it, as wide as the stations are apart.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +19,8 @@ BESIDE = 1e-6  # of the link's size: nodes so far off a line are on it
 SPARE = 2  # stations beyond the travel of the slider, where the link has them
 FEWEST, MOST = 4, 48
 KNOWN = 1e-3  # of the ball: a spread below cannot determine a gradient
+Directed = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]
+"""Origin and axis of a line."""
 APART = 1e-3  # of the largest singular value of stations that move apart: 0.1 of two elements, 2e-6 of one, 1 of beams
 
 
@@ -27,15 +30,23 @@ class Stations:
 
     s : (k,) places along the line from its origin, increasing [m]
     points : (k, 3) the same in the reference position [m]
-    weights : (k, n) scalar weights of the displacement at each, u = weights @ state
+    weights : of each the scalar weights (n,) of its displacement, u = weights @ state of its segment
+    keys : of each the segment of the link that it is on
     """
 
     s: Float[np.ndarray, " k"]
     points: Float[np.ndarray, "k 3"]
-    weights: Float[np.ndarray, "k n"]
+    weights: tuple[Float[np.ndarray, " _"], ...]
+    keys: tuple[str, ...]
+
+    def reach(self, s: float) -> bool:
+        """Whether a place is between the first and the last."""
+        slack = BESIDE * float(np.ptp(self.s))
+        return bool(self.s[0] - slack <= s <= self.s[-1] + slack)
 
     def at(self, s: Float[np.ndarray, " T"], rate: int = 0) -> Float[np.ndarray, "T k"]:
-        """Weights of the stations in the displacement at other places: cardinal functions of the cubic spline.
+        """Weights of the stations in the displacement at other places: cardinal functions of the cubic spline, and beyond
+        its ends of its tangents there.
 
         Parameters
         ----------
@@ -43,110 +54,142 @@ class Stations:
         """
         from scipy.interpolate import CubicSpline
 
-        return np.asarray(CubicSpline(self.s, np.eye(len(self.s)))(s, rate))
+        spline = CubicSpline(self.s, np.eye(len(self.s)))
+        inside = np.clip(s, self.s[0], self.s[-1])
+        beyond = (s - inside)[:, None]
+        if rate > 1:
+            return np.where(beyond == 0, spline(inside, rate), 0.0)
+        return np.asarray(spline(inside, rate) + (beyond * spline(inside, 1) if rate == 0 else 0.0))
 
 
 def stations(
-    link: Link,
+    parts: Mapping[str, Link],
     where: str,
     origin: Float[np.ndarray, "3"],
     axis: Float[np.ndarray, "3"],
     travel: tuple[float, float],
+    whole: bool = False,
 ) -> Stations:
     """Stations for a slider on a line of a link; each of one that bends can move without the others.
 
     Parameters
     ----------
+    parts : the link's segments by their keys, or it alone
     origin, axis : of the line, in the reference position; axis a unit vector
     travel : least and greatest place of the slider along the line [m]
+    whole : whether they reach along all of the link, as its bending and the slider's own motion may carry this anywhere
 
     Raises
     ------
     MeshError
         If the link does not reach along the line as far as the slider goes, or cannot bend there.
     """
-    full, rigid = link.full, link.rigid
-    if full is None or link.Q is None:
-        found = _along_line(link, where, origin, axis, travel)
-        return found if rigid or not link.meshed else _apart(link, where, found)
-    found = _along_line(full, where, origin, axis, travel)
-    if full.meshed and not rigid:
-        _apart(full, where, found)
-    own = Stations(found.s, found.points, found.weights @ link.Q)
-    return own if rigid else _apart(link, where, own)
+    full = {key: link if link.full is None or link.Q is None else link.full for key, link in parts.items()}
+    meshed = next(iter(full.values())).meshed
+    found = (_in_balls if meshed else _at_nodes)(full, where, (origin, axis), travel, whole)
+    weights = list(found.weights)
+    for key, link in parts.items():
+        here = [k for k, each in enumerate(found.keys) if each == key]
+        if meshed and not link.rigid:
+            _check_apart(full[key], where, [weights[k] for k in here])
+        if full[key] is not link:
+            for k in here:
+                weights[k] = weights[k] @ link.Q
+            if not link.rigid:
+                _check_apart(link, where, [weights[k] for k in here])
+    return replace(found, weights=tuple(weights))
 
 
-def _along_line(
-    link: Link, where: str, origin: np.ndarray, axis: np.ndarray, travel: tuple[float, float]
-) -> Stations:
-    return (_in_balls if link.meshed else _at_nodes)(link, where, origin, axis, travel)
-
-
-def _apart(link: Link, where: str, found: Stations) -> Stations:
-    """Stations, each of which can move without the others: what dependent ones bear is rounding."""
-    size = np.linalg.svd(found.weights, compute_uv=False)
+def _check_apart(link: Link, where: str, weights: list[Float[np.ndarray, " n"]]) -> None:
+    """Whether each station can move without the others: what dependent ones bear is rounding."""
+    if not weights:
+        return
+    size = np.linalg.svd(np.array(weights), compute_uv=False)
     determined = int((size > APART * size[0]).sum())
-    if determined == len(found.s):
-        return found
+    if determined == len(weights):
+        return
     instead = (
         "give it more basis functions"
         if link.Q is not None
         else "give it two elements along the line at least"
     )
     raise MeshError(
-        f"{where}: link '{link.name}' must be able to bend along its line in {len(found.s)} ways, as many as there are "
+        f"{where}: link '{link.name}' must be able to bend along its line in {len(weights)} ways, as many as there are "
         f"stations on it, got {determined}: {instead}"
     )
 
 
 def _at_nodes(
-    link: Link, where: str, origin: np.ndarray, axis: np.ndarray, travel: tuple[float, float]
+    parts: Mapping[str, Link], where: str, line: Directed, travel: tuple[float, float], whole: bool
 ) -> Stations:
-    """Of a beam: its nodes on the line."""
-    along, off = _along(link.X, origin, axis)
-    on = np.flatnonzero((link.one != 0) & (off <= BESIDE * link.size))
-    on = on[np.argsort(along[on])]
-    if len(on) < FEWEST:
+    """Of a beam: its nodes on the line, of one that is cut up those of all segments."""
+    found: list[tuple[float, str, int]] = []
+    for key, link in parts.items():
+        along, off = _along(link.X, *line)
+        on = np.flatnonzero((link.one != 0) & (off <= BESIDE * link.size))
+        found += [(float(along[n]), key, int(n)) for n in on]
+    found.sort()
+    name, size = next(iter(parts.values())).name, max(link.size for link in parts.values())
+    found = [x for k, x in enumerate(found) if k == 0 or x[0] - found[k - 1][0] > BESIDE * size]
+    if len(found) < FEWEST:
         raise MeshError(
-            f"{where}: its line must run along the axis of beam '{link.name}' over {FEWEST} nodes at least, got "
-            f"{len(on)} there: draw it along the beam, or give this more elements"
+            f"{where}: its line must run along the axis of beam '{name}' over {FEWEST} nodes at least, got "
+            f"{len(found)} there: draw it along the beam, or give this more elements"
         )
-    _check_travel(link, where, (along[on[0]], along[on[-1]]), travel)
-    on = on[_near(along[on], travel)]
-    weights = np.zeros((len(on), link.n))
-    weights[np.arange(len(on)), on] = 1.0
-    return Stations(along[on], link.X[on], weights)
+    s = np.array([x[0] for x in found])
+    _check_travel(where, name, (s[0], s[-1]), travel, BESIDE * size)
+    every = np.unique(np.linspace(0, len(s) - 1, min(len(s), MOST)).round().astype(int))
+    kept = every if whole else np.arange(len(s))[_near(s, travel)]
+    on_link = [found[k][1:] for k in kept]
+    return Stations(
+        s[kept],
+        np.array([parts[key].X[n] for key, n in on_link]),
+        tuple(np.eye(1, parts[key].n, n)[0] for key, n in on_link),
+        tuple(key for key, _ in on_link),
+    )
 
 
 def _in_balls(
-    link: Link, where: str, origin: np.ndarray, axis: np.ndarray, travel: tuple[float, float]
+    parts: Mapping[str, Link], where: str, line: Directed, travel: tuple[float, float], whole: bool
 ) -> Stations:
     """Of a meshed link: means over balls that reach to the next station, as far as the link is wide, or an element long.
 
-    Closer ones would be as good as dependent on each other.
+    Closer ones would be as good as dependent on each other. Of a link that is cut up each is a mean over the segment that
+    has the most of its ball.
     """
-    on = _material(link)
-    along, off = _along(on.x, origin, axis)
-    width = _width(link, axis)
-    near = off <= width
-    if not near.any():
+    origin, axis = line
+    on = {key: _material(link) for key, link in parts.items()}
+    width, links = _width(np.concatenate([link.nodes for link in parts.values()]), axis), list(parts.values())
+    reached, longs = [], []
+    for key, link in parts.items():
+        near = (_along(on[key].x, origin, axis)[1] <= width).any(axis=1)
+        if near.any():
+            corners = (link.X[link.cells[near]] - origin) @ axis
+            reached += [corners.min(), corners.max()]
+            longs.append(np.ptp(corners, axis=1))
+    if not reached:
         raise MeshError(
-            f"{where}: its line must run along link '{link.name}', got one that nowhere comes near it"
+            f"{where}: its line must run along link '{links[0].name}', got one that nowhere comes near it"
         )
-    reach = (float(along[near].min()), float(along[near].max()))
-    _check_travel(link, where, reach, travel)
-    long = np.ptp(link.X[link.cells[near.any(axis=1)]] @ axis, axis=1).mean()
-    apart = max(width, float(long))
-    low, high = max(reach[0], travel[0] - apart), min(reach[1], travel[1] + apart)
+    reach = (float(min(reached)), float(max(reached)))
+    _check_travel(where, links[0].name, reach, travel, BESIDE * max(link.size for link in links))
+    apart = max(width, float(np.concatenate(longs).mean()))
+    low, high = reach if whole else (max(reach[0], travel[0] - apart), min(reach[1], travel[1] + apart))
     count = int(np.clip(np.ceil((high - low) / apart) + 1, FEWEST, MOST))
     s = np.linspace(low, high, count)
     points = origin + np.outer(s, axis)
     radius = max(apart, float(s[1] - s[0]))
-    weights = np.array([_mean_at(on, link, point, radius) for point in points])
-    if not weights.any(axis=1).all():
-        gap = points[~weights.any(axis=1)][0]
-        raise MeshError(f"{where}: link '{link.name}' must have material along its line, got none at {gap} m")
-    return Stations(s, points, weights)
+    keys, weights = [], []
+    for point in points:
+        shares = {key: _share(each, point, radius) for key, each in on.items()}
+        keys.append(max(shares, key=lambda key: float(shares[key].sum())))
+        weights.append(_mean_at(on[keys[-1]], parts[keys[-1]], point, radius))
+    gaps = [point for point, each in zip(points, weights, strict=True) if not each.any()]
+    if gaps:
+        raise MeshError(
+            f"{where}: link '{links[0].name}' must have material along its line, got none at {gaps[0]} m"
+        )
+    return Stations(s, points, tuple(weights), tuple(keys))
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +211,7 @@ def _material(link: Link) -> _Material:
 
 def _mean_at(on: _Material, link: Link, point: np.ndarray, radius: float) -> Float[np.ndarray, " n"]:
     """Weights of the value at a point of the affine field that fits the material in a ball about it best."""
-    share = on.dV * np.clip(1 - (np.linalg.norm(on.x - point, axis=2) / radius) ** 2, 0, None) ** 2
+    share = _share(on, point, radius)
     cells = np.flatnonzero(share.any(axis=1))
     if not len(cells):
         return np.zeros(link.n)
@@ -180,9 +223,15 @@ def _mean_at(on: _Material, link: Link, point: np.ndarray, radius: float) -> Flo
     return np.bincount(on.dofs[cells].ravel(), weights=local.ravel(), minlength=link.n)
 
 
-def _width(link: Link, axis: np.ndarray) -> float:
-    """The link's width across a line: that of a bar whose nodes spread as much."""
-    X = link.nodes - link.nodes.mean(axis=0)
+def _share(on: _Material, point: np.ndarray, radius: float) -> Float[np.ndarray, "e q"]:
+    """Volume of Gauss points, those near a point weighted most."""
+    away = np.linalg.norm(on.x - point, axis=2) / radius
+    return np.asarray(on.dV * np.clip(1 - away**2, 0, None) ** 2)
+
+
+def _width(nodes: Float[np.ndarray, "n 3"], axis: np.ndarray) -> float:
+    """A link's width across a line: that of a bar whose nodes spread as much."""
+    X = nodes - nodes.mean(axis=0)
     across = X - np.outer(X @ axis, axis)
     return float(np.sqrt(12) * np.linalg.svd(across / np.sqrt(len(X)), compute_uv=False)[0])
 
@@ -203,10 +252,11 @@ def _near(s: Float[np.ndarray, " k"], travel: tuple[float, float]) -> slice:
     return slice(first, max(end, first + FEWEST))
 
 
-def _check_travel(link: Link, where: str, reach: tuple[float, float], travel: tuple[float, float]) -> None:
-    slack = BESIDE * link.size
+def _check_travel(
+    where: str, name: str, reach: tuple[float, float], travel: tuple[float, float], slack: float
+) -> None:
     if travel[0] < reach[0] - slack or travel[1] > reach[1] + slack:
         raise MeshError(
-            f"{where}: the pin must stay on link '{link.name}', which reaches from {reach[0]:.6g} to {reach[1]:.6g} m "
+            f"{where}: the pin must stay on link '{name}', which reaches from {reach[0]:.6g} to {reach[1]:.6g} m "
             f"along the line, got a travel from {travel[0]:.6g} to {travel[1]:.6g} m"
         )

@@ -1,7 +1,7 @@
 """What joints enforced by constraint equations have on their links: coupling surfaces, or stations along the line of a
 slot."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,7 +24,7 @@ from kedfem.links.record import Link
 from kedfem.links.stations import Stations, stations
 from kedfem.links.surfaces.coupling_surfaces import port_weights, rigid_link_surface
 from kedfem.motion.joint_equations import joint_axis
-from kedfem.scene import Limit, LineSpring, Motor, Scene, Spring
+from kedfem.scene import Limit, LineSpring, Motor, Scene, Spring, corotational_links
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,15 +43,17 @@ class Own:
     """Port points that one side of a joint has to itself.
 
     key : of the link; slider : name of a rigid slider instead, whose one unknown is its travel
-    points, weights : (p, 3) in the reference position, and (p, n)
+    points, weights : (p, 3) in the reference position, and (n,) of each
     selection : (dp, c) displacements there from the side's own unknowns, world components
+    keys : of each point, if they are on several segments of the link
     """
 
     key: str
     slider: str
     points: Float[np.ndarray, "p 3"]
-    weights: Float[np.ndarray, "p n"]
+    weights: Float[np.ndarray, "p n"] | Sequence[Float[np.ndarray, " _"]]
     selection: Float[np.ndarray, "m c"]
+    keys: tuple[str, ...] = ()
 
 
 Held = tuple[Float[np.ndarray, "r 3"], Float[np.ndarray, "r 3"]]
@@ -192,17 +194,17 @@ def _side(
         return None, None
     where, body = f"joints.{name}", layout.bodies[on]
     if slot:
-        key, link = next((key, link) for key, link in links.items() if link.name == on)
+        parts = {key: link for key, link in links.items() if link.name == on}
         joint = scene.joints[name]
         line = layout.slots[name]
         if not isinstance(line, Stations):
-            line = stations(link, where, np.asarray(joint.at), joint_axis(joint), line)
-        points, known = station_ports(line, link)
-        side = Side(body, line.points[0], known, np.zeros((len(points), link.d, 0)), line, points=points)
-        weights = line.weights
-    else:
-        key, surface = part_surface(scene, name, links, on)
-        points, known = surface_ports(surface, links[key], where)
-        side = Side(body, surface.origin, known, np.zeros((len(points), links[key].d, 0)), points=points)
-        weights = port_weights(surface, points)
-    return side, Own(key, "", points, weights, np.eye(known.shape[2] * len(points)))
+            whole = not corotational_links(scene).isdisjoint(joint.links)
+            line = stations(parts, where, np.asarray(joint.at), joint_axis(joint), line, whole)
+        points, known = station_ports(line, next(iter(parts.values())))
+        side = Side(body, line.points[0], known, np.zeros((*known.shape[::2], 0)), line, points=points)
+        own = np.eye(known.shape[2] * len(points))
+        return side, Own(line.keys[0], "", points, line.weights, own, line.keys)
+    key, surface = part_surface(scene, name, links, on)
+    points, known = surface_ports(surface, links[key], where)
+    side = Side(body, surface.origin, known, np.zeros((len(points), links[key].d, 0)), points=points)
+    return side, Own(key, "", points, port_weights(surface, points), np.eye(known.shape[2] * len(points)))

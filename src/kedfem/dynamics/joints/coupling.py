@@ -174,7 +174,9 @@ def _own_columns(
         return [first_of[own.slider]]
     d = ports[own.key].link.d
     for k, (weights, point) in enumerate(zip(own.weights, own.points, strict=True)):
-        ports[own.key].add(weights, point, name, list(range(d)), unknowns + d * k, np.eye(d))
+        ports[own.keys[k] if own.keys else own.key].add(
+            weights, point, name, list(range(d)), unknowns + d * k, np.eye(d)
+        )
     return list(range(unknowns, unknowns + d * len(own.points)))
 
 

@@ -14,15 +14,17 @@ FINER = 8  # looks between two points of the path
 
 
 def slot_travels(scene: Scene, linkage: Linkage, along: Path | None = None) -> dict[str, tuple[float, float]]:
-    """Least and greatest place of each slot's pin along its line, from where it is drawn [m].
+    """Least and greatest place of each slot's pin along its line, from where it is drawn [m]; that alone without a drive.
 
     Parameters
     ----------
-    along : path over the drive's range, needed with slots
+    along : path over the drive's range, needed with slots and a drive
     """
     slots = {name: joint for name, joint in scene.joints.items() if joint.kind == "slot"}
     if not slots:
         return {}
+    if not linkage.drives:
+        return dict.fromkeys(slots, (0.0, 0.0))
     if along is None:
         raise ValueError("the path of a linkage with slots must be given, got none")
     angles = np.linspace(along.phi[0], along.phi[-1], FINER * len(along.phi))

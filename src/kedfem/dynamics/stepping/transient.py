@@ -12,7 +12,7 @@ from kedfem.dynamics.rigid_body import forcings, motions
 from kedfem.dynamics.stepping.marks import Mark
 from kedfem.dynamics.stepping.solvers import block_length
 from kedfem.dynamics.stepping.start import motion_of, started
-from kedfem.dynamics.system.march import HALVINGS, ConvergenceError
+from kedfem.dynamics.system.march import HALVINGS, ConvergenceError, LeftLineError
 from kedfem.dynamics.system.period.search import residual_of
 from kedfem.dynamics.system.starts.deflected import quasi_static_position, static
 from kedfem.dynamics.system.starts.instant import Instant
@@ -69,6 +69,8 @@ def transient(
                 if failed.taken:
                     links, multipliers = solver.handed_on(failed.history, forcing, part)
                     yield Block(first + k, part.part(0, failed.taken), links, multipliers=multipliers)
+                if isinstance(failed, LeftLineError):
+                    raise SolveError(failed.said) from None
                 at = _moment(linkage, part, failed.taken)
                 raise SolveError(_stuck(first + k + failed.taken, at, failed, solver)) from None
             yield from _finite(linkage, Block(first + k, part, links, multipliers=multipliers))

@@ -175,6 +175,10 @@ class Ends(NamedTuple):
 
     line, line_at, full_at, full : ends on lines of slots, where their stations' weights begin, and what these stations
         have of z: a step makes `onto` of them
+    number : (E,) of each end's line, −1: none; free : whether its pin is where both links are, an OFFSET
+    axis, knots : (L, 3) their reference directions, and (n,) places of all stations; cubic_at, cubics : (p − 1, 4, p) of
+        each the cardinal functions from each station on
+    weights, slopes, pin : (n,) and (L,), where a step puts the stations' weights with their slopes, and the pins' places
     """
 
     body: Any
@@ -192,6 +196,15 @@ class Ends(NamedTuple):
     line_at: Any
     full_at: Any
     full: Any
+    number: Any
+    free: Any
+    axis: Any
+    knots: Any
+    cubic_at: Any
+    cubics: Any
+    weights: Any
+    slopes: Any
+    pin: Any
 
 
 class Constraints(NamedTuple):

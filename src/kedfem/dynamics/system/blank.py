@@ -33,7 +33,7 @@ def empty_trial(bodies: Bodies, ends: Ends, of: Constraints, like: State) -> Tri
     L, k, r, E = len(bodies.motion), len(bodies.place), len(of.law), len(ends.form)
     b, _, points = bodies.beams.tangent.shape
     q, B, size = int(bodies.port_at[-1]), int(bodies.B_at[-1]), int(bodies.row_at[-1])
-    place = (np.zeros((E, 3)), np.zeros((E, 3, 3)), np.zeros((E, 3, 3)), np.zeros((E, 3, 3)))
+    place = (np.zeros((E, 3)), *np.zeros((3, E, 3, 3)), np.zeros((len(ends.knots), 3)))
     return Trial(
         u=like.u.copy(), f=like.u.copy(), damped=like.damped.copy(), seen=like.seen.copy(), Q=like.Q.copy(),
         angle=like.angle.copy(), base=np.zeros((b, 4, points)), resisted=np.zeros((b, 3, points)),

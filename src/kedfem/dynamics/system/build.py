@@ -26,6 +26,8 @@ from kedfem.dynamics.system.record import (
     ANGLE,
     DISTANCE,
     GAP,
+    LINE,
+    OFFSET,
     TURN,
     Constraint,
     Curve,
@@ -39,7 +41,6 @@ from kedfem.dynamics.system.record import (
     Term,
     rotation_term,
 )
-from kedfem.errors import SceneError
 from kedfem.links.record import Link
 from kedfem.motion.constraints import CONSTRAINED, perpendiculars
 from kedfem.motion.joint_equations import joint_axis
@@ -56,7 +57,6 @@ from kedfem.scene import (
     is_constant,
     pieces,
 )
-from kedfem.scene.checks.capabilities import SLOTS
 
 ELEMENTS = ("springs", "motors", "limits")  # sections of a scene
 Vector = Float[np.ndarray, "3"]
@@ -73,7 +73,7 @@ def system_of(
 
     Raises
     ------
-    MeshError, SceneError
+    MeshError
         If a joint or force element finds no place on its links.
     """
     model = model or elastic_model(scene, linkage, along=along, elements=True)
@@ -129,8 +129,6 @@ class _Builder:
             self.add(joint.name, terms, Held(), joint, first)
         elif kind in ELEMENTS:
             self.element(joint, getattr(scene, kind)[name])
-        elif scene.joints[joint.name].kind == "slot" and set(joint.bodies) & self.own:
-            raise SceneError([SLOTS.fault(("joints", joint.name), {})])
         else:
             for term, law in self.constrained(joint):
                 self.add(joint.name, (term,), law, joint)
@@ -216,10 +214,12 @@ class _Builder:
         at = np.asarray(made.at)
         i, j = self.end(joint, 0, at), self.end(joint, 1, at)
         gaps, turns = CONSTRAINED[made.kind]
+        slides = self.ends[j].form == LINE and bool(set(joint.bodies) & self.own)
         for axis in gaps:
             n = "xyz".index(axis)
             if self.determines(joint, frame[n], np.zeros(3)):
-                yield Term(GAP, i, j, at, at, frame[n]), self.bushing(joint.name, n, turning=False)
+                kind = OFFSET if slides else GAP
+                yield Term(kind, i, j, at, at, frame[n]), self.bushing(joint.name, n, turning=False)
         if made.kind == "universal":
             one, other = (np.asarray(bore_axis(made, link)) for link in ordered(made))
             yield Term(TURN, i, j, one, one, other), self.bushing(joint.name, 2, turning=True)

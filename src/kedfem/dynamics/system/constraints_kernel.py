@@ -7,12 +7,14 @@ import numpy as np
 
 from kedfem.compiled import inlined, inner
 from kedfem.dynamics.system.ends_kernel import borne, cross, dot, times
+from kedfem.dynamics.system.measures_kernel import borne_by_line, off_line, rotation_along, tilt_along
 from kedfem.dynamics.system.record import (
     CURVE,
     DISTANCE,
     DRIVEN,
     GAP,
     HELD,
+    OFFSET,
     RATE,
     ROTATION,
     SPRING,
@@ -20,7 +22,6 @@ from kedfem.dynamics.system.record import (
     TIME,
     TURN,
 )
-from kedfem.dynamics.system.rotations_kernel import rotation_along, tilt_along
 
 
 @inner
@@ -34,9 +35,16 @@ def coordinate(ends, of, r, rigid_motion, place, turned, row, y, w):  # type: ig
     y, w : (16,), (12, 3) room
     """
     total, rate = 0.0, 0.0
-    x, Q, _, _ = place
+    x, Q, _, _, _ = place
     for t in range(of.term_at[r], of.term_at[r + 1]):
         i, j, kind, factor = of.i[t], of.j[t], of.kind[t], of.factor[t]
+        if kind == OFFSET:
+            value, turning = off_line(ends, of, t, rigid_motion, place, w)
+            total += factor * value
+            rate += factor * turning
+            rate += borne(ends, i, w[6], w[7], factor, rigid_motion, place, row, y, w)
+            rate += borne_by_line(ends, j, w[6], w[8], factor, rigid_motion, row, w)
+            continue
         if kind in (GAP, DISTANCE):
             value = between(kind, ends, of, t, x, Q, w)
         elif kind == TURN:

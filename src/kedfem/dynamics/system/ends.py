@@ -5,7 +5,18 @@ import numpy as np
 from kedfem.arrays import Float, Int
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side
 from kedfem.dynamics.joints.constraint_matrices import seen_from
-from kedfem.dynamics.system.record import FACE, LINE, PLANAR, PLANAR_BEAM, POINT, RIGID, SOLID, End, Line
+from kedfem.dynamics.system.record import (
+    FACE,
+    LINE,
+    PLANAR,
+    PLANAR_BEAM,
+    POINT,
+    RIGID,
+    SOLID,
+    End,
+    Line,
+    System,
+)
 from kedfem.motion.rigid import RigidMotion
 
 NOTHING = 1e-12  # entries of a selection that are rounding
@@ -74,12 +85,28 @@ def end_of(side: Side, joint: ConstraintJoint) -> End:
     )
 
 
+def line_of(end: End) -> Line:
+    """The line of an end that has one."""
+    if end.line is None:
+        raise ValueError("an end must be on a line to have stations, got one that is not")
+    return end.line
+
+
 def line_weights(end: End, motion: RigidMotion) -> Float[np.ndarray, "T p"]:
     """Weights of the stations of a line where its pin is, in the rigid-body motion."""
-    line = end.line
-    if line is None:
-        raise ValueError("an end must be on a line to have stations, got one that is not")
+    line = line_of(end)
     return line.stations.at(seen_from(motion, (line.pin, end.body), line.at) @ line.axis)
+
+
+def left_line(system: System, end: int, t: float) -> str:
+    """What is wrong where a pin slides beyond the line of an end."""
+    name = next(each.name for each in system.constraints if any(term.j == end for term in each.terms))
+    carrier = system.model.links[system.model.bodies.index(system.ends[end].body)].name
+    s = line_of(system.ends[end]).stations.s
+    return (
+        f"joints.{name}: the pin must stay on link '{carrier}', which reaches from {s[0]:.6g} to {s[-1]:.6g} m along the "
+        f"line, got one that slides off it at t = {t:.6g} s: draw a longer line, or hold the pin"
+    )
 
 
 def _form(side: Side, d: int, known: int) -> int:

@@ -6,7 +6,7 @@ moment τ on Q is
 
     τ · ω = Σ q_k · δD_k,   q_k = Q (t × e_k),   t = G⁻¹ Qᵀ τ
 
-    place : x (E, 3), Q (E, 3, 3), D (E, 3, 3), U (E, 3, 3) of all ends
+    place : x (E, 3), Q (E, 3, 3), D (E, 3, 3), U (E, 3, 3) of all ends; X (n, 3) of the stations of all lines
 """
 
 import numpy as np
@@ -64,7 +64,7 @@ def placed(ends, R, p, z, place, y, w):  # type: ignore[no-untyped-def]
     R, p : (M, 3, 3), (M, 3) of all bodies of the linkage
     y, w : (16,), (12, 3) room
     """
-    x, Q, D, U = place
+    x, Q, D, U, X = place
     for e in range(len(ends.form)):
         body, form, d = ends.body[e], ends.form[e], ends.components[e]
         times(R[body], ends.origin[e], w[0])
@@ -82,6 +82,26 @@ def placed(ends, R, p, z, place, y, w):  # type: ignore[no-untyped-def]
         elif form != POINT:
             directed(ends, e, R[body], y, D[e], w[0])
             oriented(ends.directions[e], D[e], Q[e], U[e], w)
+    for n in range(len(ends.line)):
+        if ends.free[n]:
+            stationed(ends, n, R[ends.body[ends.line[n]]], p[ends.body[ends.line[n]]], z, X, w)
+
+
+@inlined
+def stationed(ends, n, R, p, z, X, w):  # type: ignore[no-untyped-def]
+    """X becomes the positions of the stations of line n."""
+    e, first, at = ends.line[n], ends.line_at[n], ends.full_at[n]
+    d, column, c = ends.components[e], ends.column_at[e], ends.column_at[e + 1] - ends.column_at[e]
+    for k in range(first, ends.line_at[n + 1]):
+        for m in range(3):
+            w[0, m] = ends.origin[e, m] + (ends.knots[k] - ends.knots[first]) * ends.axis[n, m]
+        times(R, w[0], X[k])
+        for m in range(3):
+            X[k, m] += p[m]
+        for m in range(d):
+            for o in range(c):
+                X[k, m] += ends.full[at + o] * z[ends.columns[column + o]]
+            at += c
 
 
 @inner
@@ -198,7 +218,7 @@ def borne(ends, e, force, moment, factor, rigid_motion, place, row, y, w):  # ty
     -------
     Their power in the rigid-body motion, z constant
     """
-    _, Q, D, U = place
+    _, Q, D, U, _ = place
     R, v, omega = rigid_motion
     form, d, body = ends.form[e], ends.components[e], ends.body[e]
     times(R[body], ends.origin[e], w[0])

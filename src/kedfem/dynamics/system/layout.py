@@ -24,6 +24,7 @@ from kedfem.dynamics.system.record import (
     HELD,
     LINE,
     NOMINAL,
+    OFFSET,
     POINT,
     SPRING,
     STOP,
@@ -32,7 +33,6 @@ from kedfem.dynamics.system.record import (
     Constraint,
     Curve,
     Driven,
-    End,
     Held,
     Law,
     Spring,
@@ -172,13 +172,18 @@ def _flat(arrays: Sequence[np.ndarray], kind: type = float) -> np.ndarray:
     return np.concatenate([np.zeros(0, kind), *(np.asarray(x, kind).ravel() for x in arrays)])
 
 
-def end_arrays(ends: Sequence[End], number: Int[np.ndarray, " k"]) -> Ends:
+def end_arrays(system: System, number: Int[np.ndarray, " k"]) -> Ends:
     """All ends as flat arrays on the renumbered interface unknowns."""
+    ends = system.ends
     columns, every = [end.columns for end in ends], [end.onto for end in ends]
     lines = [n for n, end in enumerate(ends) if end.form == LINE]
     full = [every[n] for n in lines]
     onto = [x[:1] if n in lines else x for n, x in enumerate(every)]
     forms = [POINT if end.form == LINE else end.form for end in ends]
+    of_lines = [(end.line.axis, end.line.stations) for end in ends if end.line is not None]
+    cubics = [_cardinal(along.s) for _, along in of_lines]
+    terms = [term for each in system.constraints for term in each.terms]
+    free = {term.j for term in terms if term.kind == OFFSET}
     return Ends(
         body=np.array([end.body for end in ends], int), form=np.array(forms, int),
         origin=_rows([end.origin for end in ends]),
@@ -187,8 +192,18 @@ def end_arrays(ends: Sequence[End], number: Int[np.ndarray, " k"]) -> Ends:
         components=np.array([end.onto.shape[1] for end in ends], int), column_at=ends_of([len(c) for c in columns]),
         columns=_flat([number[c] for c in columns], int), onto_at=ends_of([x.size for x in onto]), onto=_flat(onto),
         line=np.array(lines, int), line_at=ends_of([len(x) for x in full]), full_at=ends_of([x.size for x in full]),
-        full=_flat(full),
+        full=_flat(full), number=np.array([lines.index(n) if n in lines else -1 for n in range(len(ends))], int),
+        free=np.array([n in free for n in lines], bool), axis=_rows([axis for axis, _ in of_lines]),
+        knots=_flat([along.s for _, along in of_lines]), cubic_at=ends_of([x.size for x in cubics]), cubics=_flat(cubics),
+        weights=np.zeros(sum(map(len, full))), slopes=np.zeros(sum(map(len, full))), pin=np.zeros(len(lines)),
     )  # fmt: skip
+
+
+def _cardinal(s: Float[np.ndarray, " p"]) -> Float[np.ndarray, "_ 4 p"]:
+    """Coefficients of a cubic spline's cardinal functions by powers of the place from each station on."""
+    from scipy.interpolate import CubicSpline
+
+    return np.ascontiguousarray(CubicSpline(s, np.eye(len(s))).c[::-1].transpose(1, 0, 2))
 
 
 def constraint_arrays(constraints: Sequence[Constraint], profile: Profile) -> Constraints:
@@ -271,4 +286,4 @@ def as_arrays(system: System, parts: Sequence[Part]) -> tuple[Bodies, Ends, Cons
     """A system's flat arrays, its bodies factored."""
     made = profile(system)
     bodies = body_arrays(system, parts, made)
-    return bodies, end_arrays(system.ends, made.number), constraint_arrays(system.constraints, made)
+    return bodies, end_arrays(system, made.number), constraint_arrays(system.constraints, made)

@@ -13,7 +13,7 @@ from kedfem.dynamics.rigid_body import forcing_of, forcings
 from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.dynamics.system.arrays import Bodies, Coefficients, Constraints, Ends
 from kedfem.dynamics.system.blank import empty_history, empty_trial, room
-from kedfem.dynamics.system.ends import line_weights
+from kedfem.dynamics.system.ends import left_line, line_weights
 from kedfem.dynamics.system.forces.stresses import NO_TERMS, Stressed, stressed
 from kedfem.dynamics.system.forces.turning_loads import turning
 from kedfem.dynamics.system.layout import TOLERANCE, as_arrays, coefficients, factored
@@ -23,7 +23,7 @@ from kedfem.dynamics.system.state import Driving, History, State, copied
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import RigidMotion
 
-MET = -2  # of `step_kernel`
+MET, LEFT = -2, -3  # of `step_kernel`
 HALVINGS = 6  # a step is taken in up to 2⁶ parts
 Motion = Callable[[Float[np.ndarray, " T"]], RigidMotion]
 """Rigid-body motion at given times."""
@@ -63,6 +63,14 @@ class ConvergenceError(SolveError):
             "from one to the next: take a smaller step, or more numerical damping (rho_inf)"
         )
         self.state, self.history, self.taken, self.moves = state, history, taken, moves
+
+
+class LeftLineError(ConvergenceError):
+    """A step at whose end a pin is beyond the line of its slot; `said` says which."""
+
+    def __init__(self, said: str, state: State, history: History, taken: int) -> None:
+        SolveError.__init__(self, said)
+        self.said, self.state, self.history, self.taken, self.moves = said, state, history, taken, ""
 
 
 def ready(system: System, scheme: Scheme, tolerance: float = TOLERANCE) -> Ready:
@@ -137,6 +145,8 @@ def march(
     ------
     ConvergenceError
         If the iterations of a step do not: with its time, the body that moves most, and all that came before.
+    LeftLineError
+        If a pin slides beyond the line of its slot.
     """
     from kedfem.dynamics.system.reference import handed
 
@@ -159,11 +169,16 @@ def march(
         done += int(taken)
         if done < T:
             last, before = float(motion.t[done]), History(*(x[:done] for x in history))
+            if worst <= LEFT:
+                line = int(of.ends.line[LEFT - worst])
+                raise LeftLineError(left_line(of.system, line, last), state, before, done)
             if between is None or not halvings:
                 moves = of.system.names[worst] if worst >= 0 else ""
                 raise ConvergenceError(last, state, before, done, moves)
             try:
                 state, parts = _in_parts(of, state, last, between, halvings, worst == MET)
+            except LeftLineError as failed:
+                raise LeftLineError(failed.said, state, before, done) from None
             except ConvergenceError as failed:
                 raise ConvergenceError(last, state, before, done, failed.moves) from None
             for row, found in zip(history, parts, strict=True):

@@ -47,6 +47,8 @@ from kedfem.dynamics.system.rigid_frame_kernel import (
 from kedfem.dynamics.system.stress_kernel import combined, stressed_begin, stressed_end, stressed_side
 
 MET = -2  # instead of a body: a stop was met, and the step is to be divided
+LEFT = -3  # the same, and less by the number of a line that its pin leaves
+SLACK = 1e-6  # of a line: a pin so far off its ends is on it
 PASSES = 40  # in a step, of which it takes 2 to 6
 PATIENCE, EASIER = 14, 100.0  # after so many a larger change is taken, and counted
 STALLED = 4  # passes in which changes do not halve: they may be rounding
@@ -55,7 +57,7 @@ ROUNDING = 1e-8  # of a stiffened deflection: changes below are rounding then
 
 @compiled
 def marched(c, bodies, ends, of, driving, state, trial, work, history, solved):  # type: ignore[no-untyped-def]
-    """Take T steps in place; how many were taken, and the body that moved most in one that did not converge, or MET.
+    """Take T steps in place; how many were taken, and the body that moved most in one that did not converge, MET or LEFT.
 
     Parameters
     ----------
@@ -68,6 +70,9 @@ def marched(c, bodies, ends, of, driving, state, trial, work, history, solved): 
             return t, worst
         if meets(of, state, trial):
             return t, MET
+        line = left(ends, of)
+        if line >= 0:
+            return t, LEFT - line
         finish(c, bodies, ends, of, driving, t, state, trial, work, history)
     return len(driving.t), -1
 
@@ -83,6 +88,19 @@ def meets(of, state, trial):  # type: ignore[no-untyped-def]
             if lower <= e0 <= upper and not lower <= e1 <= upper:
                 return True
     return False
+
+
+@inner
+def left(ends, of):  # type: ignore[no-untyped-def]
+    """The first line whose pin is beyond its ends, −1 without any."""
+    if of is None:
+        return -1
+    for n in range(len(ends.line)):
+        first, last = ends.knots[ends.line_at[n]], ends.knots[ends.line_at[n + 1] - 1]
+        slack = SLACK * (last - first)
+        if ends.free[n] and not first - slack <= ends.pin[n] <= last + slack:
+            return n
+    return -1
 
 
 @inlined

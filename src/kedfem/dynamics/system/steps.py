@@ -72,15 +72,20 @@ def scene_system(scene: Scene, model: Model, stresses: Stiffening | None = None)
 
 def _lines(model: Model) -> dict[str, Stations]:
     """Stations of all slots on the links that carry them."""
-    out = {}
+    out, keys = {}, link_keys(model)
     for row in model.rows:
         side = row.sides[1]
         if side is not None and side.stations is not None:
-            k = model.bodies.index(side.body)
-            weights = np.zeros((len(side.points), model.links[k].n))
-            own_points = [name == row.name for name in model.joints[k].joints]
-            weights[:, model.joints[k].nodes] = model.joints[k].weights[own_points]
-            out[row.name] = replace(side.stations, weights=weights)
+            found: dict[int, tuple[str, np.ndarray]] = {}
+            for key, link, joint, body in zip(keys, model.links, model.joints, model.bodies, strict=True):
+                for port, name in enumerate(joint.joints) if body == side.body else ():
+                    if name == row.name:
+                        weights = np.zeros(link.n)
+                        weights[joint.nodes] = joint.weights[port]
+                        away = np.linalg.norm(side.points - joint.points[port], axis=1)
+                        found[int(away.argmin())] = key, weights
+            on, every = zip(*(found[k] for k in range(len(side.points))), strict=True)
+            out[row.name] = replace(side.stations, weights=every, keys=on)
     return out
 
 

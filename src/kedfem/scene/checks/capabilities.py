@@ -61,14 +61,15 @@ class Refusal:
         return Fault((*(where if self.where.startswith("{where}") else ()), *keys), text)
 
 
-SLOTS = Refusal("joints", {"joint": ("slot",), "frames": ("co-rotational",)}, "{where}.kind",
-    'be another than slot with frames = "co-rotational"', "the pin of a slot slides as the rigid-body motion shows",
-    "a slot", 'take frames = "rigid-body", or a slide with a hinge')  # fmt: skip
+UNLIKE = Refusal("joints", {"joint": ("slot",), "bushing": ("unlike across the line",), "drive": ("none",)},
+    "{where}.bushing", "be alike in all directions across the line of a slot in space that no drive moves",
+    "its stations do not show how the line turns about itself", "one that is not",
+    "give it one stiffness and one damping, or take a drive")  # fmt: skip
 SLIDERS = Refusal("model", {"enforced": (CONSTRAINED,), "link": ("slider",)}, "{where}.links",
     "join links with a shape by a {kind} joint that moves with both", "it is a point mass on another link",
     "{name!r}, a rigid slider", "give it a shape")  # fmt: skip
 REFUSALS = (
-    SLOTS,
+    UNLIKE,
     SLIDERS,
     Refusal("joints", {"enforced": (CONSTRAINED,), "rho_inf": ("1",)}, "analysis.rho_inf",
         "be less than 1 with {where}", "its force would swing from step to step, and grow", "1", "take 0.95"),

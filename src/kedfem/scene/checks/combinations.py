@@ -9,6 +9,7 @@ from kedfem.scene.checks.capabilities import CONSTRAINED, MIXED, SHARED, Facts, 
 from kedfem.scene.checks.parts import Entry, Parts, category, link_names
 from kedfem.scene.questions.modelling import default_frames, enforced_by_equations
 from kedfem.scene.questions.planes import spatial_beams
+from kedfem.scene.records.joints import Bushing
 from kedfem.scene.records.wording import NOUNS, shown
 
 Told = tuple[str, Facts, Where, Mapping[str, str]]
@@ -50,8 +51,11 @@ def common_facts(parts: Parts) -> dict[str, str]:
 def joints(parts: Parts) -> Iterator[Told]:
     """Good joints: how each is enforced, and what it joins."""
     moving = {name for name in parts.good.joints if enforced_by_equations(parts.good, name)}
-    mixed = any(category(link) == "plane" for link in parts.links.values())
-    spatial = spatial_beams(parts.good) if mixed else frozenset[str]()  # asked for beside plane links only
+    asked = any(category(link) == "plane" for link in parts.links.values())
+    asked = asked or any(
+        joint.word("kind") == "slot" and joint.has("bushing") for joint in parts.joints.values()
+    )
+    spatial = spatial_beams(parts.good) if asked else frozenset[str]()
     for joint in parts.joints.values():
         kind, held = str(joint.word("kind")), [parts.links[x] for x in link_names(joint) if x in parts.links]
         facts = {"joint": kind, "partners": partners(held, spatial)}
@@ -66,7 +70,17 @@ def joints(parts: Parts) -> Iterator[Told]:
             words |= {"key": "bushing", "noun": "one"}
             turns = joint.record.bushing.rotational_stiffness is not None
             facts["bushing"] = "against rotations" if turns else "given"
+            if kind == "slot" and not turns and unlike_across(joint.record.bushing):
+                planar = all(
+                    category(x) == "plane" or (category(x) == "beam" and x.name not in spatial) for x in held
+                )
+                facts["bushing"] = "given" if planar else "unlike across the line"
         yield "joints", facts, joint.where, words
+
+
+def unlike_across(bushing: Bushing) -> bool:
+    """Whether a bushing gives way across its axis in one direction more than in another."""
+    return any(each is not None and each[0] != each[1] for each in (bushing.stiffness, bushing.damping))
 
 
 def partners(held: list[Entry], spatial: frozenset[str]) -> str:

@@ -1,6 +1,6 @@
 """Rotation vectors of one end against another, and of the tilt of an axis: moments by their components, of many times.
 
-As `rotations_kernel` has them. arccos(c) / √(1 − c²), which is t / sin t at c = cos t, is a power series of (1 − c)/2
+As `measures_kernel` has them. arccos(c) / √(1 − c²), which is t / sin t at c = cos t, is a power series of (1 − c)/2
 near c = 1.
 """
 

@@ -12,8 +12,9 @@ from kedfem.arrays import Float
 from kedfem.dynamics.history import Block, Multipliers
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
 from kedfem.dynamics.system.ends import corners, end_of, same_end
+from kedfem.dynamics.system.forces.lines import OffLine, off_line
 from kedfem.dynamics.system.forces.poses import Vectors, point_forces, poses, turning
-from kedfem.dynamics.system.record import DISTANCE, GAP, Constraint, End, Term
+from kedfem.dynamics.system.record import DISTANCE, GAP, OFFSET, Constraint, End, Term
 from kedfem.motion.constraints import cross
 from kedfem.motion.rigid import RigidMotion
 
@@ -45,6 +46,10 @@ class Supports:
     def exerted(self, each: Constraint, term: Term) -> list[tuple[End, Vectors, Vectors, Vectors]]:
         """Both ends of a term with their places, and force and moment there of a unit multiplier."""
         ends = [self.of.system.ends[n] for n in (term.i, term.j)]
+        if term.kind == OFFSET:
+            of, (x, Q) = self._off_line(each, term), poses(ends[0], self.motion, self.z(each))
+            moment = cross(Q @ (term.a - ends[0].origin), of.force)
+            return [(ends[0], x, of.force, moment), (ends[1], of.c, -of.force, cross(of.tangent, of.slope))]
         (x_i, Q_i), (x_j, Q_j) = (poses(end, self.motion, self.z(each)) for end in ends)
         if term.kind in (GAP, DISTANCE):
             a_i, a_j = Q_i @ (term.a - ends[0].origin), Q_j @ (term.a_j - ends[1].origin)
@@ -55,6 +60,19 @@ class Supports:
             return [(ends[0], x_i, n, cross(a_i, n)), (ends[1], x_j, -n, cross(n, reach))]
         turn = turning(term, Q_i, Q_j)
         return [(ends[0], x_i, 0 * x_i, turn), (ends[1], x_j, 0 * x_j, -turn)]
+
+    def _off_line(self, each: Constraint, term: Term) -> OffLine:
+        """A pin beside its line, which a term is about."""
+        end = self.of.system.ends[term.j]
+        return off_line(term.b, self.point(each, term.i, term.a), end, self.motion, self.of.z)
+
+    def _shared(
+        self, each: Constraint, term: Term, end: End, force: Vectors, moment: Vectors
+    ) -> Float[np.ndarray, "T p d"]:
+        """Forces at an end's interface points that do what a term's force and moment on it do."""
+        if term.kind == OFFSET and end.line is not None:
+            return self._off_line(each, term).at_stations(end.line.stations)[:, :, : end.onto.shape[1]]
+        return point_forces(end, self.motion, self.z(each), force, moment)
 
     def point(self, each: Constraint, n: int, at: Float[np.ndarray, "3"]) -> Vectors:
         """Where a point of the body of end n, in the reference position, is as a constraint sees it."""
@@ -89,7 +107,7 @@ class Supports:
                 for other, _, f, t in self.exerted(each, term):
                     if same_end(other, end):
                         m = term.factor * self.of.multiplier[:, n, None, None]
-                        y += m * point_forces(end, self.motion, self.z(each), f, t)
+                        y += m * self._shared(each, term, end, f, t)
         return y
 
 

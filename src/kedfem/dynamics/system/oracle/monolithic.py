@@ -25,13 +25,10 @@ from kedfem.dynamics.loads import applied
 from kedfem.dynamics.matrices.substructure import mass_matrix
 from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.stepping.scheme import Scheme
-from kedfem.dynamics.system.oracle.monolithic_places import force, placed, turned_load, valued
+from kedfem.dynamics.system.oracle.monolithic_lines import measured
+from kedfem.dynamics.system.oracle.monolithic_places import force, turned_load
 from kedfem.dynamics.system.oracle.monolithic_tangent import Inverse, inverse, tangent
-from kedfem.dynamics.system.record import (
-    Driven,
-    Held,
-    System,
-)
+from kedfem.dynamics.system.record import Driven, Held, System
 from kedfem.errors import SolveError
 from kedfem.links.record import Matrix
 from kedfem.motion.rigid import RigidMotion
@@ -253,8 +250,7 @@ class Monolithic:
                 continue
             for term in each.terms:
                 where = np.zeros(self.k) if each.linear else z
-                poses = [placed(self.system.ends[x], R, p, where) for x in (term.i, term.j)]
-                value, row, turned[place] = valued(self.system, term, poses, turned[place])
+                value, row, turned[place] = measured(self.system, term, (R, p, where), turned[place])
                 e[n] += term.factor * value
                 C[n] += term.factor * row
                 place += 1

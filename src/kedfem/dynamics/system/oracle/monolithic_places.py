@@ -152,6 +152,14 @@ def placed(end: End, R: Any, p: Any, z: Column) -> Pose:
     return Pose(x, Q, by_x, Q @ np.linalg.solve(np.trace(U) * np.eye(3) - (U + U.T) / 2, axial))
 
 
+def point(
+    pose: Pose, end: End, a: Float[np.ndarray, "3"]
+) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 k"]]:
+    """Where a point of an end is, and how this changes with z."""
+    arm = pose.Q @ (a - end.origin)
+    return pose.x + arm, pose.by_x + np.cross(pose.by_Q, arm, axisa=0, axisb=0, axisc=0)
+
+
 def valued(system: System, term: Term, poses: list[Pose], near: float) -> tuple[float, Column, float]:
     """A term's value, its gradient by z, and an angle to be near the next time."""
     one, other = poses

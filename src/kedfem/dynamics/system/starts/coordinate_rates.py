@@ -8,12 +8,12 @@ with B = Q₀ᵀ A and Q = Q₀ exp [w t + b t²/2]×, the skew parts of exp(−
 Constraints that are linear in z are derivatives by z: taken by a complex step, exact to rounding.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from kedfem.arrays import Complex, Float
+from kedfem.arrays import Float
 from kedfem.dynamics.system.forces.rotations import arc
 from kedfem.dynamics.system.record import (
     ANGLE,
@@ -21,6 +21,7 @@ from kedfem.dynamics.system.record import (
     FACE,
     GAP,
     LINE,
+    OFFSET,
     PLANAR,
     PLANAR_BEAM,
     POINT,
@@ -34,11 +35,12 @@ from kedfem.dynamics.system.record import (
     System,
     Term,
 )
+from kedfem.dynamics.system.starts.offsets import offset
+from kedfem.dynamics.system.starts.series import Series, inverse, product, root
 from kedfem.motion.newton import cross_matrix, rotation
 from kedfem.motion.rigid import RigidMotion
 
 STEP = 1e-150  # of complex steps: its square is nothing
-Series = Float[np.ndarray, "3 *_"] | Complex[np.ndarray, "3 *_"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +99,15 @@ def angles(system: System, at: Places, z: Float[np.ndarray, " k"]) -> Float[np.n
     return np.array([angle(each, term) for each in system.constraints for term in each.terms])
 
 
+def pins(system: System, at: Places, z: Float[np.ndarray, " k"]) -> dict[int, float]:
+    """Places of pins on lines as they are, by the numbers of the lines' ends [m]."""
+    poses, out = _Poses(system, at, np.stack([z, 0 * z, 0 * z])), dict[int, float]()
+    for term in (term for each in system.constraints for term in each.terms if term.kind == OFFSET):
+        found = offset(term, _point(system, term, poses), system.ends[term.j], at, poses.z)
+        out[term.j] = found[1]
+    return out
+
+
 def moved_by(system: System, terms: Sequence[Term]) -> set[int]:
     """Interface unknowns that move the ends of terms."""
     ends = (system.ends[n] for n in {n for term in terms for n in (term.i, term.j)})
@@ -125,9 +136,21 @@ class _Poses:
         return self._found[n]
 
 
-def _summed(system: System, each: Constraint, poses: Callable[[int], tuple[Series, Series]]) -> Series:
-    found = (term.factor * value(system, term, poses(term.i), poses(term.j)) for term in each.terms)
+def _summed(system: System, each: Constraint, poses: _Poses) -> Series:
+    found = (term.factor * _of_term(system, term, poses) for term in each.terms)
     return np.asarray(sum(found))
+
+
+def _of_term(system: System, term: Term, poses: _Poses) -> Series:
+    if term.kind != OFFSET:
+        return value(system, term, poses(term.i), poses(term.j))
+    return offset(term, _point(system, term, poses), system.ends[term.j], poses.at, poses.z)[0]
+
+
+def _point(system: System, term: Term, poses: _Poses) -> Series:
+    """The point of end i that a term is about, as a series."""
+    x, Q = poses(term.i)
+    return np.asarray(x + Q @ (term.a - system.ends[term.i].origin))
 
 
 def pose(end: End, at: Places, z: Series) -> tuple[Series, Series]:
@@ -259,23 +282,3 @@ def _angle(c: Series, s: Series) -> Series:
     p1, q1 = (c[0] * c[1] + s[0] * s[1]) / size, (c[0] * s[1] - s[0] * c[1]) / size
     q2 = (c[0] * s[2] - s[0] * c[2]) / size
     return np.array([turned, q1, q2 - 2 * p1 * q1])
-
-
-def product(of: Callable[..., np.ndarray], a: Series, b: Series) -> Series:
-    """A product of two series, linear in both."""
-    return np.stack([of(a[0], b[0]), of(a[1], b[0]) + of(a[0], b[1]),
-                     of(a[2], b[0]) + 2 * of(a[1], b[1]) + of(a[0], b[2])])  # fmt: skip
-
-
-def root(x: Series) -> Series:
-    """Square root of a series (3,); of a distance of none nothing, as it has no direction in the steps either."""
-    r = np.sqrt(x[0])
-    if r == 0:
-        return np.zeros(3)
-    first = x[1] / (2 * r)
-    return np.array([r, first, (x[2] / 2 - first**2) / r])
-
-
-def inverse(x: Series) -> Series:
-    """1/x of a series (3,)."""
-    return np.array([1 / x[0], -x[1] / x[0] ** 2, 2 * x[1] ** 2 / x[0] ** 3 - x[2] / x[0] ** 2])

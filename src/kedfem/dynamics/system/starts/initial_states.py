@@ -57,6 +57,7 @@ def begun(
     """
     of = now.of
     z, none = now.interface(u), np.zeros(of.system.unknowns)
+    now.check_lines(z)
     C = now.gradients(z)
     hard = now.hard(C)
     closing = _closing(now, C[hard], now.coordinates(np.stack([z, now.interface(v), none]))[1, hard])

@@ -12,6 +12,7 @@ from kedfem.arrays import Bool, Float, Int
 from kedfem.dynamics.joints.attachments import interface_matrix
 from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.matrices.substructure import factored
+from kedfem.dynamics.system.ends import left_line, line_of
 from kedfem.dynamics.system.forces.turning_loads import turned as turned_load
 from kedfem.dynamics.system.forces.turning_loads import turning
 from kedfem.dynamics.system.march import Ready, driving
@@ -29,9 +30,10 @@ from kedfem.dynamics.system.record import (
     law_at,
 )
 from kedfem.dynamics.system.sparse import SparsePart, softening
-from kedfem.dynamics.system.starts.coordinate_rates import angles, coordinates, places, travels
+from kedfem.dynamics.system.starts.coordinate_rates import angles, coordinates, pins, places, travels
 from kedfem.dynamics.system.starts.internal_forces import Inside, Still, inside, own, rows
 from kedfem.dynamics.system.starts.linear_equations import HeldBody, mass_body, sparse_body
+from kedfem.errors import SolveError
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.rigid import RigidMotion
 
@@ -147,6 +149,19 @@ class Instant:
                 out[n] += 0.0 if each.linear or term.kind != ANGLE else term.factor * more[place]
                 place += 1
         return out
+
+    def check_lines(self, z: Flat) -> None:
+        """Whether all pins are on their lines.
+
+        Raises
+        ------
+        SolveError
+            If one has slid off.
+        """
+        system = self.of.system
+        for end, s in pins(system, self.at, z).items():
+            if not line_of(system.ends[end]).stations.reach(s):
+                raise SolveError(left_line(system, end, self.time))
 
     def gradients(self, z: Flat) -> sp.csr_array:
         """Of all coordinates by z."""

@@ -1,0 +1,77 @@
+"""Pins of slots on lines of links that bend and turn: where they are, and what a unit multiplier exerts there.
+
+As `measures_kernel` has it, over time.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kedfem.arrays import Float
+from kedfem.dynamics.system.ends import line_of
+from kedfem.dynamics.system.record import End
+from kedfem.links.stations import Stations
+from kedfem.motion.rigid import RigidMotion
+
+FEET = 30  # Newton's steps to a place, of which it takes 2 to 4
+CLOSE = 1e-14  # of the line: a change of a place is rounding
+TURNED = 1e-24  # (2 − the angle from half a turn)²: the direction across a line turned back is any
+Vectors = Float[np.ndarray, "T 3"]
+
+
+@dataclass(frozen=True, slots=True)
+class OffLine:
+    """A pin x beside its line, over time.
+
+    s : (T,) its place [m]; c, tangent : (T, 3) of the line there
+    force : (T, 3) on the pin, its negative on the line; slope : (T, 3) what the line's slopes bear [m]
+    """
+
+    s: Float[np.ndarray, " T"]
+    c: Vectors
+    tangent: Vectors
+    force: Vectors
+    slope: Vectors
+
+    def at_stations(self, along: Stations) -> Float[np.ndarray, "T p 3"]:
+        """Forces at the stations of the line."""
+        N, N1 = along.at(self.s)[:, :, None], along.at(self.s, 1)[:, :, None]
+        return np.asarray(N1 * self.slope[:, None] - N * self.force[:, None])
+
+
+def off_line(
+    b: Float[np.ndarray, "3"], x: Vectors, end: End, motion: RigidMotion, z: Float[np.ndarray, "T k"]
+) -> OffLine:
+    """What a unit force along b, across the line of an end in the reference position, does to a pin at x and the line."""
+    line, d, R = line_of(end), end.onto.shape[1], motion.R[:, end.body]
+    X = motion.p[:, None, end.body] + line.stations.points @ R.transpose(0, 2, 1)
+    X[:, :, :d] += np.einsum("pdc,tc->tpd", end.onto, z[:, end.columns])
+    s = feet(line.stations, X, x)
+    c, t, bend = (np.einsum("tp,tpm->tm", line.stations.at(s, k), X) for k in range(3))
+    size, away, beside = _dot(t, t), x - c, R @ b
+    h = R @ line.axis + t / np.sqrt(size)
+    twice = _dot(h, h)
+    share = np.where(twice > TURNED, 1 / np.maximum(twice, TURNED), 0.0)
+    on_b, on_d = _dot(h, beside), _dot(h, away)
+    g = (4 * on_b * on_d * share * h - 2 * (beside * on_d + away * on_b)) * share
+    q = (g - _dot(g, t) / size * t) / np.sqrt(size)
+    kappa = _dot(q, bend) / (size - _dot(bend, away))
+    return OffLine(s, c, t, beside - 2 * on_b * share * h + kappa * t, q + kappa * away)
+
+
+def feet(along: Stations, X: Float[np.ndarray, "T p 3"], x: Vectors) -> Float[np.ndarray, " T"]:
+    """Places on lines through stations X at which points x stand square to them, from their nearest stations on [m]."""
+    s = along.s[np.linalg.norm(X - x[:, None], axis=2).argmin(axis=1)]
+    for _ in range(FEET):
+        c, tangent, bend = (np.einsum("tp,tpm->tm", along.at(s, k), X) for k in range(3))
+        size = _dot(tangent, tangent)[:, 0]
+        steep = size - _dot(bend, x - c)[:, 0]
+        change = _dot(tangent, x - c)[:, 0] / np.where(steep > 0, steep, size)
+        s = s + change
+        if (np.abs(change) <= CLOSE * np.ptp(along.s)).all():
+            break
+    return np.asarray(s)
+
+
+def _dot(a: Vectors, b: Vectors) -> Float[np.ndarray, "T 1"]:
+    return np.asarray((a * b).sum(axis=1)[:, None])
