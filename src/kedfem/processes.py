@@ -26,8 +26,8 @@ POLL = 0.5  # seconds between two looks for the parent
 AGAIN = 0.05  # seconds until an interruption that was dropped is raised again
 LATE = 75  # the exit status of a worker that was ended by `at_most`
 BLAS_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-UNUSED = ("numpy.f2py", "numpy.testing", "meshio._cli")
-"""By kedfem: scipy loads all that numpy has, meshio its own commands; together a twelfth of a short run."""
+UNUSED = ("numpy.f2py", "numpy.testing", "meshio._cli", "yaml")
+"""By kedfem: scipy loads all that numpy has, meshio its own commands, numba what reads settings that few have."""
 _asked: list[int] = []  # the signals that have interrupted this process
 
 

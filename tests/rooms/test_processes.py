@@ -34,7 +34,7 @@ QUICK = """
 import sys
 from kedfem.processes import UNUSED, import_quickly
 import_quickly()
-import kedfem.analysis, meshio
+import kedfem.analysis, meshio, numba
 print([type(sys.modules[name]).__name__ for name in UNUSED])
 from numpy.testing import assert_allclose
 assert_allclose(1.0, 1.0)

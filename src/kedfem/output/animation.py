@@ -5,9 +5,9 @@ import re
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from html import escape
 from itertools import count
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
 from kedfem.errors import OutputError
 from kedfem.folders import PART
@@ -144,6 +144,6 @@ def _rows(entries: Sequence[Entry]) -> bytes:
     rows, last, part = [], None, 0
     for time, name, file in entries:
         part, last = (part + 1 if time == last else 0), time
-        at = f'timestep="{time!r}" part="{part}" name={quoteattr(name)} file={quoteattr(file)}'
+        at = f'timestep="{time!r}" part="{part}" name="{escape(name)}" file="{escape(file)}"'
         rows.append(f"    <DataSet {at}/>\n")
     return "".join(rows).encode()

@@ -1,9 +1,9 @@
 """VTU files: meshes, links with values, frames of an animation."""
 
 from collections.abc import Mapping, Sequence
+from html import escape
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -127,11 +127,11 @@ def _field_data(now: Mapping[str, float], fields: Sequence[Block], first: int) -
         for number, field in enumerate(fields, start=first)
     )
     moments = "".join(
-        f'<DataArray type="Float64" Name={quoteattr(name)} NumberOfTuples="1" format="ascii">{x!r}</DataArray>'
+        f'<DataArray type="Float64" Name="{escape(name)}" NumberOfTuples="1" format="ascii">{x!r}</DataArray>'
         for name, x in now.items()
     )
     return moments + numbers
 
 
 def _number(name: str, number: int) -> str:
-    return f'<DataArray type="Int32" Name={quoteattr(name)} NumberOfTuples="1" format="ascii">{number}</DataArray>'
+    return f'<DataArray type="Int32" Name="{escape(name)}" NumberOfTuples="1" format="ascii">{number}</DataArray>'

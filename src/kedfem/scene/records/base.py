@@ -36,7 +36,9 @@ class Record(BaseModel):
     exactly_one: ClassVar[tuple[tuple[str, ...], str]] = ((), "")
     at_least_one: ClassVar[tuple[tuple[str, ...], str]] = ((), "")
     only_with: ClassVar[tuple[tuple[str, str], ...]] = ()
-    model_config = ConfigDict(frozen=True, extra="forbid", validate_by_name=True, validate_by_alias=True)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", validate_by_name=True, validate_by_alias=True, defer_build=True
+    )
 
     @model_validator(mode="after")
     def _goes_together(self) -> Self:
