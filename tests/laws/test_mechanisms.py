@@ -145,6 +145,14 @@ def test_a_hinge_in_a_bushing_turns_alike_when_all_of_it_is_turned() -> None:
     assert max(found.values()) < 0.1
 
 
+@pytest.mark.parametrize("seed", [2010, 2035])
+def test_a_slot_in_a_link_of_few_elements_is_the_same_when_all_of_it_is_turned(seed: int) -> None:
+    """Stations as far apart as elements are long, and at cuts: rounding chose how many, and on which segment."""
+    what, found = tried("turned", seed, "co-rotational")
+    assert what == "fine", found
+    assert max(found.values()) < 0.1
+
+
 def test_what_a_drive_leaves_free_begins_to_move_alike_when_all_of_it_is_turned() -> None:
     """A link that slides along the line of two planes, beside a drive; once 1900 times what is allowed, as what it rests
     against at first was an axis of the world."""

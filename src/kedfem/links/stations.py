@@ -18,6 +18,9 @@ from kedfem.links.record import Link
 BESIDE = 1e-6  # of the link's size: nodes so far off a line are on it
 SPARE = 2  # stations beyond the travel of the slider, where the link has them
 FEWEST, MOST = 4, 48
+SAME = (
+    1e-6  # relative: what rounding must not decide, as of elements as long as stations are apart, or at a cut
+)
 KNOWN = 1e-3  # of the ball: a spread below cannot determine a gradient
 Directed = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]
 """Origin and axis of a line."""
@@ -175,14 +178,14 @@ def _in_balls(
     _check_travel(where, links[0].name, reach, travel, BESIDE * max(link.size for link in links))
     apart = max(width, float(np.concatenate(longs).mean()))
     low, high = reach if whole else (max(reach[0], travel[0] - apart), min(reach[1], travel[1] + apart))
-    count = int(np.clip(np.ceil((high - low) / apart) + 1, FEWEST, MOST))
+    count = int(np.clip(np.ceil((high - low) / apart - SAME) + 1, FEWEST, MOST))
     s = np.linspace(low, high, count)
     points = origin + np.outer(s, axis)
     radius = max(apart, float(s[1] - s[0]))
     keys, weights = [], []
     for point in points:
-        shares = {key: _share(each, point, radius) for key, each in on.items()}
-        keys.append(max(shares, key=lambda key: float(shares[key].sum())))
+        shares = {key: float(_share(each, point, radius).sum()) for key, each in on.items()}
+        keys.append(next(key for key, share in shares.items() if share >= (1 - SAME) * max(shares.values())))
         weights.append(_mean_at(on[keys[-1]], parts[keys[-1]], point, radius))
     gaps = [point for point, each in zip(points, weights, strict=True) if not each.any()]
     if gaps:
