@@ -137,7 +137,8 @@ def test_bad_files_are_refused_as_by_mesh(
     before = list(Path().iterdir())
     said = run_kedfem("new", "--from", tmp_path / name)
     assert said.code == USER_ERROR
-    assert said.err.splitlines()[-1:] == run_kedfem("mesh", tmp_path / name).err.splitlines()[-1:]  # less progress
+    of_mesh = run_kedfem("mesh", tmp_path / name).err
+    assert said.err == of_mesh[of_mesh.index("error: ") :]  # without its progress
     assert f"error: {name}: must " in said.err
     assert list(Path().iterdir()) == before
 
