@@ -56,6 +56,28 @@ def test_what_the_scene_states_stays() -> None:
     assert "the scene states all meshes; the run reports their error" in plan.notes
 
 
+def test_a_plan_that_was_kept_leaves_title_fatigue_and_output_as_the_scene_has_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They are none of what it depends on: runs again with `csv = true`, or other material data, had the first's."""
+    monkeypatch.setenv("KEDFEM_CACHE", str(tmp_path / "cache"))
+    raw = arm(model="beam")
+    first = planned(scene_from(raw, tmp_path / "here"))
+    monkeypatch.setattr("kedfem.accuracy.plan._planned", lambda *_: pytest.fail("it is kept"))
+    materials = {"steel": {"group": "steel", "tensile_strength": "500 MPa"}}
+    more = {
+        "title": "again",
+        "output": {"csv": True, "animation": False},
+        "fatigue": {"materials": materials},
+    }
+    again = planned(scene_from(raw | more, tmp_path / "there"))
+    assert again.scene.links == first.scene.links
+    assert again.scene.analysis == first.scene.analysis
+    assert (again.scene.title, again.scene.output.csv, again.scene.output.animation) == ("again", True, None)
+    assert again.scene.fatigue is not None
+    assert again.scene.folder == tmp_path / "there"
+
+
 def test_links_whose_steps_in_full_would_be_dear_are_reduced_unless_they_or_the_step_are_stated(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -33,7 +33,7 @@ from kedfem.accuracy.meshes import (
     with_segments,
     with_simpler_links,
 )
-from kedfem.accuracy.prepared import Prepared, key
+from kedfem.accuracy.prepared import Prepared, key, with_models
 from kedfem.accuracy.reduction import Reduction, prepared
 from kedfem.accuracy.trials import Stage, Trials
 from kedfem.accuracy.variants import families, of_family, with_analysis, with_links
@@ -140,7 +140,7 @@ def planned(scene: Scene, stage: Stage = lambda name: None) -> Plan:
     plan: Plan = kept(
         "plan", key(scene), partial(_planned, search, scene), lambda plan: replace(plan, links={}), itself
     )
-    return plan
+    return replace(plan, scene=with_models(scene, plan.scene))  # kept ones are of a scene with other outputs
 
 
 def _planned(search: Trials, scene: Scene) -> Plan:

@@ -39,6 +39,8 @@ from kedfem.scene import (
 )
 from kedfem.store import contents
 
+BESIDE = ("title", "fatigue", "output")
+"""Sections of a scene on which no plan and no reduced model depends, probes of the output apart."""
 INSTANTS = 16  # where the linkage is examined before the first run
 MOMENTS = 16  # of a run where its residual is taken
 
@@ -77,10 +79,16 @@ def moving(scene: Scene) -> tuple[Linkage, Path]:
     return joined, path(joined, *drive_range(scene))
 
 
+def with_models(scene: Scene, of: Scene) -> Scene:
+    """A scene with all of another of the same `key`, but for its own title, fatigue and output, and its folder."""
+    every = {name: getattr(of, name) for name in Scene.model_fields if name not in BESIDE}
+    return scene.model_copy(update=every)
+
+
 def key(scene: Scene) -> str:
     """A digest of everything in a scene that a plan or a reduced model depends on, the contents of its files too."""
-    described = scene.model_dump(mode="json", exclude={"title", "fatigue"})
-    described["output"] = described["output"]["probes"]
+    described = scene.model_dump(mode="json", exclude={*BESIDE})
+    described["probes"] = scene.output.model_dump(mode="json")["probes"]
     digest = sha256(json.dumps(described).encode())
     shapes = (link.shape for link in scene.links.values())
     digest.update(contents(scene.folder / x.file for x in shapes if isinstance(x, Cad | MeshFile | Part)))
