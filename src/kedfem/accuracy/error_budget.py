@@ -169,7 +169,7 @@ REMEDIES = {
     "mesh": "take finer elements; where mesh and element are left out, analysis.accuracy chooses them, up to "
     f"{UNKNOWNS:,} unknowns in all",
     "step": "take a shorter step, or leave it out so that analysis.accuracy chooses it; a sudden start or load that "
-    "excites vibration beyond any step needs a smoother one, or damping",
+    'excites vibration beyond any step needs initial = "quasi-static", a smoother one, or damping',
     "positions": "take more of them, analysis.steps_per_revolution (or step), and let loads come and go over several",
     "reduction": "a smaller analysis.reduction_tolerance, or links that are not reduced",
     "frames": 'analysis.frames = "co-rotational" is right at any deflection; with it, more segments or elements',
