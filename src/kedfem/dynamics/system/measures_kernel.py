@@ -128,7 +128,7 @@ def off_line(ends, of, t, rigid_motion, place, w):  # type: ignore[no-untyped-de
 
 @inlined
 def foot(ends, n, X, w):  # type: ignore[no-untyped-def]
-    """Place on line n at which a point w[11] stands square to it, sought from its nearest station on; see `on_curve`."""
+    """Place on line n at which a point w[11] stands square to it, sought from its nearest station on; see `spline_at`."""
     first, last = ends.line_at[n], ends.line_at[n + 1]
     least, s = np.inf, 0.0
     for k in range(first, last):
@@ -137,7 +137,7 @@ def foot(ends, n, X, w):  # type: ignore[no-untyped-def]
             least, s = away, ends.knots[k]
     whole = ends.knots[last - 1] - ends.knots[first]
     for _ in range(FEET):
-        on_curve(ends, n, s, X, w)
+        spline_at(ends, n, s, X, w)
         steep = dot(w[5], w[5]) - dot(w[8], w[9])
         change = dot(w[5], w[9]) / (steep if steep > 0.0 else dot(w[5], w[5]))
         if abs(change) <= CLOSE * whole:
@@ -147,7 +147,7 @@ def foot(ends, n, X, w):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def on_curve(ends, n, s, X, w):  # type: ignore[no-untyped-def]
+def spline_at(ends, n, s, X, w):  # type: ignore[no-untyped-def]
     """w[5] and w[8] become c' and c'' of line n at s, beyond its ends those of its tangents there, w[9] the way from c to
     w[11], and ends.weights and ends.slopes N and N'."""
     first, last = ends.line_at[n], ends.line_at[n + 1]

@@ -9,7 +9,7 @@ Without a drive links accelerate as rigid bodies where they are, and K Î´ = P âˆ
 
 from collections.abc import Callable, Sequence
 from copy import copy
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -42,7 +42,8 @@ THIRD, FOURTH = np.array([[-1, 3, -3, 1, 0], [1, -4, 6, -4, 1]])  # third and fo
 Rows = Sequence[Float[np.ndarray, "_ _"]]
 
 
-class Moved(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Moved:
     """A deflection u with its rate v, (N,) world components.
 
     strained : the rate again, by differences of what rigid-body frames see, for what damps deformations: the error of v
