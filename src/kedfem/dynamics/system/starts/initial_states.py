@@ -49,7 +49,7 @@ def as_coordinates(of: Ready, given: Sequence[np.ndarray]) -> Flat:
 def begun(
     now: Instant, u: Flat, v: Flat, accelerated: Accelerated = accelerations, strained: Flat | None = None
 ) -> State:
-    """The state with given displacements, and rates that are made to keep all constraints.
+    """The state with given displacements, rates made to keep all constraints, and accelerations, [KED, eq. (20)].
 
     Parameters
     ----------
