@@ -1,6 +1,5 @@
-"""Unknowns under constraints and laws, by one factor of both: H z = f + Cᵀ m, C z + m / κ = target."""
+"""Unknowns under constraints and laws, by one sparse factor of both: H z = f + Cᵀ m, C z + m / κ = target."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,12 +9,10 @@ from scipy.sparse.linalg import splu
 
 from kedfem.arrays import Float, Int
 from kedfem.dynamics.matrices.cholesky import Cholesky
-from kedfem.dynamics.matrices.dense import as_dense
 from kedfem.errors import SolveError
 
 DEPENDENT = 1e-9  # what is left of a constraint of unit size where others constrain the same
 INDEPENDENT = 1e-10  # least eigenvalue of products of constraints of unit size: above, none repeats others
-FEW = 200  # unknowns and constraints up to which a dense factor costs less than what a sparse one does around itself
 MANY = 100  # constraints from which that is asked first: a dense decomposition takes the time of their cube
 
 Flat = Float[np.ndarray, " _"]
@@ -37,22 +34,20 @@ class Bordered:
     """
 
     def __init__(self, H: Any, C: sp.csr_array, compliance: Flat) -> None:
-        few = sum(C.shape) <= FEW
-        held = C.toarray() if few else C
-        self.kept, self.count = independent_rows(held, compliance), len(compliance)
-        rows = held[self.kept]
+        self.kept = independent_rows(C, compliance)
+        self.count = len(compliance)
+        rows = C[self.kept]
         usual = np.abs(H.diagonal()).mean() if rows.shape[1] else 1.0
         size = row_sizes(rows)
         self.scale = usual / np.where(size > 0, size, 1.0)  # so that both parts are about as large
-        rows, soft = scaled(rows, self.scale), self.scale**2 * compliance[self.kept]
-        self.matrix: Any = (
-            np.block([[H.toarray(), -rows.T], [rows, np.diag(soft)]]) if few
-            else sp.csc_array(sp.block_array([[H, -rows.T], [rows, sp.diags_array(soft)]]))
-        )  # fmt: skip
+        rows = sp.diags_array(self.scale) @ rows
+        self.matrix = sp.csc_array(
+            sp.block_array([[H, -rows.T], [rows, sp.diags_array(self.scale**2 * compliance[self.kept])]])
+        )
         if not self.matrix.shape[0]:
             return
         try:
-            self.solve = _dense_inverse(self.matrix) if few else splu(self.matrix).solve
+            self.factor = splu(self.matrix)
         except RuntimeError as error:
             raise SolveError(
                 "joints: bodies must be held by joints or springs, got some that move freely"
@@ -68,60 +63,37 @@ class Bordered:
         """
         right, m = np.concatenate([f, self.scale * target[self.kept]]), np.zeros(self.count)
         if len(right):
-            found = self.solve(right)
+            found = self.factor.solve(right)
             left = right - self.matrix @ found
             left[: len(f) if closes else 0] = 0.0
-            right = found + self.solve(left)
+            right = found + self.factor.solve(left)
         m[self.kept] = self.scale * right[len(f) :]
         return right[: len(f)], m
 
 
-def _dense_inverse(A: Float[np.ndarray, "n n"]) -> Callable[[Flat], Flat]:
-    """Solutions with a small matrix, its rows and columns scaled to one.
-
-    Raises
-    ------
-    RuntimeError
-        If it is singular.
-    """
-    rows = np.abs(A).max(axis=1)
-    columns = np.abs(A / np.where(rows > 0, rows, 1.0)[:, None]).max(axis=0)
-    if not (rows > 0).all() or not (columns > 0).all():
-        raise RuntimeError("a row or column is zero")
-    factor, order, singular = scipy.linalg.lapack.dgetrf(A / rows[:, None] / columns)
-    if singular:
-        raise RuntimeError("the matrix is exactly singular")
-    return lambda f: np.asarray(scipy.linalg.lapack.dgetrs(factor, order, f / rows)[0] / columns)
-
-
-def independent_rows(C: Any, compliance: Flat) -> Int[np.ndarray, " q"]:
-    """Numbers of laws, and of constraints that do not repeat others; C sparse or not."""
+def independent_rows(C: sp.csr_array, compliance: Flat) -> Int[np.ndarray, " q"]:
+    """Numbers of laws, and of constraints that do not repeat others."""
     size = row_sizes(C)
     hard = np.flatnonzero((compliance == 0.0) & (size > DEPENDENT))
     soft = np.flatnonzero(compliance != 0.0)
-    unit = scaled(C[hard], 1 / size[hard])
+    unit = sp.csr_array(sp.diags_array(1 / size[hard]) @ C[hard])
     if len(hard) and not _independent(unit):
-        _, upper, order = scipy.linalg.qr(as_dense(unit.T), mode="economic", pivoting=True)
+        _, upper, order = scipy.linalg.qr(unit.T.toarray(), mode="economic", pivoting=True)
         hard = hard[order[: int((np.abs(np.diag(upper)) > DEPENDENT).sum())]]
     return np.sort(np.concatenate([hard, soft]))
 
 
-def row_sizes(C: Any) -> Flat:
+def row_sizes(C: sp.csr_array) -> Flat:
     """Length of each row."""
     return np.asarray(np.sqrt((C * C).sum(axis=1)))
 
 
-def scaled(C: Any, factor: Flat) -> Any:
-    """Each row times its factor."""
-    return sp.csr_array(sp.diags_array(factor) @ C) if sp.issparse(C) else factor[:, None] * C
-
-
-def _independent(unit: Any) -> bool:
+def _independent(unit: sp.csr_array) -> bool:
     """Whether many rows of length one are surely independent, by a sparse factor of their products."""
     if unit.shape[0] < MANY:
         return False
     try:
-        Cholesky(sp.csr_array(unit @ unit.T) - INDEPENDENT * sp.eye_array(unit.shape[0]), "constraints")
+        Cholesky(sp.csr_array(unit @ unit.T - INDEPENDENT * sp.eye_array(unit.shape[0])), "constraints")
     except SolveError:
         return False
     return True
