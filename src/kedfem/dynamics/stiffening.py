@@ -20,7 +20,7 @@ from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
 from kedfem.dynamics.joints.constraint_matrices import JointRows, joint_rows
 from kedfem.dynamics.joints.ports import Rotation, port_columns
 from kedfem.dynamics.loads import Pattern
-from kedfem.dynamics.matrices.interface import solver, static_tie
+from kedfem.dynamics.matrices.interface import solved, static_tie
 from kedfem.dynamics.matrices.substructure import Substructure, factored, mass_matrix
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_elements import RigidElements, unit_loads_on, with_elements
@@ -221,7 +221,7 @@ def port_forces(
             z = np.linalg.solve(H, f[..., None])
         else:
             each = enumerate(zip(H, f, strict=True))
-            z = np.stack([solver(H_t, static_tie(rows, t))(f_t)[0] for t, (H_t, f_t) in each])[..., None]
+            z = np.stack([solved(H_t, f_t, static_tie(rows, t))[0] for t, (H_t, f_t) in each])[..., None]
         v = [x - (b @ z[:, c])[..., 0] for x, b, c in zip(v, RB, held, strict=True)]
     return [(-x @ part.S)[:, : len(part.attachment.keep)] for x, part in zip(v, parts, strict=True)]
 
