@@ -14,7 +14,6 @@ from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.start import initial_rates
 from kedfem.dynamics.system.build import system_of
-from kedfem.dynamics.system.layout import profile
 from kedfem.dynamics.system.march import Ready, displacements, march, ready
 from kedfem.dynamics.system.oracle.monolithic import Monolithic
 from kedfem.dynamics.system.oracle.monolithic_steps import begun as as_the_oracle_begins
@@ -87,11 +86,6 @@ def rows(of: Ready, x: np.ndarray) -> np.ndarray:
     """All bodies' rows, flat, over time (T, N)."""
     every = [displacements(of, k, x).reshape(len(x), -1) for k in range(len(of.system.names))]
     return np.concatenate(every, axis=1)
-
-
-def in_order(of: Ready, z: np.ndarray) -> np.ndarray:
-    """Interface unknowns and their rates (3, k) of a state, in the order of the record."""
-    return z[:, profile(of.system).number]
 
 
 def by_oracle(of: Begun, count: int, keeps: bool = False) -> tuple[np.ndarray, np.ndarray]:

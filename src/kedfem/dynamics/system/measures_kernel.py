@@ -22,10 +22,8 @@ import numpy as np
 
 from kedfem.compiled import inlined, inner
 from kedfem.dynamics.system.ends_kernel import cross, dot, times
+from kedfem.dynamics.system.record import CLOSE, FEET, TURNED
 
-FEET = 30  # Newton's steps to the place of a pin on its line, of which it takes 2 to 4
-CLOSE = 1e-14  # of the line: a change of that place is rounding
-TURNED = 1e-24  # (2 − the angle from half a turn)²: the direction across a line turned back is any
 SMALL = 1e-2  # squares of angles below which series are exact to rounding
 
 

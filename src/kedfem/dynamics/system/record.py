@@ -16,6 +16,9 @@ GAP, TURN, ANGLE, DISTANCE, ROTATION, TILT, OFFSET = range(7)
 RIGID, POINT, PLANAR_BEAM, PLANAR, FACE, SOLID, LINE = range(7)
 NOMINAL, STRESSED, COROTATIONAL, TANGENTIAL = range(4)
 RIGID_BODY = STRESSED  # frames up to it are those of the rigid-body motion
+FEET = 30  # Newton's steps to the place of a pin on its line, of which it takes 2 to 4
+CLOSE = 1e-14  # of the line: a change of that place is rounding
+TURNED = 1e-24  # (2 − the angle from half a turn)²: the direction across a line turned back is any
 
 Vector = Float[np.ndarray, "3"]
 

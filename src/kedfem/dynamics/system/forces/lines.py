@@ -9,13 +9,10 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.system.ends import line_of
-from kedfem.dynamics.system.record import End
+from kedfem.dynamics.system.record import CLOSE, FEET, TURNED, End
 from kedfem.links.stations import Stations
 from kedfem.motion.rigid import RigidMotion
 
-FEET = 30  # Newton's steps to a place, of which it takes 2 to 4
-CLOSE = 1e-14  # of the line: a change of a place is rounding
-TURNED = 1e-24  # (2 − the angle from half a turn)²: the direction across a line turned back is any
 Vectors = Float[np.ndarray, "T 3"]
 
 
@@ -43,9 +40,8 @@ def off_line(
     b: Float[np.ndarray, "3"], x: Vectors, end: End, motion: RigidMotion, z: Float[np.ndarray, "T k"]
 ) -> OffLine:
     """What a unit force along b, across the line of an end in the reference position, does to a pin at x and the line."""
-    line, d, R = line_of(end), end.onto.shape[1], motion.R[:, end.body]
-    X = motion.p[:, None, end.body] + line.stations.points @ R.transpose(0, 2, 1)
-    X[:, :, :d] += np.einsum("pdc,tc->tpd", end.onto, z[:, end.columns])
+    line, R = line_of(end), motion.R[:, end.body]
+    X = stationed(end, R, motion.p[:, end.body], z)
     s = feet(line.stations, X, x)
     c, t, bend = (np.einsum("tp,tpm->tm", line.stations.at(s, k), X) for k in range(3))
     size, away, beside = _dot(t, t), x - c, R @ b
@@ -57,6 +53,20 @@ def off_line(
     q = (g - _dot(g, t) / size * t) / np.sqrt(size)
     kappa = _dot(q, bend) / (size - _dot(bend, away))
     return OffLine(s, c, t, beside - 2 * on_b * share * h + kappa * t, q + kappa * away)
+
+
+def stationed(
+    end: End, R: Float[np.ndarray, "T 3 3"], p: Vectors, z: Float[np.ndarray, "T k"]
+) -> Float[np.ndarray, "T p 3"]:
+    """Where the stations of an end's line are, or their series in time.
+
+    Parameters
+    ----------
+    R, p : of the line's body
+    """
+    X = p[:, None] + line_of(end).stations.points @ R.transpose(0, 2, 1)
+    X[:, :, : end.onto.shape[1]] += np.einsum("pdc,tc->tpd", end.onto, z[:, end.columns])
+    return np.asarray(X)
 
 
 def feet(along: Stations, X: Float[np.ndarray, "T p 3"], x: Vectors) -> Float[np.ndarray, " T"]:

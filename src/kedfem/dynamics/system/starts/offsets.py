@@ -9,8 +9,8 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.system.ends import line_of
-from kedfem.dynamics.system.forces.lines import TURNED, feet
-from kedfem.dynamics.system.record import End, Term
+from kedfem.dynamics.system.forces.lines import feet, stationed
+from kedfem.dynamics.system.record import TURNED, End, Term
 from kedfem.dynamics.system.starts.series import Series, inverse, product, root
 
 if TYPE_CHECKING:
@@ -26,10 +26,8 @@ def offset(
     ----------
     x : the pin as a series; end : the line's
     """
-    along, d = line_of(end).stations, end.onto.shape[1]
-    R = at.R[:, end.body]
-    X = at.p[:, None, end.body] + along.points @ R.transpose(0, 2, 1)
-    X[:, :, :d] += np.einsum("pdc,tc->tpd", end.onto, z[:, end.columns])
+    along, R = line_of(end).stations, at.R[:, end.body]
+    X = stationed(end, R, at.p[:, end.body], z)
     s = np.array([feet(along, X[:1], x[:1])[0], 0.0, 0.0])
     weights = [along.at(s[:1], k)[0] for k in range(4)]
 
