@@ -212,13 +212,13 @@ def _compile_parts_once() -> None:
 
 if KNOWN:
     _compile_parts_once()
-_OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
-_FAST: dict[str, Any] = {**_OPTIONS, "fastmath": {"reassoc", "contract", "nsz"}}
+_FAST: dict[str, Any] = {
+    "cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True,
+    "fastmath": {"reassoc", "contract", "nsz"},
+}  # fmt: skip
 compiled = _kept(_FAST)
 _INNER: dict[str, Any] = {**_FAST, "no_cpython_wrapper": True, "_nrt": False}
 inner = _kept(_INNER)
 """Called by compiled loops only, and allocates nothing, so that no references are counted: compiled in less time."""
 inlined = _kept({**_INNER, "inline": "always"})
 """Called at one place: a part of its caller, as each function is optimised once more with every one that calls it."""
-compiled_in_order = _kept(_OPTIONS)
-"""Sums as written, where their order matters."""

@@ -199,12 +199,10 @@ def test_rotations_of_hinges_are_counted_at_any_time_as_in_order() -> None:
         ready, t = meshed(scene), np.linspace(0.0, 1.0, 501)
         elements = on_rigid_motion(rigid_elements(scene, ready.linkage.bodies), ready.path)
         motion = rigid_motion(ready.linkage, ready.path, t, path_parameter(scene, t))
-        in_order = elements.over(motion).forces
+        in_order = elements.over(motion)[1]
         turns = np.array([elements._turned(motion.part(k, k + 1)) for k in range(len(t))])
         assert np.abs(turns[:, 0] - motion.phi).max() < 1.0  # of the grid point next to it
         for k in (0, 170, 333, 500):
-            assert_allclose(
-                elements.over(motion.part(k, k + 1)).forces[0], in_order[k], rtol=1e-12, atol=1e-12
-            )
+            assert_allclose(elements.over(motion.part(k, k + 1))[1][0], in_order[k], rtol=1e-12, atol=1e-12)
         moment = np.array(next(m for end, _, m in elements.wrenches(motion) if end.link == "crank"))
         assert_allclose(moment[:, 2], -2.0 * motion.phi - 0.1 * speed, rtol=1e-9)

@@ -64,11 +64,11 @@ def test_a_change_in_what_a_kernel_imports_begins_a_new_folder(tmp_path: Path) -
     assert compiled.kernel_folder(root) != first
 
 
-def test_the_kinds_of_force_elements_and_the_options_of_the_compiler_are_in_it() -> None:
+def test_the_kinds_of_laws_and_the_options_of_the_compiler_are_in_it() -> None:
     from kedfem.compiled import ROOT, _imported
 
-    files = _imported(ROOT / "dynamics" / "force_elements_kernel.py", ROOT)
-    assert {ROOT / "dynamics" / "force_element.py", ROOT / "compiled.py"} <= files
+    files = _imported(ROOT / "dynamics" / "system" / "constraints_kernel.py", ROOT)
+    assert {ROOT / "dynamics" / "system" / "record.py", ROOT / "compiled.py"} <= files
 
 
 def test_all_records_that_kernels_are_given_are_in_it() -> None:
@@ -175,14 +175,14 @@ loop_kernel.twice(eval(sys.argv[1]))
     assert len(list((tmp_path / "cache").rglob("loop_kernel*.nbc"))) == 2
 
 
-PRODUCT = """
+RESIDUALS = """
 import numpy as np
 from kedfem.compiled import compiling
-from kedfem.dynamics.force_elements_kernel import dot
-told = []
+from kedfem.results.stresses.envelope_kernel import residuals_of
+told, out = [], np.zeros((5, 1, 2))
 with compiling(told.append):
-    product = dot(np.array([1.0, 2.0, 0.0]), np.array([3.0, 4.0, 5.0]))
-assert product == 11.0
+    residuals_of(np.array([[0.0], [1.0], [0.0]]), 1, out)
+assert out[0, 0, 0] == 1.0
 print("compiled" if told else "read")
 """
 
@@ -196,7 +196,7 @@ def test_a_file_of_compiled_code_with_a_flipped_bit_is_made_again_without_a_word
     }
 
     def ran() -> str:
-        command = [sys.executable, "-W", "error", "-c", PRODUCT]
+        command = [sys.executable, "-W", "error", "-c", RESIDUALS]
         done = subprocess.run(
             command, env=environment, capture_output=True, text=True, timeout=120, check=False
         )

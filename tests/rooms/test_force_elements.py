@@ -22,12 +22,13 @@ from kedfem.dynamics.force_element import (
     TURN,
     End,
     ForceElement,
-    evaluated,
-    kernel_table,
+    coordinate,
+    effort,
+    placed,
+    unit_forces,
     wrench,
 )
 from kedfem.dynamics.force_elements import force_elements, hinges
-from kedfem.dynamics.force_elements_kernel import evaluate, evaluate_all
 from kedfem.dynamics.history import Block, LinkHistory
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.system.forces.exerted import at_ends
@@ -64,22 +65,33 @@ def hinge(one: int, other: int, axis: np.ndarray, **law: Any) -> ForceElement:
     return ForceElement("h", TURN, (end(one, X[one][0]), end(other, X[other][1])), axis=axis, **law)
 
 
-def drawn(every: Sequence[ForceElement]) -> np.ndarray:
-    x = np.zeros((len(every), 2, 2, 3))
-    for i, element in enumerate(every):
-        for e in (0, 1):
-            x[i, e, : len(element.ends[e].X)] = element.ends[e].X
+def drawn(element: ForceElement) -> np.ndarray:
+    x = np.zeros((2, 2, 3))
+    for e, each in enumerate(element.ends):
+        x[e, : len(each.X)] = each.X
     return x
 
 
 def found(
     element: ForceElement, x: np.ndarray, v: np.ndarray | None = None, t: float = 0.0, before: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Forces (2, 2, 3) and values (4,) of one force element."""
-    forces, values = np.zeros((1, 2, 2, 3)), np.zeros((1, 4))
-    v = np.zeros_like(x) if v is None else v
-    evaluate(t, np.ones(1), x[None], v[None], np.array([before]), kernel_table([element]), forces, values)
-    return forces[0], values[0]
+    """Forces (2, 2, 3), where no hub is deformed, and q, q', Q of one force element."""
+    unit = unit_forces(element, x[None])[0]
+    q, rate = coordinate(element, x[None], before), np.atleast_1d(0.0 if v is None else (unit * v).sum())
+    Q = effort(element, resting(1, np.array([t])), q, rate)
+    return Q * unit, np.array([q[0], rate[0], Q[0]])
+
+
+def gradient(element: ForceElement, x: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """∂q/∂x (T, 2, 2, 3) of any state, by central differences."""
+    out, h = np.zeros_like(x), 1e-5
+    for at in np.ndindex(x.shape[1:]):
+        moved = np.zeros(x.shape[1:])
+        moved[at] = h
+        change = coordinate(element, x + moved) - coordinate(element, x - moved)
+        whole = 2 * np.pi if element.kind == TURN else np.inf
+        out[:, *at] = (change - (np.round(change / whole) * whole if np.isfinite(whole) else 0.0)) / (2 * h)
+    return out
 
 
 def turned(x: np.ndarray, element: ForceElement, turns: Sequence[np.ndarray]) -> np.ndarray:
@@ -113,14 +125,14 @@ def unit(seed: int) -> np.ndarray:
 @pytest.mark.parametrize("angle", [0.0, 1.2, -2.9, 3.1])
 def test_a_hinge_tells_its_turn(one: int, other: int, axis: np.ndarray, angle: float) -> None:
     element = hinge(one, other, axis)
-    x = turned(drawn([element])[0], element, [(angle + 0.3) * axis, 0.3 * axis])
+    x = turned(drawn(element), element, [(angle + 0.3) * axis, 0.3 * axis])
     assert found(element, x)[1][0] == pytest.approx(angle, abs=1e-12)
 
 
 @pytest.mark.parametrize(("one", "other"), FORMS + UPRIGHT)
 def test_turns_are_counted_on(one: int, other: int) -> None:
     element = hinge(one, other, Z)
-    x0, q = drawn([element])[0], 0.0
+    x0, q = drawn(element), 0.0
     for angle in [*np.arange(0, 20, 1.3), *np.arange(20, -20, -2.9)]:
         q = float(found(element, turned(x0, element, [angle * Z, 0 * Z]), before=q)[1][0])
         assert q == pytest.approx(angle, abs=1e-9)
@@ -134,25 +146,26 @@ def test_a_turn_does_not_depend_on_where_all_of_it_is_turned(
 ) -> None:
     axis = unit(seed)
     element = hinge(one, other, axis, **LAWS)
-    x = turned(drawn([element])[0], element, [angle * axis, 0 * axis])
-    x += 0.1 * np.random.default_rng(seed).normal(size=x.shape)  # hubs deform and tilt
-    f, values = found(element, x, before=angle)
+    x = turned(drawn(element), element, [angle * axis, 0 * axis])
     R = Rotation.from_rotvec(3 * whole)
+    f, values = found(element, x, before=angle)
     F, turned_values = found(element, np.array([R.apply(e) for e in x]), before=angle)
     np.testing.assert_allclose(turned_values, values, atol=1e-9)
     np.testing.assert_allclose(F, [R.apply(e) for e in f], atol=1e-9)
+    x += 0.1 * np.random.default_rng(seed).normal(size=x.shape)  # hubs deform and tilt
+    q = coordinate(element, np.array([x, [R.apply(e) for e in x]]), angle)
+    assert q[1] == pytest.approx(q[0], abs=1e-9)
 
 
 @pytest.mark.parametrize(("one", "other"), FORMS + UPRIGHT)
 @given(seed=seeds)
 @settings(max_examples=examples(20), deadline=None)
 def test_the_work_of_a_torque_is_that_of_its_turn(one: int, other: int, seed: int) -> None:
-    """Forces · δx = Q δq by central differences, from any deformed and tilted state."""
+    """Forces · δx = Q δq by central differences, along any deformation."""
     rng = np.random.default_rng(seed)
     axis = unit(seed) if ANGLE not in (one, other) else Z
     element = hinge(one, other, axis, curve=straight((0.0,), (2.5,)))
-    x = turned(drawn([element])[0], element, [rng.uniform(-2, 2) * axis, 0 * axis])
-    x += 0.1 * rng.normal(size=x.shape)
+    x = turned(drawn(element), element, [rng.uniform(-2, 2) * axis, 0 * axis])
     v = rng.normal(size=x.shape)
     f, values = found(element, x, v)
     h = 1e-5
@@ -163,20 +176,18 @@ def test_the_work_of_a_torque_is_that_of_its_turn(one: int, other: int, seed: in
 
 @pytest.mark.parametrize(("one", "other"), FORMS)
 def test_torques_on_both_ends_balance(one: int, other: int) -> None:
-    """Σ x × f over all directions is the moment; on the first end it is T n where nothing is tilted."""
+    """Σ x × f over all directions is the moment, T n on the first end."""
     axis = unit(3)
     element = hinge(one, other, axis, curve=straight((0.0,), (2.5,)))
-    x = turned(drawn([element])[0], element, [0.9 * axis, 0.2 * axis])
+    x = turned(drawn(element), element, [0.9 * axis, 0.2 * axis])
     moments = np.cross(x, found(element, x)[0]).sum(axis=1)
     np.testing.assert_allclose(moments, [2.5 * axis, -2.5 * axis], atol=1e-12)
-    x += 0.1 * np.random.default_rng(1).normal(size=x.shape)
-    np.testing.assert_allclose(np.cross(x, found(element, x)[0]).sum(axis=(0, 1)), 0, atol=1e-12)
 
 
 def test_a_planar_beam_takes_the_torque_on_its_angle() -> None:
     for axis in (Z, -Z):
         element = hinge(ANGLE, ANGLE, axis, curve=straight((0.0,), (2.5,)))
-        f, _ = found(element, turned(drawn([element])[0], element, [4 * Z, 1 * Z]))
+        f, _ = found(element, turned(drawn(element), element, [4 * Z, 1 * Z]))
         np.testing.assert_allclose(f[:, 0], [2.5 * axis, -2.5 * axis], atol=1e-12)
         assert not f[:, 1].any()
 
@@ -186,26 +197,26 @@ def test_a_planar_beam_takes_the_torque_on_its_angle() -> None:
 
 def test_a_torsion_spring_turns_back() -> None:
     element = hinge(PAIR, PAIR, Z, stiffness=3.0, damping=0.5, free=0.2)
-    x0 = drawn([element])[0]
+    x0 = drawn(element)
     x = turned(x0, element, [1.2 * Z, 0 * Z])
     v = np.zeros_like(x)
     v[0] = np.cross(2.0 * Z, x[0])
     _, values = found(element, x, v)
-    np.testing.assert_allclose(values, [1.2, 2.0, -3.0 * 1.0 - 0.5 * 2.0, 0.5 * 3.0 * 1.0**2], atol=1e-12)
+    np.testing.assert_allclose(values, [1.2, 2.0, -3.0 * 1.0 - 0.5 * 2.0], atol=1e-12)
 
 
 def test_a_spring_between_points_pulls_along_its_line() -> None:
     element = ForceElement("s", DISTANCE, (end(POINT, [0, 0, 0]), end(POINT, [3, 4, 0])), 10.0, 2.0, 4.0)
-    x, v = drawn([element])[0], np.zeros((2, 2, 3))
+    x, v = drawn(element), np.zeros((2, 2, 3))
     v[1, 0] = [1, 0, 0]  # lengthens it by 3/5
     f, values = found(element, x, v)
-    np.testing.assert_allclose(values, [5, 0.6, -10 * 1 - 2 * 0.6, 5.0])
+    np.testing.assert_allclose(values, [5, 0.6, -10 * 1 - 2 * 0.6])
     np.testing.assert_allclose(f[:, 0], 11.2 * np.array([[0.6, 0.8, 0], [-0.6, -0.8, 0]]))
 
 
 def test_a_spring_of_no_length_has_no_direction() -> None:
     element = ForceElement("s", DISTANCE, (end(POINT, [1, 0, 0]), end(POINT, [1, 0, 0])), 10.0, 2.0, 0.0)
-    f, values = found(element, drawn([element])[0])
+    f, values = found(element, drawn(element))
     assert not f.any()
     assert not values.any()
 
@@ -214,10 +225,10 @@ def test_a_slide_is_pushed_along_its_axis() -> None:
     axis = unit(5)
     element = ForceElement("m", SLIDE, (end(POINT, [1, 2, 3]), end(POINT, [1, 2, 3], -1)), axis=axis,
                     over=POSITION, curve=straight((0.0, 1.0), (0.0, 8.0)))  # fmt: skip
-    x = drawn([element])[0]
+    x = drawn(element)
     x[0, 0] += 0.25 * axis + 7 * np.array(perpendiculars(axis)[0])
     f, values = found(element, x)
-    np.testing.assert_allclose(values, [0.25, 0, 2.0, 0], atol=1e-12)
+    np.testing.assert_allclose(values, [0.25, 0, 2.0], atol=1e-12)
     np.testing.assert_allclose(f[:, 0], [2 * axis, -2 * axis], atol=1e-12)
 
 
@@ -225,7 +236,7 @@ def test_a_slide_is_pushed_along_its_axis() -> None:
 def test_a_curve_is_linear_between_its_points_and_held_outside(over: int) -> None:
     at, value = (-1.0, 0.5, 2.0), (5.0, -1.0, 3.0)
     element = hinge(PAIR, PAIR, Z, over=over, curve=straight(at, value))
-    x0 = drawn([element])[0]
+    x0 = drawn(element)
     for s in np.linspace(-2, 3, 21):
         x = turned(x0, element, [(s if over == POSITION else 0.3) * Z, 0 * Z])
         v = np.zeros_like(x)
@@ -234,25 +245,18 @@ def test_a_curve_is_linear_between_its_points_and_held_outside(over: int) -> Non
         assert got == pytest.approx(np.interp(s, at, value), abs=1e-12)
 
 
-def test_several_elements_and_times_at_once_are_as_one_by_one() -> None:
-    every = [hinge(PAIR, PAIR, Z, **LAWS), ForceElement("s", DISTANCE, (end(POINT, [0, 0, 0]), end(POINT, [1, 0,
-    0])), 2.0),
-             hinge(ANGLE, PAIR, Z, curve=straight((0.0, 1.0), (1.0, 2.0)))]  # fmt: skip
-    x0, t = drawn(every), np.linspace(0, 2, 9)
-    x = np.array([[turned(each, element, [2 * s * Z, -s * Z]) for each, element in zip(x0, every, strict=True)]
-                  for s in t])  # fmt: skip
-    values, before = np.zeros((9, 3, 4)), np.zeros(3)
-    forces = np.zeros_like(x)
-    evaluate_all(t, np.ones((9, 3)), x, np.zeros_like(x), before, kernel_table(every), forces, values)
-    q = np.zeros(3)
-    for k in range(9):
-        for i, element in enumerate(every):
-            alone = found(element, x[k, i], t=t[k], before=q[i])
-            np.testing.assert_allclose(forces[k, i], alone[0], atol=1e-12)
-            np.testing.assert_allclose(values[k, i], alone[1], atol=1e-12)
-        q = values[k, :, 0]
-    np.testing.assert_allclose(values[:, 0, 0], 3 * t, atol=1e-12)
-    np.testing.assert_array_equal(before, values[-1, :, 0])
+def test_several_times_at_once_are_as_one_by_one() -> None:
+    spring_ = ForceElement("s", DISTANCE, (end(POINT, [0, 0, 0]), end(POINT, [1, 0, 0])), 2.0)
+    t = np.linspace(0, 2, 9)
+    for element in (hinge(PAIR, PAIR, Z), spring_, hinge(ANGLE, PAIR, Z)):
+        x = np.array([turned(drawn(element), element, [2 * s * Z, -s * Z]) for s in t])
+        q, unit = coordinate(element, x), unit_forces(element, x)
+        for k in range(9):
+            alone = coordinate(element, x[k : k + 1], q[max(k - 1, 0)])[0]
+            assert q[k] == pytest.approx(alone, abs=1e-12)
+            np.testing.assert_allclose(unit[k], unit_forces(element, x[k : k + 1])[0], atol=1e-12)
+        if element.kind == TURN:
+            np.testing.assert_allclose(q, 3 * t, atol=1e-12)
 
 
 # -- on links -----------------------------------------------------------------------------------------------
@@ -297,7 +301,7 @@ def state_of(
     element: ForceElement, model: Model, motion: Callable[[int, np.ndarray], np.ndarray]
 ) -> np.ndarray:
     """Vectors (2, 2, 3) of an element's ends where the functions of link k, at X (n, 3), are moved by motion(k, X)."""
-    x = drawn([element])[0]
+    x = drawn(element)
     for e, at in enumerate(element.ends):
         if at.k >= 0:
             u = motion(at.k, model.links[at.k].X)
@@ -450,7 +454,9 @@ def test_a_channel_tells_how_a_hinge_turned(kind: str, length: int) -> None:
 
 @pytest.mark.parametrize("kind", ["beam", "plane", "solid", "rigid-body", "monolithic"])
 def test_channels_and_forces_are_those_of_laws_where_links_are(kind: str) -> None:
-    """The system's coordinates against the kernel's, from the links' states; the joint's axis is −z, a motor over speed.
+    """The system's coordinates against those of a force element's vectors, from the links' states.
+
+    The joint's axis is −z, a motor over speed.
 
     A coupling surface turns by its rotation there and by its directions here: they differ by the square of its strain.
     """
@@ -468,28 +474,26 @@ def test_channels_and_forces_are_those_of_laws_where_links_are(kind: str) -> Non
         raw["analysis"] = {"end_time": 0.5, "step": 5e-3, "rho_inf": 0.8}
     ready, every = ran(raw)
     elements = force_elements(ready.scene, ready.model)
-    measured, turned, table = (
-        measured_elements(ready.scene, ready.model),
-        np.zeros(len(elements)),
-        kernel_table(elements),
-    )
+    measured, before = measured_elements(ready.scene, ready.model), np.zeros(len(elements))
     channels = acting(ready.scene, measured)
     assert not any(each.channel.name.startswith("drive") for each in channels)
     for block in every:
-        here = evaluated(elements, table, turned, block.motion, block.links)
         got = {each.channel.name: each.rows(block)[:, 0] for each in channels}
         for i, element in enumerate(elements):
-            q, rate, Q = here.values[:, i, :3].T
+            x, v = placed(element, block.motion, block.links)
+            q = coordinate(element, x, before[i])
+            unit, before[i] = gradient(element, x, q), q[-1]
+            rate = (unit * v).sum(axis=(1, 2, 3))
+            Q = effort(element, block.motion, q, rate)
             values = {"angle": q, "length": q, "speed": rate, "torque": Q, "force": -Q}
             for what in values.keys() & {
                 x.rpartition("/")[2] for x in got if x.startswith(f"{element.name}/")
             }:
                 assert_near(got.pop(f"{element.name}/{what}"), values[what])
             for e, on in enumerate(at_ends(supports(block), element.name.replace("/", "."))):
-                for x, wanted in zip(
-                    on, wrench(element.ends[e], here.x[:, i, e], here.forces[:, i, e]), strict=True
-                ):
-                    assert_near(x, wanted)
+                f = Q[:, None, None] * unit[:, e]
+                for got_, wanted in zip(on, wrench(element.ends[e], x[:, e], f), strict=True):
+                    assert_near(got_, wanted)
         assert set(got) <= {"joints/A/angle"}
 
 

@@ -1,7 +1,7 @@
 """The record of a force element: a force that depends on how the mechanism moves; where its ends are, and how they move.
 
 A force element has two ends. An end is up to two vectors of a link, linear in its state: a point, or directions across a
-hinge. `force_elements_kernel` makes forces on these vectors from their positions and velocities.
+hinge. Its coordinate q depends on these vectors alone, and its force Q acts on them as Q ∂q/∂x.
 """
 
 from collections.abc import Callable, Sequence
@@ -82,31 +82,6 @@ class ForceElement:
     curve: Pieces = NO_CURVE
 
 
-Table = tuple[np.ndarray, ...]
-
-
-def kernel_table(every: Sequence[ForceElement]) -> Table:
-    """What the kernel takes of force elements: kinds, forms, numbers, over, first, at, cubics, periods."""
-    numbers = np.zeros((len(every), 16))
-    for row, element in zip(numbers, every, strict=True):
-        row[:2] = element.stiffness, element.damping
-        row[2], row[14] = element.limits or (element.free, element.free)
-        e1, e2 = perpendiculars(element.axis)
-        row[3:12] = np.concatenate([element.axis, e1, e2])
-        if element.kind == TURN:
-            row[12:14] = _drawn_angles(element, e1, e2)
-    return (
-        np.array([element.kind for element in every], int),
-        np.array([[end.form for end in element.ends] for element in every], int).reshape(-1, 2),
-        numbers,
-        np.array([element.over for element in every], int),
-        np.concatenate([[0], np.cumsum([len(element.curve.at) for element in every], dtype=int)]),
-        np.array([x for element in every for x in element.curve.at], float),
-        np.array([c for element in every for c in element.curve.coefficients], float).reshape(-1, 4),
-        np.array([element.curve.period for element in every], float),
-    )
-
-
 def stiffness_factors(every: Sequence[Factor | None], t: Times, phi: Times) -> Float[np.ndarray, "T A"]:
     """What the stiffness of each force element, or law, is multiplied by over time; one where it has no factor."""
     out = np.ones((len(t), len(every)))
@@ -116,70 +91,118 @@ def stiffness_factors(every: Sequence[Factor | None], t: Times, phi: Times) -> F
     return out
 
 
-def _drawn_angles(element: ForceElement, e1: Vector, e2: Vector) -> list[float]:
-    """Angles from the second end's directions to the first's, in the reference position."""
-    drawn = []
-    for k in range(2):
-        a, b = (
-            {PAIR: end.X[k % len(end.X)], SINGLE: end.X[0], ANGLE: (e1, e2)[k]}[end.form]
-            for end in element.ends
-        )
-        drawn.append(float(np.arctan2(element.axis @ np.cross(b, a), a @ b)))
-    return drawn
+Vectors = Float[np.ndarray, "T 2 2 3"]
+"""Two vectors of each of two ends over time; the second is zero where there is none."""
 
 
-Vectors = tuple[Float[np.ndarray, "T 2 3"], Float[np.ndarray, "T 2 3"]]
-"""Two vectors of an end over time, and their rates; the second is zero where there is none."""
-
-
-def rigid_vectors(end: End, motion: RigidMotion) -> Vectors:
-    """What an end's vectors and their rates would be if its link did not deform or leave the rigid-body motion."""
-    R, omega, m = motion.R[:, end.body], motion.omega[:, end.body], len(end.X)
-    x, v = np.zeros((2, len(motion.t), 2, 3))
-    if end.form == ANGLE:
-        x[:, 0, 2], v[:, 0, 2] = np.arctan2(R[:, 1, 0], R[:, 0, 0]), omega[:, 2]
-        return x, v
-    x[:, :m] = end.X @ R.transpose(0, 2, 1)
-    v[:, :m] = cross(omega[:, None], x[:, :m])
-    if end.form == POINT:
-        x[:, 0] += motion.p[:, end.body] + end.offset
-        v[:, 0] += motion.v[:, end.body]
-    return x, v
-
-
-@dataclass(frozen=True, slots=True)
-class Evaluated:
-    """Force elements over time: vectors of both ends, forces on them, values as of the kernel."""
-
-    x: Float[np.ndarray, "T A 2 2 3"]
-    forces: Float[np.ndarray, "T A 2 2 3"]
-    values: Float[np.ndarray, "T A 4"]
-
-
-def evaluated(
-    every: Sequence[ForceElement], table: Table, turned: Float[np.ndarray, " A"], motion: RigidMotion,
-    links: Sequence[LinkHistory] = (),
-) -> Evaluated:  # fmt: skip
-    """All force elements at successive times.
+def placed(
+    element: ForceElement, motion: RigidMotion, links: Sequence[LinkHistory] = ()
+) -> tuple[Vectors, Vectors]:
+    """Vectors of both ends and their rates.
 
     Parameters
     ----------
-    turned : coordinates before, near which rotations are; moved on to the last
     links : histories of a model's links; without them none deforms or leaves the rigid-body motion
     """
-    from kedfem.dynamics.force_elements_kernel import evaluate_all
+    x, v = np.zeros((2, len(motion.t), 2, 2, 3))
+    for e, end in enumerate(element.ends):
+        R, omega, m = motion.R[:, end.body], motion.omega[:, end.body], len(end.X)
+        if end.form == ANGLE:
+            x[:, e, 0, 2], v[:, e, 0, 2] = np.arctan2(R[:, 1, 0], R[:, 0, 0]), omega[:, 2]
+        else:
+            x[:, e, :m] = end.X @ R.transpose(0, 2, 1)
+            v[:, e, :m] = cross(omega[:, None], x[:, e, :m])
+        if end.form == POINT:
+            x[:, e, 0] += motion.p[:, end.body] + end.offset
+            v[:, e, 0] += motion.v[:, end.body]
+        if end.k >= 0 and links:
+            for of, u in ((x, links[end.k].u), (v, links[end.k].v)):
+                d = u.shape[2]
+                of[:, e, :m, :d] += (end.weights @ u) * end.mask[:d]
+    return x, v
 
-    x, v, forces = np.zeros((3, len(motion.t), len(every), 2, 2, 3))
-    for i, element in enumerate(every):
-        for e, end in enumerate(element.ends):
-            x[:, i, e], v[:, i, e] = rigid_vectors(end, motion)
-            if end.k >= 0 and links:
-                x[:, i, e] += elastic_vectors(end, links[end.k].u)
-                v[:, i, e] += elastic_vectors(end, links[end.k].v)
-    factors = stiffness_factors([each.factor for each in every], motion.t, motion.phi)
-    values = np.zeros((len(motion.t), len(every), 4))
-    evaluate_all(motion.t, factors, x, v, turned, table, forces, values)
-    return Evaluated(x, forces, values)
+
+def coordinate(element: ForceElement, x: Vectors, before: float = 0.0) -> Times:
+    """The turn, travel or distance q of the first end against the second, whatever their links do.
+
+    A turn is the mean over two pairs of directions a, b of the ends, drawn across the axis n and seen along it, of
+    atan2(n · (b × a), a · b − (n · a)(n · b)), less that in the reference position, counted on beyond ±π. n moves with
+    the first end that shows it.
+
+    Parameters
+    ----------
+    before : a turn before the first time, near which it is
+    """
+    if element.kind != TURN:
+        gap = x[:, 0, 0] - x[:, 1, 0]
+        return np.asarray(
+            (_axis(element, x) * gap).sum(axis=1) if element.kind == SLIDE else np.linalg.norm(gap, axis=1)
+        )
+    drawn = np.zeros((1, 2, 2, 3))
+    for e, end in enumerate(element.ends):
+        drawn[0, e, : len(end.X)] = end.X
+    turned = np.full((1 + len(x), 2), before)
+    turned[1:] = _angles(element, x) - _angles(element, drawn)
+    return np.asarray(np.unwrap(turned, axis=0)[1:].mean(axis=1))
+
+
+def _angles(element: ForceElement, x: Vectors) -> Float[np.ndarray, "T 2"]:
+    n, out = _axis(element, x), []
+    for k in range(2):
+        a, b = (_direction(element, end.form, x[:, e], k) for e, end in enumerate(element.ends))
+        across = (a * b).sum(axis=1) - (n * a).sum(axis=1) * (n * b).sum(axis=1)
+        out.append(np.arctan2((n * cross(b, a)).sum(axis=1), across))
+    return np.stack(out, axis=1)
+
+
+def _axis(element: ForceElement, x: Vectors) -> Float[np.ndarray, "T 3"]:
+    """The axis of a hinge as its first end shows it that does; of a slide as the second end, if that turns it."""
+    if element.kind == SLIDE and x[0, 1, 1].any():
+        return x[:, 1, 1]
+    for e, end in enumerate(element.ends) if element.kind == TURN else ():
+        if end.form in (PAIR, SINGLE):
+            n = cross(x[:, e, 0], x[:, e, 1]) if end.form == PAIR else x[:, e, 1]
+            return np.asarray(n / np.linalg.norm(n, axis=1)[:, None])
+    return np.tile(element.axis, (len(x), 1))
+
+
+def _direction(element: ForceElement, form: int, x: Float[np.ndarray, "T 2 3"], k: int) -> np.ndarray:
+    """The k-th direction of an end across the axis of its hinge: of a planar beam one that ψ turns."""
+    if form != ANGLE:
+        return x[:, k if form == PAIR else 0]
+    e, angle = perpendiculars(element.axis)[k], x[:, 0, 2, None] * element.axis[2]
+    return np.asarray(np.cos(angle) * e + np.sin(angle) * cross(element.axis, e))
+
+
+def unit_forces(element: ForceElement, x: Vectors) -> Vectors:
+    """∂q/∂x, forces on the vectors of both ends under Q = 1, where no hub is deformed: of a hinge couples."""
+    out, n = np.zeros_like(x), _axis(element, x)
+    if element.kind == DISTANCE:
+        n = x[:, 0, 0] - x[:, 1, 0]
+        size = np.linalg.norm(n, axis=1)[:, None]
+        n = n / np.where(size > 0.0, size, 1.0)  # points that meet have no direction
+    for e, end in enumerate(element.ends):
+        sign = 1 - 2 * e
+        if element.kind != TURN:
+            out[:, e, 0] = sign * n
+        elif end.form == ANGLE:
+            out[:, e, 0, 2] = sign * n[:, 2]
+        else:
+            m = 2 if end.form == PAIR else 1
+            out[:, e, :m] = sign * cross(n[:, None], x[:, e, :m]) / m
+    return out
+
+
+def effort(element: ForceElement, motion: RigidMotion, q: Times, rate: Times) -> Times:
+    """Q along the coordinate at the times of a motion."""
+    stretch = q - np.clip(q, *(element.limits or (element.free, element.free)))
+    stiffness = element.stiffness * stiffness_factors([element.factor], motion.t, motion.phi)[:, 0]
+    Q = -stiffness * stretch - element.damping * rate
+    if element.limits:  # a stop pushes, and only beyond
+        Q = np.where(Q * stretch < 0.0, Q, 0.0)
+    if len(element.curve.at):
+        Q = Q + element.curve((motion.t, rate, q)[element.over])[0]
+    return np.asarray(Q)
 
 
 def wrench(
@@ -190,11 +213,3 @@ def wrench(
         return f[:, 0], cross(x[:, 0], f[:, 0])
     moment = f[:, 0] if end.form == ANGLE else cross(x, f).sum(axis=1)
     return np.zeros_like(moment), np.asarray(moment)
-
-
-def elastic_vectors(end: End, u: Float[np.ndarray, "T n d"]) -> Float[np.ndarray, "T 2 3"]:
-    """What an end's vectors have of the displacement of its link, or of its rate."""
-    moved = end.weights @ u
-    out = np.zeros((len(u), 2, 3))
-    out[:, : moved.shape[1], : u.shape[2]] = moved
-    return np.asarray(out * end.mask)

@@ -12,14 +12,13 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.dynamics.force_element import (
     POINT,
-    TIME,
     TURN,
     End,
-    Evaluated,
     ForceElement,
-    Table,
-    evaluated,
-    kernel_table,
+    coordinate,
+    effort,
+    placed,
+    unit_forces,
     wrench,
 )
 from kedfem.dynamics.force_elements import force_elements
@@ -27,9 +26,9 @@ from kedfem.dynamics.model import Model
 from kedfem.links.record import Link
 from kedfem.motion.path import Path, place_on
 from kedfem.motion.rigid import RigidMotion, resting
-from kedfem.scene import Pieces, Scene
+from kedfem.scene import Scene
 
-ONE = Pieces(np.zeros(1), np.array([[1.0, 0.0, 0.0, 0.0]]))
+Forces = Float[np.ndarray, "T A 2 2 3"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,26 +40,32 @@ class RigidElements:
     """
 
     every: Sequence[ForceElement]
-    table: Table
     along: Path
     turned: Float[np.ndarray, "G A"]
 
-    def over(self, motion: RigidMotion) -> Evaluated:
-        """All of them at the times of a motion, with the vectors that forces act on.
+    def over(self, motion: RigidMotion) -> tuple[Forces, Forces]:
+        """Vectors of all ends at the times of a motion, and the forces on them.
 
         Parameters
         ----------
         motion : between successive times no hinge turns by π
         """
-        return evaluated(self.every, self.table, self._turned(motion), motion)
+        x, forces = np.zeros((2, len(motion.t), len(self.every), 2, 2, 3))
+        for i, (element, before) in enumerate(zip(self.every, self._turned(motion), strict=True)):
+            x[:, i], v = placed(element, motion)
+            unit = unit_forces(element, x[:, i])
+            rate = (unit * v).sum(axis=(1, 2, 3))
+            Q = effort(element, motion, coordinate(element, x[:, i], float(before)), rate)
+            forces[:, i] = Q[:, None, None, None] * unit
+        return x, forces
 
     def wrenches(
         self, motion: RigidMotion
     ) -> Iterator[tuple[End, Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]]:
         """Force and moment about the world's origin (T, 3) of every end."""
-        found = self.over(motion)
+        x, forces = self.over(motion)
         for i, e, end in self.ends():
-            yield end, *wrench(end, found.x[:, i, e], found.forces[:, i, e])
+            yield end, *wrench(end, x[:, i, e], forces[:, i, e])
 
     def ends(self, k: int | None = None) -> Iterator[tuple[int, int, End]]:
         """Numbers of element and end, and the end: all, or those on a link of the model."""
@@ -79,13 +84,14 @@ class RigidElements:
 
 def on_rigid_motion(every: Sequence[ForceElement], along: Path) -> RigidElements:
     """Force elements on the rigid-body motion along a path."""
-    table, start = kernel_table(every), int(np.abs(along.phi).argmin())
+    start = int(np.abs(along.phi).argmin())
     turned = np.zeros((len(along.phi), len(every)))
     for order in (np.arange(start, len(along.phi)), np.arange(start, -1, -1)):
         here = replace(resting(along.R.shape[1], np.zeros(len(order))), R=along.R[order])
-        turned[order] = evaluated(every, table, np.zeros(len(every)), here).values[..., 0]
-    turned[:, [each.kind != TURN for each in every]] = 0.0
-    return RigidElements(every, table, along, turned)
+        for i, element in enumerate(every):
+            if element.kind == TURN:
+                turned[order, i] = coordinate(element, placed(element, here)[0])
+    return RigidElements(every, along, turned)
 
 
 def rigid_elements_of(scene: Scene, model: Model, along: Path) -> RigidElements | None:
@@ -103,7 +109,7 @@ def rigid_elements_of(scene: Scene, model: Model, along: Path) -> RigidElements 
 
 
 def with_elements(
-    k: int, F: Float[np.ndarray, "T n d"], elements: RigidElements, forces: Float[np.ndarray, "T A 2 2 3"]
+    k: int, F: Float[np.ndarray, "T n d"], elements: RigidElements, forces: Forces
 ) -> Float[np.ndarray, "T n d"]:
     """Loads on a link of a model with those of force elements, world components.
 
@@ -123,12 +129,13 @@ def unit_loads_on(k: int, link: Link, elements: RigidElements) -> list[Float[np.
     Torques have the same directions on a link at all times, forces at points may have any.
     """
     out, space = [], 2 if link.planar else 3
+    still = resting(1 + max((end.body for _, _, end in elements.ends()), default=0), np.zeros(1))
     for i, e, end in elements.ends(k):
         if end.form == POINT:
             units = np.zeros((space, 2, 3))
             units[np.arange(space), 0, np.arange(space)] = 1.0
         else:
-            units = _torque(elements.every[i], e)[None]
+            units = unit_forces(elements.every[i], placed(elements.every[i], still)[0])[:, e]
         out += list(_nodal(end, link.d, units))
     return out
 
@@ -137,10 +144,3 @@ def _nodal(end: End, d: int, f: Float[np.ndarray, "T 2 3"]) -> Float[np.ndarray,
     """What forces on an end's vectors are at the nodes of its link."""
     on_rows = (f * end.mask)[:, : len(end.weights), :d]
     return np.asarray(end.weights.T @ on_rows)
-
-
-def _torque(element: ForceElement, e: int) -> Float[np.ndarray, "2 3"]:
-    """Forces on the directions of one end under a unit torque, in the reference position."""
-    unit = [replace(element, stiffness=0.0, damping=0.0, factor=None, over=TIME, curve=ONE)]
-    still = resting(1 + max(end.body for end in element.ends), np.zeros(1))
-    return np.asarray(evaluated(unit, kernel_table(unit), np.zeros(1), still).forces[0, 0, e])

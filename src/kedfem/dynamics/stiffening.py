@@ -96,7 +96,7 @@ class Stiffening:
         """Loads of all links with those of motors and springs, world components."""
         if self.elements is None:
             return [each.F for each in forcing]
-        forces = self.elements.over(motion).forces
+        _, forces = self.elements.over(motion)
         return [with_elements(k, each.F, self.elements, forces) for k, each in enumerate(forcing)]
 
     def turnings(self, at: Sequence[ForcingAt]) -> list[Turning]:

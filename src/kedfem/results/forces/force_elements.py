@@ -12,9 +12,8 @@ from kedfem.dynamics.force_element import (
     TURN,
     End,
     ForceElement,
-    Table,
-    evaluated,
-    kernel_table,
+    coordinate,
+    placed,
 )
 from kedfem.dynamics.force_elements import force_elements, hinges
 from kedfem.dynamics.history import Block
@@ -35,8 +34,6 @@ class Measured:
 
     every: Sequence[ForceElement]
     hinges: Sequence[ForceElement]
-    table: Table
-    turned: Float[np.ndarray, " A"] = field(default_factory=lambda: np.zeros(0))
     block: Block | None = None
     angles: Float[np.ndarray, "T A"] = field(default_factory=lambda: np.zeros((0, 0)))
 
@@ -73,11 +70,13 @@ class Measured:
     def turns(self, block: Block) -> Float[np.ndarray, "T A"]:
         """Rotations of all hinges; blocks in the order of time."""
         if block is not self.block:
-            before = np.zeros(len(self.hinges)) if block.step == 0 or not self.turned.size else self.turned
-            self.turned, self.block = before.copy(), block
-            self.angles = evaluated(self.hinges, self.table, self.turned, block.motion, block.links).values[
-                ..., 0
-            ]
+            before = (
+                np.zeros(len(self.hinges)) if block.step == 0 or not len(self.angles) else self.angles[-1]
+            )
+            self.block, self.angles = block, np.zeros((len(block), len(self.hinges)))
+            for i, hinge in enumerate(self.hinges):
+                x, _ = placed(hinge, block.motion, block.links)
+                self.angles[:, i] = coordinate(hinge, x, float(before[i]))
         return self.angles
 
 
@@ -89,7 +88,7 @@ def constraint_of(element: ForceElement) -> str:
 def measured_elements(scene: Scene, model: Model) -> Measured:
     """Motors, springs and limits of a scene and, without a drive, the turns of its hinges."""
     turns = () if scene.driven is not None else hinges(scene, model)
-    return Measured(force_elements(scene, model), turns, kernel_table(turns))
+    return Measured(force_elements(scene, model), turns)
 
 
 def acting(scene: Scene, measured: Measured) -> list[Recorded]:
