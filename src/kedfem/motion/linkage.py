@@ -13,14 +13,7 @@ import scipy.linalg
 from kedfem.arrays import Float
 from kedfem.errors import MotionError, SceneError
 from kedfem.motion.blocks import Blocks, blocks
-from kedfem.motion.constraints import (
-    GAP,
-    ConstraintEquation,
-    Rows,
-    stacked,
-    travel_row,
-    turn_row,
-)
+from kedfem.motion.constraints import GAP, ConstraintEquation, Rows, stacked, travel_row, turn_row
 from kedfem.motion.drives import Drives, drives
 from kedfem.motion.joint_equations import (
     GROUND,

@@ -152,11 +152,7 @@ def _spring_field(
 
 
 def rigid_springs(
-    scene: Scene,
-    linkage: Linkage,
-    motion: RigidMotion,
-    k: int,
-    seen: Mapping[str, Float[np.ndarray, "n 3"]],
+    scene: Scene, linkage: Linkage, motion: RigidMotion, k: int, seen: Mapping[str, Float[np.ndarray, "n 3"]]
 ) -> list[RigidField]:
     """Springs of rigid links at one time point.
 

@@ -13,28 +13,14 @@ from kedfem.dynamics.joints.constraint_joints import ordered
 from kedfem.dynamics.model import Model
 from kedfem.links.beams.spatial_recovery import drawn
 from kedfem.links.record import Link, in_space
-from kedfem.links.recovery import (
-    StressRecovery,
-    extreme_stresses,
-    nodal_state,
-    nodal_stress,
-    turned_stress,
-)
+from kedfem.links.recovery import StressRecovery, extreme_stresses, nodal_state, nodal_stress, turned_stress
 from kedfem.mesh.cad.sides import boundary_sides, side_corners
 from kedfem.mesh.elements.shape_functions import HEX8
 from kedfem.motion.constraints import cross
 from kedfem.motion.joint_equations import joint_axis
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
-from kedfem.output.attached import (
-    Carriers,
-    ball,
-    ball_words,
-    balls,
-    every_link,
-    slider_place,
-    springs,
-)
+from kedfem.output.attached import Carriers, ball, ball_words, balls, every_link, slider_place, springs
 from kedfem.output.fields import DRIVE_FORCE, DRIVE_TORQUE, FORCE, MOMENT, JointField, LinkField, RigidField
 from kedfem.results.recorded import drive_effort
 from kedfem.scene import Scene

@@ -9,13 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from kedfem.arrays import Float, Int
-from kedfem.links.beams.beam import (
-    assembled,
-    cell_type,
-    parent_nodes,
-    parent_weights,
-    shape_functions,
-)
+from kedfem.links.beams.beam import assembled, cell_type, parent_nodes, parent_weights, shape_functions
 from kedfem.links.beams.beam_axis import Axis, chord_axes
 from kedfem.links.beams.section import Section
 from kedfem.links.record import Link, mass_constants, read_only

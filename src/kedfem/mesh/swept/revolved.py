@@ -142,11 +142,7 @@ def _cut(
 
 
 def _plan(
-    gmsh: ModuleType,
-    solid: Solid,
-    turn: Frame,
-    axes: Float[np.ndarray, "3 3"],
-    faces: list[tuple[int, int]],
+    gmsh: ModuleType, solid: Solid, turn: Frame, axes: Float[np.ndarray, "3 3"], faces: list[tuple[int, int]]
 ) -> Plan:
     """The plan of half a section; it is as thick as its mean point goes (Pappus)."""
     occ = gmsh.model.occ

@@ -11,15 +11,7 @@ from kedfem.motion.batch import Choice, Moving
 from kedfem.motion.constraints import ANGLE
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import OPEN
-from kedfem.motion.path.continuation import (
-    ROUNDING,
-    Stand,
-    continued,
-    quintics,
-    shapes,
-    split,
-    started,
-)
+from kedfem.motion.path.continuation import ROUNDING, Stand, continued, quintics, shapes, split, started
 from kedfem.motion.path.record import Path
 from kedfem.motion.path.refinement import halved, refined
 from kedfem.motion.path.weakest import checked

@@ -7,14 +7,7 @@ from functools import partial
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.force_element import (
-    DISTANCE,
-    TURN,
-    End,
-    ForceElement,
-    coordinate,
-    placed,
-)
+from kedfem.dynamics.force_element import DISTANCE, TURN, End, ForceElement, coordinate, placed
 from kedfem.dynamics.force_elements import force_elements, hinges
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model
