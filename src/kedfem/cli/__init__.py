@@ -18,13 +18,9 @@ from kedfem.errors import KedfemError, OutputError
 from kedfem.processes import end_as_interrupted, import_quickly, interruption_asked, one_blas_thread
 
 app = typer.Typer(
-    name="kedfem",
-    help="How much the links of a moving mechanism bend, vibrate and are stressed.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-)
+    name="kedfem", help="How much the links of a moving mechanism bend, vibrate and are stressed.",
+    no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
+)  # fmt: skip
 
 
 @app.callback(invoke_without_command=True)

@@ -12,21 +12,15 @@ from kedfem.errors import SceneError
 
 PAGE = "the run in one page, for any browser"
 FILES = {
-    "results.h5": "time series",
-    "results.csv": "the same as a table",
-    "results.parquet": "the same for pandas",
-    "animation.pvd": "animation, open in ParaView",
-    "paraview.py": "state for ParaView that opens all of it",
-    "animation.vtkhdf": "the same in one file",
-    "plots": "plots",
-    "envelope.vtu": "highest stresses over all steps, for ParaView",
-    "peaks.csv": "top ten of each link",
-    "worst.png": "picture of the highest stress",
+    "results.h5": "time series", "results.csv": "the same as a table",
+    "results.parquet": "the same for pandas", "animation.pvd": "animation, open in ParaView",
+    "paraview.py": "state for ParaView that opens all of it", "animation.vtkhdf": "the same in one file",
+    "plots": "plots", "envelope.vtu": "highest stresses over all steps, for ParaView",
+    "peaks.csv": "top ten of each link", "worst.png": "picture of the highest stress",
     "fatigue.vtu": "damage and utilisation, for ParaView",
     "fatigue.csv": "life at the worst places of each link",
-    "mesh_error.vtu": "where the mesh is coarse, for ParaView",
-    "report.html": PAGE,
-}
+    "mesh_error.vtu": "where the mesh is coarse, for ParaView", "report.html": PAGE,
+}  # fmt: skip
 
 NOTHING = "nothing was computed yet, as the first step had not begun, and nothing was written"
 

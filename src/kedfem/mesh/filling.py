@@ -174,22 +174,13 @@ def _tried(
 def _options(size: float, turn: float, finest: float, setting: Setting) -> dict[str, float]:
     """gmsh's options for tetrahedra of a size, which turn by so much along a curved face unless finer than a least."""
     return {
-        "Mesh.MeshSizeMax": size,
-        "Mesh.MeshSizeMin": finest,
-        "Mesh.MeshSizeFromCurvature": float(np.ceil(2 * np.pi / turn - 1e-9)),
-        "Mesh.MeshSizeFromPoints": 0,
-        "Mesh.MeshSizeExtendFromBoundary": 1,
-        "Mesh.Algorithm": setting.plane,
-        "Mesh.Algorithm3D": setting.solid,
-        "Mesh.Optimize": 1,
-        "Mesh.OptimizeNetgen": int(setting.solid == 1),
-        "Mesh.RecombineAll": 0,
-        "Mesh.SubdivisionAlgorithm": 0,
-        "Mesh.ElementOrder": 1,
-        "Mesh.SecondOrderLinear": 0,
-        "Mesh.SecondOrderIncomplete": 0,
-        "Mesh.HighOrderOptimize": 0,
-    }
+        "Mesh.MeshSizeMax": size, "Mesh.MeshSizeMin": finest,
+        "Mesh.MeshSizeFromCurvature": float(np.ceil(2 * np.pi / turn - 1e-9)), "Mesh.MeshSizeFromPoints": 0,
+        "Mesh.MeshSizeExtendFromBoundary": 1, "Mesh.Algorithm": setting.plane,
+        "Mesh.Algorithm3D": setting.solid, "Mesh.Optimize": 1, "Mesh.OptimizeNetgen": int(setting.solid == 1),
+        "Mesh.RecombineAll": 0, "Mesh.SubdivisionAlgorithm": 0, "Mesh.ElementOrder": 1,
+        "Mesh.SecondOrderLinear": 0, "Mesh.SecondOrderIncomplete": 0, "Mesh.HighOrderOptimize": 0,
+    }  # fmt: skip
 
 
 @contextmanager

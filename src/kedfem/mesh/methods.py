@@ -71,12 +71,8 @@ def cad_mesh(
     """
     file = folder / shape.file
     described = [
-        name,
-        shape.model_dump(mode="json"),
-        link.mesh.model_dump(mode="json"),
-        link.element,
-        kept_whole,
-    ]
+        name, shape.model_dump(mode="json"), link.mesh.model_dump(mode="json"), link.element, kept_whole,
+    ]  # fmt: skip
     key = sha256(json.dumps(described).encode() + contents([file])).hexdigest()
     mesh: SolidMesh = kept(
         "mesh",

@@ -17,18 +17,11 @@ from kedfem.errors import MeshError
 
 #: Debian packages that hold the shared libraries that gmsh's wheel links to.
 SYSTEM_PACKAGES = {
-    "libGLU.so.1": "libglu1-mesa",
-    "libGL.so.1": "libgl1",
-    "libXrender.so.1": "libxrender1",
-    "libXcursor.so.1": "libxcursor1",
-    "libXfixes.so.3": "libxfixes3",
-    "libXext.so.6": "libxext6",
-    "libXft.so.2": "libxft2",
-    "libfontconfig.so.1": "libfontconfig1",
-    "libXinerama.so.1": "libxinerama1",
-    "libX11.so.6": "libx11-6",
-    "libgomp.so.1": "libgomp1",
-}
+    "libGLU.so.1": "libglu1-mesa", "libGL.so.1": "libgl1", "libXrender.so.1": "libxrender1",
+    "libXcursor.so.1": "libxcursor1", "libXfixes.so.3": "libxfixes3", "libXext.so.6": "libxext6",
+    "libXft.so.2": "libxft2", "libfontconfig.so.1": "libfontconfig1", "libXinerama.so.1": "libxinerama1",
+    "libX11.so.6": "libx11-6", "libgomp.so.1": "libgomp1",
+}  # fmt: skip
 _QUAD4 = 3  # gmsh's number of the 4-node quadrilateral
 _one_at_a_time = threading.RLock()
 

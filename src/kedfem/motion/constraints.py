@@ -86,15 +86,10 @@ def joint_rows(
     upright = [ConstraintEquation(TURN, i, j, axis, b, name) for b in across]
     slides = [ConstraintEquation(GAP, i, j, point, b, name) for b in across]
     return {
-        "spherical": meet,
-        "weld": meet + aligned,
-        "revolute": meet + upright,
-        "planar": [ConstraintEquation(GAP, i, j, point, axis, name), *upright],
-        "slot": slides,
-        "cylindrical": slides + upright,
-        "screw": slides + upright,
-        "prismatic": slides + aligned,
-    }[kind]
+        "spherical": meet, "weld": meet + aligned, "revolute": meet + upright,
+        "planar": [ConstraintEquation(GAP, i, j, point, axis, name), *upright], "slot": slides,
+        "cylindrical": slides + upright, "screw": slides + upright, "prismatic": slides + aligned,
+    }[kind]  # fmt: skip
 
 
 def turn_row(name: str, i: int, j: int, axis: Vector) -> ConstraintEquation:

@@ -39,12 +39,8 @@ def mobility(scene: Scene, link: Linkage, along: Path) -> Mobility:
     held = drawn.J[~drawn.driven]
     count, loops = redundancy(drawn), len(scene.joints) - len(scene.links)
     return Mobility(
-        freedom=drawn.J.shape[1] - rank(held),
-        drives=int(drawn.driven.sum()),
-        equations=len(held),
-        redundancy=count,
-        redundant=tuple(redundant(drawn)) if count else (),
-        remedy=remedy(drawn, looser_rows(scene, drawn)) if count else "",
-        free=tuple(free_motions(drawn)),
+        freedom=drawn.J.shape[1] - rank(held), drives=int(drawn.driven.sum()), equations=len(held),
+        redundancy=count, redundant=tuple(redundant(drawn)) if count else (),
+        remedy=remedy(drawn, looser_rows(scene, drawn)) if count else "", free=tuple(free_motions(drawn)),
         dead_point=nearest_dead_point(scene, link, along) if loops and drawn.driven.any() else None,
-    )
+    )  # fmt: skip

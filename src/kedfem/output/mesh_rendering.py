@@ -85,14 +85,9 @@ def image(given: Any, i: int) -> Any:
     plotter.set_background("white")
     plotter.enable_anti_aliasing("ssaa")
     plotter.add_mesh(
-        surface,
-        scalars="quality",
-        cmap=colours(),
-        clim=(0, 1),
-        show_scalar_bar=False,
-        ambient=0.45,
+        surface, scalars="quality", cmap=colours(), clim=(0, 1), show_scalar_bar=False, ambient=0.45,
         diffuse=0.6,
-    )
+    )  # fmt: skip
     plotter.add_mesh(edges, color="black", line_width=1.5)
     plotter.camera_position = [tuple(points.mean(axis=0) + direction), tuple(points.mean(axis=0)), tuple(up)]
     if i == 0 and "label_places" in given:

@@ -14,13 +14,10 @@ from kedfem.results.table import DIGITS, drive_heading, text_file
 from kedfem.scene import Scene
 
 QUANTITIES = (
-    ("position", "xyz", "m"),
-    ("orientation", "wxyz", "-"),
-    ("velocity", "xyz", "m/s"),
-    ("angular_velocity", "xyz", "rad/s"),
-    ("acceleration", "xyz", "m/s^2"),
+    ("position", "xyz", "m"), ("orientation", "wxyz", "-"), ("velocity", "xyz", "m/s"),
+    ("angular_velocity", "xyz", "rad/s"), ("acceleration", "xyz", "m/s^2"),
     ("angular_acceleration", "xyz", "rad/s^2"),
-)
+)  # fmt: skip
 """Of each link, in world components."""
 
 

@@ -102,15 +102,11 @@ def draw_links(plotter: Any, grid: Any, shown: View) -> None:
     """All links with their edges on one colour scale; what hides the highest stress is translucent."""
     stress = grid.point_data["MPa"]
     look = {
-        "scalars": "MPa",
-        "cmap": "turbo",
+        "scalars": "MPa", "cmap": "turbo",
         "clim": (0.0, float(np.max(stress, where=np.isfinite(stress), initial=0.0)) or 1.0),
-        "smooth_shading": True,
-        "show_scalar_bar": False,
-        "nan_color": "lightgrey",
-        "ambient": 0.55,
+        "smooth_shading": True, "show_scalar_bar": False, "nan_color": "lightgrey", "ambient": 0.55,
         "diffuse": 0.5,
-    }
+    }  # fmt: skip
     above = lifted(grid)
     is_line = np.isin(grid.celltypes, list(LINES))
     solids, pieces = above.extract_cells(~is_line), []

@@ -148,13 +148,9 @@ def flow(of: Sequence[Constants], found: Fields, at: RigidRates) -> Flow:
     loads += _work(Mv, at.rates[1]) + couples[0] * turns[1]
     supports = _work(ports, at.rates[0]) + couples[2] * turns[0] + found.powers[2]
     return Flow(
-        kinetic.sum(axis=0),
-        loads.sum(axis=0),
-        supports.sum(axis=0),
-        _neglected(found, at),
-        found.powers[2].sum(axis=0),
-        np.array([x.damping.alpha for x in of]) @ found.powers[0],
-    )
+        kinetic.sum(axis=0), loads.sum(axis=0), supports.sum(axis=0), _neglected(found, at),
+        found.powers[2].sum(axis=0), np.array([x.damping.alpha for x in of]) @ found.powers[0],
+    )  # fmt: skip
 
 
 def _neglected(found: Fields, at: RigidRates) -> Scalars:

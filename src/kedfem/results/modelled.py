@@ -13,15 +13,10 @@ from kedfem.motion.linkage import Linkage
 from kedfem.scene import Scene, moments_of_inertia
 
 ELEMENTS = {
-    "hexahedron27": "hex27",
-    "hexahedron20": "hex20",
-    "hexahedron": "hex8",
-    "tetra10": "tet10",
-    "quad9": "quad9",
-    "line3": "beam3",
-    "line": "beam2",
+    "hexahedron27": "hex27", "hexahedron20": "hex20", "hexahedron": "hex8", "tetra10": "tet10",
+    "quad9": "quad9", "line3": "beam3", "line": "beam2",
     **{f"line{nodes}": f"beam{nodes}" for nodes in (4, 5, 7, 9)},
-}
+}  # fmt: skip
 """What users call elements, by their name in meshio."""
 
 

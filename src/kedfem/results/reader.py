@@ -114,23 +114,15 @@ def _results(file: Any, path: Path) -> Results:
     later = on_demand.OnDemand(path, scene, known, n) if large and facts["status"] != "running" else None
     warnings, seconds = read_account(file)
     return Results(
-        time=all_rows(time, n),
-        angle=all_rows(drive, n),
-        channels=later
-        or {name: (channel, on_demand.rows_of(file[name], channel, n)) for name, channel in known.items()},
-        status=_status(facts["status"]),
-        scene_json=scene,
-        scene_toml=None if toml is None else read_text(toml),
-        notes=read_facts(file["notes"]),
-        reason=facts["reason"],
-        version=facts["kedfem_version"],
-        drive=replace(position, description=read_facts(drive)["description"]),
-        peaks=read_peaks(file),
-        warnings=warnings,
-        seconds=seconds,
-        links={name: read_facts(group) for name, group in file["notes"].items()},
-        fatigue=read_fatigue(file),
-    )
+        time=all_rows(time, n), angle=all_rows(drive, n),
+        channels=later or {name: (channel, on_demand.rows_of(file[name], channel, n)) for name, channel in known.items()},
+        status=_status(facts["status"]), scene_json=scene,
+        scene_toml=None if toml is None else read_text(toml), notes=read_facts(file["notes"]),
+        reason=facts["reason"], version=facts["kedfem_version"],
+        drive=replace(position, description=read_facts(drive)["description"]), peaks=read_peaks(file),
+        warnings=warnings, seconds=seconds,
+        links={name: read_facts(group) for name, group in file["notes"].items()}, fatigue=read_fatigue(file),
+    )  # fmt: skip
 
 
 def _status(found: str) -> Status:

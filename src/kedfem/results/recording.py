@@ -52,14 +52,9 @@ def recording(
     if without_vibration(scene):  # sums over time steps say nothing of positions found each by itself
         energies = [each for each in energies if each.channel.name == STRAIN]
     return [
-        *probes,
-        *joints,
-        *drive,
-        *gears,
-        *_rigid(scene, model, along, linked),
-        *acting(scene, forces.force_elements),
-        *energies,
-    ]
+        *probes, *joints, *drive, *gears, *_rigid(scene, model, along, linked),
+        *acting(scene, forces.force_elements), *energies,
+    ]  # fmt: skip
 
 
 def rows(recorded: Sequence[Recorded], block: Block) -> dict[str, Rows]:

@@ -110,19 +110,13 @@ def _cad_face(gmsh: ModuleType, tag: int, name: str, sign: float) -> CadFace:
     form = fitted_form(Sample(all_over.points, within.points, sign * within.normals), _ACCURACY, _SKEW)
     centroid = np.array(gmsh.model.occ.getCenterOfMass(2, tag))
     return CadFace(
-        tag=tag,
-        name=name,
-        kind=form.kind,
-        centre=centroid if form.kind in ("plane", "other") else form.centre,
-        direction=form.direction,
-        radius=form.radius,
-        inward=form.inward,
-        area=float(gmsh.model.occ.getMass(2, tag)),
-        length=form.length,
-        surface=gmsh.model.getType(2, tag) if form.kind == "other" else "",
+        tag=tag, name=name, kind=form.kind,
+        centre=centroid if form.kind in ("plane", "other") else form.centre, direction=form.direction,
+        radius=form.radius, inward=form.inward, area=float(gmsh.model.occ.getMass(2, tag)),
+        length=form.length, surface=gmsh.model.getType(2, tag) if form.kind == "other" else "",
         bend=_least_radius(gmsh, tag, within) if form.kind == "other" else np.nan,
         hollow=_hollow(within, sign) if form.kind == "other" else form.inward,
-    )
+    )  # fmt: skip
 
 
 def _hollow(within: Places, sign: float) -> bool:

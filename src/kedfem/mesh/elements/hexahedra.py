@@ -8,13 +8,9 @@ import numpy as np
 from kedfem.arrays import Float, Int
 from kedfem.mesh.elements.shape_functions import HEX8, HEX20, HEX27, QUAD9, node_numbers, shape_functions
 
-CELL_TYPES = {
-    4: "tetra",
-    8: "hexahedron",
-    10: "tetra10",
-    20: "hexahedron20",
-    27: "hexahedron27",
-}  # meshio's names
+CELL_TYPES = {  # meshio's names
+    4: "tetra", 8: "hexahedron", 10: "tetra10", 20: "hexahedron20", 27: "hexahedron27",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

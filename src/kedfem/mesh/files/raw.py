@@ -23,13 +23,9 @@ CORNERS = {"tetra": 4, "hexahedron": 8, "wedge": 6, "pyramid": 5}
 _FLAT = {"triangle": 3, "quad": 4}
 #: Abaqus' elements of plane strain and stress that programs write surfaces as, and which meshio has not.
 _PLANE = {
-    "CPS6": "triangle6",
-    "CPS8": "quad8",
-    "CPE3": "triangle",
-    "CPE4": "quad",
-    "CPE8": "quad8",
+    "CPS6": "triangle6", "CPS8": "quad8", "CPE3": "triangle", "CPE4": "quad", "CPE8": "quad8",
     "S6": "triangle6",
-}
+}  # fmt: skip
 #: Kinds that some of meshio's readers give and its record of a mesh does not know, with their dimension.
 _QUADRATIC = {"wedge15": 3, "wedge18": 3, "pyramid13": 3, "pyramid14": 3, "quad8": 2, "quad9": 2}
 #: Corners of the sides S1, S2 … of Abaqus' hexahedra and tetrahedra.

@@ -165,14 +165,9 @@ def group_face(name: str, points: Float[np.ndarray, "n 3"], sides: Int[np.ndarra
     centroid = areas @ places / areas.sum()
     centre = centroid if form.kind in ("plane", "other") else form.centre
     return Face(
-        name,
-        form.kind,
-        centre,
-        form.direction,
-        form.radius,
-        form.inward,
+        name, form.kind, centre, form.direction, form.radius, form.inward,
         sides[:, : side_corners(sides.shape[1])],
-    )
+    )  # fmt: skip
 
 
 def _sets(raw: RawMesh, corners: Int[np.ndarray, "f c"]) -> Iterator[tuple[str, Int[np.ndarray, "q c"]]]:

@@ -35,14 +35,9 @@ class _Piece:
     def turned(self) -> "_Piece":
         """The curve run through from its end."""
         return _Piece(
-            self.tag,
-            self.ends[::-1],
-            self.parameters[::-1],
-            self.lengths[-1] - self.lengths[::-1],
-            self.samples[::-1],
-            self.bends[::-1],
-            -self.tangents[::-1],
-        )
+            self.tag, self.ends[::-1], self.parameters[::-1], self.lengths[-1] - self.lengths[::-1],
+            self.samples[::-1], self.bends[::-1], -self.tangents[::-1],
+        )  # fmt: skip
 
 
 @contextmanager
@@ -179,14 +174,9 @@ def _piece(gmsh: ModuleType, tag: int, axes: Float[np.ndarray, "3 3"]) -> _Piece
         ends.reverse()
     bends = abs(np.asarray(gmsh.model.getCurvature(1, tag, parameters)))
     return _Piece(
-        tag,
-        (ends[0], ends[-1]),
-        parameters,
-        np.concatenate([[0.0], np.cumsum(steps)]),
-        samples,
-        np.where(np.isfinite(bends), bends, 0.0),
-        (slopes / speeds[:, None])[[0, -1]],
-    )
+        tag, (ends[0], ends[-1]), parameters, np.concatenate([[0.0], np.cumsum(steps)]), samples,
+        np.where(np.isfinite(bends), bends, 0.0), (slopes / speeds[:, None])[[0, -1]],
+    )  # fmt: skip
 
 
 def _is_reversed(

@@ -13,17 +13,12 @@ from kedfem.scene.records.units import Quantity
 from kedfem.scene.records.wording import either, one_of, shown, unknown_key
 
 WANTED = {
-    "model_type": "must be a table of keys",
-    "model_attributes_type": "must be a table of keys",
-    "dict_type": "must be a table of keys",
-    "tuple_type": "must be a list",
-    "string_type": "must be a text",
-    "string_too_short": "must be a text that is not empty",
-    "bool_type": "must be true or false",
-    "int_type": "must be a whole number",
-    "int_from_float": "must be a whole number",
+    "model_type": "must be a table of keys", "model_attributes_type": "must be a table of keys",
+    "dict_type": "must be a table of keys", "tuple_type": "must be a list", "string_type": "must be a text",
+    "string_too_short": "must be a text that is not empty", "bool_type": "must be true or false",
+    "int_type": "must be a whole number", "int_from_float": "must be a whole number",
     "invalid_key": "must be a key that is a text",
-}
+}  # fmt: skip
 
 
 def record_faults(error: ValidationError, hint: Any, raw: Any, prefix: Where = ()) -> list[Fault]:

@@ -150,18 +150,12 @@ def scene_parts(raw: Mapping[str, Any], scene: Scene | None, folder: Path, sketc
     tables = {name: entries(name) for name in TABLES} | {"probes": entries("output", "probes")}
     drive = single("drive") if raw.get("drive") is not None else NONE
     return Parts(
-        **tables,
-        drive=drive,
-        damping=single("damping"),
-        analysis=single("analysis"),
+        **tables, drive=drive, damping=single("damping"), analysis=single("analysis"),
         animation=single("output", "animation"),
         fatigue=single("fatigue") if raw.get("fatigue") is not None else NONE,
-        materials=[*(own if isinstance(own, Mapping) else ()), *BUILT_IN],
-        raw=raw,
-        folder=folder,
-        sketch=sketch,
-        good=scene or good_scene(tables, drive, record_of(raw.get("gravity"), "gravity")),
-    )
+        materials=[*(own if isinstance(own, Mapping) else ()), *BUILT_IN], raw=raw, folder=folder,
+        sketch=sketch, good=scene or good_scene(tables, drive, record_of(raw.get("gravity"), "gravity")),
+    )  # fmt: skip
 
 
 def good_scene(tables: Mapping[str, Mapping[str, Entry]], drive: Entry, gravity: XYZ | None) -> Scene:

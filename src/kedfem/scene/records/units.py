@@ -30,29 +30,13 @@ UNIT = re.compile(rf"(?:{NAMED}|1(?= ?/))(?:(?: ?[*/·] ?| ){NAMED})*")
 """Names with powers of one digit, multiplied and divided: nothing that could be reckoned with."""
 
 KINDS = {
-    "1": "a number",
-    "m": "a length",
-    "m^2": "an area",
-    "m^4": "a second moment of area",
-    "rad": "an angle",
-    "s": "a time",
-    "Hz": "a frequency",
-    "rad/s": "a rotational speed",
-    "1/s": "a rate",
-    "m/s": "a speed",
-    "m/s^2": "an acceleration",
-    "kg": "a mass",
-    "kg*m^2": "a moment of inertia",
-    "kg/m^3": "a density",
-    "Pa": "a pressure",
-    "N": "a force",
-    "N/m^3": "a force per volume",
-    "N*m": "a torque",
-    "N/m": "a stiffness",
-    "N*s/m": "a damping constant",
-    "N*m/rad": "a torsional stiffness",
+    "1": "a number", "m": "a length", "m^2": "an area", "m^4": "a second moment of area", "rad": "an angle",
+    "s": "a time", "Hz": "a frequency", "rad/s": "a rotational speed", "1/s": "a rate", "m/s": "a speed",
+    "m/s^2": "an acceleration", "kg": "a mass", "kg*m^2": "a moment of inertia", "kg/m^3": "a density",
+    "Pa": "a pressure", "N": "a force", "N/m^3": "a force per volume", "N*m": "a torque",
+    "N/m": "a stiffness", "N*s/m": "a damping constant", "N*m/rad": "a torsional stiffness",
     "N*m*s/rad": "a torsional damping constant",
-}
+}  # fmt: skip
 UNREADABLE = (
     ValueError,
     TypeError,

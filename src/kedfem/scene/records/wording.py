@@ -7,31 +7,17 @@ from difflib import get_close_matches
 from typing import Any
 
 KEYS = {  # of scenes by their former names: messages about unknown words name the present ones
-    "functions": "reduction",
-    "modes": "reduction",
-    "reduced": "reduction",
-    "fidelity": "model",
-    "step": "file",
-    "reduction": "reduction_tolerance",
-    "port": "coupling",
-    "turning_stiffness": "rotational_stiffness",
-    "turning_damping": "rotational_damping",
-    "spin": "angular_velocity",
-    "turns": "revolutions",
-    "last_turns": "last_revolutions",
-    "steps_per_turn": "steps_per_revolution",
-    "frames_per_turn": "frames_per_revolution",
-    "levels": "extrapolation_levels",
-    "exaggeration": "deformation_scale",
-    "ignore": "defeature_size",
-}
+    "functions": "reduction", "modes": "reduction", "reduced": "reduction", "fidelity": "model",
+    "step": "file", "reduction": "reduction_tolerance", "port": "coupling",
+    "turning_stiffness": "rotational_stiffness", "turning_damping": "rotational_damping",
+    "spin": "angular_velocity", "turns": "revolutions", "last_turns": "last_revolutions",
+    "steps_per_turn": "steps_per_revolution", "frames_per_turn": "frames_per_revolution",
+    "levels": "extrapolation_levels", "exaggeration": "deformation_scale", "ignore": "defeature_size",
+}  # fmt: skip
 VALUES = {
-    "nominal": "rigid-body",
-    "following": "co-rotational",
-    "literal": "monolithic",
-    "averaged": "distributing",
-    "stiff": "rigid",
-}
+    "nominal": "rigid-body", "following": "co-rotational", "literal": "monolithic",
+    "averaged": "distributing", "stiff": "rigid",
+}  # fmt: skip
 NOUNS = {"solid": "solid", "plane": "plane link", "beam": "beam"}  # links by what they are modelled as
 
 
