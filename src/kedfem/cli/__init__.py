@@ -9,7 +9,7 @@ import typer
 
 from kedfem.cli.exporting import export
 from kedfem.cli.new import KINDS, new
-from kedfem.cli.options import DEFECT, DOUBTFUL, INTERRUPTED, USER_ERROR
+from kedfem.cli.options import DEFECT, DOUBTFUL, INTERRUPTED, USER_ERROR, flag
 from kedfem.cli.parts import frequencies, mesh
 from kedfem.cli.results import compare, loads, report, view
 from kedfem.cli.running import accuracy, check, kinematics, run, sweep
@@ -25,8 +25,7 @@ app = typer.Typer(
 
 @app.callback(invoke_without_command=True)
 def _root(
-    context: typer.Context,
-    version: Annotated[bool, typer.Option("--version", help="Show the version and exit.")] = False,
+    context: typer.Context, version: Annotated[bool, flag("--version", "Show the version and exit.")] = False
 ) -> None:
     if version:
         from kedfem import __version__
@@ -36,7 +35,7 @@ def _root(
     del context
 
 
-def cache(clear: Annotated[bool, typer.Option("--clear", help="Remove all that is kept.")] = False) -> None:
+def cache(clear: Annotated[bool, flag("--clear", "Remove all that is kept.")] = False) -> None:
     """Show what is kept between runs, and where."""
     from kedfem.folders import cache_folder, named_cache
     from kedfem.store import clear as cleared

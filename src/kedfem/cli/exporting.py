@@ -3,60 +3,37 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from kedfem.cli.options import ScenePath, Within
+from kedfem.cli.options import ScenePath, Within, flag, given, option
 from kedfem.cli.screen import say, show, stages
 
 
 def export(
     scene: ScenePath,
-    link: Annotated[str | None, typer.Option(metavar="NAME", help="The elastic link whose matrices.")] = None,
+    link: Annotated[str | None, option("The elastic link whose matrices.", "NAME")] = None,
     file: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE", help="NAME.npz or NAME.mat for the matrices; default: LINK.npz beside the scene."
-        ),
+        option("NAME.npz or NAME.mat for the matrices; default: LINK.npz beside the scene.", "FILE"),
     ] = None,
-    motion: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="NAME.csv for the rigid motion of all links.")
-    ] = None,
+    motion: Annotated[Path | None, option("NAME.csv for the rigid motion of all links.", "FILE")] = None,
     state_space: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE", help="NAME.npz or NAME.mat for the mechanism as a linear system at a position."
-        ),
+        option("NAME.npz or NAME.mat for the mechanism as a linear system at a position.", "FILE"),
     ] = None,
     gltf: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="NAME.glb for the links of the scene's run in motion, for 3-D viewers."
-        ),
+        Path | None, option("NAME.glb for the links of the scene's run in motion, for 3-D viewers.", "FILE")
     ] = None,
-    modes: Annotated[
-        int, typer.Option(metavar="N", help="Of the linear system: vibrations that are kept.")
-    ] = 12,
-    at: Annotated[
-        float,
-        typer.Option(metavar="SECONDS", help="Of the linear system: when the drive is at the position."),
-    ] = 0.0,
+    modes: Annotated[int, option("Of the linear system: vibrations that are kept.", "N")] = 12,
+    at: Annotated[float, option("Of the linear system: when the drive is at the position.", "SECONDS")] = 0.0,
     free: Annotated[
-        bool,
-        typer.Option("--free", help="Of the linear system: the drive lets go, and its torque is an input."),
+        bool, flag("--free", "Of the linear system: the drive lets go, and its torque is an input.")
     ] = False,
     within: Within = False,
 ) -> None:
     """For other programs: matrices of a link, the mechanism as a linear system, motion of all, moving shapes."""
     from kedfem.errors import SceneError
 
-    options = {
-        "--link": link,
-        "--file": file,
-        "--motion": motion,
-        "--state-space": state_space,
-        "--gltf": gltf,
-    }
-    match [key for key, value in options.items() if value is not None]:
+    named = given(link=link, file=file, motion=motion, state_space=state_space, gltf=gltf)
+    match [f"--{key.replace('_', '-')}" for key in named]:
         case ["--motion"] if motion:
             say(*_motion(scene, motion, within))
         case ["--state-space"] if state_space:

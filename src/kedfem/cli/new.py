@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from kedfem.cli.options import option
 from kedfem.cli.screen import progress, say
 from kedfem.errors import OutputError, SceneError
 
@@ -24,15 +25,13 @@ def new(
     ] = None,
     assembly: Annotated[
         Path | None,
-        typer.Option(
+        option(
+            "A CAD file (STEP, IGES or BREP): its solids become links, joints where they meet are proposed.",
+            "ASSEMBLY",
             "--from",
-            metavar="ASSEMBLY",
-            help="A CAD file (STEP, IGES or BREP): its solids become links, joints where they meet are proposed.",
         ),
     ] = None,
-    scale: Annotated[
-        float | None, typer.Option(help="Metres per unit of ASSEMBLY, if not its own unit.")
-    ] = None,
+    scale: Annotated[float | None, option("Metres per unit of ASSEMBLY, if not its own unit.")] = None,
 ) -> None:
     """Write a commented scene to start from."""
     if assembly is not None:

@@ -8,9 +8,19 @@ import typer
 USER_ERROR, DEFECT, DOUBTFUL, INTERRUPTED = 2, 3, 4, 130
 
 
+def option(text: str, metavar: str | None = None, *names: str) -> Any:
+    """An option with a value: what it is, and what its value is called."""
+    return typer.Option(*names, metavar=metavar, help=text)
+
+
+def flag(name: str, text: str) -> Any:
+    """An option without a value."""
+    return typer.Option(name, help=text)
+
+
 def goes_to(default: str, what: str = "all goes") -> Any:
     """The option that says where a command writes."""
-    return typer.Option(help=f"Where {what}; default: {default}.")
+    return option(f"Where {what}; default: {default}.")
 
 
 def given(**keys: Any) -> dict[str, Any]:
@@ -19,17 +29,13 @@ def given(**keys: Any) -> dict[str, Any]:
 
 
 ScenePath = Annotated[Path, typer.Argument(metavar="SCENE", help="The scene file (TOML).")]
-Quick = Annotated[bool, typer.Option("--quick", help="Plain defaults for what the scene leaves open.")]
+Quick = Annotated[bool, flag("--quick", "Plain defaults for what the scene leaves open.")]
 Within = Annotated[
-    bool, typer.Option("--within", help="Refuse a scene that names files or folders outside its own folder.")
+    bool, flag("--within", "Refuse a scene that names files or folders outside its own folder.")
 ]
-Solid = Annotated[str | None, typer.Option(metavar="NAME", help="Which solid of an assembly.")]
-Size = Annotated[
-    str | None, typer.Option(metavar="LENGTH", help="Edge length of a part's elements, e.g. '3 mm'.")
-]
-Across = Annotated[
-    int | None, typer.Option(help="Elements across a part's smallest width; 2 if nothing else is given.")
-]
-Unknowns = Annotated[int | None, typer.Option(help="About so many unknowns of a part.")]
-ElementKind = Annotated[str, typer.Option(metavar="KIND", help="Of a part: hex27, hex20, hex8 or tet10.")]
-Scale = Annotated[float | None, typer.Option(help="Metres per unit of a part's file, if not its own unit.")]
+Solid = Annotated[str | None, option("Which solid of an assembly.", "NAME")]
+Size = Annotated[str | None, option("Edge length of a part's elements, e.g. '3 mm'.", "LENGTH")]
+Across = Annotated[int | None, option("Elements across a part's smallest width; 2 if nothing else is given.")]
+Unknowns = Annotated[int | None, option("About so many unknowns of a part.")]
+ElementKind = Annotated[str, option("Of a part: hex27, hex20, hex8 or tet10.", "KIND")]
+Scale = Annotated[float | None, option("Metres per unit of a part's file, if not its own unit.")]

@@ -6,7 +6,19 @@ from typing import Annotated
 
 import typer
 
-from kedfem.cli.options import Across, ElementKind, Scale, Size, Solid, Unknowns, Within, given, goes_to
+from kedfem.cli.options import (
+    Across,
+    ElementKind,
+    Scale,
+    Size,
+    Solid,
+    Unknowns,
+    Within,
+    flag,
+    given,
+    goes_to,
+    option,
+)
 from kedfem.cli.screen import progress, say, show, warn
 from kedfem.errors import OutputError, SceneError
 
@@ -22,9 +34,7 @@ def mesh(
     across: Across = None,
     unknowns: Unknowns = None,
     element: ElementKind = "hex27",
-    min_quality: Annotated[
-        float | None, typer.Option(metavar="NUMBER", help="Least scaled Jacobian of the elements.")
-    ] = None,
+    min_quality: Annotated[float | None, option("Least scaled Jacobian of the elements.", "NUMBER")] = None,
     scale: Scale = None,
     folder: Annotated[Path | None, goes_to("PART-mesh beside the part", "mesh and picture go")] = None,
 ) -> None:
@@ -63,23 +73,21 @@ def frequencies(
         typer.Argument(metavar="SCENE", help="The scene file (TOML); or a part: a CAD file or a mesh file."),
     ],
     context: typer.Context,
-    modes: Annotated[int, typer.Option(help="Frequencies at each position, or of the part.")] = 6,
-    positions: Annotated[int, typer.Option(help="Over a turn, or over the whole run.")] = 16,
-    free: Annotated[bool, typer.Option("--free", help="Drives let go of their joints.")] = False,
-    harmonics: Annotated[int, typer.Option(help="Of the drive that are compared.")] = 5,
-    shapes: Annotated[
-        int, typer.Option(help="Lowest mode shapes that are drawn, and animated for ParaView.")
-    ] = 0,
-    link: Annotated[str | None, typer.Option(metavar="NAME", help="One link of the scene alone.")] = None,
+    modes: Annotated[int, option("Frequencies at each position, or of the part.")] = 6,
+    positions: Annotated[int, option("Over a turn, or over the whole run.")] = 16,
+    free: Annotated[bool, flag("--free", "Drives let go of their joints.")] = False,
+    harmonics: Annotated[int, option("Of the drive that are compared.")] = 5,
+    shapes: Annotated[int, option("Lowest mode shapes that are drawn, and animated for ParaView.")] = 0,
+    link: Annotated[str | None, option("One link of the scene alone.", "NAME")] = None,
     hold: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="NAME",
-            help="A joint of the link, or a face of the part, that is held; several: given again. Default: free.",
+        option(
+            "A joint of the link, or a face of the part, that is held; several: given again. Default: free.",
+            "NAME",
         ),
     ] = None,
     material: Annotated[
-        str, typer.Option(metavar="NAME", help="Of a part: one that is built in, or '{ density = … }'.")
+        str, option("Of a part: one that is built in, or '{ density = … }'.", "NAME")
     ] = "steel",
     solid: Solid = None,
     size: Size = None,
@@ -134,8 +142,8 @@ def frequencies(
 
 def _refuse(context: typer.Context, options: Iterable[str], wanted: str) -> None:
     """Refuse options that have no meaning for what was named."""
-    for option in options:
-        source = context.get_parameter_source(option)
+    for name in options:
+        source = context.get_parameter_source(name)
         if source is not None and source.name == "COMMANDLINE":
-            got = context.params[option]
-            raise SceneError(f"--{option}: {wanted}, got {'it' if isinstance(got, bool) else got}")
+            got = context.params[name]
+            raise SceneError(f"--{name}: {wanted}, got {'it' if isinstance(got, bool) else got}")

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from kedfem.cli.options import Within, goes_to
+from kedfem.cli.options import Within, goes_to, option
 from kedfem.cli.running import PAGE
 from kedfem.cli.screen import progress, say, say_written, show, warn
 from kedfem.errors import OutputError, SceneError
@@ -20,18 +20,16 @@ def loads(
         Path, typer.Argument(metavar="RESULTS", help="results.h5, or the folder that has it.")
     ],
     last: Annotated[
-        float | None,
-        typer.Option(metavar="REVOLUTIONS", help="Of the drive, at the end, that count; default: all."),
+        float | None, option("Of the drive, at the end, that count; default: all.", "REVOLUTIONS")
     ] = None,
     link: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Load cases of this link instead, for a static analysis of it."),
+        str | None, option("Load cases of this link instead, for a static analysis of it.", "NAME")
     ] = None,
     at: Annotated[
         list[float] | None,
-        typer.Option(
-            metavar="SECONDS",
-            help="Instant of a load case; several: given again. Default: that of the link's highest stress.",
+        option(
+            "Instant of a load case; several: given again. Default: that of the link's highest stress.",
+            "SECONDS",
         ),
     ] = None,
     folder: Annotated[Path | None, goes_to("loads beside the results")] = None,
@@ -78,8 +76,8 @@ def compare(
     ],
     over: Annotated[
         str | None,
-        typer.Option(
-            help="time or drive, what curves are over; default: the drive's position where runs have other speeds."
+        option(
+            "time or drive, what curves are over; default: the drive's position where runs have other speeds."
         ),
     ] = None,
     folder: Annotated[Path | None, goes_to("compare beside the first results")] = None,
@@ -98,8 +96,7 @@ def compare(
 def report(
     given: Given,
     file: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Where it goes; default: report.html beside the results."),
+        Path | None, option("Where it goes; default: report.html beside the results.", "FILE")
     ] = None,
     within: Within = False,
 ) -> None:

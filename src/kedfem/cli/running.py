@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from kedfem.cli.options import DOUBTFUL, Quick, ScenePath, Within, goes_to
+from kedfem.cli.options import DOUBTFUL, Quick, ScenePath, Within, flag, goes_to, option
 from kedfem.cli.screen import interruptible, progress, say, say_written, show, stages, warn
 from kedfem.errors import SceneError
 
@@ -30,10 +30,9 @@ def run(
     quick: Quick = False,
     within: Within = False,
     resume: Annotated[
-        bool,
-        typer.Option("--resume", help="Go on from the last state that an interrupted or killed run stored."),
+        bool, flag("--resume", "Go on from the last state that an interrupted or killed run stored.")
     ] = False,
-    states: Annotated[float, typer.Option(metavar="SECONDS", help="Time between stored states.")] = 10.0,
+    states: Annotated[float, option("Time between stored states.", "SECONDS")] = 10.0,
 ) -> None:
     """Analyse a scene: time series, animation, plots, a picture."""
     from kedfem.analysis import analyse
@@ -127,9 +126,9 @@ def kinematics(
 def accuracy(
     scene: ScenePath,
     folder: Annotated[Path | None, goes_to("SCENE-accuracy beside the scene", "table and plot go")] = None,
-    repeats: Annotated[int, typer.Option(help="Runs of short variants; medians are shown.")] = 3,
-    most: Annotated[float, typer.Option(metavar="SECONDS", help="What the whole study may take.")] = 60.0,
-    quick: Annotated[bool, typer.Option("--quick", help="A small reference and few variants.")] = False,
+    repeats: Annotated[int, option("Runs of short variants; medians are shown.")] = 3,
+    most: Annotated[float, option("What the whole study may take.", "SECONDS")] = 60.0,
+    quick: Annotated[bool, flag("--quick", "A small reference and few variants.")] = False,
 ) -> None:
     """Run a scene in many variants: how fast, how near to the finest."""
     from kedfem.accuracy.study.files import write_study, write_study_plot
@@ -156,38 +155,27 @@ def accuracy(
 def sweep(
     scene: ScenePath,
     over: Annotated[
-        list[str],
-        typer.Option(
-            metavar="KEY=VALUES", help="A key or parameter, and a,b,c or from:to:count; several: a grid."
-        ),
+        list[str], option("A key or parameter, and a,b,c or from:to:count; several: a grid.", "KEY=VALUES")
     ],
     samples: Annotated[
-        int | None, typer.Option(help="Points of a Latin hypercube instead of a grid; each KEY=from:to.")
+        int | None, option("Points of a Latin hypercube instead of a grid; each KEY=from:to.")
     ] = None,
-    last: Annotated[
-        float, typer.Option(metavar="REVOLUTIONS", help="Whose extremes count, the last ones.")
-    ] = 1.0,
-    workers: Annotated[int | None, typer.Option(help="Processes; as many as there are cores.")] = None,
+    last: Annotated[float, option("Whose extremes count, the last ones.", "REVOLUTIONS")] = 1.0,
+    workers: Annotated[int | None, option("Processes; as many as there are cores.")] = None,
     cluster: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS", help="A Dask scheduler whose workers run the points, as tcp://host:8786."
-        ),
+        str | None, option("A Dask scheduler whose workers run the points, as tcp://host:8786.", "ADDRESS")
     ] = None,
     quick: Quick = False,
-    keep: Annotated[bool, typer.Option("--keep", help="Leave a folder of results for each point.")] = False,
+    keep: Annotated[bool, flag("--keep", "Leave a folder of results for each point.")] = False,
     edges: Annotated[
         float | None,
-        typer.Option(
-            metavar="WIDTH",
-            help="Find edges of unstable bands along the first key to this relative width, as 0.001.",
-        ),
+        option("Find edges of unstable bands along the first key to this relative width, as 0.001.", "WIDTH"),
     ] = None,
     follow: Annotated[
         bool,
-        typer.Option(
+        flag(
             "--follow",
-            help="Look for each steady motion where that of the point before was found, in the order of the first key.",
+            "Look for each steady motion where that of the point before was found, in the order of the first key.",
         ),
     ] = False,
     folder: Annotated[Path | None, goes_to("SCENE-sweep beside the scene")] = None,
