@@ -49,7 +49,7 @@ ENERGIES = (
     (
         "work",
         ("loads", "supports"),
-        "work done by the loads, motors and springs; by the drive and the other supports",
+        "work done by loads, motors and springs; by the drive and the other supports",
     ),
     ("dissipated", ("dissipated",), "energy that damping took"),
     (
@@ -220,12 +220,11 @@ class Account:
 def energy_channels(account: Account) -> list[tuple[Channel, Callable[[Block], Rows]]]:
     """Energies over time, and the residual of the integration."""
 
-    def rows(name: str) -> Callable[[Block], Rows]:
-        return lambda block: account.rows(block)[name]
+    def rows(name: str, block: Block) -> Rows:
+        return account.rows(block)[name]
 
-    return [
-        (Channel(f"energy/{name}", columns, "J", "", text), rows(name)) for name, columns, text in ENERGIES
-    ]
+    channels = [Channel(f"energy/{name}", columns, "J", "", text) for name, columns, text in ENERGIES]
+    return [(each, partial(rows, each.name.removeprefix("energy/"))) for each in channels]
 
 
 def balance_warning(found: Balance) -> tuple[str, ...]:

@@ -23,14 +23,11 @@ def not_finite(
     time: Float[np.ndarray, " b"], values: Mapping[str, Float[np.ndarray, "b c"]]
 ) -> tuple[int, str] | None:
     """The first row that holds something that is not finite, and what to say of it."""
-    first = len(time)
-    message = ""
+    first, message = len(time), ""
     for name, block in values.items():
         bad = ~np.isfinite(block).all(axis=1)
         if bad.any() and (row := int(np.argmax(bad))) < first:
             got = block[row][~np.isfinite(block[row])][0]
-            first, message = (
-                row,
-                f"{name}: must be finite, got {got:g} at t = {time[row]:.6g} s; take a shorter step",
-            )
+            first = row
+            message = f"{name}: must be finite, got {got:g} at t = {time[row]:.6g} s; take a shorter step"
     return (first, message) if message else None

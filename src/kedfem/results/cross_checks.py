@@ -47,8 +47,8 @@ class _Pair:
         """More time points."""
         self.count += len(e)
         self.products += [np.vdot(e, e), np.vdot(e, r), np.vdot(r, r)]
-        sums = np.stack([e.sum(axis=0), r.sum(axis=0)])
-        self.means = self.means + sums
+
+        self.means = self.means + np.stack([e.sum(axis=0), r.sum(axis=0)])
 
     @property
     def size(self) -> float:
@@ -82,14 +82,12 @@ class CrossChecks:
     def __init__(self, scene: Scene, linkage: Linkage, channels: Sequence[Channel], account: Account) -> None:
         known = {each.name: each for each in channels}
         self.linkage, self.size = linkage, linkage.size
-        self.pairs = [
-            _Pair(name, rigid, [list(each.columns).index(x) for x in known[rigid].columns], each.unit)
-            for name, each in known.items()
-            for rigid in [_rigid_name(name)]
-            if rigid in known
-            and "without what is along" not in known[rigid].description
-            and not linkage.mobility
-        ]
+        self.pairs = []
+        for name, each in known.items() if not linkage.mobility else ():
+            rigid = known.get(_rigid_name(name))
+            if rigid is not None and "without what is along" not in rigid.description:
+                columns = [each.columns.index(x) for x in rigid.columns]
+                self.pairs.append(_Pair(name, rigid.name, columns, each.unit))
         self.drives = {drive_effort(scene, name)[0]: scene.joints[name] for name in scene.driven_joints}
         self.account = account
         all_known = bool(self.drives) and known.keys() >= self.drives.keys()
@@ -106,10 +104,8 @@ class CrossChecks:
             each.add(values[each.elastic][:, each.columns], values[each.rigid])
         if not self.worked:
             return
-        power = np.sum(
-            [values[effort][:, 0] * joint_rate(x, self.linkage, motion) for effort, x in self.drives.items()],
-            axis=0,
-        )
+        rates = {effort: joint_rate(x, self.linkage, motion) for effort, x in self.drives.items()}
+        power = np.sum([values[effort][:, 0] * rate for effort, rate in rates.items()], axis=0)
         t0, before = self._last or (float(motion.t[0]), float(power[0]))
         h = np.diff(motion.t, prepend=t0)
         work = self._work + np.cumsum(0.5 * h * (power + np.concatenate([[before], power[:-1]])))
@@ -144,15 +140,14 @@ class CrossChecks:
                 )
         if self.unworked > UNWORKED:
             names, left = ", ".join(self.drives), f"{100 * self.unworked:.2g} % of the energy exchanged"
-            meaning = (
-                f"by {left}: a part of its effort is missing"
-                if self.unworked > MISSING
-                else f"by {left}, no more: so far efforts and energies are uncertain; a shorter step shows whether it is "
-                "the steps'"
-            )
-            out.append(
-                f"{names}: the work of the drive is off the change of energy and the other work {meaning}"
-            )
+            meaning = "a part of its effort is missing"
+            if self.unworked <= MISSING:
+                left += ", no more"
+                meaning = (
+                    "so far efforts and energies are uncertain; a shorter step shows whether it is the steps'"
+                )
+            off = f"is off the change of energy and the other work by {left}"
+            out.append(f"{names}: the work of the drive {off}: {meaning}")
         return tuple(out)
 
     def _arm(self, each: _Pair) -> float:

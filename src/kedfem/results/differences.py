@@ -111,12 +111,8 @@ def differences(runs: Sequence[Results], over: Over, at: Float[np.ndarray, " T"]
         if peaks.max() <= NOTHING * highest.get(channel.unit, 0.0) or not peaks[0]:
             continue
         off = [magnitude(channel, x - values[0]) / peaks[0] for x in values]
-        out.append(
-            Difference(
-                channel, values, peaks, np.array([x.max() for x in off]),
-                np.array([np.sqrt(np.mean(x**2)) for x in off]), np.array([at[x.argmax()] for x in off]),
-            )
-        )  # fmt: skip
+        most, rms = np.array([x.max() for x in off]), np.array([np.sqrt(np.mean(x**2)) for x in off])
+        out.append(Difference(channel, values, peaks, most, rms, np.array([at[x.argmax()] for x in off])))
     return out
 
 

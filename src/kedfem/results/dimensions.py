@@ -30,9 +30,9 @@ def columns_dimension(columns: Sequence[str]) -> str:
     return NAMED.get(tuple(columns), "_".join(columns))
 
 
-def cf_units(unit: str) -> str:
-    """A channel's unit as CF has it: 1 where there is none."""
-    return unit or "1"
+def cf_attributes(channel: Channel) -> dict[str, str]:
+    """A channel's unit, as CF has it 1 where there is none, and what it is."""
+    return {"units": channel.unit or "1", "long_name": channel.description}
 
 
 def lay_dimensions(file: Any, drive: Channel, channels: Sequence[Channel]) -> None:
@@ -48,13 +48,8 @@ def lay_dimensions(file: Any, drive: Channel, channels: Sequence[Channel]) -> No
             write_facts(file[name], {"long_name": f"components {', '.join(channel.columns)}"})
             file[name].make_scale(name)
     for channel in (TIME, drive, *channels):
-        rows, attributes = (
-            file[channel.name],
-            {"units": cf_units(channel.unit), "long_name": channel.description},
-        )
-        if channel.columns:
-            attributes["coordinates"] = drive.name
-        write_facts(rows, attributes)
+        rows = file[channel.name]
+        write_facts(rows, cf_attributes(channel) | ({"coordinates": drive.name} if channel.columns else {}))
         if channel is not TIME:
             rows.dims[0].attach_scale(file[TIME.name])
         if name := columns_dimension(channel.columns):

@@ -105,9 +105,8 @@ def claimed(folder: Path, within: Sequence[str] = ()) -> Iterator[Path]:
         yield folder
     finally:
         with suppress(OSError):
-            (
-                folder / LOCK
-            ).unlink()  # while it is held: who waits for it sees that it is gone, and makes a new one
+            # while it is held: who waits for it sees that it is gone, and makes a new one
+            (folder / LOCK).unlink()
         lock.release()
         if new:
             with suppress(OSError):
@@ -144,6 +143,5 @@ def of_extra(package: str, where: str, extra: str = DATA) -> Any:
     try:
         return import_module(package)
     except ImportError as error:
-        raise OutputError(
-            f"{where}: needs {package}, which is not installed: pip install 'kedfem[{extra}]'"
-        ) from error
+        missing = f"{where}: needs {package}, which is not installed: pip install 'kedfem[{extra}]'"
+        raise OutputError(missing) from error

@@ -64,6 +64,5 @@ def write_frequencies(
 def write_part_frequencies(path: Path, values: Float[np.ndarray, " f"]) -> None:
     """One row a mode: its number, natural frequency [Hz]."""
     with text_file(path) as file:
-        write_numbers(
-            file, ["mode", "frequency [Hz]"], [np.column_stack([1 + np.arange(len(values)), values])]
-        )
+        rows = np.column_stack([1 + np.arange(len(values)), values])
+        write_numbers(file, ["mode", "frequency [Hz]"], [rows])

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -101,11 +102,11 @@ def _point(
 ) -> list[tuple[Channel, Callable[[RigidMotion], Rows]]]:
     """Position, velocity and acceleration of a point of a body, in the reference position."""
 
-    def rows(name: str) -> Callable[[RigidMotion], Rows]:
-        return lambda motion: getattr(motion, name)(body, at)
+    def rows(name: str, motion: RigidMotion) -> Rows:
+        return np.asarray(getattr(motion, name)(body, at))
 
     return [
-        (Channel(f"{key}/{name}", XYZ, unit, "world", f"{name} {text}"), rows(name))
+        (Channel(f"{key}/{name}", XYZ, unit, "world", f"{name} {text}"), partial(rows, name))
         for name, unit in RATES.items()
     ]
 
@@ -127,20 +128,14 @@ def _turn(
     def turned(motion: RigidMotion) -> Rows:
         return rotation_vector(motion.R[:, body]) if turn is None else turn.values(motion)[:, None]
 
-    def rate(of: str) -> Callable[[RigidMotion], Rows]:
-        def rows(motion: RigidMotion) -> Rows:
-            vector = getattr(motion, of)[:, body]
-            return np.asarray(vector if normal is None else (vector @ normal)[:, None])
-
-        return rows
+    def rate(of: str, motion: RigidMotion) -> Rows:
+        vector = getattr(motion, of)[:, body]
+        return np.asarray(vector if normal is None else (vector @ normal)[:, None])
 
     rotation = Channel(f"{key}/rotation", angles, "rad", frame, f"{what} {text} from the reference position")
-    return [
-        (rotation, turned),
-        *(
-            (Channel(f"{key}/{word}", rates, unit, frame, f"{word.replace('_', ' ')} {text}"), rate(of))
-            for word, unit, of in TURNS
-        ),
+    return [(rotation, turned)] + [
+        (Channel(f"{key}/{word}", rates, unit, frame, f"{word.replace('_', ' ')} {text}"), partial(rate, of))
+        for word, unit, of in TURNS
     ]
 
 

@@ -22,9 +22,8 @@ ELEMENTS = {
 
 def modelled(scene: Scene, linkage: Linkage, model: Model) -> dict[str, Mapping[str, Any]]:
     """Link → facts about it, as `Results.links` has them."""
-    inertias, out = inertias_of_model(scene, linkage, model), dict[str, Mapping[str, Any]]()
-    for name, parts in segments(model).items():
-        out[name] = element_facts(parts)
+    inertias = inertias_of_model(scene, linkage, model)
+    out = {name: element_facts(parts) for name, parts in segments(model).items()}
     out |= {prescribed.link.name: {"model": "rigid, with the drive"} for prescribed in model.prescribed}
     out |= {slider.name: {"model": "rigid slider"} for slider in model.sliders}
     return {name: {**facts, **_masses(inertias, linkage.bodies.index(name))} for name, facts in out.items()}
@@ -32,11 +31,8 @@ def modelled(scene: Scene, linkage: Linkage, model: Model) -> dict[str, Mapping[
 
 def element_facts(parts: Sequence[Link]) -> Mapping[str, Any]:
     """What a link, or its segments, is made of: `model`, `elements`, `unknowns`."""
-    return {
-        "model": element_words(parts),
-        "elements": sum(len(part.cells) for part in parts),
-        "unknowns": sum(part.unknowns for part in parts),
-    }
+    elements, unknowns = sum(len(part.cells) for part in parts), sum(part.unknowns for part in parts)
+    return {"model": element_words(parts), "elements": elements, "unknowns": unknowns}
 
 
 def element_words(parts: Sequence[Link]) -> str:
@@ -62,8 +58,5 @@ def _masses(inertias: Inertias, body: int) -> Mapping[str, Any]:
     mass, arm = float(inertias.mass[body]), centre - inertias.centre
     J = inertia_of(inertias.second[body] - mass * np.outer(arm, arm))
     J[2, 2] += inertias.spin[body]
-    return {
-        "mass [kg]": mass,
-        "centre of mass [m]": centre,
-        "inertia [kg m^2]": np.array(moments_of_inertia(J)),
-    }
+    inertia = np.array(moments_of_inertia(J))
+    return {"mass [kg]": mass, "centre of mass [m]": centre, "inertia [kg m^2]": inertia}

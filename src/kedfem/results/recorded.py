@@ -55,6 +55,5 @@ def drive_channel(scene: Scene) -> Channel:
     channel = TRAVEL if scene.joints[names[0]].kind == "prismatic" else ANGLE
     if len(names) == 1:
         return channel
-    return replace(
-        channel, description=f"{channel.description}, of {names[0]}, the first of {len(names)} drives"
-    )
+    text = f"{channel.description}, of {names[0]}, the first of {len(names)} drives"
+    return replace(channel, description=text)

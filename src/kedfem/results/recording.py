@@ -1,6 +1,7 @@
 """From the elastic motion to rows of channels: probes, joint forces, drive torque; block by block."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import partial
 
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.inertias import inertias_of_model
@@ -44,9 +45,8 @@ def recording(
     forces = Forces(ConstraintForces(model), force_elements or measured_elements(scene, model))
     account = account or Account(model, forces.force_elements, lambda: stresses_of(scene, model))
     joints = [channel for name in scene.joints for channel in joint_channels(scene, model, name, forces)]
-    drive = [
-        channel for name in scene.driven_joints for channel in drive_channels(scene, model, name, forces)
-    ]
+    driven = scene.driven_joints
+    drive = [channel for name in driven for channel in drive_channels(scene, model, name, forces)]
     gears = [gear_channel(model, name) for name in scene.gears]
     energies = [Recorded(*each) for each in energy_channels(account)]
     if without_vibration(scene):  # sums over time steps say nothing of positions found each by itself
@@ -69,7 +69,7 @@ def _rigid(scene: Scene, model: Model, along: Path | None, linked: Linkage | Non
     linked = linked or linkage(scene)
     forces = rigid_forces(scene, linked, inertias_of_model(scene, linked, model), along)
 
-    def rows(name: str) -> Callable[[Block], Rows]:
-        return lambda block: forces.rows(block.motion, block.step)[name]
+    def rows(name: str, block: Block) -> Rows:
+        return forces.rows(block.motion, block.step)[name]
 
-    return [Recorded(each.channel, rows(each.channel.name)) for each in forces.every]
+    return [Recorded(each.channel, partial(rows, each.channel.name)) for each in forces.every]

@@ -222,9 +222,8 @@ class Results:
 
 def rounding(results: Results) -> dict[str, float]:
     """Unit → what is rounding beside the largest value that has it; of moments, beside forces where joints are, too."""
-    places = [
-        each["at"] for each in json.loads(results.scene_json).get("joints", {}).values() if each.get("at")
-    ]
+    joints = json.loads(results.scene_json).get("joints", {}).values()
+    places = [each["at"] for each in joints if each.get("at")]
     size = float(np.linalg.norm(np.ptp(places, axis=0))) if places else 0.0
     highest = largest_by_unit(results.channels.values(), size)
     return {unit: NOTHING * value for unit, value in highest.items()}

@@ -12,9 +12,9 @@ from typing import Any, TextIO
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.results.dimensions import cf_units, columns_dimension
+from kedfem.results.dimensions import cf_attributes, columns_dimension
 from kedfem.results.files import of_extra, replacing
-from kedfem.results.records import Channel, Results
+from kedfem.results.records import TIME, Channel, Results
 
 ROWS = 100_000  # of a table, put together at a time
 # of numbers in tables: more than any result is exact to, half as long as what gives back the same float
@@ -80,19 +80,15 @@ def require_parquet(where: str) -> None:
 def as_data_tree(results: Results) -> Any:
     """An xarray.DataTree with the groups and names of the results file."""
     xarray = of_extra("xarray", "Results.to_xarray")
-    time = xarray.Variable("time", results.time, {"units": "s", "long_name": "time"})
-    attributes = {"units": results.drive.unit, "long_name": results.drive.description}
-    along = {"time": time, results.drive.name: xarray.Variable("time", results.angle, attributes)}
+    time = xarray.Variable("time", results.time, cf_attributes(TIME))
+    drive = xarray.Variable("time", results.angle, cf_attributes(results.drive))
+    along = {"time": time, results.drive.name: drive}
     groups: dict[str, dict[str, Any]] = {}
     for channel, values in results.channels.values():
         group, _, name = channel.name.rpartition("/")
         dimension = columns_dimension(channel.columns)
         dims, array = (("time", dimension), values) if dimension else (("time",), values[:, 0])
-        attributes = {
-            "units": cf_units(channel.unit),
-            "long_name": channel.description,
-            "frame": channel.frame,
-        }
+        attributes = cf_attributes(channel) | {"frame": channel.frame}
         labels = {dimension: list(channel.columns)} if dimension else {}
         found = xarray.DataArray(array, dims=dims, coords=along | labels, attrs=attributes)
         groups.setdefault(group, {})[name] = found

@@ -146,10 +146,10 @@ class ResultsWriter:
         """
         require_channels(self.channels, len(time), values)
         if (fault := not_finite(time, values)) is not None:
-            row, attributes = fault
+            row, message = fault
             if row:
                 self.append(time[:row], angle[:row], {name: block[:row] for name, block in values.items()})
-            raise SolveError(attributes)
+            raise SolveError(message)
         try:
             require_space(self.path.parent, self._block_space(len(time)))
             for name, block in (*values.items(), (self.drive.name, angle), (TIME.name, time)):
@@ -199,15 +199,8 @@ class ResultsWriter:
 
     def _lay_out(self) -> None:
         """The empty file: scene, notes, one extendable dataset per channel with its units and dimensions."""
-        version = installed_version()
-        began = {
-            "format": FORMAT,
-            "kedfem_version": version,
-            "status": "running",
-            "reason": "",
-            "run": self.run,
-        }
-        write_facts(self._file, began)
+        began = {"status": "running", "reason": "", "run": self.run}
+        write_facts(self._file, {"format": FORMAT, "kedfem_version": installed_version(), **began})
         scene = self._file.create_group("scene")
         for key, text in self._scene.items():
             write_text(scene, key, text)
@@ -218,10 +211,8 @@ class ResultsWriter:
         for index, channel in enumerate((TIME, self.drive, *self.channels)):
             width = (len(channel.columns),) if len(channel.columns) > 1 else ()
             rows = new_rows(self._file, channel.name, width)
-            attributes = {"unit": channel.unit, "frame": channel.frame, "description": channel.description}
-            write_facts(
-                rows, {**attributes, "columns": list(channel.columns) or [channel.name], "index": index}
-            )
+            said = {"unit": channel.unit, "frame": channel.frame, "description": channel.description}
+            write_facts(rows, said | {"columns": list(channel.columns) or [channel.name], "index": index})
         lay_dimensions(self._file, self.drive, self.channels)
         seal(self._file)
 
@@ -233,11 +224,8 @@ class ResultsWriter:
         self._file = opened(self._part, "r+")
         found = series(self._file)
         names = {f"/{each.name}" for each in (TIME, self.drive, *self.channels)}
-        if (
-            read_facts(self._file).get("run") != self.run
-            or set(found) != names
-            or len(before.time) < self._before
-        ):
+        own = read_facts(self._file).get("run") == self.run and set(found) == names
+        if not own or len(before.time) < self._before:
             wanted = f"{self.path}: must hold the {self._before} rows of the run to be resumed"
             raise OutputError(f"{wanted}, got another run's or fewer; run without --resume")
         for name in ADDED:

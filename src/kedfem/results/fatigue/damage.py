@@ -5,7 +5,6 @@ keeps; it is made for a few points at a time (`surface`).
 """
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from kedfem.results.fatigue.strength import Strength, strength_of, verdict
 from kedfem.results.fatigue.surface import CRITERIA, FINDLEY, LinkFatigue, Look, Period
 from kedfem.results.records import Fatigue, FatigueSpot
 from kedfem.results.stresses.envelope import Envelope
-from kedfem.results.stresses.peaks import drawn_points, places_apart
+from kedfem.results.stresses.peaks import drawn_points, places_apart, within
 from kedfem.scene import Fatigue as Asked
 from kedfem.scene import Scene, time_grid, turn_steps, without_vibration
 
@@ -106,13 +105,8 @@ def _spots(
     points = np.concatenate([drawn_points(each.recovery) for each in every])
     damage = np.concatenate([each.damage for each in every])
     ranked = damage if np.nanmax(damage, initial=0.0) > 0 else np.concatenate([x.utilisation for x in every])
-    ends = np.cumsum([len(each.damage) for each in every])
-    judge = partial(_spot, asked=asked, period=period)
-    found = []
-    for k in places_apart(points, ranked, MOST):
-        part = int(np.searchsorted(ends, k, side="right"))
-        found.append(judge(list(looks.values())[part], k - int(ends[part]) + len(every[part].damage)))
-    return tuple(found)
+    found = (within([len(each.damage) for each in every], k) for k in places_apart(points, ranked, MOST))
+    return tuple(_spot(list(looks.values())[part], node, asked, period) for part, node in found)
 
 
 def _spot(look: Look, point: int, asked: Asked, period: Period) -> FatigueSpot:

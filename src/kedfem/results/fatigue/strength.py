@@ -102,18 +102,8 @@ def _of_strains(data: FatigueData, known: StrainLife, E: float) -> Strength:
     cycles = data.endurance_cycles
     endurance = float(np.exp(np.interp(np.log(cycles), np.log(LIVES), S)))
     M = data.mean_stress_sensitivity or 0.0
-    return Strength(
-        S[::-1].copy(),
-        np.log(LIVES)[::-1].copy(),
-        ENDLESS * endurance,
-        M,
-        endurance,
-        cycles,
-        np.nan,
-        np.nan,
-        1.0,
-        data,
-    )
+    falling, N = S[::-1].copy(), np.log(LIVES)[::-1].copy()
+    return Strength(falling, N, ENDLESS * endurance, M, endurance, cycles, np.nan, np.nan, 1.0, data)
 
 
 def material_factors(

@@ -7,13 +7,13 @@ from kedfem.dynamics.joints.constraint_joints import ordered
 from kedfem.dynamics.model import Model, PrescribedBody
 from kedfem.dynamics.system.forces.exerted import effort
 from kedfem.dynamics.system.forces.supports import supports
-from kedfem.motion.joint_equations import joint_axis
+from kedfem.motion.joint_equations import joint_axis, moving_pair
 from kedfem.results.forces.constraint_forces import of_joint
 from kedfem.results.forces.hub_forces import hub_wrench, partner
 from kedfem.results.forces.port_forces import Forces, holder, loose, negligible, port_wrench
 from kedfem.results.recorded import Recorded, Rows, drive_effort
 from kedfem.results.records import Channel
-from kedfem.scene import GROUND, Scene
+from kedfem.scene import Scene
 
 
 def drive_channels(scene: Scene, model: Model, driven: str, forces: Forces) -> list[Recorded]:
@@ -24,7 +24,7 @@ def drive_channels(scene: Scene, model: Model, driven: str, forces: Forces) -> l
     prescribed = next((x for x in model.prescribed if x.hub == driven), None)
     if prescribed is not None:
         return _hub_drive(scene, model, prescribed, forces)
-    name = next(link for link in joint.links if link != "ground")
+    name = moving_pair(joint)[0]
     axis, at = joint_axis(joint), np.asarray(joint.at)
     wrench = port_wrench(model, holder(model, name, driven), driven, at, forces)
     channel = _drive_channel(scene, driven, name)
@@ -38,7 +38,7 @@ def _hub_drive(scene: Scene, model: Model, prescribed: PrescribedBody, forces: F
     wrench, others = hub_wrench(scene, model, prescribed, forces)
     if not all(negligible(loose(model, *each)[which] @ axis) for each in others):
         return []
-    on = next(link for link in joint.links if link != GROUND)
+    on = moving_pair(joint)[0]
     sign = 1.0 if on == prescribed.link.name else -1.0
     bodies = {x.link.name: x.body for x in model.prescribed}
 
@@ -69,7 +69,7 @@ def gear_channel(model: Model, name: str) -> Recorded:
 def _row_drive(scene: Scene, driven: str) -> Recorded:
     """Torque, of a slide force, of a drive enforced by constraint equations, along its axis in the second link."""
     joint = scene.joints[driven]
-    on = next(link for link in joint.links if link != GROUND)
+    on = moving_pair(joint)[0]
     sign = 1.0 if ordered(joint)[0] == on else -1.0
     channel = _drive_channel(scene, driven, on)
     return Recorded(channel, lambda block: sign * effort(supports(block), driven)[:, None])

@@ -14,6 +14,7 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.system.forces.exerted import at_ends
 from kedfem.dynamics.system.forces.supports import supports
 from kedfem.motion.constraints import cross
+from kedfem.motion.joint_equations import moving_pair
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import Channel
 from kedfem.scene import Scene
@@ -36,9 +37,8 @@ class Measured:
             ends = [end.link in links for end in element.ends]
             if any(ends):
                 found = at_ends(supports(block), constraint_of(element))
-                yield from (
-                    (end, *on) for end, on, here in zip(element.ends, found, ends, strict=True) if here
-                )
+                every = zip(element.ends, found, ends, strict=True)
+                yield from ((end, *on) for end, on, here in every if here)
 
     def on(self, link: str, block: Block, about: Rows) -> tuple[Rows, Rows]:
         """Force and moment of all force elements on a link without unknowns of its own: a slider, a prescribed one.
@@ -63,9 +63,8 @@ class Measured:
     def turns(self, block: Block) -> Float[np.ndarray, "T A"]:
         """Rotations of all hinges; blocks in the order of time."""
         if block is not self.block:
-            before = (
-                np.zeros(len(self.hinges)) if block.step == 0 or not len(self.angles) else self.angles[-1]
-            )
+            first = block.step == 0 or not len(self.angles)
+            before = np.zeros(len(self.hinges)) if first else self.angles[-1]
             self.block, self.angles = block, np.zeros((len(block), len(self.hinges)))
             for i, hinge in enumerate(self.hinges):
                 x, _ = placed(hinge, block.motion, block.links)
@@ -104,8 +103,7 @@ def _column(element: ForceElement, which: str, sign: float, block: Block) -> Row
 
 def _turn(scene: Scene, hinge: ForceElement) -> Channel:
     name = hinge.name.split("/")[1]
-    one, other = scene.joints[name].links
-    one, other = (other, one) if one == "ground" else (one, other)
+    one, other = moving_pair(scene.joints[name])
     text = f"rotation of joint {name}: link {one} against {other}, from the reference position"
     return Channel(f"{hinge.name}/angle", ("angle",), "rad", "", text)
 
@@ -121,15 +119,8 @@ def _channels(element: ForceElement) -> list[tuple[Channel, str, float]]:
     hinge = element.kind == TURN
     place, unit = ("angle", "rad") if hinge else ("travel", "m")
     effort, force_unit = ("torque", "N m") if hinge else ("force", "N")
-    out = [
-        (
-            Channel(f"{element.name}/{place}", (place,), unit, "", f"{place} of the joint of {what}"),
-            POSITION,
-            1.0,
-        ),
-        (Channel(f"{element.name}/{effort}", (effort,), force_unit, "", f"{effort} of {what}"), EFFORT, 1.0),
-    ]
+    every = [(place, unit, f"{place} of the joint of {what}", POSITION)]
     if kind == "motors":
-        speed = Channel(f"{element.name}/speed", ("speed",), f"{unit}/s", "", f"speed of the joint of {what}")
-        out.insert(1, (speed, SPEED, 1.0))
-    return out
+        every.append(("speed", f"{unit}/s", f"speed of the joint of {what}", SPEED))
+    every.append((effort, force_unit, f"{effort} of {what}", EFFORT))
+    return [(Channel(f"{element.name}/{x}", (x,), u, "", text), which, 1.0) for x, u, text, which in every]

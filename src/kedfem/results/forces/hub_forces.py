@@ -62,7 +62,7 @@ def hub_wrench(
             moment = moment + m + cross((R @ (at - hub)), f)
         for rider, on_rider, _ in riders:
             f, m = on_rider(block)
-            place = block.motion.p[:, rider.body] + block.motion.R[:, rider.body] @ scene.joints[rider.hub].at
+            place = block.motion.position(rider.body, np.asarray(scene.joints[rider.hub].at))
             force, moment = force + f, moment + m + cross(place - centre, f)
         for name in sliding:
             f, m, point = forces.rows.wrench(name, block)
@@ -88,7 +88,7 @@ def _geared(
             sign = share * ((prescribed.body == i) - (prescribed.body == j))
             along = sign * pushed * (block.motion.R[:, j] @ joint.axis)
             if joint.gap.any():  # a rack's push goes through the point of link i
-                place = block.motion.p[:, i] + block.motion.R[:, i] @ joint.at
+                place = block.motion.position(i, joint.at)
                 force, moment = force + along, moment + cross(place - about, along)
             else:
                 moment = moment + along

@@ -11,11 +11,12 @@ from kedfem.dynamics.joints.constraint_joints import ordered
 from kedfem.dynamics.model import Model, PrescribedBody, Slider
 from kedfem.links.record import in_space
 from kedfem.motion.constraints import cross
+from kedfem.motion.joint_equations import moving_pair
 from kedfem.results.forces.hub_forces import constrained_joints, hub_wrench, partner
 from kedfem.results.forces.port_forces import Forces, determinate, holder, loose, negligible, port_wrench
 from kedfem.results.recorded import Recorded, Rows, once
 from kedfem.results.records import XYZ, Channel
-from kedfem.scene import GROUND, ForceLoad, Scene
+from kedfem.scene import ForceLoad, Scene
 
 
 def joint_channels(scene: Scene, model: Model, name: str, forces: Forces) -> list[Recorded]:
@@ -38,15 +39,13 @@ def joint_channels(scene: Scene, model: Model, name: str, forces: Forces) -> lis
     sign = -1.0 if opposite else 1.0
     label = f"of joint {name} on link {on} from {other}"
     at = np.asarray(scene.joints[name].at)
-    return _channels(
-        name, label, port_wrench(model, k, name, at, forces), determinate(model, k, name, at), sign
-    )
+    wrench = port_wrench(model, k, name, at, forces)
+    return _channels(name, label, wrench, determinate(model, k, name, at), sign)
 
 
 def _row_joint(scene: Scene, model: Model, name: str, forces: Forces) -> list[Recorded]:
     """Of a joint enforced by constraint equations, about its point on the first link, of a slot the pin."""
-    first, second = scene.joints[name].links
-    on, other = (second, first) if first == GROUND else (first, second)
+    on, other = moving_pair(scene.joints[name])
     sign = 1.0 if ordered(scene.joints[name])[0] == on else -1.0
     label = f"of joint {name} on link {on} from {other}"
     return _channels(name, label, partial(forces.rows.wrench, name), forces.rows.determined(name), sign)
@@ -90,9 +89,8 @@ def _slider(scene: Scene, model: Model, slider: Slider, name: str, forces: Force
     The slider does not rotate and its mass is at the joint, so that moments pass through it to the guide.
     """
     guided = name == slider.guide
-    joints = (
-        [j for j, x in scene.joints.items() if slider.name in x.links and j != name] if guided else [name]
-    )
+    others = [j for j, x in scene.joints.items() if slider.name in x.links and j != name]
+    joints = others if guided else [name]
     pairs = [(k, j) for k, x in enumerate(model.joints) for j in joints if j in x.joints]
     points = {j: np.asarray(scene.joints[j].at) for j in {*joints, name}}
     known = [determinate(model, k, j, points[j]) for k, j in pairs]
@@ -118,10 +116,10 @@ def _on_slider(scene: Scene, model: Model, slider: Slider, forces: Forces, block
     carrier, motion, body = model.links[slider.carrier], block.motion, model.bodies[slider.carrier]
     X = slider.weights @ carrier.X
     elastic = np.tensordot(block.links[slider.carrier].a, slider.weights, (1, 0))
-    a = motion.p2[:, body] + motion.R2[:, body] @ X + in_space(carrier, elastic)
+    a = motion.acceleration(body, X) + in_space(carrier, elastic)
     force, moment = slider.mass * (np.asarray(scene.gravity) - a), np.zeros((len(block), 3))
     for x in slider.loads:
         f = np.outer(x.factor(motion.t, motion.phi), in_space(carrier, carrier.one @ x.forces))
         force, moment = force + f, moment + cross(np.asarray(cast(ForceLoad, scene.loads[x.load]).at) - X, f)
-    f, m = forces.force_elements.on(slider.name, block, motion.p[:, body] + motion.R[:, body] @ X)
+    f, m = forces.force_elements.on(slider.name, block, motion.position(body, X))
     return force + f, moment + m

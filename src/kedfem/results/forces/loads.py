@@ -4,6 +4,7 @@ Equivalent bearing load [ISO 281, and catalogues of the makers]: bearings of con
 of varying load lives as with P_m = (∫ P^p |ω| dt / ∫ |ω| dt)^(1/p), ω the speed of shaft against housing.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -168,14 +169,8 @@ def acted_links(name: str, joint: Joint, description: str) -> tuple[str, str]:
     """
     one, other = joint.links
     for on, by in ((one, other), (other, one)):
-        starts = [
-            f"force of joint {name} on {a} {on} from {b}{by}"
-            for a in ("link", "slider")
-            for b in ("", "slider ")
-        ]
-        if any(
-            description == start or description.startswith((f"{start} ", f"{start};")) for start in starts
-        ):
+        words = f"force of joint {re.escape(name)} on (link|slider) {re.escape(on)} from (slider )?{re.escape(by)}"
+        if re.match(rf"{words}([ ;]|\Z)", description):
             return on, by
     raise ValueError(f"joint {name}: no link is said that the force acts on, in {description!r}")
 
@@ -189,9 +184,8 @@ def drive_loads(
         keys = [drive_effort(scene, name, rigid)[0] for rigid in ("", "rigid_")]
         found = next((results.channels[key] for key in keys if key in results.channels), None)
         if found is not None:
-            rate = (
-                None if linked is None or motion is None else joint_rate(scene.joints[name], linked, motion)
-            )
+            known = (linked, motion) if linked is not None and motion is not None else None
+            rate = joint_rate(scene.joints[name], *known) if known else None
             out.append(DriveLoad(name, found[0].unit, found[1][:, 0], rate))
     return out
 

@@ -83,21 +83,9 @@ def constants(link: Link, joint: Attachment, body: int, damping: Rayleigh) -> Co
     spin = float(link.one @ link.m1[:, 2]) if link.kind == "beam" else 0.0
     couples = (link.one, link.m1[:, -1], at_ports[:, 0]) if link.kind == "beam" else (None,) * 3
     every = zip((fit, weighted, at_ports), couples, strict=True)
-    of_forces, of_masses, of_ports = (Weights(np.ascontiguousarray(x.T), couple) for x, couple in every)
-    return Constants(
-        link,
-        joint,
-        body,
-        damping,
-        k,
-        of_forces,
-        of_masses,
-        of_ports,
-        fit.T @ weighted,
-        spin,
-        _stiffness(link),
-        _masses(link),
-    )
+    F, M, ports = (Weights(np.ascontiguousarray(x.T), couple) for x, couple in every)
+    K0, masses = _stiffness(link), _masses(link)
+    return Constants(link, joint, body, damping, k, F, M, ports, fit.T @ weighted, spin, K0, masses)
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,12 +153,8 @@ def flat_times(A: Matrix, u: Field) -> Field:
 
 def crossed(k: int, x: Field, y: Field) -> Float[np.ndarray, "c T"]:
     """Σ x × y of translations and forces, in a plane the one component across it."""
-    return np.stack(
-        [
-            np.vecdot(x[:, :, i], y[:, :, j]) - np.vecdot(x[:, :, j], y[:, :, i])
-            for i, j in ACROSS[2 * (3 - k) :]
-        ]
-    )
+    of, dot = ACROSS[2 * (3 - k) :], np.vecdot
+    return np.stack([dot(x[:, :, i], y[:, :, j]) - dot(x[:, :, j], y[:, :, i]) for i, j in of])
 
 
 def turned(N: Float[np.ndarray, "k k S T"]) -> Float[np.ndarray, "c S T"]:

@@ -72,9 +72,8 @@ def _arms_over_time(
     attachment, link, body = model.joints[k], model.links[k], model.bodies[k]
     here = np.array([name == joint for name in attachment.joints], bool)
     drawn, weights = attachment.points[here], attachment.weights[here]
-    among = np.linalg.lstsq(
-        np.vstack([np.ones(len(drawn)), (drawn - at).T]), np.array([1.0, 0, 0, 0]), rcond=1e-9
-    )[0]
+    centred = np.vstack([np.ones(len(drawn)), (drawn - at).T])
+    among = np.linalg.lstsq(centred, np.array([1.0, 0, 0, 0]), rcond=1e-9)[0]
     beside = at - among @ drawn
 
     def undeformed(block: Block) -> Float[np.ndarray, "T p 3"]:
@@ -138,6 +137,5 @@ def resultant(
 
 def holder(model: Model, name: str, joint: str) -> int:
     """The link of a name, or its segment, that a joint holds."""
-    return next(
-        k for k, link in enumerate(model.links) if link.name == name and joint in model.joints[k].joints
-    )
+    every = enumerate(zip(model.links, model.joints, strict=True))
+    return next(k for k, (link, held) in every if link.name == name and joint in held.joints)

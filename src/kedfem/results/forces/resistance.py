@@ -86,9 +86,8 @@ def _turning(rows: Float[np.ndarray, "m S T"], arms: Float[np.ndarray, "c S T"],
     moment = turned(y[1:]) + arms
     moment[-1] += rows[-1]
     impulse, turn = np.einsum("ijst,jst->ist", at.R, y[0]), rotated(at, moment)
-    return np.asarray(
-        np.einsum("ist,ist->t", impulse, at.rates[0, 0]) + np.einsum("ist,ist->t", turn, at.omega)
-    )
+    both = (impulse, at.rates[0, 0]), (turn, at.omega)
+    return np.asarray(sum(np.einsum("ist,ist->t", x, y) for x, y in both))
 
 
 def held(of: Constants, history: LinkHistory, at: RigidRates) -> Field | None:
@@ -107,15 +106,10 @@ def last_of(
     first = which % len(t)
     one = slice(first, first + 1)
     then = at.every(one)
-    kept = [
-        (
-            x.g[one].copy(),
-            y.Kg[one].copy(),
-            None if y.Cg is None else y.Cg[one].copy(),
-            held(link, x.every(one), then),
-        )
-        for link, x, y in zip(of, histories, made, strict=True)
-    ]
+    kept = []
+    for link, x, y in zip(of, histories, made, strict=True):
+        Cg = None if y.Cg is None else y.Cg[one].copy()
+        kept.append((x.g[one].copy(), y.Kg[one].copy(), Cg, held(link, x.every(one), then)))
     return Last(t[one], then, kept)
 
 

@@ -83,14 +83,16 @@ def _of(
     """Of one link, in segments or not."""
     points = np.concatenate([drawn_points(each.recovery) for each, _ in parts])
     stress = np.concatenate([each.stress[VON_MISES] for each, _ in parts])
-    ends = np.cumsum([each.stress.shape[1] for each, _ in parts])
-    out: list[Peak] = []
-    for k in places_apart(points, stress, most):
-        part = int(np.searchsorted(ends, k, side="right"))
-        each, words = parts[part]
-        node = k - int(ends[part]) + each.stress.shape[1]
-        out.append(peak_at(each, when, node, words))
-    return out
+    sizes = [each.stress.shape[1] for each, _ in parts]
+    found = (within(sizes, k) for k in places_apart(points, stress, most))
+    return [peak_at(parts[part][0], when, node, parts[part][1]) for part, node in found]
+
+
+def within(sizes: Sequence[int], k: int) -> tuple[int, int]:
+    """In which of several parts, one after the other, number k of all is, and its number there."""
+    ends = np.cumsum(sizes)
+    part = int(np.searchsorted(ends, k, side="right"))
+    return part, k - int(ends[part]) + sizes[part]
 
 
 def places_apart(points: Float[np.ndarray, "p 3"], values: Float[np.ndarray, " p"], most: int) -> list[int]:
