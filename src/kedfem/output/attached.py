@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +23,7 @@ STEEL = 7850.0  # kg/m³
 BALL = 0.01, 0.03  # least and largest radius of a mass that a link carries, of what is drawn
 
 Point = Float[np.ndarray, "3"]
+Points = Float[np.ndarray, "n 3"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,11 +113,18 @@ def balls(carriers: Carriers, bodies: Mapping[str, Body]) -> list[LinkField]:
         found = None if body.link in sliders else carriers.place(body.link, centre)
         if found is None:
             continue
-        points, none = found[0] + ball(body.mass, size), np.full((27, 6), np.nan)
-        moved, cell = np.tile(found[1], (27, 1)), np.arange(27)[None]
-        empty = none, none[:, 0], none[:, :2]
-        out.append(LinkField(name, "hexahedron27", cell, points, moved, *empty, label=ball_words(name, body)))
+        points, moved = found[0] + ball(body.mass, size), np.tile(found[1], (27, 1))
+        words, cell = ball_words(name, body), np.arange(27)[None]
+        out.append(unstressed(name, "hexahedron27", cell, points, moved, label=words))
     return out
+
+
+def unstressed(
+    name: str, kind: str, cells: Int[np.ndarray, "e k"], points: Points, moved: Points, **more: Any
+) -> LinkField:
+    """What is drawn without stresses."""
+    none = np.full((len(points), 6), np.nan)
+    return LinkField(name, kind, cells, points, moved, none, none[:, 0], none[:, :2], **more)
 
 
 def springs(carriers: Carriers, scene: Scene) -> list[LinkField]:
@@ -130,25 +139,24 @@ def springs(carriers: Carriers, scene: Scene) -> list[LinkField]:
         (a, moved_a), (b, moved_b) = (each for each in found if each is not None)
         shape, cells = spring.shape
         points = stretched(shape, spring.line, np.array([a, b]))
-        out.append(_spring_field(name, points, cells, moved_a + shape[:, 2:] * (moved_b - moved_a)))
+        moved = moved_a + shape[:, 2:] * (moved_b - moved_a)
+        out.append(unstressed(name, "quad", cells, points, moved, spring=True))
     for name, winding in hinge_springs(scene, outlines, size).items():
         pose = carriers.pose(winding.link, np.asarray(winding.at))
         if pose is None:
             continue
         place, moved, R = pose
         points, cells = winding.shape
-        out.append(_spring_field(name, place + points @ R.T, cells, np.tile(moved, (len(points), 1))))
+        moved = np.tile(moved, (len(points), 1))
+        out.append(unstressed(name, "quad", cells, place + points @ R.T, moved, spring=True))
     return out
 
 
-def _spring_field(
-    name: str,
-    points: Float[np.ndarray, "n 3"],
-    cells: Int[np.ndarray, "e 4"],
-    moved: Float[np.ndarray, "n 3"],
-) -> LinkField:
-    none = np.full((len(points), 6), np.nan)
-    return LinkField(name, "quad", cells, points, moved, none, none[:, 0], none[:, :2], spring=True)
+def rigidly_moved(motion: RigidMotion, k: int, body: int, X: Points) -> tuple[Points, Points, Points]:
+    """Places, velocities and accelerations of points of a body at one time point."""
+    arms = X @ motion.R[k, body].T
+    velocity = motion.v[k, body] + cross(np.broadcast_to(motion.omega[k, body], arms.shape), arms)
+    return motion.p[k, body] + arms, velocity, motion.p2[k, body] + X @ motion.R2[k, body].T
 
 
 def rigid_springs(
@@ -164,12 +172,8 @@ def rigid_springs(
         return []
     out, size = [], _size(list(seen.values()))
 
-    def moved(link: str, X: Float[np.ndarray, "n 3"]) -> list[Float[np.ndarray, "n 3"]]:
-        """Places, velocities and accelerations."""
-        b = linkage.bodies.index(link)
-        arms = X @ motion.R[k, b].T
-        turning = cross(np.broadcast_to(motion.omega[k, b], arms.shape), arms)
-        return [motion.p[k, b] + arms, motion.v[k, b] + turning, motion.p2[k, b] + X @ motion.R2[k, b].T]
+    def moved(link: str, X: Points) -> tuple[Points, Points, Points]:
+        return rigidly_moved(motion, k, linkage.bodies.index(link), X)
 
     for name, spring in line_springs(scene, seen, size).items():
         both = [moved(end.link, np.array([end.at])) for end in spring.ends]
@@ -180,8 +184,7 @@ def rigid_springs(
         out.append(RigidField(name, "quad", cells, points, velocity, acceleration, spring=True))
     for name, winding in hinge_springs(scene, seen, size).items():
         around, cells = winding.shape
-        points, velocity, acceleration = moved(winding.link, winding.at + around)
-        out.append(RigidField(name, "quad", cells, points, velocity, acceleration, spring=True))
+        out.append(RigidField(name, "quad", cells, *moved(winding.link, winding.at + around), spring=True))
     return out
 
 

@@ -86,10 +86,8 @@ def swept(stations: int, corners: int, closed: list[bool], start: int) -> list[i
         for at in range(0, (stations - 1) * corners, corners)
         for i, j in zip(first, (*first[1:], start), strict=True)
     ]
-    ends = (corners, *reversed(first)), (corners, *last)
-    return [
-        x for face in (*sides, *(end for end, shut in zip(ends, closed, strict=True) if shut)) for x in face
-    ]
+    ends = zip(((corners, *reversed(first)), (corners, *last)), closed, strict=True)
+    return [x for face in (*sides, *(end for end, shut in ends if shut)) for x in face]
 
 
 def shape_functions(nodes: int, r: Float[np.ndarray, " k"]) -> Float[np.ndarray, "k m"]:

@@ -59,19 +59,16 @@ def fatigue_warning(found: Fatigue | None) -> tuple[str, ...]:
     out = [f"fatigue: {found.doubt}"] if found.doubt else []
     if found.without:
         out.append(f"fatigue: no data of {', '.join(found.without)}, which were left out")
-    left = {name: n for name, n in found.left_out.items() if n}
-    if left:
-        message = ", ".join(f"{n:,} of {name}" for name, n in left.items())
+    if left := found.left_out_words:
         out.append(
-            f"fatigue: points of the surface near {AWAY} were left out, {message}: fatigue.near_joints takes them in"
+            f"fatigue: points of the surface near {AWAY} were left out, {left}: fatigue.near_joints takes them in"
         )
     worst = found.worst
     if worst is not None and worst.utilisation > 1:
         life = f"{found.hours(worst):.3g} h at a safety factor of 1"
         where = f"link {worst.link} at {place_of(worst.place)} in the reference position"
-        out.append(
-            f"fatigue: {where} is loaded to {worst.utilisation:.3g} times of what it may be; life {life}"
-        )
+        loaded = f"is loaded to {worst.utilisation:.3g} times of what it may be"
+        out.append(f"fatigue: {where} {loaded}; life {life}")
     return tuple(out)
 
 
@@ -79,9 +76,11 @@ def fields(
     scene: Scene, model: Model, recoveries: Sequence[StressRecovery], snapshot: Snapshot
 ) -> list[LinkField]:
     """What a frame shows of each link, deformed as the animation exaggerates it."""
-    animation = scene.output.animation
-    scale = animation.deformation_scale if animation else 1.0
-    return link_fields(model, recoveries, snapshot, scale, scene)
+    return link_fields(model, recoveries, snapshot, _scale(scene), scene)
+
+
+def _scale(scene: Scene) -> float:
+    return scene.output.animation.deformation_scale if scene.output.animation else 1.0
 
 
 def refuse_foreign(folder: Path) -> None:
@@ -142,10 +141,8 @@ def write_derived(scene: Scene, results: Results, peak: Peak | None, folder: Pat
     title = f"{scene.title or 'kedfem'}: highest stress {stress_at(peak)}, t = {peak.time:.4g} s"
     if clock(scene) != "time":
         title += f", drive {moment(scene, peak.time, peak.angle)}"
-    animation = scene.output.animation
-    scale = animation.deformation_scale if animation else 1.0
     try:
-        write_picture(folder / WORST, folder / PICTURE, title, scale, scene.gravity, plots)
+        write_picture(folder / WORST, folder / PICTURE, title, _scale(scene), scene.gravity, plots)
     except PictureError as err:
         return (str(err),)
     return ()

@@ -16,11 +16,21 @@ from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import StressRecovery, extreme_stresses, nodal_state, nodal_stress, turned_stress
 from kedfem.mesh.cad.sides import boundary_sides, side_corners
 from kedfem.mesh.elements.shape_functions import HEX8
-from kedfem.motion.constraints import cross
+from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.joint_equations import joint_axis
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
-from kedfem.output.attached import Carriers, ball, ball_words, balls, every_link, slider_place, springs
+from kedfem.output.attached import (
+    Carriers,
+    ball,
+    ball_words,
+    balls,
+    every_link,
+    rigidly_moved,
+    slider_place,
+    springs,
+    unstressed,
+)
 from kedfem.output.fields import DRIVE_FORCE, DRIVE_TORQUE, FORCE, MOMENT, JointField, LinkField, RigidField
 from kedfem.results.recorded import drive_effort
 from kedfem.scene import Scene
@@ -63,20 +73,17 @@ def link_fields(
     scene : whose masses and springs are drawn too
     """
     motion, k = snapshot.motion, snapshot.k
+    elastic = zip(model.links, model.bodies, recoveries[: len(model.links)], snapshot.states, strict=True)
     fields = [
         link_field(link, recovery, (motion.p[k, body], motion.R[k, body]), state, deformation_scale)
-        for link, body, recovery, state in zip(
-            model.links, model.bodies, recoveries[: len(model.links)], snapshot.states, strict=True
-        )
+        for link, body, recovery, state in elastic
     ]
     for prescribed, recovery in zip(model.prescribed, recoveries[len(model.links) :], strict=True):
         X = recovery.at_points((prescribed.link.full or prescribed.link).X)
         points = motion.p[k, prescribed.body] + X @ motion.R[k, prescribed.body].T
-        none = np.full((len(X), 6), np.nan)
-        name, kind, cells = prescribed.link.name, recovery.cell_type, recovery.cells
-        section = _section(prescribed.link)
+        name, section = prescribed.link.name, _section(prescribed.link)
         fields.append(
-            LinkField(name, kind, cells, points, np.zeros_like(X), none, none[:, 0], none[:, :2], section)
+            unstressed(name, recovery.cell_type, recovery.cells, points, np.zeros_like(X), section=section)
         )
     out = _joined(fields) + _blocks(model, snapshot, deformation_scale)
     if scene is None or not (scene.bodies or scene.springs):
@@ -103,11 +110,8 @@ def link_field(
     if link.rigid:
         stress, von, least_and_most = (np.full_like(of, np.nan) for of in (stress, von, least_and_most))
     points = p + recovery.at_points(shown.X) @ R.T + deformation_scale * displacement
-    kind, cells = recovery.cell_type, recovery.cells
-    stress = _in_world(shown, moment, stress)
-    return LinkField(
-        link.name, kind, cells, points, displacement, stress, von, least_and_most, _section(link)
-    )
+    values = displacement, _in_world(shown, moment, stress), von, least_and_most
+    return LinkField(link.name, recovery.cell_type, recovery.cells, points, *values, _section(link))
 
 
 def _in_world(link: Link, moment: LinkMoment, stress: Float[np.ndarray, "p 6"]) -> Float[np.ndarray, "p 6"]:
@@ -129,21 +133,16 @@ def _section(link: Link) -> tuple[float, float, bool] | None:
 
 def _blocks(model: Model, snapshot: Snapshot, deformation_scale: float) -> list[LinkField]:
     """Sliders without a shape: blocks along their guides, at the joints with the links that carry them."""
-    if not model.sliders:
-        return []
     out = []
     for slider in model.sliders:
         link = model.links[slider.carrier]
         place, moved = slider_place(model, slider, snapshot, deformation_scale)
         z = slider.axis
-        x = np.cross(z, np.eye(3)[np.abs(z).argmin()])
-        x /= np.linalg.norm(x)
-        frame = np.array([1.5 * z, np.cross(z, x), x])  # longer along the guide
+        x, y = perpendiculars(z)
+        frame = np.array([1.5 * z, y, x])  # longer along the guide
         points = place + BLOCK * _width(link) / 2 * HEX8 @ frame
-        none = np.full((8, 6), np.nan)
-        shift = np.tile(moved, (8, 1))
         cell = np.arange(8)[None]
-        out.append(LinkField(slider.name, "hexahedron", cell, points, shift, none, none[:, 0], none[:, :2]))
+        out.append(unstressed(slider.name, "hexahedron", cell, points, np.tile(moved, (8, 1))))
     return out
 
 
@@ -196,13 +195,8 @@ def rigid_fields(every: Sequence[Sight], motion: RigidMotion, k: int) -> list[Ri
     """All links at one time point, with velocities and accelerations."""
     out = []
     for each in every:
-        b = each.body
-        arms = each.points @ motion.R[k, b].T
-        velocity = motion.v[k, b] + cross(np.broadcast_to(motion.omega[k, b], arms.shape), arms)
-        acceleration = motion.p2[k, b] + each.points @ motion.R2[k, b].T
-        points = motion.p[k, b] + arms
-        seen = each.cell_type, each.cells, points, velocity, acceleration
-        out.append(RigidField(each.name, *seen, label=each.label))
+        moved = rigidly_moved(motion, k, each.body, each.points)
+        out.append(RigidField(each.name, each.cell_type, each.cells, *moved, label=each.label))
     return out
 
 

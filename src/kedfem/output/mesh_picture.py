@@ -52,12 +52,8 @@ def drawn(mesh: SolidMesh) -> Drawn:
         functions = shape_functions(QUAD9, 2 * places - 1)
     points = (functions @ full.points[sides]).reshape(-1, 3)
     start = k * k * np.arange(len(sides))[:, None, None]
-    return Drawn(
-        points,
-        (start + square).reshape(-1, 4),
-        np.repeat(quality[owners], FINENESS**2),
-        (start + rim).reshape(-1, k),
-    )
+    patches, lines = (start + square).reshape(-1, 4), (start + rim).reshape(-1, k)
+    return Drawn(points, patches, np.repeat(quality[owners], FINENESS**2), lines)
 
 
 def write_mesh_picture(
@@ -97,8 +93,5 @@ def _numbers(mesh: SolidMesh, found: Sequence[Offer]) -> dict[str, np.ndarray]:
         places.append(at)
         numbers.append(np.full(len(at), each.number))
         normals.append(np.broadcast_to(each.face.direction if plane else np.zeros(3), at.shape))
-    return {
-        "label_places": np.concatenate(places),
-        "label_numbers": np.concatenate(numbers),
-        "label_normals": np.concatenate(normals),
-    }
+    labels = {"places": places, "numbers": numbers, "normals": normals}
+    return {f"label_{what}": np.concatenate(each) for what, each in labels.items()}

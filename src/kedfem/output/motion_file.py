@@ -80,6 +80,6 @@ def _rows(
     motion: RigidMotion, body: int, at: Float[np.ndarray, "3"], q: Float[np.ndarray, "T 4"]
 ) -> list[Float[np.ndarray, "T c"]]:
     """All quantities of a body, in the order of QUANTITIES."""
-    moved = (of(body, at) for of in (motion.position, motion.velocity, motion.acceleration))
-    position, velocity, acceleration = moved
-    return [position, q, velocity, motion.omega[:, body], acceleration, motion.alpha[:, body]]
+    velocity, acceleration = motion.velocity(body, at), motion.acceleration(body, at)
+    turning = motion.omega[:, body], motion.alpha[:, body]
+    return [motion.position(body, at), q, velocity, turning[0], acceleration, turning[1]]

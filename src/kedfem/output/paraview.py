@@ -113,10 +113,6 @@ def _arrows(scene: Scene, results: Results) -> str:
         values = [results.channels[name][1] for name in names if name in results.channels]
         largest = max((float(np.linalg.norm(x, axis=1).max()) for x in values), default=0.0)
         if largest > 0:
-            title = array if array != FORCE else f"joint {FORCE}"
-            out.append(
-                ARROWS.substitute(title=title, array=array, largest=largest, share=ARROW, colour=colour)
-            )
-    if not out:
-        return ""
-    return BLOCK.substitute(block=JOINTS) + "".join(out)
+            title, size = array if array != FORCE else f"joint {FORCE}", {"largest": largest, "share": ARROW}
+            out.append(ARROWS.substitute(size, title=title, array=array, colour=colour))
+    return BLOCK.substitute(block=JOINTS) + "".join(out) if out else ""

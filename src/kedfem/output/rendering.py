@@ -71,9 +71,8 @@ def mark(plotter: Any, grid: Any) -> None:
     for radius, width, colour in ((13, 6, "white"), (13, 3, "black")):
         ring = np.column_stack([x + radius * np.cos(angle), y + radius * np.sin(angle), 0 * angle])
         plotter.add_actor(_flat(pyvista.MultipleLines(ring), width, colour), reset_camera=False)
-    words = plotter.add_text(
-        f"{np.nanmax(stress):.4g} MPa", position=(x + 18, y + 10), font_size=10, color="black"
-    )
+    text = f"{np.nanmax(stress):.4g} MPa"
+    words = plotter.add_text(text, position=(x + 18, y + 10), font_size=10, color="black")
     words.prop.SetBackgroundColor(1.0, 1.0, 1.0)
     words.prop.SetBackgroundOpacity(0.7)
 
@@ -140,9 +139,8 @@ def draw_balls(plotter: Any, grid: Any, words: Mapping[int, str], shown: View) -
 def draw_springs(plotter: Any, grid: Any, words: Mapping[int, str], shown: View) -> None:
     """Springs and dampers, with their names where these are few."""
     for number, word in words.items():
-        spring = grid.extract_cells(grid.cell_data["link"] == number).extract_surface(
-            algorithm="dataset_surface"
-        )
+        cells = grid.extract_cells(grid.cell_data["link"] == number)
+        spring = cells.extract_surface(algorithm="dataset_surface")
         plotter.add_mesh(spring, color=COIL, scalars=None, smooth_shading=True, split_sharp_edges=True)
         if len(words) <= NAMED:
             name(plotter, spring.center, word, shown)
@@ -192,15 +190,12 @@ def draw_words(plotter: Any, title: str, deformation_scale: float, cut: bool) ->
     letters = int(plotter.window_size[0] / 16)
     whole = re.sub(r"\([^)]*\) m\b|\bt = \S+ s\b", lambda part: part[0].replace(" ", "\xa0"), title)
     text = "\n".join(textwrap.wrap(whole, letters, max_lines=3, placeholder=" …"))
-    words = plotter.add_text(
-        text, position=(0.03, 0.97), viewport=True, font_size=13, color="black", font_file=font
-    )
+    look = {"viewport": True, "color": "black", "font_file": font}
+    words = plotter.add_text(text, position=(0.03, 0.97), font_size=13, **look)
     words.prop.justification_vertical = "top"
     words.prop.SetLineSpacing(1.2)
     scale = f"deformation × {deformation_scale:g}" + ("; cut at the highest stress" if cut else "")
-    plotter.add_text(
-        scale, position=(0.03, 0.015), viewport=True, font_size=11, color="black", font_file=font
-    )
+    plotter.add_text(scale, position=(0.03, 0.015), font_size=11, **look)
     wide, high = plotter.window_size
     plotter.add_axes(color="black", line_width=3, viewport=(1 - 210 / wide, 0.0, 1 - 30 / wide, 180 / high))
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from kedfem.arrays import Float, Int
 from kedfem.motion.constraints import perpendiculars
+from kedfem.motion.newton import cross_matrix
 from kedfem.scene import LineSpring
 
 WIDTH = 0.012  # radius of a coil, of what is drawn
@@ -42,10 +43,10 @@ def spring_shape(spring: LineSpring, size: float, inner: float = 0.0) -> Shape:
     length = math.dist(*(end.at for end in spring.between)) if spring.between else 0.0
     radius = min(WIDTH * size, SLENDER * length) if length else WIDTH * size
     radius = max(radius, inner / (1 - 2 * WIRE))
-    parts = (
-        [_coil(radius, length or radius / SLENDER)] if spring.stiffness or spring.force is not None else []
-    )
-    if spring.damping or (spring.force is not None and spring.force.over == "speed"):
+    parts, force = [], spring.force
+    if spring.stiffness or force is not None:
+        parts.append(_coil(radius, length or radius / SLENDER))
+    if spring.damping or (force is not None and force.over == "speed"):
         parts.append(_damper(radius))
     first = np.cumsum([0, *(len(points) for points, _ in parts)])
     cells = [of + n for (_, of), n in zip(parts, first, strict=False)]
@@ -79,7 +80,7 @@ def _least_rotation(z: Float[np.ndarray, "3"], d: Float[np.ndarray, "3"]) -> Flo
     if c < -1.0 + 1e-9:  # opposite: half a turn about any axis across
         e = perpendiculars(z)[0]
         return 2 * np.outer(e, e) - np.eye(3)
-    V = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+    V = cross_matrix(v)
     return np.asarray(np.eye(3) + V + V @ V / (1.0 + c))
 
 

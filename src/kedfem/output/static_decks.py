@@ -62,9 +62,8 @@ def write_deck(
             file.write(",\n".join(lines) + "\n")
         file.write("*NSET, NSET=SUPPORTS\n")
         file.writelines(f"{node + 1}\n" for node in sorted({node for node, _ in held}))
-        file.write(
-            f"*MATERIAL, NAME=LINK\n*ELASTIC\n{material.youngs_modulus:.9e}, {material.poisson_ratio:.9e}\n"
-        )
+        elastic = f"{material.youngs_modulus:.9e}, {material.poisson_ratio:.9e}"
+        file.write(f"*MATERIAL, NAME=LINK\n*ELASTIC\n{elastic}\n")
         file.write(f"*DENSITY\n{material.density:.9e}\n*SOLID SECTION, ELSET=EALL, MATERIAL=LINK\n")
         file.write("** six supports, statically determinate: their reactions are what the balance leaves\n")
         file.write("*BOUNDARY\n")
@@ -112,14 +111,8 @@ def write_resultants(
     path: Path, X: Forces, cases: Sequence[LoadCase], about: Mapping[str, Float[np.ndarray, "3"]], drive: str
 ) -> None:
     """Force and moment of each kind at each instant as CSV."""
-    columns = [
-        f"{what} {c} [{unit}]"
-        for what, unit in (("point", "m"), ("force", "N"), ("moment", "N m"))
-        for c in "xyz"
-    ]
-    rows = (
-        [case.time, case.angle, name, *np.concatenate(vectors)]
-        for case in cases
-        for name, vectors in resultants(X, case, about).items()
-    )
+    vectors = ("point", "m"), ("force", "N"), ("moment", "N m")
+    columns = [f"{what} {c} [{unit}]" for what, unit in vectors for c in "xyz"]
+    every = ((case, each) for case in cases for each in resultants(X, case, about).items())
+    rows = ([case.time, case.angle, name, *np.concatenate(found)] for case, (name, found) in every)
     write_rows(path, ["time [s]", drive, "what", *columns], rows)

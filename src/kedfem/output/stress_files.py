@@ -47,10 +47,8 @@ class Extremes:
         for k, name in enumerate(KINDS):
             none = np.isnan(stress[k])
             out[f"{name} stress [Pa]"] = stress[k]
-            for phrase, values in (
-                (f"time of {name} stress [s]", self.when[0]),
-                (f"{what} of {name} stress [{unit}", self.when[1]),
-            ):
+            phrases = f"time of {name} stress [s]", f"{what} of {name} stress [{unit}"
+            for phrase, values in zip(phrases, self.when, strict=True):
                 out[phrase] = np.where(none, np.nan, values[np.where(none, 0, step[k])])
         return out
 

@@ -74,9 +74,8 @@ class AnimationFile:
                 root = file["VTKHDF"] if self.written else _laid_out(file, fields, arrays, self.drive)
                 self._append(root, time, angle, {"Points": points, **_in("PointData", arrays)})
         except (OSError, RuntimeError) as error:
-            raise OutputError(
-                f"{self.path}: must be a file that can be written, got {reason(error)}"
-            ) from error
+            got = f"must be a file that can be written, got {reason(error)}"
+            raise OutputError(f"{self.path}: {got}") from error
         self.written += 1
 
     def _append(self, root: Any, time: float, angle: float, arrays: dict[str, np.ndarray]) -> None:
@@ -86,14 +85,9 @@ class AnimationFile:
             root[name].resize((k + 1) * n, axis=0)
             root[name][k * n :] = x
         field, sizes = f"FieldData/{self.drive}", f"Steps/FieldDataSizes/{self.drive}"
-        steps = {
-            "Steps/Values": time,
-            field: angle,
-            sizes: (1, 1),
-            "Steps/PartOffsets": 0,
-            "Steps/NumberOfParts": 1,
-        }
-        steps |= {"Steps/PointOffsets": k * n, "Steps/CellOffsets": 0, "Steps/ConnectivityIdOffsets": 0}
+        steps = {"Steps/Values": time, field: angle, sizes: (1, 1), "Steps/PartOffsets": 0}
+        steps |= {"Steps/NumberOfParts": 1, "Steps/PointOffsets": k * n, "Steps/CellOffsets": 0}
+        steps |= {"Steps/ConnectivityIdOffsets": 0}
         steps |= {f"Steps/PointDataOffsets/{name}": k * n for name in root["PointData"]}
         steps |= {f"Steps/CellDataOffsets/{name}": 0 for name in root["CellData"]}
         steps |= {f"Steps/FieldDataOffsets/{self.drive}": k}
@@ -116,10 +110,8 @@ def _point_data(fields: Blocks) -> dict[str, np.ndarray]:
     out = {}
     for name, shape in shapes.items():
         none = 0.0 if shape == (3,) else np.nan
-        parts = [
-            each.get(name, np.full((len(field.points), *shape), none))
-            for field, each in zip(fields, every, strict=True)
-        ]
+        empty = [np.full((len(field.points), *shape), none) for field in fields]
+        parts = [each.get(name, nothing) for each, nothing in zip(every, empty, strict=True)]
         out[name] = np.concatenate(parts).astype(np.float32)
     return out
 
@@ -144,13 +136,9 @@ def _laid_out(file: Any, fields: Blocks, arrays: dict[str, np.ndarray], drive: s
     n, steps = int(first[-1]), root.create_group("Steps")
     for name, x in {"Points": np.zeros((n, 3), np.float32), **_in("PointData", arrays)}.items():
         _growing(root, name, x.dtype, x.shape[1:], max(min(n, 100_000), 1))
-    for name in ("PartOffsets", "NumberOfParts", "PointOffsets", "CellOffsets", "ConnectivityIdOffsets"):
-        _growing(steps, name, np.int64)
-    for name in [
-        *(f"PointDataOffsets/{x}" for x in arrays),
-        "CellDataOffsets/link",
-        f"FieldDataOffsets/{drive}",
-    ]:
+    counted = ("PartOffsets", "NumberOfParts", "PointOffsets", "CellOffsets", "ConnectivityIdOffsets")
+    of_data = (f"PointDataOffsets/{x}" for x in arrays)
+    for name in (*counted, *of_data, "CellDataOffsets/link", f"FieldDataOffsets/{drive}"):
         _growing(steps, name, np.int64)
     _growing(steps, f"FieldDataSizes/{drive}", np.int64, (2,))
     _growing(steps, "Values", np.float64)

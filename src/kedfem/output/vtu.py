@@ -94,18 +94,11 @@ def write_blocks(path: Path, now: Mapping[str, float], fields: Sequence[Block], 
     """
     points, cells = _together([(field.points, (field.cell_type, field.cells)) for field in fields])
     every = [field.arrays() for field in fields]
-    values = {
-        name: np.concatenate([each[name] for each in every]).astype(np.float32, order="C")
-        for name in every[0]
-    }
+    whole = {name: np.concatenate([each[name] for each in every]) for name in every[0]}
+    values = {name: x.astype(np.float32, order="C") for name, x in whole.items()}
     link = [np.full(len(field.cells), i, np.int32) for i, field in enumerate(fields, start=first)]
-    write_vtu(
-        path,
-        points.astype(np.float32),
-        cells,
-        point_data=values,
-        cell_data={"link": link} | _sections(fields),
-    )
+    of_cells = {"link": link} | _sections(fields)
+    write_vtu(path, points.astype(np.float32), cells, point_data=values, cell_data=of_cells)
     complete(path, _field_data(now, fields, first))
 
 
@@ -120,18 +113,16 @@ def _sections(fields: Sequence[Block]) -> dict[str, list[np.ndarray]]:
 
 def _field_data(now: Mapping[str, float], fields: Sequence[Block], first: int) -> str:
     """The frame's time and drive, and which number in the cell data is which link, or which point which joint."""
-    numbers = "".join(
-        "".join(_number(f"joint {name}", k) for k, name in enumerate(field.names))
-        if isinstance(field, JointField)
-        else _number(numbered(field), number)
-        for number, field in enumerate(fields, start=first)
-    )
-    moments = "".join(
-        f'<DataArray type="Float64" Name="{escape(name)}" NumberOfTuples="1" format="ascii">{x!r}</DataArray>'
-        for name, x in now.items()
-    )
-    return moments + numbers
+    out = [_number(name, x, "Float64") for name, x in now.items()]
+    for number, field in enumerate(fields, start=first):
+        if isinstance(field, JointField):
+            out += [_number(f"joint {name}", k) for k, name in enumerate(field.names)]
+        else:
+            out.append(_number(numbered(field), number))
+    return "".join(out)
 
 
-def _number(name: str, number: int) -> str:
-    return f'<DataArray type="Int32" Name="{escape(name)}" NumberOfTuples="1" format="ascii">{number}</DataArray>'
+def _number(name: str, x: float, kind: str = "Int32") -> str:
+    return (
+        f'<DataArray type="{kind}" Name="{escape(name)}" NumberOfTuples="1" format="ascii">{x!r}</DataArray>'
+    )

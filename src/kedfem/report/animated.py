@@ -69,9 +69,8 @@ def animated(
     for time, files in shown:
         grid = _read(files)
         if grid.n_points != first.n_points:
-            raise OutputError(
-                f"{files[0]}: must have the mesh of {pattern[0].name}, got another one: run the scene again"
-            )
+            wanted = f"must have the mesh of {pattern[0].name}, got another one: run the scene again"
+            raise OutputError(f"{files[0]}: {wanted}")
         times.append(time)
         for source in sources:
             source.frame(grid, deformation_scale)

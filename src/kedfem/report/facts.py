@@ -37,10 +37,7 @@ def facts(results: Results, highest: Peak | None, moment: Callable[[float, float
         message = f"link {spot.link}; life {life_of(spot.damage, results.fatigue)}"
         message += "; doubtful, see below" if results.fatigue.doubt else ""
         out.append(Fact("Highest utilisation in fatigue", percent(spot.utilisation), message))
-    errors = {
-        key.removeprefix(TOGETHER): float(x) for key, x in results.notes.items() if key.startswith(TOGETHER)
-    }
-    if errors:
+    if errors := _noted(results.notes, TOGETHER):
         worst = max(errors, key=lambda kind: errors[kind])
         out.append(Fact("Estimated error", percent(errors[worst]), f"of {worst}, the largest; see below"))
     return out
@@ -68,17 +65,12 @@ def links_table(scene: Mapping[str, Any], results: Results) -> Table:
         message = results.links.get(name, {})
         mass, centre = message.get("mass [kg]"), message.get("centre of mass [m]")
         shape = link.get("shape") or {}
-        rows.append(
-            (
-                name,
-                str(message.get("model", link.get("model", ""))),
-                str(link.get("material") or "–"),
-                str(shape.get("kind", "–")) + (f" {shape['file']}" if "file" in shape else ""),
-                *(_count(message.get(key)) for key in ("elements", "unknowns")),
-                "–" if mass is None else with_prefix(float(mass), "kg"),
-                "–" if centre is None else place_of(centre),
-            )
-        )
+        model, material = str(message.get("model", link.get("model", ""))), str(link.get("material") or "–")
+        form = str(shape.get("kind", "–")) + (f" {shape['file']}" if "file" in shape else "")
+        counts = (_count(message.get(key)) for key in ("elements", "unknowns"))
+        weight = "–" if mass is None else with_prefix(float(mass), "kg")
+        place = "–" if centre is None else place_of(centre)
+        rows.append((name, model, material, form, *counts, weight, place))
     head = ("link", "model", "material", "shape", "elements", "unknowns", "mass", "centre of mass")
     note = "Mass with what is attached; centre of mass in the reference position."
     return Table("Links", head, rows, note)
@@ -137,12 +129,8 @@ def frequencies_table(found: Summary) -> Table:
         message += f" {found.still} motions without strain are left out."
     if found.speed:
         message += f" The scene's drive turns at {found.speed:.4g} rpm."
-    return Table(
-        "Natural frequencies",
-        head if found.speed else head[:3],
-        [r if found.speed else r[:3] for r in rows],
-        message,
-    )
+    columns = len(head) if found.speed else 3
+    return Table("Natural frequencies", head[:columns], [row[:columns] for row in rows], message)
 
 
 def _rpm(slowest: float, fastest: float) -> str:
@@ -176,16 +164,9 @@ def _numbers(title: str, what: str, reported: Mapping[str, Mapping[str, float]],
 
 def budget_table(notes: Mapping[str, str | float]) -> list[Table]:
     """Estimated errors: a line for each source, a column for each kind of channel."""
-    cells = {
-        tuple(key.removeprefix(OF_SOURCE).split(", ", 1)): float(x)
-        for key, x in notes.items()
-        if key.startswith(OF_SOURCE) and ", " in key
-    }
-    cells |= {
-        ("together", key.removeprefix(TOGETHER)): float(x)
-        for key, x in notes.items()
-        if key.startswith(TOGETHER)
-    }
+    of_sources = {key: x for key, x in _noted(notes, OF_SOURCE).items() if ", " in key}
+    cells = {tuple(key.split(", ", 1)): x for key, x in of_sources.items()}
+    cells |= {("together", kind): x for kind, x in _noted(notes, TOGETHER).items()}
     if not cells:
         return []
     kinds = list(dict.fromkeys(kind for _, kind in cells))
@@ -196,6 +177,11 @@ def budget_table(notes: Mapping[str, str | float]) -> list[Table]:
     message = "; ".join(str(x) for key, x in notes.items() if key.startswith(UNKNOWN))
     note = "Of each channel's largest value." + (f" No estimate of {message}." if message else "")
     return [Table("Estimated error", ("from", *kinds), rows, note)]
+
+
+def _noted(notes: Mapping[str, str | float], beginning: str) -> dict[str, float]:
+    """Numbers whose names begin so, by what follows."""
+    return {key.removeprefix(beginning): float(x) for key, x in notes.items() if key.startswith(beginning)}
 
 
 def steady_table(notes: Mapping[str, str | float]) -> list[Table]:

@@ -29,9 +29,8 @@ def fatigue_rows(found: Fatigue, most: int) -> Rows:
 def life_of(damage: float, found: Fatigue) -> str:
     """Life in turns of the drive, or periods, and hours, by the damage in a period."""
     turns, what = (found.revolutions, "revolutions") if found.revolutions else (1.0, "periods")
-    if damage * ENDLESS < turns:
-        return "endless"
-    return f"{turns / damage:.3g} {what}, {found.period / damage / 3600:.3g} h"
+    hours = found.period / 3600
+    return "endless" if damage * ENDLESS < turns else f"{turns / damage:.3g} {what}, {hours / damage:.3g} h"
 
 
 def fatigue_notes(found: Fatigue) -> list[str]:
@@ -40,10 +39,8 @@ def fatigue_notes(found: Fatigue) -> list[str]:
     lines = [f"Period {with_prefix(found.period, 's')}{turns}; stresses repeat to {percent(found.repeats)}."]
     lines += [f"DOUBTFUL: {found.doubt}."] if found.doubt else []
     lines += [f"{name}: {words}." for name, words in found.strengths.items()]
-    left = {name: n for name, n in found.left_out.items() if n}
-    if left:
-        points = ", ".join(f"{n:,} of {name}" for name, n in left.items())
-        lines.append(f"Left out near corners, point forces and joints: {points} points.")
+    if left := found.left_out_words:
+        lines.append(f"Left out near corners, point forces and joints: {left} points.")
     empty = [name for name, spots in found.spots.items() if not spots]
     lines += [f"No point of {', '.join(empty)} is left to look at."] if empty else []
     lines += [f"No data of {', '.join(found.without)}."] if found.without else []

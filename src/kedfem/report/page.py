@@ -165,14 +165,9 @@ def _moving(
     first = 0
     if highest is not None and len(shown.times):
         first = int(np.abs(shown.times - highest.time).argmin())
+    most = 0.0 if highest is None else highest.stress
     return {
-        "document": viewer(
-            shown,
-            0.0 if highest is None else highest.stress,
-            _marks(scene, highest),
-            np.array(gravity, float),
-            first,
-        ),
+        "document": viewer(shown, most, _marks(scene, highest), np.array(gravity, float), first),
         "frames": _frames(scene, results, shown, highest),
         "cursor": cursor_places(results, shown.times),
         "first": first,
@@ -192,10 +187,8 @@ def _frames(
     """What each frame is; after the last one links are in the reference position, and no instant."""
     angles = np.interp(shown.times, results.time, results.angle) if len(results.time) else 0 * shown.times
     captions = [_moment(scene, results, float(t), float(x)) for t, x in zip(shown.times, angles, strict=True)]
-    drawn = "links in the reference position" + (
-        ", with the highest stress of each point over all steps" if highest else ""
-    )
-    return [*captions, drawn]
+    stresses = ", with the highest stress of each point over all steps" if highest else ""
+    return [*captions, f"links in the reference position{stresses}"]
 
 
 def _marks(scene: Mapping[str, Any], highest: Peak | None) -> list[Mark]:

@@ -98,9 +98,8 @@ def scale() -> list[tuple[float, tuple[float, ...]]]:
     from matplotlib import colormaps
 
     parts = np.linspace(0.0, 1.0, 41)
-    return [
-        (float(part), tuple(map(float, colormaps["turbo"](LEAST + (1 - LEAST) * part)[:3]))) for part in parts
-    ]
+    colours = colormaps["turbo"](LEAST + (1 - LEAST) * parts)[:, :3]
+    return [(part, tuple(rgb)) for part, rgb in zip(parts.tolist(), colours.tolist(), strict=True)]
 
 
 def _mesh(k3d: Any, surface: Surface, highest: float, fine: float) -> Any:
@@ -115,9 +114,8 @@ def _mesh(k3d: Any, surface: Surface, highest: float, fine: float) -> Any:
         look = {"attribute": _series([x.astype(np.float32) for x in stress]), "color_range": [0.0, highest]}
         look["color_map"] = [x for part, rgb in scale() for x in (part, *rgb)]
     triangles = surface.triangles.astype(np.uint32)
-    mesh = k3d.mesh(
-        vertices, triangles, flat_shading=False, side="double", roughness=0.9, name=surface.name, **look
-    )
+    look |= {"flat_shading": False, "side": "double", "roughness": 0.9, "name": surface.name}
+    mesh = k3d.mesh(vertices, triangles, **look)
     mesh.model_matrix = _series([*map(_matrix, surface.placements), np.eye(4, dtype=np.float32)])
     return mesh
 
@@ -130,11 +128,8 @@ def _mark(k3d: Any, mark: Mark, shown: Animated, size: float) -> list[Any]:
     places = [mark.at] * (len(shown.times) + 1)
     if of is not None:
         near = int(((of.points[0] - mark.at) ** 2).sum(axis=1).argmin())
-        places = [
-            placed.p + placed.R @ (points[near] if mark.hot else mark.at)
-            for points, placed in zip(of.points[1:], of.placements, strict=True)
-        ]
-        places.append(mark.at)
+        frames = zip(of.points[1:], of.placements, strict=True)
+        places = [x.p + x.R @ (points[near] if mark.hot else mark.at) for points, x in frames] + [mark.at]
     colour, radius = (HOT, 0.014) if mark.hot else (DARK, 0.011)
     look = {"color": colour, "name": mark.name}
     positions = _series([place[None].astype(np.float32) for place in places])

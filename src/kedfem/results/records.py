@@ -144,6 +144,11 @@ class Fatigue:
         every = [spot for spots in self.spots.values() for spot in spots]
         return max(every, key=lambda spot: spot.utilisation, default=None)
 
+    @property
+    def left_out_words(self) -> str:
+        """Links with points that were left out, and how many; "" without any."""
+        return ", ".join(f"{n:,} of {name}" for name, n in self.left_out.items() if n)
+
     def hours(self, spot: FatigueSpot) -> float:
         """Life at a place [h]; infinite without damage."""
         return self.period / spot.damage / 3600 if spot.damage else math.inf

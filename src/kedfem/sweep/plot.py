@@ -6,7 +6,7 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from kedfem.accuracy.steady import GROWS
-from kedfem.output.plots.drawing import figure_saved
+from kedfem.output.plots.drawing import draw_legend, figure_saved
 from kedfem.sweep.axes import Axis
 from kedfem.sweep.edges import Edge, unstable_bands
 from kedfem.sweep.files import column_units, largest, plain_quantities
@@ -58,8 +58,8 @@ def write_plot(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row], edges:
             ax.set_ylabel(label)
             ax.set_ylim(0.0, 1.05 * ax.get_ylim()[1])
             ax.grid(alpha=0.3)
-            ax.legend(loc="upper left", bbox_to_anchor=(1.005, 1.02), frameon=False)
-        panes[-1].set_xlabel(axes[0].key + (f" ({axes[0].unit})" if axes[0].unit else ""))
+            draw_legend(ax)
+        panes[-1].set_xlabel(_label(axes[0]))
 
 
 def _write_map(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row], edges: Sequence[Edge]) -> None:
@@ -91,10 +91,13 @@ def _write_map(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row], edges:
             ax.plot(band, [at, at], **look)
         ax.plot([each.at for each in edges], [y[each.points[0]] for each in edges], "k|", markersize=16)
         figure.colorbar(shown, ax=ax, label="growth in a period")
-        for name, axis in (("x", axes[0]), ("y", axes[1])):
-            getattr(ax, f"set_{name}label")(axis.key + (f" ({axis.unit})" if axis.unit else ""))
+        ax.set(xlabel=_label(axes[0]), ylabel=_label(axes[1]))
         ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, frameon=False)
         ax.grid(alpha=0.3)
+
+
+def _label(axis: Axis) -> str:
+    return axis.key + (f" ({axis.unit})" if axis.unit else "")
 
 
 def _far(growth: np.ndarray) -> float:

@@ -209,10 +209,8 @@ def _spring_law(spring: Spring) -> tuple[str, str]:
     """Where a spring is, and its constants."""
     if isinstance(spring, LineSpring):
         ends = " and ".join(end.link for end in spring.between or ())
-        on, units = (
-            f"spring between {ends}" if ends else f"spring along joint {spring.joint}",
-            ("N/m", "N s/m"),
-        )
+        on = f"spring between {ends}" if ends else f"spring along joint {spring.joint}"
+        units = "N/m", "N s/m"
     else:
         on, units = f"spring about joint {spring.joint}", ("N m/rad", "N m s/rad")
     factor = spring.stiffness_factor
@@ -232,10 +230,9 @@ def _initial_speeds(ready: Prepared) -> list[tuple[str, str]]:
     if not (analysis.initial_speeds or analysis.initial_motions):
         return []
     v, omega = (np.linalg.norm(x, axis=1) for x in initial_twists(ready.scene, ready.linkage))
-    speeds = [
-        f"{w:.4g} rad/s" if w > NOTHING * omega.max() else f"{s:.4g} m/s"
-        for s, w in zip(v, omega, strict=True)
-    ]
+    turns = omega > NOTHING * omega.max()
+    every = zip(v, omega, turns, strict=True)
+    speeds = [f"{w:.4g} rad/s" if turning else f"{s:.4g} m/s" for s, w, turning in every]
     return [(f"link {x} starts with", y) for x, y in zip(ready.linkage.bodies[1:], speeds[1:], strict=True)]
 
 

@@ -65,15 +65,9 @@ def scene_text(solids: Sequence[AssemblySolid], file: str, scale: float | None) 
     ground = ground_solid(solids, found)
     found = sorted(found, key=lambda each: _order(each, ground, solids))
     links = (_link(name, solid, file, scale) for name, solid in zip(names, solids, strict=True))
-    return "".join(
-        [
-            _HEAD.format(file=_shown(file)),
-            f"\ntitle = {_quoted(Path(file).stem)}\n",
-            *(_as_frame(table, names[i]) if i == ground else f"\n{table}" for i, table in enumerate(links)),
-            *_joints(found, names, ground),
-            _ANALYSIS,
-        ]
-    )
+    head = f"{_HEAD.format(file=_shown(file))}\ntitle = {_quoted(Path(file).stem)}\n"
+    tables = (_as_frame(x, names[i]) if i == ground else f"\n{x}" for i, x in enumerate(links))
+    return "".join([head, *tables, *_joints(found, names, ground), _ANALYSIS])
 
 
 def link_names(names: Sequence[str]) -> list[str]:

@@ -30,12 +30,9 @@ def kinematics_tables(scene: Scene, moved: Moved) -> list[Table]:
     """Coordinates of joints, transmission angles, forces of joints and drive, and the seconds spent."""
     angles = [*left("coupler", "drives"), *right("from", "to", "furthest from 90°", f"at {clock(scene)}")]
     forces = [*left("of"), *right("largest", f"at {clock(scene)}")]
+    joints = [*left("joint", "coordinate"), *right("from", "to", "range")]
     return [
-        listed(
-            Text(scene.title or "Joints"),
-            [*left("joint", "coordinate"), *right("from", "to", "range")],
-            _coordinates(scene, moved),
-        ),
+        listed(Text(scene.title or "Joints"), joints, _coordinates(scene, moved)),
         listed("Transmission angles", angles, _transmissions(scene, moved)),
         listed("Largest forces were all links rigid", forces, _forces(scene, moved)),
         seconds_table(f"{len(moved.results.time) - 1} steps", moved.seconds),
@@ -51,9 +48,8 @@ def _coordinates(scene: Scene, moved: Moved) -> Iterator[tuple[str, ...]]:
     for each in moved.recorded.coordinates:
         values = moved.results.channels[f"joints/{each.joint}/{each.name}"][1][:, 0]
         low, high = float(values.min()), float(values.max())
-        words = [
-            _length(x) if each.kind == "length" else f"{np.degrees(x):.2f}°" for x in (low, high, high - low)
-        ]
+        shown = _length if each.kind == "length" else _degrees
+        words = [shown(x) for x in (low, high, high - low)]
         driven, links = "", scene.joints[each.joint].links
         if each.joint in scene.driven_joints:  # between moving links it is easily taken the other way round
             driven = " (driven)" if "ground" in links else f" of {links[0]} against {links[1]} (driven)"
@@ -64,7 +60,7 @@ def _transmissions(scene: Scene, moved: Moved) -> Iterator[tuple[str, ...]]:
     for each in moved.recorded.transmissions:
         values = moved.results.channels[transmission_key(each.coupler)][1][:, 0]
         k = first_largest(np.abs(values - np.pi / 2))
-        words = (f"{np.degrees(x):.2f}°" for x in (values.min(), values.max(), values[k]))
+        words = map(_degrees, (values.min(), values.max(), values[k]))
         yield each.coupler, each.driven, *words, _at(scene, moved, k)
 
 
@@ -84,6 +80,10 @@ def _forces(scene: Scene, moved: Moved) -> Iterator[tuple[str, ...]]:
 
 def _at(scene: Scene, moved: Moved, k: int) -> str:
     return moment(scene, float(moved.results.time[k]), float(moved.results.angle[k]))
+
+
+def _degrees(x: float) -> str:
+    return f"{np.degrees(x):.2f}°"
 
 
 def _length(x: float) -> str:
@@ -131,12 +131,9 @@ def frequencies_tables(scene: Scene, found: Frequencies) -> list[Table]:
     still = f"; {found.still} motions without strain, at 0 Hz" if found.still else ""
     stiffened = ", stiffened by its motion" if scene.analysis.stiffening else ""
     title = Text(f"Natural frequencies of the frozen linkage{stiffened} [Hz]{still}")
-    places = [
-        "in the reference position"
-        if scene.driven is None
-        else moment(scene, float(t), float(angle), frozen=True)
-        for t, angle in zip(found.time, found.angle, strict=True)
-    ]
+    positions = zip(found.time.tolist(), found.angle.tolist(), strict=True)
+    places = [moment(scene, *each, frozen=True) for each in positions]
+    places = ["in the reference position"] * len(places) if scene.driven is None else places
     out = []
     for modes in _blocks(range(found.values.shape[1]), MODES):
         columns = [*left("position"), *right(*(str(k + 1) for k in modes))]
@@ -151,9 +148,7 @@ def frequencies_tables(scene: Scene, found: Frequencies) -> list[Table]:
 
 
 def _speeds(found: Frequencies, ranges: Mapping[tuple[int, int], str], harmonics: Sequence[int]) -> Table:
-    message = (
-        f"Drive speeds at which its harmonics meet them [rpm]; the drive turns at {found.speed * RPM:.4g}"
-    )
+    turns = f"the drive turns at {found.speed * RPM:.4g}"
     beyond = any(np.isinf(x.fastest) for x in found.crossings)
     caption = "* at the drive's speed" + ("; – alone: beyond the speeds examined" if beyond else "")
     columns = [*left("mode"), *right(*(f"{k}×" for k in harmonics))]
@@ -161,7 +156,8 @@ def _speeds(found: Frequencies, ranges: Mapping[tuple[int, int], str], harmonics
         (str(mode), *(ranges.get((mode, k), "–") for k in harmonics))
         for mode in sorted({mode for mode, _ in ranges})
     )
-    return listed(Text(message), columns, rows, caption=Text(caption))
+    title = Text(f"Drive speeds at which its harmonics meet them [rpm]; {turns}")
+    return listed(title, columns, rows, caption=Text(caption))
 
 
 def _blocks(numbers: Sequence[int], most: int) -> list[Sequence[int]]:

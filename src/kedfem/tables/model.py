@@ -93,12 +93,8 @@ def _quality(*parts: Link) -> str:
     full = [link.full or link for link in parts]
     if not full[0].meshed:
         return "-"
-    meshes = [
-        QuadMesh(link.X, link.cells, link.thickness)
-        if link.kind == "plane"
-        else SolidMesh(link.X, link.cells)
-        for link in full
-    ]
+    plane = full[0].kind == "plane"
+    meshes = (QuadMesh(x.X, x.cells, x.thickness) if plane else SolidMesh(x.X, x.cells) for x in full)
     return f"{min(mesh_quality(mesh).least for mesh in meshes):.2f}"
 
 

@@ -65,7 +65,7 @@ def _chosen(link: LinkScene) -> str:
     open_kind = isinstance(link.shape, Cad | MeshFile) and "element" not in link.model_fields_set
     kind = (
         f"{link.element} " if link.element and not open_kind else ""
-    )  # what a file is meshed with its shape says
+    )  # a file's shape says what it is meshed with
     return f"{'reduced ' * link.reduced}{kind}{link.model}" + (f" ({mesh})" if mesh else "") + segments
 
 
@@ -75,12 +75,10 @@ def _size(key: str, value: object) -> object:
 
 def reduction_table(reduction: Reduction) -> Table:
     """Estimated error of reduced links, channel by channel."""
-    return listed(
-        "Error of the reduction (estimated)",
-        [*left("channel"), *right("of its peak")],
-        ((name, percent(error)) for name, error in reduction.estimate.items()),
-        caption=f"asked for: {percent(reduction.tolerance)}; against the same links unreduced",
-    )
+    columns, caption = [*left("channel"), *right("of its peak")], f"asked for: {percent(reduction.tolerance)}"
+    rows = ((name, percent(error)) for name, error in reduction.estimate.items())
+    caption += "; against the same links unreduced"
+    return listed("Error of the reduction (estimated)", columns, rows, caption=caption)
 
 
 def run_tables(scene: Scene, done: Run) -> list[Table]:
@@ -145,9 +143,8 @@ def steady_table(found: Steady) -> Table:
 def stress_table(scene: Scene, peaks: Mapping[str, Peak]) -> Table:
     """The highest stress of each link over all steps, and away from where it is not what it seems."""
     columns = [*left("link"), *right("stress"), *left("reference position", clock(scene), "near")]
-    return listed(
-        "Highest von Mises stress, over all steps", columns, peak_rows(peaks, partial(moment, scene))
-    )
+    rows = peak_rows(peaks, partial(moment, scene))
+    return listed("Highest von Mises stress, over all steps", columns, rows)
 
 
 def fatigue_table(found: Fatigue) -> Table:
@@ -166,11 +163,9 @@ def fatigue_table(found: Fatigue) -> Table:
 
 def budget_table(found: Budget) -> Table:
     """Estimated errors: a line for each source, a column for each kind of channel."""
-    table = listed(
-        "Estimated error, of each channel's largest value",
-        [*left("from"), *right(*found.kinds)],
-        ((x.source, *(_cell(x.errors.get(kind)) for kind in found.kinds)) for x in found.shares),
-    )
+    rows = ((x.source, *(_cell(x.errors.get(kind)) for kind in found.kinds)) for x in found.shares)
+    columns = [*left("from"), *right(*found.kinds)]
+    table = listed("Estimated error, of each channel's largest value", columns, rows)
     table.add_row("together", *(_cell(found.together[kind]) for kind in found.kinds), style="bold")
     lines = [f"mesh of {name}: {percent(eta)} in the energy norm" for name, eta in found.links.items()]
     lines += [f"no estimate of {text}" for text in found.limits]

@@ -63,11 +63,8 @@ def _peaks(found: Comparison) -> Table:
 def study_tables(study: Study, machine: str) -> list[Table]:
     """Variants by time with their errors, and what the reference's own error is made of; those not run, by reason."""
     first, *others, last = STUDY_COLUMNS
-    columns = [
-        *left(first, min_width=11),
-        *right(*others, no_wrap=True),
-        *right(last, no_wrap=True, min_width=len(REFERENCE)),
-    ]
+    columns = [*left(first, min_width=11), *right(*others, no_wrap=True)]
+    columns += right(last, no_wrap=True, min_width=len(REFERENCE))
     shares = ", ".join(f"{name} {percent(share)}" for name, share in study.shares.items())
     unknown = "" if "mesh" in study.shares else "; its mesh could not be compared with a coarser one"
     caption = Text(
@@ -106,11 +103,9 @@ def sweep_tables(done: Swept) -> tuple[list[Table], list[str]]:
     failed = [k for k, row in enumerate(done.rows) if row.status == "failed"]
     fresh = len(done.rows) - done.before
     title = f"Sweep: {len(done.rows)} points, {len(failed)} failed, {fresh} run now"
-    how = (
-        "" if done.planned is None else f"steps and meshes of all as planned at {_place(done, done.planned)}"
-    )
+    how = done.planned is not None and f"steps and meshes of all as planned at {_place(done, done.planned)}"
     columns = [*left("quantity"), *right("largest"), *left("unit", "at")]
-    table = listed(Text(title), columns, caption=Text(how))
+    table = listed(Text(title), columns, caption=Text(how or ""))
     units = column_units(done.rows)
     for name in plain_quantities(list(units)):
         sizes = {k: largest(row, name) for k, row in enumerate(done.rows) if name in row.extremes}

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.output.plots.drawing import envelope, figure_saved
+from kedfem.output.plots.drawing import draw_legend, envelope, figure_saved
 from kedfem.output.plots.files import remove_plots
 from kedfem.output.words import prefixed
 from kedfem.results import ready_folder
@@ -28,18 +28,17 @@ def write_comparison(
     along : (T,) [s], or [rad], [m] of the drive
     """
     remove_plots(ready_folder(folder))
-    factor, label = (1.0, "time (s)")
-    if over == "drive":
-        angle = drive.unit == "rad"
-        factor, label = (180 / np.pi, "drive angle (°)") if angle else (1.0, "drive travel (m)")
+    factor, label = 1.0, "time (s)" if over == "time" else "drive travel (m)"
+    if over == "drive" and drive.unit == "rad":
+        factor, label = 180 / np.pi, "drive angle (°)"
     for each in found:
         _write_picture(each, names, factor * along, label, folder)
     header = ["channel", "unit", "run", "peak", "largest difference [%]", "at", "rms difference [%]"]
-    rows = [
+    every = ((x, k, name) for x in found for k, name in enumerate(names))
+    rows = (
         [x.channel.name, x.channel.unit, name, x.peaks[k], 100 * x.largest[k], x.at[k], 100 * x.rms[k]]
-        for x in found
-        for k, name in enumerate(names)
-    ]
+        for x, k, name in every
+    )
     write_rows(folder / "differences.csv", header, rows)
 
 
@@ -71,7 +70,7 @@ def _write_picture(
         below.set_ylabel("difference\n(% of peak)")
         below.set_xlabel(label)
         below.set_xlim(along[0], along[-1])
-        above.legend(loc="upper left", bbox_to_anchor=(1.005, 1.02), frameon=False)
+        draw_legend(above)
         for ax in (above, below):
             ax.grid(alpha=0.3)
             ax.ticklabel_format(useOffset=False)

@@ -155,11 +155,21 @@ def draw_panels(figure: Any, along: Abscissa, panels: list[Panel]) -> Any:
         quantity = panel.quantity if len(panels) < 3 else panel.quantity.replace(" ", "\n")
         draw_curves(ax, along, replace(panel, quantity=quantity))
     if along.degrees is not None:
-        axes[-1].plot(along.values, along.degrees, color="0.35", linewidth=1.2)
-        axes[-1].set_ylabel("drive (°)")
-        axes[-1].grid(alpha=0.3)
+        draw_drive(axes[-1], along)
     draw_abscissa(axes[0], axes[-1], along)
     return axes
+
+
+def draw_drive(ax: Any, along: Abscissa) -> None:
+    """The drive's angle over time."""
+    ax.plot(along.values, along.degrees, color="0.35", linewidth=1.2)
+    ax.set_ylabel("drive (°)")
+    ax.grid(alpha=0.3)
+
+
+def draw_legend(ax: Any, **look: Any) -> None:
+    """Names of curves, beside the axes."""
+    ax.legend(loc="upper left", **{"bbox_to_anchor": (1.005, 1.02), "frameon": False, **look})
 
 
 def draw_curves(ax: Any, along: Abscissa, panel: Panel) -> None:
@@ -198,8 +208,7 @@ def draw_curves(ax: Any, along: Abscissa, panel: Panel) -> None:
         words = words if len(words) <= NAMED else f"{len(names)} others"
         ax.plot([], [], " ", label=_lines(f"{words}: < {100 * FAINT:g} %"))
     if len(curves) > 1:
-        columns = 1 + (len(ax.get_legend_handles_labels()[0]) > 18)
-        ax.legend(loc="upper left", bbox_to_anchor=(1.005, 1.02), frameon=False, ncols=columns)
+        draw_legend(ax, ncols=1 + (len(ax.get_legend_handles_labels()[0]) > 18))
     ax.axhline(0.0, color="0.5", linewidth=0.6, zorder=1)
     if panel.limits:
         margin = 0.05 * np.ptp(panel.limits)

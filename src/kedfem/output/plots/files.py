@@ -6,10 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from kedfem.output.abscissa import Abscissa, draw_abscissa
 from kedfem.output.plots.drawing import (
     MARK,
     draw_curves,
+    draw_drive,
     draw_panels,
     drawn_over,
     figure_saved,
@@ -107,9 +110,7 @@ def _draw_page(figure: Any, along: Abscissa, page: Sequence[Picture], rows: int)
         for row, (title, panel) in enumerate(panels[column * rows : (column + 1) * rows]):
             top = height - ABOVE - row * HEIGHT
             place = (column * WIDTH + LEFT, top - HEIGHT + BETWEEN, WIDTH - LEFT - RIGHT, HEIGHT - BETWEEN)
-            ax = figure.add_axes(
-                [place[0] / width, place[1] / height, place[2] / width, place[3] / height], sharex=first
-            )
+            ax = figure.add_axes(np.divide(place, (width, height, width, height)), sharex=first)
             first = first or ax
             _draw_panel(ax, along, title, panel)
             axes.append(ax)
@@ -121,9 +122,7 @@ def _draw_page(figure: Any, along: Abscissa, page: Sequence[Picture], rows: int)
 
 def _draw_panel(ax: Any, along: Abscissa, title: str, panel: Panel | None) -> None:
     if panel is None:
-        ax.plot(along.values, along.degrees, color="0.35", linewidth=1.2)
-        ax.set_ylabel("drive (°)")
-        ax.grid(alpha=0.3)
+        draw_drive(ax, along)
     else:
         draw_curves(ax, along, panel)
     ax.set_title(title, loc="left", fontsize=FONT + 1, pad=3)

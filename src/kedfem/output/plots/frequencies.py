@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.output.plots.drawing import figure_saved
+from kedfem.output.plots.drawing import draw_legend, figure_saved
 from kedfem.scene.records.units import RPM
 
 
@@ -23,7 +23,7 @@ def write_over_turn(
         ax.set_ylabel("frequency (Hz)")
         ax.set_ylim(bottom=0.0)
         ax.grid(alpha=0.3)
-        ax.legend(title="mode", loc="upper left", bbox_to_anchor=(1.005, 1.02), frameon=False)
+        draw_legend(ax, title="mode")
 
 
 def write_campbell(
@@ -37,9 +37,8 @@ def write_campbell(
     speed : that of the scene
     """
     rpm = RPM * speeds
-    with figure_saved(
-        path, "Campbell plot: natural frequencies over a turn, harmonics of the drive"
-    ) as figure:
+    title = "Campbell plot: natural frequencies over a turn, harmonics of the drive"
+    with figure_saved(path, title) as figure:
         ax = figure.subplots()
         for k, (least, most) in enumerate(zip(lowest, highest, strict=True)):
             if np.isfinite(least).all() and (least.min() <= harmonics * rpm[-1] / 60 or k == 0):
@@ -53,4 +52,4 @@ def write_campbell(
         ax.set_xlabel("drive speed (rpm); dotted: the scene's")
         ax.set_ylabel("frequency (Hz)")
         ax.grid(alpha=0.3)
-        ax.legend(loc="upper left", bbox_to_anchor=(1.04, 1.02), frameon=False)
+        draw_legend(ax, bbox_to_anchor=(1.04, 1.02))

@@ -77,12 +77,11 @@ def pictures(results: Results) -> Iterator[Picture]:
             names = [f"{prefix}/{kind}" for kind in kinds if f"{prefix}/{kind}" in channels]
             if len(names) > 1:
                 grouped |= set(names)
-                if all(
-                    largest(channels[name][1]) <= least.get(channels[name][0].unit, 0.0) for name in names
-                ):
+                every = [channels[name] for name in names]
+                if all(largest(values) <= least.get(channel.unit, 0.0) for channel, values in every):
                     continue  # a slide that turns by rounding
-                yield Picture(_file(f"{prefix}/{what}"), _shared(channels[names[0]][0], kinds[0]), None,
-                              [panel for name in names for panel in _single(*channels[name])])  # fmt: skip
+                panels = [panel for each in every for panel in _single(*each)]
+                yield Picture(_file(f"{prefix}/{what}"), _shared(every[0][0], kinds[0]), None, panels)
     for kind, title in COORDINATES.items():
         curves = _of_joints(results, f"/{kind}")
         if len(curves) > 1:
@@ -220,12 +219,8 @@ def _energies(results: Results) -> Curves:
 
 def _of_joints(results: Results, ending: str) -> Curves:
     """Joint → the only column of its channel of that kind."""
-    return {name: values[:, 0] for name, values in _values(results, ending).items() if values.shape[1] == 1}
-
-
-def _values(results: Results, ending: str) -> dict[str, Float[np.ndarray, "n c"]]:
-    return {
-        name.removeprefix("joints/").removesuffix(ending): values
-        for name, (_, values) in results.channels.items()
-        if name.startswith("joints/") and name.endswith(ending)
+    found = {
+        name: x for name, (_, x) in results.channels.items() if x.shape[1] == 1 and name.endswith(ending)
     }
+    joints = {name: x[:, 0] for name, x in found.items() if name.startswith("joints/")}
+    return {name.removeprefix("joints/").removesuffix(ending): x for name, x in joints.items()}
