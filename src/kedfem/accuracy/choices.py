@@ -25,22 +25,13 @@ from kedfem.scene import LinkScene, Scene, scene_from, time_grid, turn_steps, wi
 
 FOLLOWED = 0.5  # of the accuracy: rigid-body frames that err by more give way to co-rotational frames, in scenes of beams
 DEARER = 1.5  # the same where solid or plane links would follow too: it costs them more, and the estimate is cautious
-ELEMENTS = (
-    ("beam3", 1),
-    ("beam5", 1),
-    ("beam5", 2),
-    ("beam5", 3),
-    ("beam5", 4),
-    ("beam5", 6),
-)  # tried, coarsest first
+ELEMENTS = ("beam3", 1), *(("beam5", count) for count in (1, 2, 3, 4, 6))  # tried, coarsest first
 COUNTS = 1, 2, 3, 4, 6, 8, 12, 16, 24  # tried of an element that the scene states
 FINEST = 2  # times the elements of the last one tried: the reference of beams
 FEWEST = 50  # time points of an analysis
 ROWS = 180  # the same of a turn: curves and animations have no others
-TRIED, COARSER = (
-    3,
-    4,
-)  # levels of a trial, which show whether errors fall with the step; its coarsest step, of the finest
+# levels of a trial, which show whether errors fall with the step; its coarsest step, of the finest
+TRIED, COARSER = 3, 4
 LEAST = 12  # steps of the coarsest level of a trial
 MOST_STEPS = 200_000  # of the analysis
 TRIES = 5  # steps tried
@@ -66,11 +57,8 @@ def open_step(scene: Scene) -> bool:
 
 def open_beams(scene: Scene) -> list[str]:
     """Names of the elastic beams whose elements it leaves open."""
-    return [
-        name
-        for name, link in scene.links.items()
-        if elastic(link, "beam") and "mesh" not in link.model_fields_set
-    ]
+    links = scene.links.items()
+    return [n for n, link in links if elastic(link, "beam") and "mesh" not in link.model_fields_set]
 
 
 def beams_only(scene: Scene) -> bool:

@@ -159,9 +159,8 @@ def meaningless(budget: Budget, balance: Balance | None, unworked: float) -> str
     energy = {"energy": balance.energy} if balance else {}
     left = {"the drive's work": unworked} | energy
     message = [f"{what} {percent(error)}" for what, error in lost.items()]
-    message += [
-        f"{percent(share)} of {what} unaccounted for" for what, share in left.items() if share >= UNACCOUNTED
-    ]
+    left = {what: share for what, share in left.items() if share >= UNACCOUNTED}
+    message += [f"{percent(share)} of {what} unaccounted for" for what, share in left.items()]
     return "; ".join(message)
 
 
@@ -190,11 +189,8 @@ def percent(error: float) -> str:
 
 def attributes(budget: Budget) -> dict[str, float | str]:
     """The budget as notes of a results file."""
-    notes: dict[str, float | str] = {
-        f"{OF_SOURCE}{share.source}, {kind}": error
-        for share in budget.shares
-        for kind, error in share.errors.items()
-    }
+    every = ((share.source, *each) for share in budget.shares for each in share.errors.items())
+    notes: dict[str, float | str] = {f"{OF_SOURCE}{source}, {kind}": error for source, kind, error in every}
     notes |= {f"{TOGETHER}{kind}": error for kind, error in budget.together.items()}
     notes |= {f"mesh error of {link}, energy norm": error for link, error in budget.links.items()}
     notes |= {f"{UNKNOWN}{k}": text for k, text in enumerate(budget.limits, start=1)}

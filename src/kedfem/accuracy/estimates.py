@@ -39,9 +39,8 @@ from kedfem.links.indicator import Indicator, indicator
 from kedfem.results.recording import recording
 from kedfem.scene import ForceLoad, Scene, time_grid, without_vibration
 
-LARGE = (
-    100_000  # unknowns of a model for which no companion is made: its modes cost as much as hundreds of steps
-)
+# unknowns of a model for which no companion is made: its modes cost as much as hundreds of steps
+LARGE = 100_000
 SPAN = 6000  # steps of a companion's run, at most: longer analyses are judged by their beginning
 CHEAP = 2e7  # steps times unknowns that take seconds: of small models more than SPAN
 SLOW = 1000  # the same where no compiled loop runs them
@@ -98,21 +97,15 @@ class Seen:
 
 def watcher(ready: Prepared, solvers: Sequence[Steps] = ()) -> Seen:
     """A watcher of a prepared scene's steps, as its solvers take them; of its links alone without any."""
-    return Seen(
-        Strained(ready.model),
-        GeometricError(ready.model, ready.scene.analysis.stiffening, bool(ready.scene.limits)),
-        step_error(ready),
-        Rounding.of(ready.model, solvers),
-        Given(ready.model),
-        not without_vibration(ready.scene),
-    )
+    scene, model = ready.scene, ready.model
+    geometric = GeometricError(model, scene.analysis.stiffening, bool(scene.limits))
+    rounding, steps = Rounding.of(model, solvers), not without_vibration(scene)
+    return Seen(Strained(model), geometric, step_error(ready), rounding, Given(model), steps)
 
 
 def companion(ready: Prepared) -> Prepared | None:
     """A model whose runs are cheap beside those of a prepared scene; None of one too large to make it."""
-    if ready.model.unknowns > LARGE:
-        return None
-    return first_reduced(ready, FUNCTIONS)
+    return None if ready.model.unknowns > LARGE else first_reduced(ready, FUNCTIONS)
 
 
 def budget(
@@ -182,11 +175,7 @@ def spanned(scene: Scene, model: Model) -> Scene:
     elements = scene.springs or scene.limits
     compiled = all(link.unknowns <= SMALL for link in model.links) and not model.rows and not elements
     most = max(SPAN, int(CHEAP / max(model.unknowns, 1))) if compiled else SLOW
-    if grid.steps <= most:
-        return scene
-    return with_analysis(
-        scene, end_time=most * grid.step, revolutions=None, step=grid.step, steps_per_revolution=None
-    )
+    return scene if grid.steps <= most else in_steps(scene, grid.step, most)
 
 
 def frames_share(geometric: GeometricError, kinds: Sequence[str]) -> Share | None:
@@ -210,20 +199,16 @@ def step_errors(ready: Prepared, base: Histories) -> dict[str, float]:
     firm = [x for x in ready.model.step_limits if x is not None and x.in_steps(grid.step).turns_little]
     alike = all(x.in_steps(2 * grid.step).turns_little for x in firm)
     longer = alike and grid.steps // 2 >= max(fewest_steps(ready.scene), 4)
-    scene = (
-        _beside(ready.scene, 2.0, grid.steps // 2) if longer else _beside(ready.scene, 0.5, 2 * grid.steps)
-    )
+    h, steps = (2.0 * grid.step, grid.steps // 2) if longer else (0.5 * grid.step, 2 * grid.steps)
+    scene = with_analysis(in_steps(ready.scene, h, steps), extrapolation_levels=1)
     other = histories(replace(ready, scene=scene), near=base.begun)
     fine, coarse = (base, other) if longer else (other, base)
     return single_errors(fine, coarse, bool(ready.scene.limits))[0 if longer else 1]
 
 
-def _beside(scene: Scene, factor: float, steps: int) -> Scene:
-    """The scene in so many steps, by a factor longer."""
-    h = factor * time_grid(scene).step
-    return with_analysis(
-        scene, end_time=h * steps, revolutions=None, step=h, steps_per_revolution=None, extrapolation_levels=1
-    )
+def in_steps(scene: Scene, h: float, steps: int) -> Scene:
+    """The scene in so many steps of h."""
+    return with_analysis(scene, end_time=h * steps, revolutions=None, step=h, steps_per_revolution=None)
 
 
 def _step_share(errors: Mapping[str, float]) -> Share:
@@ -242,9 +227,8 @@ def _limits(ready: Prepared, found: Mapping[int, Indicator]) -> list[str]:
     scene, out, grows = ready.scene, [], "it grows as elements shrink"
     at_edges = dict.fromkeys(ready.model.links[k].name for k, each in found.items() if each.singular)
     if at_edges:
-        out.append(
-            f"stress of {', '.join(at_edges)} at an edge that points inwards without a fillet: {grows}"
-        )
+        edge = "an edge that points inwards without a fillet"
+        out.append(f"stress of {', '.join(at_edges)} at {edge}: {grows}")
     meshed = {link.name for link in ready.model.links if link.meshed}
     loads = scene.loads.items()
     points = [name for name, x in loads if isinstance(x, ForceLoad) and x.link in meshed and x.at is not None]

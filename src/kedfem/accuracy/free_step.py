@@ -96,10 +96,8 @@ def _error(differences: Sequence[float]) -> float:
 def _unreached(found: _Halved, asked: float, until: float, error: float) -> str:
     errors = found.errors
     name = max(errors, key=errors.__getitem__)
-    message = (
-        f"the step's error stays at {percent(error)} in {name} with {found.steps:,} steps, the most that are "
-        "tried"
-    )
+    most = f"{found.steps:,} steps, the most that are tried"
+    message = f"the step's error stays at {percent(error)} in {name} with {most}"
     if until >= found.coarse.time[-1]:
         return message
     return (

@@ -136,24 +136,20 @@ class GeometricError:
 
     def __post_init__(self) -> None:
         self._slides = slides(self.model)
-        self._of = [
-            slices(link, joint) if link.fit is None else None
-            for link, joint in zip(self.model.links, self.model.joints, strict=True)
-        ]
+        joined = zip(self.model.links, self.model.joints, strict=True)
+        self._of = [slices(link, joint) if link.fit is None else None for link, joint in joined]
 
     def add(self, block: Block) -> None:
         """Look at some time points of a block."""
-        looked_at = [
-            history.strain for of, history in zip(self._of, block.links, strict=True) if of is not None
-        ]
+        both = zip(self._of, block.links, strict=True)
+        looked_at = [history.strain for of, history in both if of is not None]
         if not looked_at:
             return
         self.strain = max(self.strain, float(np.sum(looked_at, axis=0).max()))
         some, axial = block.every(max(1, len(block) // INSTANTS)), np.zeros(1)
         guides = {body for _, body in self._slides}
-        joined = zip(
-            self.model.links, self.model.joints, self.model.bodies, some.links, self._of, strict=True
-        )
+        model = self.model
+        joined = zip(model.links, model.joints, model.bodies, some.links, self._of, strict=True)
         for link, joint, body, history, of in joined:
             if of is not None:
                 turned = (slopes(link, of, history, some.motion.R[:, body]) ** 2).sum(axis=2)

@@ -59,9 +59,8 @@ def histories(
     follow : sees every block with its rows
     near : a state near to that with which a steady motion begins
     """
-    recorded = [
-        x for x in recording(ready.scene, ready.model, linked=ready.linkage) if asked_for(x.channel.name)
-    ]
+    every = recording(ready.scene, ready.model, linked=ready.linkage)
+    recorded = [x for x in every if asked_for(x.channel.name)]
     times, taken, kept = [], [], []
     solvers = level_steps(ready.scene, ready.model)
     for solver in solvers:
@@ -134,10 +133,8 @@ def worst(errors: Mapping[str, float]) -> float:
 def _columns(found: tuple[Channel, Float[np.ndarray, "T c"]], like: Channel) -> Float[np.ndarray, "T d"]:
     """The columns that another channel has; a planar link's third is zero."""
     channel, values = found
-    zero = np.zeros(len(values))
-    return np.stack(
-        [values[:, channel.columns.index(c)] if c in channel.columns else zero for c in like.columns], axis=1
-    )
+    known = dict(zip(channel.columns, values.T, strict=True))
+    return np.stack([known.get(c, np.zeros(len(values))) for c in like.columns], axis=1)
 
 
 def _at(

@@ -57,10 +57,8 @@ def _separate(small: Prepared, base: Histories, finer: Scene, eta: Mapping[str, 
 
 def softened(model: Model, eta: Mapping[str, float]) -> Model:
     """A model whose meshed links give by what their meshes are too stiff: K0 (1 − 2 η²)."""
-    return replace(
-        model,
-        links=tuple(_softer(link, max(1 - SOFT * eta.get(link.name, 0.0) ** 2, 0.2)) for link in model.links),
-    )
+    factors = (max(1 - SOFT * eta.get(link.name, 0.0) ** 2, 0.2) for link in model.links)
+    return replace(model, links=tuple(map(_softer, model.links, factors)))
 
 
 def _softer(link: Link, factor: float) -> Link:

@@ -41,13 +41,11 @@ def open_meshes(scene: Scene) -> list[str]:
 def with_fillets(scene: Scene, asked: float) -> Scene:
     """The scene with fillets and free bores of CAD parts and outlines as fine as stress needs, where meshes are open."""
     angle = np.radians(next((angle for least, angle in FILLETS if asked >= least), FINEST_FILLET))
-    links = {
-        name: filleted(link, float(angle))
-        for name, link in scene.links.items()
-        if isinstance(link.shape, Cad | Extrusion | Part)
-        and link.model != "rigid"
-        and "mesh" not in link.model_fields_set
+    drawn = {
+        name: link for name, link in scene.links.items() if isinstance(link.shape, Cad | Extrusion | Part)
     }
+    free = {n: x for n, x in drawn.items() if x.model != "rigid" and "mesh" not in x.model_fields_set}
+    links = {name: filleted(link, float(angle)) for name, link in free.items()}
     return with_links(scene, links) if links else scene
 
 
@@ -56,11 +54,8 @@ def open_modes(scene: Scene) -> list[str]:
     too: what is chosen for these makes unreduced steps dear."""
     if scene.analysis.solver == "monolithic" or not (open_step(scene) or open_meshes(scene)):
         return []
-    return [
-        name
-        for name, link in scene.links.items()
-        if elastic(link, "solid", "plane") and not link.model_fields_set & {"reduction"}
-    ]
+    links = scene.links.items()
+    return [n for n, x in links if elastic(x, "solid", "plane") and "reduction" not in x.model_fields_set]
 
 
 def with_mesh(
@@ -104,9 +99,8 @@ def chosen_meshes(search: Trials, scene: Scene, allowed: float, auto: Sequence[s
         worst_links = [name for name in names if eta.get(name, 0.0) >= 0.3 * max(eta.values())]
         scene = _finer(scene, worst_links, factor)
     if error > allowed:
-        search.notes.append(
-            f"meshes of {unknowns:,} unknowns leave an error of {percent(error)}; finer ones are not taken unasked"
-        )
+        leave = f"meshes of {unknowns:,} unknowns leave an error of {percent(error)}"
+        search.notes.append(f"{leave}; finer ones are not taken unasked")
     return scene, error
 
 
@@ -173,19 +167,15 @@ def first_enough(
         error = beyond
         if error <= allowed:
             return k + 1, error
-    search.notes.append(
-        f"{finer} than those tried would be needed: these still leave an error of {percent(error)}"
-    )
+    leave = f"these still leave an error of {percent(error)}"
+    search.notes.append(f"{finer} than those tried would be needed: {leave}")
     return len(ladder) - 1, error
 
 
 def _segmented(scene: Scene, most: Mapping[str, int], count: int) -> Scene:
     """Links in segments, none in more than do not soften it."""
-    links = {
-        name: scene.links[name].model_copy(update={"segments": min(count, least)})
-        for name, least in most.items()
-    }
-    return with_links(scene, links)
+    links = {name: {"segments": min(count, least)} for name, least in most.items()}
+    return with_links(scene, {n: scene.links[n].model_copy(update=x) for n, x in links.items()})
 
 
 def stubby_warning(model: Model) -> tuple[str, ...]:
@@ -224,8 +214,9 @@ def with_simpler_links(
                 search.notes.append(f"{name}: not {simpler.model}, {str(fault).splitlines()[0]}")
                 continue
             verdict = "taken" if change <= allowed else "left out"
-            note = f"{name}: as {_noun(simpler)} the results change by {percent(change)}, {verdict}"
-            search.notes.append(note)
+            nouns = {"rigid": "a rigid link", "beam": "a beam", "plane": "a plane link"}
+            noun = nouns.get(simpler.category, "a solid")
+            search.notes.append(f"{name}: as {noun} the results change by {percent(change)}, {verdict}")
             if change <= allowed:
                 scene, error = trial, change
                 break
@@ -239,7 +230,3 @@ def _simpler(link: LinkScene, asked: float) -> Iterator[LinkScene]:
         if family == "beam":
             other = refined(other, math.ceil(4 / math.sqrt(asked)))
         yield other if family in {"rigid", "beam"} else refined(other, 2.0)
-
-
-def _noun(link: LinkScene) -> str:
-    return {"rigid": "a rigid link", "beam": "a beam", "plane": "a plane link"}.get(link.category, "a solid")

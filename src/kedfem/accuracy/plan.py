@@ -137,9 +137,8 @@ def planned(scene: Scene, stage: Stage = lambda name: None) -> Plan:
     if asked == "quick":
         raise ValueError("the scene asks for no accuracy")
     search = Trials(asked, stage)
-    plan: Plan = kept(
-        "plan", key(scene), partial(_planned, search, scene), lambda plan: replace(plan, links={}), itself
-    )
+    made = partial(_planned, search, scene)
+    plan: Plan = kept("plan", key(scene), made, lambda plan: replace(plan, links={}), itself)
     return replace(plan, scene=with_models(scene, plan.scene))  # kept ones are of a scene with other outputs
 
 

@@ -24,9 +24,8 @@ def positions_share(found: Histories, sizes: Mapping[str, float]) -> Share:
     found : channels, a row for each position
     sizes : channel that counts → its largest value
     """
-    errors = {
-        name: missed(np.linalg.norm(found.channels[name][1], axis=1)) / size for name, size in sizes.items()
-    }
+    lengths = {name: np.linalg.norm(found.channels[name][1], axis=1) for name in sizes}
+    errors = {name: missed(lengths[name]) / size for name, size in sizes.items()}
     remedy = (
         "take more of them, analysis.steps_per_revolution, and let loads come and go over several of them"
     )

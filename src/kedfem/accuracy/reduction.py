@@ -243,10 +243,9 @@ def _settled(
 def _closer(model: Model, now: Functions, next_ones: Functions, richer: Functions) -> Functions:
     """The next modes of segments, of which few count, as long as there are any; else those of the richer run."""
     lengths = [[0 if Q is None else Q.shape[1] for Q in each] for each in (now, next_ones)]
-    segments = (
-        [link.fit is not None for link in model.links] if lengths[0] != lengths[1] else [False] * len(now)
-    )
-    return [some if ours else more for ours, some, more in zip(segments, next_ones, richer, strict=True)]
+    more = lengths[0] != lengths[1]
+    every = zip(model.links, next_ones, richer, strict=True)
+    return [some if more and link.fit is not None else other for link, some, other in every]
 
 
 def _run(full: Prepared, Q: Functions, moments: Collection[int]) -> tuple[Prepared, Histories]:

@@ -17,6 +17,7 @@ from kedfem.dynamics.rigid_body import instants
 from kedfem.dynamics.stepping.scheme import Scheme, borne_rotation, generalised_alpha
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import rigid_motion
+from kedfem.results.stresses.envelope import largest_row
 from kedfem.scene import (
     Scene,
     corotational,
@@ -136,8 +137,8 @@ class StepError:
         before = a[:1] if self._last is None else self._last[None]
         change = np.linalg.norm(np.diff(np.concatenate([before, a]), axis=0), axis=1)
         self.change = max(self.change, float(change.max(initial=0.0)))
-        self.peak = max(self.peak, _largest(self._weighted(block, "u")))
-        self._swing = max(self._swing, _largest(a))
+        self.peak = max(self.peak, largest_row(self._weighted(block, "u")))
+        self._swing = max(self._swing, largest_row(a))
         rate = self.model.damping.alpha
         if self.peak:
             rate += self.model.damping.beta * self._swing / self.peak
@@ -159,11 +160,9 @@ class StepError:
 
     def _weighted(self, block: Block, name: str) -> Float[np.ndarray, "T k"]:
         """√m times a field of all links; a full mass is taken for its diagonal."""
-        columns = [
-            getattr(history, name)[:, :, c] * np.sqrt(np.abs(m.diagonal()))
-            for link, history in zip(self.model.links, block.links, strict=True)
-            for c, m in enumerate(link.mass)
-        ]
+        both = zip(self.model.links, block.links, strict=True)
+        every = ((getattr(history, name), c, m) for link, history in both for c, m in enumerate(link.mass))
+        columns = [x[:, :, c] * np.sqrt(np.abs(m.diagonal())) for x, c, m in every]
         return np.concatenate(columns, axis=1)
 
 
@@ -202,10 +201,6 @@ def resolution_warnings(found: Resolution | None, error: float | None = None) ->
     return out
 
 
-def _largest(x: Float[np.ndarray, "T k"]) -> float:
-    return float(np.sqrt((x**2).sum(axis=1).max(initial=0.0)))
-
-
 def fewest_steps(scene: Scene) -> float:
     """Steps of an analysis below which it may grow: the drive then turns by more than 1 − ρ∞ in a step."""
     rho_inf = scene.analysis.rho_inf
@@ -215,9 +210,8 @@ def fewest_steps(scene: Scene) -> float:
         return math.inf
     end = time_grid(scene).end
     t = np.linspace(0.0, end, 2001)
-    turning = [
-        each.motion for name, each in scene.driven_joints.items() if scene.joints[name].kind != "prismatic"
-    ]
+    driven = scene.driven_joints.items()
+    turning = [each.motion for name, each in driven if scene.joints[name].kind != "prismatic"]
     fastest = max((float(np.abs(drive_angle(law, t)[1]).max()) for law in turning), default=0.0)
     return fastest * end / borne_rotation(rho_inf)
 

@@ -98,11 +98,9 @@ class Rounding:
         stiffest = np.zeros(len(model.links))
         if first is not None and first.corotational:
             ready = first.ready
-            stiffest[:] = [
-                FOLLOWED[link.kind] * np.abs(part.S).max(initial=0.0) / ready.c.c_K
-                for part, link in zip(ready.parts, model.links, strict=True)
-            ]
-            stiffest[[link.rigid for link in model.links]] = 0.0
+            for k, (part, link) in enumerate(zip(ready.parts, model.links, strict=True)):
+                if not link.rigid:
+                    stiffest[k] = FOLLOWED[link.kind] * np.abs(part.S).max(initial=0.0) / ready.c.c_K
         solver = None if first is None or first.corotational or first.oracle is not None else first
         defects: list[np.ndarray | None] = []
         for k, link in enumerate(model.links):
@@ -113,9 +111,8 @@ class Rounding:
                 defects.append(LEFT[link.kind] * left)
             else:
                 defects.append(NODAL * nodal_defect(link))
-        parts = [
-            None if x is None else rigid_part(link) for x, link in zip(defects, model.links, strict=True)
-        ]
+        every = zip(defects, model.links, strict=True)
+        parts = [None if x is None else rigid_part(link) for x, link in every]
         return cls(model, defects, parts, stiffest, np.zeros(len(model.links)))
 
     def add(self, block: Block) -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kedfem.dynamics.model import Model
+from kedfem.motion.joint_equations import joint_points
 from kedfem.scene import ConstantSpeed, Ramp, Scene
 from kedfem.scene.records.materials import LINE
 from kedfem.scene.records.units import RPM
@@ -57,25 +58,18 @@ def sizes(scene: Scene, model: Model) -> Sizes:
         nodes.setdefault(link.name, []).append((link.full or link).nodes)
         masses[link.name] = masses.get(link.name, 0.0) + float(link.one @ link.m1[:, 0])
     every = {name: np.concatenate(parts) for name, parts in nodes.items()}
-    joints = np.array([joint.at for joint in scene.joints.values()]).reshape(-1, 3)
-    moduli = {
-        name: scene.materials[name].youngs_modulus
-        for name in dict.fromkeys(link.material for link in scene.links.values() if link.model != "rigid")
-        if name is not None
-    }
-    final = {
-        name: float(drive.motion.speed)
-        for name, drive in scene.driven_joints.items()
-        if isinstance(drive.motion, ConstantSpeed | Ramp)
-    }
+
+    elastic = [link.material for link in scene.links.values() if link.model != "rigid" and link.material]
+    motions = {name: drive.motion for name, drive in scene.driven_joints.items()}
+    final = {name: float(x.speed) for name, x in motions.items() if isinstance(x, ConstantSpeed | Ramp)}
     slides = {name for name in final if scene.joints[name].kind == "prismatic"}
     return Sizes(
-        float(np.ptp(np.concatenate([*every.values(), joints]), axis=0).max()),
-        {name: float(np.linalg.norm(np.ptp(X, axis=0))) for name, X in every.items()},
-        {name: masses[name] for name in scene.links if name in masses},
-        moduli,
-        {name: speed * RPM for name, speed in final.items() if name not in slides},
-        {name: speed for name, speed in final.items() if name in slides},
+        overall=float(np.ptp(np.concatenate([*every.values(), joint_points(scene)]), axis=0).max()),
+        lengths={name: float(np.linalg.norm(np.ptp(X, axis=0))) for name, X in every.items()},
+        masses={name: masses[name] for name in scene.links if name in masses},
+        moduli={name: scene.materials[name].youngs_modulus for name in dict.fromkeys(elastic)},
+        turns={name: speed * RPM for name, speed in final.items() if name not in slides},
+        speeds={name: speed for name, speed in final.items() if name in slides},
     )
 
 
@@ -106,10 +100,8 @@ def _length_doubts(scene: Scene, found: Sizes) -> Iterator[str]:
         for key in ("width", "thickness"):
             value = getattr(link.shape, key, None) or 0.0
             if span and name not in long and value > min(WIDE[0] * span, WIDE[1]):
-                yield (
-                    f"links.{name}.shape.{key}: {value:.4g} m for a link of {span:.4g} m: is it in mm? "
-                    f"write '{value:.4g} mm'"
-                )
+                doubt = f"{value:.4g} m for a link of {span:.4g} m: is it in mm? write '{value:.4g} mm'"
+                yield f"links.{name}.shape.{key}: {doubt}"
 
 
 def _material_doubts(scene: Scene) -> Iterator[str]:

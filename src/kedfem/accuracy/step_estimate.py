@@ -15,6 +15,7 @@ from kedfem.accuracy.resolution import StepError
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
 from kedfem.results.recorded import Recorded
+from kedfem.results.stresses.envelope import largest_row
 from kedfem.scene import time_grid
 
 IN_STEP = 0.3  # largest disagreement about the fastest motion at which orders 4 and 6 show
@@ -166,17 +167,17 @@ class _Sizes:
 
     def add(self, values: Rows, levels: Sequence[Rows]) -> None:
         """More time points, as combined and as each level has them."""
-        self.peak = max(self.peak, _largest(values))
+        self.peak = max(self.peak, largest_row(values))
         steps = [b - a for a, b in pairwise(levels)]
         if not len(self.differences):
             self.differences = np.zeros(len(steps))
-        self.differences = np.maximum(self.differences, [_largest(d) for d in steps])
+        self.differences = np.maximum(self.differences, [largest_row(d) for d in steps])
         if len(steps) == 2:
-            self.next = max(self.next, _largest((4 * steps[1] - steps[0]) / 3))
+            self.next = max(self.next, largest_row((4 * steps[1] - steps[0]) / 3))
         seen = [steps[-1], values] if steps else []
         if self._tail:
             seen = [np.concatenate(each) for each in zip(self._tail, seen, strict=True)]
-        self.curved = np.maximum(self.curved, [_largest(np.diff(x, 2, axis=0)) for x in seen] or 0.0)
+        self.curved = np.maximum(self.curved, [largest_row(np.diff(x, 2, axis=0)) for x in seen] or 0.0)
         self._tail = [x[-2:] for x in seen]
 
 
@@ -268,7 +269,7 @@ def single_errors(
         sizes = _Sizes()
         sizes.add((4 * own - other[: len(own)]) / 3, [other[: len(own)], own])
         if sizes.peak:
-            peak = _largest(every[:, which])
+            peak = largest_row(every[:, which])
             D, jolt = float(sizes.differences[0]) / peak, _jolt(every[:, which]) / peak if stops else 0.0
             finer[name], coarser[name] = (max(D * factor, jolt) for factor in single_level(sizes.fast))
     return finer, coarser
@@ -280,8 +281,4 @@ def _jolt(x: Rows) -> float:
     Of a vibration at ω in steps of h, (3/8) (ω h)⁴ of its amplitude.
     """
     beside = (9 * (x[2:-4] + x[4:-2]) - x[:-6] - x[6:]) / 16
-    return _largest(x[3:-3] - beside)
-
-
-def _largest(x: Rows) -> float:
-    return float(np.sqrt((x**2).sum(axis=1).max(initial=0.0)))
+    return largest_row(x[3:-3] - beside)

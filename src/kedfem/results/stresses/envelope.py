@@ -74,7 +74,7 @@ class Modes:
 
     def coordinates(self, G: Float[np.ndarray, "T k"], highest: float) -> Float[np.ndarray, "T r"]:
         """Of steps G (T, dn); new modes are made until the residual stress is nothing beside the highest so far."""
-        floor = NOTHING * _largest(G)
+        floor = NOTHING * largest_row(G)
         G = G - (G @ self.rigid.T) @ self.rigid
         C = np.zeros((len(G), 0))
         while True:
@@ -82,7 +82,7 @@ class Modes:
             added = G @ new.T
             G -= added @ new
             C = np.hstack([C, added])
-            size = _largest(G)
+            size = largest_row(G)
             stress = max(highest, self._stress_of(C[np.argmax((C**2).sum(axis=1))]) if C.size else 0.0)
             allowed = max(floor, EXACT * stress / self.gain if self.gain else 0.0)
             if size <= allowed or len(self.basis) + len(self.rigid) >= self.basis.shape[1]:
@@ -265,5 +265,6 @@ def leading(
     return np.ascontiguousarray((C * gain) @ V.T / unit), turned, head
 
 
-def _largest(G: Float[np.ndarray, "T k"]) -> float:
+def largest_row(G: Float[np.ndarray, "T k"]) -> float:
+    """The length of the longest row; 0 without any."""
     return float(np.sqrt((G**2).sum(axis=1).max(initial=0.0)))
