@@ -91,29 +91,20 @@ def closed_scene(scene: Scene, shifts: Mapping[str, Shift]) -> Scene:
             faults.append(str(error))
     if faults:
         raise MotionError("\n".join(faults))
+    analysis = scene.analysis
+    motions = {name: _moved(motion, shifts[name]) for name, motion in analysis.initial_motions.items()}
+    deflection = {name: _moved(x, shifts[x.link]) for name, x in analysis.initial_deflection.items()}
+    probes = {name: _moved(probe, shifts[probe.link]) for name, probe in scene.output.probes.items()}
     return scene.model_copy(
         update={
             "links": links,
-            "joints": {
-                name: _joint(joint, {**shifts, GROUND: STILL}) for name, joint in scene.joints.items()
-            },
+            "joints": {name: _joint(x, {**shifts, GROUND: STILL}) for name, x in scene.joints.items()},
             "loads": {name: _moved(load, shifts[load.link]) for name, load in scene.loads.items()},
             "bodies": {name: _moved(body, shifts[body.link]) for name, body in scene.bodies.items()},
             "springs": {name: _spring(spring, shifts) for name, spring in scene.springs.items()},
-            "output": scene.output.model_copy(
-                update={"probes": {k: _moved(x, shifts[x.link]) for k, x in scene.output.probes.items()}}
-            ),
-            "analysis": scene.analysis.model_copy(
-                update={
-                    "initial_motions": {
-                        name: _moved(motion, shifts[name])
-                        for name, motion in scene.analysis.initial_motions.items()
-                    },
-                    "initial_deflection": {
-                        name: _moved(force, shifts[force.link])
-                        for name, force in scene.analysis.initial_deflection.items()
-                    },
-                }
+            "output": scene.output.model_copy(update={"probes": probes}),
+            "analysis": analysis.model_copy(
+                update={"initial_motions": motions, "initial_deflection": deflection}
             ),
         }
     )
@@ -121,11 +112,8 @@ def closed_scene(scene: Scene, shifts: Mapping[str, Shift]) -> Scene:
 
 def _moved(record: AnyRecord, shift: Shift) -> AnyRecord:
     """What is on a link: its points, a vector in the link's frame, inertia."""
-    change: dict[str, Any] = {
-        key: shift.point(getattr(record, key))
-        for key in ("at", "centre")
-        if getattr(record, key, None) is not None
-    }
+    given = [key for key in ("at", "centre") if getattr(record, key, None) is not None]
+    change: dict[str, Any] = {key: shift.point(getattr(record, key)) for key in given}
     if getattr(record, "frame", None) == "link" and hasattr(record, "vector"):
         change["vector"] = shift.turned(record.vector)
     if isinstance(record, Probe) and record.chord is not None:

@@ -120,12 +120,8 @@ def free_rows(
     if kind == "weld" or axis is None:
         return []
     turn, travel = turn_row(name, i, j, axis), travel_row(name, i, j, point, axis)
-    several = {
-        "prismatic": [travel],
-        "cylindrical": [turn, travel],
-        "slot": [*aligned, travel],
-        "planar": [turn, *(travel_row(name, i, j, point, b) for b in perpendiculars(axis))],
-    }
+    several = {"prismatic": [travel], "cylindrical": [turn, travel], "slot": [*aligned, travel]}
+    several["planar"] = [turn, *(travel_row(name, i, j, point, b) for b in perpendiculars(axis))]
     return several.get(kind, [turn])
 
 

@@ -134,11 +134,11 @@ def _check_reached(asked: list[Wanted], got: Float[np.ndarray, " w"]) -> None:
             break
     else:
         return
-    lines = [
-        f"{each.where} = {each.value:.6g} {each.unit} (closest possible {round(x, 9) + 0.0:.6g})"
-        for each, x in zip(asked, got.tolist(), strict=True)
-        if each.value or abs(x) > REACHED
-    ]
+    lines = []
+    for each, x in zip(asked, got.tolist(), strict=True):
+        if each.value or abs(x) > REACHED:
+            closest = f"(closest possible {round(x, 9) + 0.0:.6g})"
+            lines.append(f"{each.where} = {each.value:.6g} {each.unit} {closest}")
     raise MotionError(
         f"analysis: the joints must allow the speeds at the start together, got {', '.join(lines)}"
     )

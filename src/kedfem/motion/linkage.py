@@ -258,12 +258,8 @@ def _holding(
     if not free:
         return []
     motions = scipy.linalg.svd(J)[2][-free:].T
-    rows = [
-        row
-        for name in scene.joints
-        if name not in scene.driven_joints
-        for row in _free_rows(scene, name, bodies, size, motions)
-    ]
+    undriven = (name for name in scene.joints if name not in scene.driven_joints)
+    rows = [row for name in undriven for row in _free_rows(scene, name, bodies, size, motions)]
     change = drawn_jacobian(rows, len(bodies), size) @ motions
     first = 1 - FIRST * np.arange(len(rows))
     _, _, order = scipy.linalg.qr((first[:, None] * change).T, pivoting=True, mode="economic")
@@ -281,11 +277,8 @@ def _free_rows(
             change = drawn_jacobian(rows, len(bodies), size) @ motions
             along = np.array([row.b if kind == GAP else np.cross(row.a, row.b) for row in rows])
             U = np.linalg.svd(along.T @ change)[0]
-            rows = [
-                travel_row(name, rows[0].i, rows[0].j, rows[0].a, d)
-                if kind == GAP
-                else turn_row(name, rows[0].i, rows[0].j, d)
-                for d in U.T[: len(rows)]
-            ]
+            i, j, a, kept = rows[0].i, rows[0].j, rows[0].a, U.T[: len(rows)]
+            gap = kind == GAP
+            rows = [travel_row(name, i, j, a, d) if gap else turn_row(name, i, j, d) for d in kept]
         out += rows
     return out

@@ -15,11 +15,9 @@ from kedfem.motion.released_motions import Drawn, directions, listed, null_space
 from kedfem.scene import Joint
 
 LOOSER = {
-    "revolute": ("spherical", "cylindrical"),
-    "prismatic": ("cylindrical",),
-    "universal": ("spherical",),
+    "revolute": ("spherical", "cylindrical"), "prismatic": ("cylindrical",), "universal": ("spherical",),
     "weld": ("spherical",),
-}
+}  # fmt: skip
 Looser = Mapping[tuple[str, str], Float[np.ndarray, "m k"]]
 """Rows of joints if they were of another kind, by joint and kind."""
 

@@ -73,7 +73,12 @@ def direction(d: Float[np.ndarray, "3"]) -> str:
     d = d / np.linalg.norm(d) * np.sign(d[np.abs(d).argmax()])
     if d.max() > 1 - STILL:
         return "xyz"[int(d.argmax())]
-    return "(" + ", ".join(f"{x + 0.0:.3g}" for x in np.round(d, 6)) + ")"
+    return components(d, 6)
+
+
+def components(d: Float[np.ndarray, "3"], digits: int = 9, form: str = ".3g") -> str:
+    """A vector in words, without what rounding left of zero."""
+    return f"({', '.join(format(x + 0.0, form) for x in np.round(d, digits))})"
 
 
 def directions(

@@ -117,14 +117,8 @@ def _distances(scene: Scene) -> dict[str, int]:
     out = {link: 0 for name in scene.driven_joints for link in scene.joints[name].links if link != GROUND}
     here = list(out)
     while here:
-        found = [
-            other
-            for link in here
-            for joint in scene.joints.values()
-            if link in joint.links
-            for other in joint.links
-            if other != GROUND and other not in out
-        ]
+        held = (joint.links for link in here for joint in scene.joints.values() if link in joint.links)
+        found = [other for links in held for other in links if other != GROUND and other not in out]
         out |= dict.fromkeys(found, out[here[0]] + 1)
         here = list(dict.fromkeys(found))
     return out

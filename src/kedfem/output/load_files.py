@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from kedfem.arrays import Bool, Float
+from kedfem.motion.released_motions import components
 from kedfem.output.plots.drawing import figure_saved
 from kedfem.output.words import prefixed
 from kedfem.results import Results
@@ -97,4 +98,4 @@ def _vector(x: Float[np.ndarray, "3"]) -> str:
     for k, name in enumerate(XYZ):
         if abs(abs(x[k]) - 1.0) < 1e-9:
             return f"−{name}" if x[k] < 0 else name
-    return f"({', '.join(f'{c + 0.0:.3g}' for c in np.round(x, 9))})"
+    return components(x)

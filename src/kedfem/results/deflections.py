@@ -9,6 +9,7 @@ from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model
 from kedfem.links.record import in_space
 from kedfem.motion.linkage import Linkage
+from kedfem.motion.released_motions import components
 from kedfem.results.link_points import Drawn, LinkPoint, link_point, seen_from
 from kedfem.results.recorded import Rows
 from kedfem.scene import Probe, Scene
@@ -39,7 +40,7 @@ def deflection(
         R = _along(frame(block)[2], drawn, second.position(block) - start)
         return seen_from(point.position(block) - start, R, point.X - first.X, axes)
 
-    ends = " to ".join(f"({', '.join(f'{round(x, 9) + 0.0:.6g}' for x in P.X)})" for P in (first, second))
+    ends = " to ".join(components(P.X, form=".6g") for P in (first, second))
     return from_chord, f"deflection from the chord {ends},"
 
 

@@ -12,6 +12,7 @@ from kedfem.motion.coordinates import Coordinate, coordinates, counted_on
 from kedfem.motion.joint_equations import GROUND
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
+from kedfem.motion.released_motions import components
 from kedfem.motion.rigid import RigidMotion
 from kedfem.motion.transmission import Transmission, transmissions
 from kedfem.results.forces.rigid import stated_link
@@ -123,7 +124,7 @@ def _turn(
         mark = np.eye(3)[np.abs(normal).argmin()]
         turn = Coordinate("", "angle", "angle", body, 0, np.zeros(3), normal, mark - (mark @ normal) * normal)
         what, frame, angles, rates = "turn", "", ("angle",), ("rate",)
-        text += " about (" + ", ".join(f"{x + 0.0:.3g}" for x in np.round(normal, 9)) + ")"
+        text += f" about {components(normal)}"
 
     def turned(motion: RigidMotion) -> Rows:
         return rotation_vector(motion.R[:, body]) if turn is None else turn.values(motion)[:, None]
@@ -146,7 +147,7 @@ def coordinate_channel(each: Coordinate, linkage: Linkage) -> tuple[Channel, Cal
     verb = "turn" if each.kind == "angle" else "travel"
     text = f"{verb} of joint {each.joint}: link {one} against {other}, from the reference position"
     if each.name.startswith("travel_"):  # of a planar joint, whose axis does not say along what
-        text += f", along ({', '.join(f'{round(x, 9) + 0.0:.4g}' for x in each.axis)}) there"
+        text += f", along {components(each.axis, form='.4g')} there"
     channel = Channel(f"joints/{each.joint}/{each.name}", (column,), unit, "", text)
     return channel, lambda motion: each.values(motion)[:, None]
 

@@ -11,6 +11,7 @@ from kedfem.dynamics.model import Model, on_segment
 from kedfem.links.point_rows import point_rows
 from kedfem.links.recovery import von_mises
 from kedfem.motion.linkage import Linkage, linkage
+from kedfem.motion.released_motions import components
 from kedfem.results.deflections import deflection
 from kedfem.results.link_points import Drawn, LinkPoint, link_point
 from kedfem.results.recorded import Recorded, Rows
@@ -50,9 +51,7 @@ def _channel(scene: Scene, model: Model, linked: Linkage, name: str, probe: Prob
 
 
 def _place(link: str, X: Drawn) -> str:
-    return (
-        f"of link {link} at ({', '.join(f'{round(x, 9) + 0.0:.6g}' for x in X)}) m in the reference position"
-    )
+    return f"of link {link} at {components(X, form='.6g')} m in the reference position"
 
 
 def _words(linked: Linkage, probe: Probe) -> str:

@@ -112,11 +112,8 @@ def _settled(
         good[1:] &= np.abs(np.diff(tau)) * fastest[:-1] <= FARTHEST
     if len(steps) > 1:
         good &= steps[1] <= CONTRACTION * steps[0] + SETTLED
-    shape, near, turns = (
-        shapes(got),
-        factor.f.value[link.rows.angles].T,
-        turning(link.rows, factor.f, got.first),
-    )
+    shape, near = shapes(got), factor.f.value[link.rows.angles].T
+    turns = turning(link.rows, factor.f, got.first)
     return [
         Stand(float(tau[k]), shape[:, k], near[k], turns[k], fastest[k], steps[0][k], factor.J[k])
         for k in range(len(tau) if good.all() else int(good.argmin()))

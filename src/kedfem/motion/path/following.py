@@ -107,12 +107,8 @@ def _turns(link: Linkage, start: Stand, step: float, period: float, end: float) 
 def _returned(link: Linkage, start: Stand, here: Stand) -> bool:
     """Whether a linkage is in its first pose again."""
     one = len(link.drives) == 1 and not link.rows.plus
-    apart = (
-        np.abs(one - other).max() / unit
-        for one, other, unit in zip(
-            split(start.shape[:1]), split(here.shape[:1]), (1.0, link.size), strict=True
-        )
-    )
+    pairs = zip(split(start.shape[:1]), split(here.shape[:1]), (1.0, link.size), strict=True)
+    apart = (np.abs(one - other).max() / unit for one, other, unit in pairs)
     return bool(max(apart) < (OPEN if one else RETURNED))
 
 

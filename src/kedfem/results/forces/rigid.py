@@ -16,6 +16,7 @@ from kedfem.motion.joint_equations import moving_pair
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path, path
 from kedfem.motion.reactions import BlockReactions, Reactions, reactions
+from kedfem.motion.released_motions import components
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.recorded import Rows, drive_effort
 from kedfem.results.records import XYZ, Channel
@@ -211,7 +212,7 @@ def determined(
     kept = np.flatnonzero(np.linalg.norm(lost, axis=1) < ALONG)
     if len(kept) == 3 - lost.shape[1]:  # what is open lies along axes of the world
         return tuple(XYZ[k] for k in kept), np.eye(3)[kept], ""
-    which = ", ".join("(" + ", ".join(f"{x + 0.0:.3g}" for x in np.round(n, 6)) + ")" for n in lost.T)
+    which = ", ".join(components(n, 6) for n in lost.T)
     return XYZ, P, f"; without what is along {which}, which statics leave open"
 
 

@@ -31,16 +31,12 @@ def frames_of(parts: Parts, link: Entry | None = None) -> str:
     return own or parts.analysis.word("frames") or default_frames(parts.driven)
 
 
-def any_corotational(parts: Parts) -> bool:
-    """Whether any link has co-rotational frames."""
-    return any(frames_of(parts, link) == "co-rotational" for link in parts.links.values())
-
-
 def common_facts(parts: Parts) -> dict[str, str]:
     """What the whole scene says."""
     record = parts.analysis.record
+    following = any(frames_of(parts, link) == "co-rotational" for link in parts.links.values())
     return {
-        "frames": "co-rotational" if any_corotational(parts) else "rigid-body",
+        "frames": "co-rotational" if following else "rigid-body",
         "stiffening": "on" if parts.analysis.raw.get("stiffening") is True else "off",
         "drive": "given" if parts.driven else "none",
         "rho_inf": "1" if record is not None and record.rho_inf == 1.0 else "below 1",
@@ -51,10 +47,8 @@ def common_facts(parts: Parts) -> dict[str, str]:
 def joints(parts: Parts) -> Iterator[Told]:
     """Good joints: how each is enforced, and what it joins."""
     moving = {name for name in parts.good.joints if enforced_by_equations(parts.good, name)}
-    asked = any(category(link) == "plane" for link in parts.links.values())
-    asked = asked or any(
-        joint.word("kind") == "slot" and joint.has("bushing") for joint in parts.joints.values()
-    )
+    slots = (joint for joint in parts.joints.values() if joint.word("kind") == "slot")
+    asked = any(category(x) == "plane" for x in parts.links.values()) or any(x.has("bushing") for x in slots)
     spatial = spatial_beams(parts.good) if asked else frozenset[str]()
     for joint in parts.joints.values():
         kind, held = str(joint.word("kind")), [parts.links[x] for x in link_names(joint) if x in parts.links]
@@ -142,11 +136,8 @@ def elements(parts: Parts) -> Iterator[Told]:
     for spring in parts.springs.values():
         facts, words = on_joint(parts, spring.word("joint"))
         element = "torsion" if spring.word("kind") == "torsion" else "along"
-        facts |= {
-            "element": element,
-            "factor": spring.word("stiffness_factor", "over") or "",
-            **driven(parts),
-        }
+        factor = spring.word("stiffness_factor", "over") or ""
+        facts |= {"element": element, "factor": factor, **driven(parts)}
         yield "springs", facts, spring.where, words
     for limit in parts.limits.values():
         facts, words = on_joint(parts, limit.word("joint"))
@@ -213,9 +204,8 @@ def limited(parts: Parts) -> dict[str, str]:
     """Factors of an analysis with limits of joints."""
     several = parts.analysis.record is not None and (parts.analysis.record.extrapolation_levels or 1) > 1
     deflected = "initial_deflection" if parts.analysis.raw.get("initial_deflection") else ""
-    return only(element="limit", levels="several" if several else "one", start=deflected) | {
-        "solver": parts.analysis.word("solver") or "condensed"
-    }
+    solver = parts.analysis.word("solver") or "condensed"
+    return only(element="limit", levels="several" if several else "one", start=deflected, solver=solver)
 
 
 def only(**facts: str) -> dict[str, str]:

@@ -77,8 +77,9 @@ def analysis_faults(parts: Parts) -> Iterator[Fault]:
             yield analysis.fault("end_time", "is required [s], got nothing")
     if analysis.has("step") and analysis.has("steps_per_revolution"):
         yield analysis.fault("step", "cannot be combined with steps_per_revolution, got both")
-    if parts.driven:
-        yield from open_model_faults(parts)
+    quick = parts.driven and analysis.word("accuracy") == "quick"
+    for link in (x for x in parts.links.values() if quick and x.word("model") == "auto"):
+        yield link.fault("model", "needs an analysis.accuracy, e.g. 0.01, got 'quick' for 'auto'")
     drives = [drive for drive in parts.all_drives if drive.record is not None]
     for drive in drives:
         yield from drive_table_faults(parts, drive)
@@ -99,13 +100,6 @@ def _repeats(parts: Parts) -> bool:
     drives = [drive.record for drive in parts.all_drives]
     known = len(drives) == 1 and drives[0] is not None and cycle(drives[0].motion) is not None
     return parts.analysis.word("kind") in {"steady", *WITHOUT_VIBRATION} and known
-
-
-def open_model_faults(parts: Parts) -> Iterator[Fault]:
-    """Models left open without saying for which accuracy."""
-    for link in parts.links.values():
-        if link.word("model") == "auto" and parts.analysis.word("accuracy") == "quick":
-            yield link.fault("model", "needs an analysis.accuracy, e.g. 0.01, got 'quick' for 'auto'")
 
 
 def drive_and_analysis_faults(parts: Parts, drive: Entry) -> Iterator[Fault]:
@@ -170,13 +164,13 @@ def speed_faults(parts: Parts, joint: Entry, given: Any) -> Iterator[Fault]:
     if joint.record is not None and kind not in STARTED:
         got = f"got {joint.name!r}, which is {kind}"
         message = f"must be of a revolute, prismatic, cylindrical or screw joint, {got}; take initial_motions"
-        yield parts.analysis.fault("initial_speeds", message, joint.name)
     elif joint.name in parts.driven_joints:
         message = f"must be of a joint that the drive does not move, got {joint.name!r}"
-        yield parts.analysis.fault("initial_speeds", message, joint.name)
     elif kind in STARTED and isinstance(given, str) and not in_unit(given, STARTED[kind]):
         message = f"must be {STARTED[kind].kind} for a {kind} joint, got {given!r}"
-        yield parts.analysis.fault("initial_speeds", message, joint.name)
+    else:
+        return
+    yield parts.analysis.fault("initial_speeds", message, joint.name)
 
 
 def in_unit(text: str, quantity: Quantity) -> bool:

@@ -92,13 +92,10 @@ def connected(start: str, pairs: list[list[str]]) -> set[str]:
 
 
 def planar_faults(parts: Parts) -> Iterator[Fault]:
-    """What leaves the plane of a scene with plane links."""
-    if any(category(link) == "plane" for link in parts.links.values()):
-        yield from _leaving_plane(parts.good, f"a scene of {NOUNS['plane']}s")
-
-
-def _leaving_plane(scene: Scene, here: str) -> Iterator[Fault]:
-    """Axes, gravity, loads and points that are not in the plane of plane links."""
+    """Axes, gravity, loads and points that are not in the plane of a scene with plane links."""
+    if all(category(link) != "plane" for link in parts.links.values()):
+        return
+    scene, here = parts.good, f"a scene of {NOUNS['plane']}s"
     for name, joint in scene.joints.items():
         yield from tilted(("joints", name), joint, f"in {here}", {"revolute"})
     yield from leaving(scene, f"in {here}")

@@ -43,7 +43,8 @@ def link_faults(parts: Parts) -> Iterator[Fault]:
 def rigid_faults(link: Entry, parts: Parts) -> Iterator[Fault]:
     """A rigid link without a shape that is not a slider, or keys of an elastic one."""
     on = [joint for joint in parts.joints.values() if link.name in link_names(joint)]
-    slides, rides = any(map(is_slide, on)), any(joint.word("kind") == "prismatic" for joint in on)
+    riding = [joint for joint in on if joint.word("kind") == "prismatic"]
+    slides = any(GROUND in link_names(joint) for joint in riding)
     slides = slides or link.record is None or link.name in moving_grounds(parts.good)
     if link.has("inertia") or link.has("centre"):  # a body by numbers, with a fault that its record shows
         return
@@ -60,7 +61,7 @@ def rigid_faults(link: Entry, parts: Parts) -> Iterator[Fault]:
                 "moving part of the ground (held by a driven joint alone); or give its mass, centre and inertia"
             )
             yield link.fault("shape", f"{wanted}, got nothing")
-        if parts.sketch and not rides and link.record is not None and link.record.mass:
+        if parts.sketch and not riding and link.record is not None and link.record.mass:
             got = f"got {link.record.mass:.6g} without a prismatic joint"
             yield link.fault("mass", f"must be that of what slides [kg], {got}")
         for key in ("material", "element"):
@@ -68,13 +69,8 @@ def rigid_faults(link: Entry, parts: Parts) -> Iterator[Fault]:
                 got = link.word(key) or "one"
                 yield link.fault(key, f"must not be given for a rigid link without a shape, got {got!r}")
     if link.has("reduction") and link.raw["reduction"] != "none":
-        got = f"got {shown(link.raw['reduction'])}"
-        yield link.fault("reduction", f"must be left out for a rigid link, {got}")
-
-
-def is_slide(joint: Entry) -> bool:
-    """Whether a joint is a slider's."""
-    return joint.word("kind") == "prismatic" and GROUND in link_names(joint)
+        reduced = shown(link.raw["reduction"])
+        yield link.fault("reduction", f"must be left out for a rigid link, got {reduced}")
 
 
 def elastic_faults(link: Entry, sketch: bool) -> Iterator[Fault]:
@@ -103,9 +99,8 @@ def meshing_faults(link: Entry) -> Iterator[Fault]:
     part = {"cad"}, "a part from CAD"
     arcs = {"cad", "extrusion", "part"}, "a part from CAD, an extrusion or a part"
     sized = {*arcs[0], "plate_link"}, "a part from CAD, an extrusion, a part or a plate link"
-    for key, (shapes, only) in {
-        "unknowns": sized, "defeature_size": part, "kind": part, "fillet_angle": arcs
-    }.items():  # fmt: skip
+    owners = {"unknowns": sized, "defeature_size": part, "kind": part, "fillet_angle": arcs}
+    for key, (shapes, only) in owners.items():
         if link.has("mesh", key) and shape not in shapes:
             yield link.fault("mesh", f"must be given for {only} only, got one for a {shape}", key)
     counted = "beam" if category(link) == "beam" else "bar" if shape == "bar" else None

@@ -16,9 +16,11 @@ from kedfem.scene.records.wording import unknown_name
 def load_faults(parts: Parts) -> Iterator[Fault]:
     """Loads, bodies and probes that do not suit their link."""
     for load in parts.loads.values():
-        known = load.word("link") in parts.links and parts.joints
-        if known and load.word("kind") == "torque" and load.word("joint") is not None:
-            yield from torque_joint_faults(load, parts)
+        known, at = load.word("link") in parts.links and parts.joints, load.word("joint")
+        if known and load.word("kind") == "torque" and at is not None:
+            here = [x.name for x in parts.joints.values() if load.word("link") in link_names(x)]
+            if at not in here:
+                yield load.fault("joint", unknown_name("a joint of the link", at, here))
     for probe in parts.probes.values():
         link, quantity = parts.links.get(probe.word("link") or ""), probe.word("quantity")
         if link is not None and category(link) == "rigid" and quantity in {"stress", "deflection"}:
@@ -30,13 +32,6 @@ def load_faults(parts: Parts) -> Iterator[Fault]:
             yield probe.fault("quantity", f"must be {wanted} {why}, got {quantity!r}")
     for body in parts.bodies.values():
         yield from flywheel_faults(body, parts)
-
-
-def torque_joint_faults(load: Entry, parts: Parts) -> Iterator[Fault]:
-    """A torque at a joint that is not one of its link."""
-    here = [joint.name for joint in parts.joints.values() if load.word("link") in link_names(joint)]
-    if load.word("joint") not in here:
-        yield load.fault("joint", unknown_name("a joint of the link", str(load.word("joint")), here))
 
 
 def flywheel_faults(body: Entry, parts: Parts) -> Iterator[Fault]:

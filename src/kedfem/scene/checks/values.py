@@ -45,25 +45,18 @@ def bare_numbers(raw: Any, hint: Any) -> Iterator[str]:
     """Doubts about numbers without a unit in raw input of a type that was found good, but for lists of numbers."""
     for where, value, inner in walk(raw, hint):
         if isinstance(value, (int, float)) and abs(value) < 1e300 and isinstance(where[-1], str):
-            yield from doubts(
-                place(where), float(value), {quantity.unit for quantity in marks(inner, Quantity)}
-            )
+            units = {quantity.unit for quantity in marks(inner, Quantity)}
+            yield from doubts(place(where), float(value), units)
 
 
 def doubts(where: str, value: float, units: set[str]) -> Iterator[str]:
     """What is doubtful about one bare number of a quantity."""
-    if units == {"rad"} and abs(value) > TURN:
-        yield (
-            f"{where}: {value:g} without a unit is in radians, {math.degrees(value):.4g}°; "
-            f"if degrees are meant write '{value:g} deg', else '{value:g} rad'"
-        )
-    if units == {"rad/s"} and abs(value) >= FAST and value % 10 == 0:
-        yield (
-            f"{where}: {value:g} without a unit is in rad/s, {value * RPM:.4g} rpm; "
-            f"if rpm are meant write '{value:g} rpm', else '{value:g} rad/s'"
-        )
-    if units == {"m/s"} and abs(value) >= FAST and value % 10 == 0:
-        yield (
-            f"{where}: {value:g} without a unit is in m/s; if mm/s are meant write '{value:g} mm/s', else "
-            f"'{value:g} m/s'"
-        )
+    fast = abs(value) >= FAST and value % 10 == 0
+    for unit, doubtful, read, what, other in (
+        ("rad", abs(value) > TURN, f"in radians, {math.degrees(value):.4g}°", "degrees", "deg"),
+        ("rad/s", fast, f"in rad/s, {value * RPM:.4g} rpm", "rpm", "rpm"),
+        ("m/s", fast, "in m/s", "mm/s", "mm/s"),
+    ):
+        if units == {unit} and doubtful:
+            instead = f"if {what} are meant write '{value:g} {other}', else '{value:g} {unit}'"
+            yield f"{where}: {value:g} without a unit is {read}; {instead}"

@@ -93,9 +93,8 @@ def spline(motion: Table, t: Times) -> Law:
     slack = 1e-9 * (last - first)
     if t.size and (t.min() < first - slack or t.max() > last + slack):
         wrong = t.min() if t.min() < first - slack else t.max()
-        raise MotionError(
-            f"motion.time of a drive: must reach t = {wrong:.6g} s, got a table from {first:.6g} to {last:.6g} s"
-        )
+        got = f"got a table from {first:.6g} to {last:.6g} s"
+        raise MotionError(f"motion.time of a drive: must reach t = {wrong:.6g} s, {got}")
     if motion.smooth is None:
         curve = CubicSpline(motion.time, motion.values)
         return curve(t), curve(t, 1), curve(t, 2)
@@ -162,16 +161,10 @@ def unit_rise(motion: Cycloidal | Polynomial, x: Times) -> Law:
         w = 2.0 * np.pi
         return x - np.sin(w * x) / w, 1.0 - np.cos(w * x), w * np.sin(w * x)
     if motion.order == 5:
-        return (
-            x**3 * (10.0 - 15.0 * x + 6.0 * x**2),
-            30.0 * x**2 * (1.0 - x) ** 2,
-            60.0 * x * (1.0 - x) * (1.0 - 2.0 * x),
-        )
-    return (
-        x**4 * (35.0 - 84.0 * x + 70.0 * x**2 - 20.0 * x**3),
-        140.0 * x**3 * (1.0 - x) ** 3,
-        420.0 * x**2 * (1.0 - x) ** 2 * (1.0 - 2.0 * x),
-    )
+        s, ds = x**3 * (10.0 - 15.0 * x + 6.0 * x**2), 30.0 * x**2 * (1.0 - x) ** 2
+        return s, ds, 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x)
+    s, ds = x**4 * (35.0 - 84.0 * x + 70.0 * x**2 - 20.0 * x**3), 140.0 * x**3 * (1.0 - x) ** 3
+    return s, ds, 420.0 * x**2 * (1.0 - x) ** 2 * (1.0 - 2.0 * x)
 
 
 FactorLaw = Callable[[Times, Times], Times]

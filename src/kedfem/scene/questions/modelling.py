@@ -83,10 +83,8 @@ def _moved_by_drives(shapeless: set[str], scene: Scene) -> Iterator[tuple[str, s
 
 def _hub(name: str, known: set[str], shapeless: set[str], scene: Scene) -> str:
     """The driven joint that moves a link without a shape, "" if other joints hold it or there is none."""
-    drives, own = (
-        scene.driven_joints,
-        {key: joint for key, joint in scene.joints.items() if name in joint.links},
-    )
+    drives, joints = scene.driven_joints, scene.joints.items()
+    own = {key: joint for key, joint in joints if name in joint.links}
     inner = [key for key, joint in own.items() if known & (set(joint.links) - {name})]
     if len(inner) != 1 or (drive := drives.get(inner[0])) is None:
         return ""
@@ -94,9 +92,7 @@ def _hub(name: str, known: set[str], shapeless: set[str], scene: Scene) -> str:
     if hub.kind not in ("revolute", "prismatic") or hub.bushing or drive.shaft_stiffness is not None:
         return ""
     if hub.kind == "prismatic" and GROUND in hub.links:
-        others = {
-            key: joint for key, joint in own.items() if key != inner[0] and not shapeless >= set(joint.links)
-        }
+        others = {key: x for key, x in own.items() if key != inner[0] and not shapeless >= set(x.links)}
         if others and not any(by_constraint_equations(each, drives.get(key)) for key, each in others.items()):
             return ""
     return inner[0]

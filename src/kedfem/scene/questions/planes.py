@@ -24,9 +24,8 @@ Placed = tuple[Where, Any]
 
 def spatial_beams(scene: Scene) -> frozenset[str]:
     """Names of the beams that move in space; all others are planar, rows (u, v, ψ)."""
-    kinds = {
-        name: link.beam for name, link in scene.links.items() if link.category == "beam" or link.rigid_line
-    }
+    lines = {name: x for name, x in scene.links.items() if x.category == "beam" or x.rigid_line}
+    kinds = {name: link.beam for name, link in lines.items()}
     open_ones = [name for name, kind in kinds.items() if kind is None]
     found = {name for name, kind in kinds.items() if kind == "spatial"}
     if any(_common_obstacles(scene, "")):
@@ -45,10 +44,8 @@ def rigid_in_space(scene: Scene, name: str) -> bool:
     link = scene.links[name]
     if link.category != "rigid" or link.rigid_line or link.shape is None:
         return False
-    return not any(
-        name in scene.joints[each].links and not enforced_by_equations(scene, each)
-        for each in scene.driven_joints.keys() & scene.joints.keys()
-    )
+    driven = [x for x in scene.driven_joints.keys() & scene.joints.keys() if name in scene.joints[x].links]
+    return all(enforced_by_equations(scene, each) for each in driven)
 
 
 def welded(scene: Scene, name: str) -> set[str]:
@@ -134,12 +131,8 @@ def vector(parts: tuple[float, ...]) -> str:
 
 def off_plane(records: Iterable[Placed], of: str) -> Iterator[Fault]:
     """Points of records that are not in the z plane of the first; `of` says what lies in it."""
-    placed = [
-        ((*where, *key), point)
-        for where, record in records
-        for key, point in _points(record)
-        if all(math.isfinite(part) for part in point)
-    ]
+    every = (((*where, *key), point) for where, record in records for key, point in _points(record))
+    placed = [(where, point) for where, point in every if all(map(math.isfinite, point))]
     if not placed:
         return
     first = placed[0][1]

@@ -120,9 +120,8 @@ def file_faults(parts: Parts) -> Iterator[Fault]:
         if isinstance(shape, Cad | MeshFile) and not (parts.folder / shape.file).is_file():
             what = "CAD" if isinstance(shape, Cad) else "mesh"
             keys = ("file",) if link.has("file") else ("shape", "file")
-            yield link.fault(
-                keys[0], f"must be a {what} file, got nothing at {parts.folder / shape.file}", *keys[1:]
-            )
+            message = f"must be a {what} file, got nothing at {parts.folder / shape.file}"
+            yield link.fault(keys[0], message, *keys[1:])
         if isinstance(shape, Part):
             try:
                 part = part_geometry(parts.folder / shape.file)

@@ -103,13 +103,10 @@ def with_expressions(raw: Mapping[str, Any], hint: Any) -> tuple[dict[str, Any],
             faults.append(Fault(where, f"must be an expression, got {shown(value)}: {reason}"))
             return value
         number = plain_number(quantity)
-        return carrying(value, quantity) if number is None else number
+        if number is not None:
+            return number
+        text = Evaluated(value)
+        text.quantity = quantity
+        return text
 
     return replaced(raw, hint, of), faults
-
-
-def carrying(text: str, quantity: Any) -> Evaluated:
-    """The text of an expression that carries what it comes to."""
-    made = Evaluated(text)
-    made.quantity = quantity
-    return made

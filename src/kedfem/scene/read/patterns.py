@@ -121,9 +121,8 @@ class _Copy:
             made = {**made, "inertia": list(moments_of_inertia(self.R @ J @ self.R.T))}
         about = "in a pattern turned about another axis than z"
         if kind in PLACED:
-            raise ValueError(
-                f"must not be a part of a file in a pattern that turns, got one of kind {kind!r}"
-            )
+            wanted = "must not be a part of a file in a pattern that turns"
+            raise ValueError(f"{wanted}, got one of kind {kind!r}")
         if kind in FLAT and tilted:
             raise ValueError(f"must be a bar or a polyline {about}, got {kind!r}")
         if kind in LINES and "up" not in (shape or {}) and tilted:
@@ -193,9 +192,8 @@ def _repeated(
         if made in tables:
             return [Fault(where, f"must have a name that is free with its number, got {made!r} twice")]
         try:
-            tables[made] = copy.completed(
-                section, value, copy.of(value, kind, "at" if section == "points" else "")
-            )
+            whole = copy.of(value, kind, "at" if section == "points" else "")
+            tables[made] = copy.completed(section, value, whole)
         except (ValueError, PydanticCustomError) as reason:
             text = reason.message() if isinstance(reason, PydanticCustomError) else str(reason)
             return [Fault(where, text)]

@@ -30,17 +30,12 @@ def with_rigid_bodies(raw: Mapping[str, Any]) -> Tables:
 
     Called where the names of points are known. A link with a fault stays as it is, for its own record to say so.
     """
-    links = raw.get("links")
-    given = {
-        name: link
-        for name, link in (links.items() if isinstance(links, Mapping) else ())
-        if isinstance(link, Mapping)
-        and link.get("model") == "rigid"
-        and "inertia" in link
-        and not link.keys() & {"shape", "file", "material"}
-    }
-    out = dict(raw)
-    for name, link in given.items():
+    links, out = raw.get("links"), dict(raw)
+    for name, link in links.items() if isinstance(links, Mapping) else ():
+        if not isinstance(link, Mapping) or link.get("model") != "rigid" or "inertia" not in link:
+            continue
+        if link.keys() & {"shape", "file", "material"}:
+            continue
         try:
             body = RigidBody.model_validate({
                 "link": name, "at": link["centre"], **{key: link[key] for key in ("mass", "centre", "inertia")},
@@ -64,19 +59,13 @@ def _carry(out: Tables, name: str, body: RigidBody) -> None:
     volume = width**2 * sum(math.dist(P, Q) for P, Q in pairwise(points))
     bodies, materials = dict(out.get("bodies", {})), dict(out.get("materials", {}))
     material = _unused(f"{LINE}{name}"[:40], materials)
-    materials[material] = {
-        "density": LIGHT * body.mass / volume,
-        "youngs_modulus": body.mass / volume * SOUND**2,
-        "poisson_ratio": 0.3,
-    }
+    stiffness = {"youngs_modulus": body.mass / volume * SOUND**2, "poisson_ratio": 0.3}
+    materials[material] = {"density": LIGHT * body.mass / volume, **stiffness}
     bodies[_unused(name, bodies)] = plain(_beside_line(body, np.array(points), width))
     link = {key: x for key, x in out["links"][name].items() if key not in {"mass", "centre", "inertia"}}
     shape = {"kind": "polyline", "points": [list(P) for P in points], "width": width, "thickness": width}
-    out |= {
-        "bodies": bodies,
-        "materials": materials,
-        "links": {**out["links"], name: {**link, "material": material, "shape": shape}},
-    }
+    links = {**out["links"], name: {**link, "material": material, "shape": shape}}
+    out |= {"bodies": bodies, "materials": materials, "links": links}
 
 
 def _beside_line(body: RigidBody, points: Float[np.ndarray, "p 3"], width: float) -> RigidBody:

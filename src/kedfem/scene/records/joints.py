@@ -219,11 +219,8 @@ class Joint(Record):
         if not isinstance(self.at, Apart):
             return self
         given, names = self.at.points, list(self.links)
-        wrong = [
-            Fault(("at", name), unknown_name("a link of the joint", name, names))
-            for name in given
-            if name not in names
-        ]
+        others = (name for name in given if name not in names)
+        wrong = [Fault(("at", x), unknown_name("a link of the joint", x, names)) for x in others]
         lacking = [Fault(("at", name), "is required [m], got nothing") for name in names if name not in given]
         refuse([*wrong, *lacking])
         return self.fill(at=apart({name: given[name] for name in names}))

@@ -150,17 +150,9 @@ class LinkScene(Record):
         if present:
             together = " and ".join(present)
             return [Fault((present[0],), f"cannot be combined with centre and inertia, got {together}")]
-        lacking = [
-            Fault(
-                (key,), f"is required for a rigid link given by mass, centre and inertia [{unit}], got {got}"
-            )
-            for key, unit, got in (
-                ("mass", "kg", "0"),
-                ("centre", "m", "nothing"),
-                ("inertia", "kg*m^2", "nothing"),
-            )
-            if not getattr(self, key)
-        ]
+        wanted = "is required for a rigid link given by mass, centre and inertia"
+        every = {"mass": "[kg], got 0", "centre": "[m], got nothing", "inertia": "[kg*m^2], got nothing"}
+        lacking = [Fault((key,), f"{wanted} {got}") for key, got in every.items() if not getattr(self, key)]
         return [*lacking, *(inertia_faults(self.inertia) if self.inertia is not None else ())]
 
     def _usual_element(self) -> str | None:

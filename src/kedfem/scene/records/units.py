@@ -37,14 +37,8 @@ KINDS = {
     "N/m": "a stiffness", "N*s/m": "a damping constant", "N*m/rad": "a torsional stiffness",
     "N*m*s/rad": "a torsional damping constant",
 }  # fmt: skip
-UNREADABLE = (
-    ValueError,
-    TypeError,
-    SyntaxError,
-    AttributeError,
-    ArithmeticError,
-    TokenError,
-)  # pint's, for no unit
+# pint's, for no unit
+UNREADABLE = (ValueError, TypeError, SyntaxError, AttributeError, ArithmeticError, TokenError)
 USUAL = {
     "mm": ("m", 1e-3), "cm": ("m", 1e-2), "dm": ("m", 0.1), "m": ("m", 1.0), "km": ("m", 1e3), "in": ("m", 0.0254),
     "ft": ("m", 0.3048), "deg": ("rad", math.pi / 180), "rad": ("rad", 1.0), "s": ("s", 1.0), "ms": ("s", 1e-3),
