@@ -91,6 +91,46 @@ def test_a_planar_linkage_holds_what_lies_outside_its_plane_twice(joints: JointT
     ]
 
 
+PENDULUM: JointTable = {"A": ("revolute", "ground", "arm", (0.0, 0.0, 0.0), Z)}
+ALONG: JointTable = {
+    "A": ("prismatic", "ground", "one", (0.0, 0.0, 0.0), (1.0, 2.0, 0.0)),
+    "B": ("prismatic", "one", "two", (0.1, 0.0, 0.0), (1.0, 2.0, 0.0)),
+    "C": ("prismatic", "two", "ground", (0.2, 0.0, 0.0), (1.0, 2.0, 0.0)),
+}
+
+
+@pytest.mark.parametrize("model", ["beam", "plane"])
+@pytest.mark.parametrize(
+    ("joints", "free"),
+    [(BAR, 1), (PENDULUM, 1), (quick_return(0.1, 0.25, 0.4), 1), (ALONG, 2)],
+    ids=["four-bar", "pendulum", "slot", "slides"],
+)
+def test_planar_links_are_counted_in_their_plane(joints: JointTable, free: int, model: str) -> None:
+    """Grübler's count 3 (links) − 2 (hinges and slides) − 1 (slots), not Kutzbach's in space."""
+    drive = {"joint": "A", "motion": UNIT_SPEED} if joints is not ALONG else None
+    tables = {"drive": drive} if drive else {"analysis": {"end_time": 1.0, "step": 0.01}}
+    scene = scene_with(joints, model=model, **tables)
+    link = linkage(scene)
+    told = mobility(scene, link, path(link, 0.0, LITTLE))
+    equations = sum(1 if each.kind == "slot" else 2 for each in scene.joints.values())
+    assert (told.plane, told.freedom, told.equations) == (True, free, equations)
+    assert told.redundancy == free - (3 * len(scene.links) - equations)
+    assert [each.words for each in told.redundant] == ["force along (0.894, -0.447, 0), moment about z"] * (
+        joints is ALONG
+    )
+
+
+def test_a_planar_link_that_no_joint_holds_has_three_motions() -> None:
+    arm = bar(np.zeros(3)) | {"model": "beam"}
+    scene = scene_from({"links": {"arm": arm}, "analysis": {"end_time": 1.0, "step": 0.01}})
+    link = linkage(scene)
+    told = mobility(scene, link, path(link, 0.0, LITTLE))
+    assert (told.freedom, told.equations) == (3, 0)
+    assert [each.words for each in told.free] == [
+        "link 'arm' can turn about z and slide along x and y, held by no joint"
+    ]
+
+
 def test_parallel_cranks_share_a_force_in_their_own_plane_as_well() -> None:
     """Three cranks: one of them could be left out. What they share is a force along the cranks, here at 1 rad."""
     joints = four_bar(0.3, 0.9, 0.3, 0.9, 1.0)
@@ -285,10 +325,10 @@ WHEELS: JointTable = {
 }
 
 
-def scene_with(joints: JointTable, **tables: object) -> Scene:
+def scene_with(joints: JointTable, model: str = "solid", **tables: object) -> Scene:
     """A linkage with gears or drives of its own."""
     at = {link: np.asarray(joint[3], float) for joint in joints.values() for link in joint[1:3]}
-    links = {link: bar(point) for link, point in at.items() if link != "ground"}
+    links = {link: bar(point) | {"model": model} for link, point in at.items() if link != "ground"}
     raw = {"links": links, "joints": {name: joint(*fields) for name, fields in joints.items()}}
     return scene_from({**raw, "analysis": {"end_time": 1.0, "step": 0.01}, **tables})
 

@@ -18,7 +18,7 @@ from kedfem.scene.questions.modelling import (
     link_frames,
     moving_grounds,
 )
-from kedfem.scene.questions.planes import spatial_beams
+from kedfem.scene.questions.planes import plane_scene, spatial_beams
 from kedfem.scene.questions.timing import TimeGrid, cycle, time_grid, turn_steps, without_vibration
 from kedfem.scene.read.files import part_geometry
 from kedfem.scene.read.scenes import face_from, link_from, material_from, read_keys, read_scene, scene_from

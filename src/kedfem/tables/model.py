@@ -105,7 +105,7 @@ def mobility_table(scene: Scene, link: Linkage, found: Mobility, works: bool = F
     ----------
     works : whether a run's first steps were found: what is free is meant to be
     """
-    table = facts("Mobility (in the reference position)")
+    table = facts(f"Mobility (in the reference position{', in its plane' * found.plane})")
     driven = f"driven at {of_joints(tuple(scene.driven_joints))}" if found.drives else "none driven"
     table.add_row("degrees of freedom", f"{found.freedom}, {driven}")
     twice = f"{found.redundancy} of them redundant" if found.redundancy else "none redundant"

@@ -39,6 +39,19 @@ def spatial_beams(scene: Scene) -> frozenset[str]:
     return frozenset(found)
 
 
+def plane_scene(scene: Scene) -> bool:
+    """Whether no link moves out of a plane z = constant: planar beams, plane links, what drives and joints carry."""
+    spatial, flat = spatial_beams(scene), False
+    for name, link in scene.links.items():
+        in_plane = link.category == "plane" or (
+            (link.category == "beam" or link.rigid_line) and name not in spatial
+        )
+        if not in_plane and (link.category != "rigid" or link.rigid_line or rigid_in_space(scene, name)):
+            return False
+        flat = flat or in_plane
+    return flat
+
+
 def rigid_in_space(scene: Scene, name: str) -> bool:
     """Whether a rigid link moves as a body in space: it has a solid shape, and no drive simply carries it along."""
     link = scene.links[name]
