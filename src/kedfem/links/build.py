@@ -57,13 +57,8 @@ def bare_links(scene: Scene, known: Mapping[str, Link] | None = None) -> dict[st
 def part_meshes(scene: Scene, names: Iterable[str]) -> dict[str, SolidMesh]:
     """Meshes of those solid links that are parts from CAD or mesh files, made side by side."""
     solids = (name for name in names if scene.links[name].family == "solid")
-    return side_by_side(
-        {
-            name: partial(solid_mesh, scene, name)
-            for name in solids
-            if isinstance(scene.links[name].shape, Cad | MeshFile)
-        }
-    )
+    parts = (name for name in solids if isinstance(scene.links[name].shape, Cad | MeshFile))
+    return side_by_side({name: partial(solid_mesh, scene, name) for name in parts})
 
 
 def solid_mesh(scene: Scene, name: str) -> SolidMesh:

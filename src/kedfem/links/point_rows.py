@@ -194,10 +194,7 @@ def _section_rows(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Poin
 
 def _outside(link: Link, where: str, point: Float[np.ndarray, "3"], gap: float) -> str:
     shown = ", ".join(f"{v:.6g}" for v in point)
-    bore = (
-        ", or for a motion the centre of a bore that a joint holds"
-        if link.meshed and where.startswith("output")
-        else ""
-    )
-    advice = f"take a point of its material{bore}"
+    advice = "take a point of its material"
+    if link.meshed and where.startswith("output"):
+        advice += ", or for a motion the centre of a bore that a joint holds"
     return f"{where}: must lie in link '{link.name}', got ({shown}), {gap:.3g} m outside it: {advice}"

@@ -242,9 +242,6 @@ def _gauss_points(link: Link) -> tuple[Float[np.ndarray, "d q"], Float[np.ndarra
         return np.full((d, 1), 0.5), np.ones((len(at_nodes), 1))
     a = np.array([0.5 - np.sqrt(1 / 12), 0.5 + np.sqrt(1 / 12)])
     points = np.stack(np.meshgrid(*[a] * d, indexing="ij")).reshape(d, -1)
-    factors = [
-        np.where(points[k] == a[0], (a[1] - at_nodes[:, k : k + 1]), (at_nodes[:, k : k + 1] - a[0]))
-        / (a[1] - a[0])
-        for k in range(d)
-    ]
+    x = at_nodes.T[:, :, None]
+    factors = np.where(points[:, None] == a[0], a[1] - x, x - a[0]) / (a[1] - a[0])
     return points, np.prod(factors, axis=0)

@@ -103,11 +103,8 @@ def segmented(
             f"be divided into more slices across the link, got {count}; take a finer mesh"
         )
     kept = tuple(cut for cut in cuts if cut)
-    return Segments(
-        tuple(replace(corotational(part), cuts=_facets_on(kept, k)) for k, (part, _) in enumerate(parts)),
-        kept,
-        tuple(n for _, n in parts),
-    )
+    own = (replace(corotational(part), cuts=_facets_on(kept, k)) for k, (part, _) in enumerate(parts))
+    return Segments(tuple(own), kept, tuple(n for _, n in parts))
 
 
 def _facets_on(cuts: Sequence[Cut], number: int) -> Int[np.ndarray, " c"]:

@@ -111,14 +111,10 @@ def _check_apart(link: Link, where: str, weights: list[Float[np.ndarray, " n"]])
     determined = int((size > APART * size[0]).sum())
     if determined == len(weights):
         return
-    instead = (
-        "give it more basis functions"
-        if link.Q is not None
-        else "give it two elements along the line at least"
-    )
+    more = "more basis functions" if link.Q is not None else "two elements along the line at least"
     raise MeshError(
         f"{where}: link '{link.name}' must be able to bend along its line in {len(weights)} ways, as many as there are "
-        f"stations on it, got {determined}: {instead}"
+        f"stations on it, got {determined}: give it {more}"
     )
 
 
@@ -144,12 +140,9 @@ def _at_nodes(
     every = np.unique(np.linspace(0, len(s) - 1, min(len(s), MOST)).round().astype(int))
     kept = every if whole else np.arange(len(s))[_near(s, travel)]
     on_link = [found[k][1:] for k in kept]
-    return Stations(
-        s[kept],
-        np.array([parts[key].X[n] for key, n in on_link]),
-        tuple(np.eye(1, parts[key].n, n)[0] for key, n in on_link),
-        tuple(key for key, _ in on_link),
-    )
+    weights = tuple(np.eye(1, parts[key].n, n)[0] for key, n in on_link)
+    X = np.array([parts[key].X[n] for key, n in on_link])
+    return Stations(s[kept], X, weights, tuple(key for key, _ in on_link))
 
 
 def _in_balls(

@@ -115,13 +115,9 @@ def apart(where: str, words: tuple[str, str], seconds: float, work: Callable[...
             break
         except TerminatedWorkerError as error:
             late, reading = "SIGXCPU" in str(error), f"({LATE})" in str(error)
-            reason = (
-                "got one that they had not read in time"
-                if reading
-                else f"got none within {seconds:g} s of processor time"
-                if late
-                else "got one at which they broke down"
-            )
+            reason = "got one at which they broke down"
+            reason = f"got none within {seconds:g} s of processor time" if late else reason
+            reason = "got one that they had not read in time" if reading else reason
             unwanted, worker.ended = worker.ended, True
             if unwanted or (not reading and (tried == TRIES - 1 or (late and not used))):
                 break

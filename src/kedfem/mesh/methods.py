@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from types import ModuleType
@@ -74,13 +75,8 @@ def cad_mesh(
         name, shape.model_dump(mode="json"), link.mesh.model_dump(mode="json"), link.element, kept_whole,
     ]  # fmt: skip
     key = sha256(json.dumps(described).encode() + contents([file])).hexdigest()
-    mesh: SolidMesh = kept(
-        "mesh",
-        key,
-        lambda: apart(keys.file, PART, LONGEST, made_mesh, keys, name, link, shape, file, kept_whole),
-        itself,
-        itself,
-    )
+    made = partial(apart, keys.file, PART, LONGEST, made_mesh, keys, name, link, shape, file, kept_whole)
+    mesh: SolidMesh = kept("mesh", key, made, itself, itself)
     return mesh
 
 
@@ -180,10 +176,8 @@ def best_mesh(
     found: list[tuple[float, SolidMesh]] = []
     reasons: list[str] = []
     for method in methods:
-        if (
-            method in (filled_mesh, subdivided_mesh)
-            and max((least for least, _ in found), default=-1.0) >= FAIR
-        ):
+        best = max((least for least, _ in found), default=-1.0)
+        if method in (filled_mesh, subdivided_mesh) and best >= FAIR:
             break
         try:
             mesh = method(gmsh, solid, sizing)

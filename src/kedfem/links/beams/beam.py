@@ -192,10 +192,14 @@ def polyline_axes(points: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, "3 3"]:
 def line_axes(start: Float[np.ndarray, "3"], end: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
     """Link axes as columns: x from start to end, z as near to the world's z as can be (its x, if the link is along z)."""
     x = (end - start) / np.linalg.norm(end - start)
-    up = np.array([0.0, 0.0, 1.0]) if abs(x[2]) < 0.9 else np.array([1.0, 0.0, 0.0])
+    return section_axes(x, np.eye(3)[2 if abs(x[2]) < 0.9 else 0]).T
+
+
+def section_axes(x: Float[np.ndarray, "3"], up: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+    """Unit vectors as rows: along a line, across it (the section's y) and as near to `up` as can be (its z)."""
     y = np.cross(up, x)
     y /= np.linalg.norm(y)
-    return np.stack([x, y, np.cross(x, y)], axis=1)
+    return np.stack([x, y, np.cross(x, y)])
 
 
 def assembled(blocks: list[np.ndarray], dofs: Int[np.ndarray, "e k"], size: int) -> sp.csr_array:

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from kedfem.arrays import Bool, Float, Int
-from kedfem.links.beams.beam import closes, line_axes, line_cells, polyline_axes, spaced
+from kedfem.links.beams.beam import closes, line_axes, line_cells, polyline_axes, section_axes, spaced
 
 LEVEL = 1e-6  # least sine between a chord and what its z is to be near to
 
@@ -86,13 +86,8 @@ def smooth_axis(
 
 
 def directions(along: Float[np.ndarray, "3"], up: Float[np.ndarray, "3"] | None) -> Float[np.ndarray, "3 3"]:
-    """Unit vectors as rows: along a line, across it (the section's y) and as near to `up` as can be (its z)."""
-    if up is None:
-        return line_axes(np.zeros(3), along).T
-    x = along / np.linalg.norm(along)
-    y = np.cross(up, x)
-    y /= np.linalg.norm(y)
-    return np.stack([x, y, np.cross(x, y)])
+    """`section_axes` of a line, with z as near to the world's as can be where no `up` is given."""
+    return line_axes(np.zeros(3), along).T if up is None else section_axes(along / np.linalg.norm(along), up)
 
 
 def chord_axes(

@@ -10,7 +10,7 @@ from kedfem.errors import MeshError
 from kedfem.links.record import Link, LinkFace
 from kedfem.links.surfaces.candidates import Candidate, distance, surfaces
 from kedfem.links.surfaces.missing import length, shown
-from kedfem.links.surfaces.surface import PLANE_TOLERANCE
+from kedfem.links.surfaces.surface import PLANE_TOLERANCE, middle_facet
 from kedfem.mesh.elements.hexahedra import Face
 from kedfem.scene import ChosenFace, Scene
 
@@ -116,9 +116,8 @@ def as_choice(link: Link, each: Candidate) -> str:
 
 def _on(link: Link, each: Candidate) -> tuple[float, float, float]:
     """A point of a surface, near its middle [m]."""
-    middles = link.X[link.basis.mesh.facets[:, each.facets]].mean(axis=0)
-    x, y, z = middles[np.linalg.norm(middles - each.centre, axis=1).argmin()]
-    return float(x), float(y), float(z)
+    x, y, z = middle_facet(link, each.facets, each.centre).tolist()
+    return x, y, z
 
 
 def _face(link: Link, choice: ChosenFace, each: Candidate) -> LinkFace:

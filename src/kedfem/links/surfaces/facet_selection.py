@@ -106,8 +106,5 @@ def _told(link: Link, where: str, point: Float[np.ndarray, "3"], found: list[Rou
 
 def _own_axes(link: Link, point: Float[np.ndarray, "3"]) -> list[Float[np.ndarray, "3"]]:
     """Directions of the link's own bores and journals whose axes pass through a point."""
-    return [
-        each.direction
-        for each in round_candidates(link)
-        if each.cylindrical and each.beside(point) <= CYLINDER_TOLERANCE * each.radius
-    ]
+    found = (each for each in round_candidates(link) if each.cylindrical)
+    return [x.direction for x in found if x.beside(point) <= CYLINDER_TOLERANCE * x.radius]

@@ -11,7 +11,7 @@ from kedfem.links.record import Link, LinkFace
 from kedfem.links.solid import link_faces, solid_basis, vtk_cells
 from kedfem.links.surfaces.facet_selection import picked
 from kedfem.links.surfaces.round_surfaces import CLOSED
-from kedfem.links.surfaces.surface import flat_face, surface_quadrature
+from kedfem.links.surfaces.surface import flat_face, middle_facet, surface_quadrature
 from kedfem.mesh import SolidMesh
 from kedfem.mesh.elements.hexahedra import CELL_TYPES, Face
 
@@ -56,13 +56,11 @@ def offers(mesh: SolidMesh) -> list[Offer]:
         if kind in KINDS and len(each.facets):
             rows.append((KINDS.index(kind), -float(surface_quadrature(link, each.facets).dA.sum()), each))
     rows = sorted(rows, key=lambda row: row[:2])[:MOST]
-    listed = [each for _, _, each in rows]
-    return [
-        Offer(
-            number, each.face, KINDS[kind], _point(link, each), _found(link, KINDS[kind], each, listed), -area
-        )
-        for number, (kind, area, each) in enumerate(rows, start=1)
-    ]
+    listed, out = [each for _, _, each in rows], []
+    for number, (k, area, each) in enumerate(rows, start=1):
+        found = _found(link, KINDS[k], each, listed)
+        out.append(Offer(number, each.face, KINDS[k], _point(link, each), found, -area))
+    return out
 
 
 def face_kind(mesh: SolidMesh, face: Face) -> str:
@@ -91,10 +89,8 @@ def _surface_of(mesh: SolidMesh) -> Link:
 
 def _point(link: Link, each: LinkFace) -> Float[np.ndarray, "3"]:
     """Where one would put a joint on a face [m]."""
-    if each.face.kind != "plane":
-        return each.face.centre
-    middles = link.X[link.basis.mesh.facets[:, each.facets]].mean(axis=0)
-    return np.asarray(middles[np.linalg.norm(middles - each.face.centre, axis=1).argmin()])
+    centre = each.face.centre
+    return centre if each.face.kind != "plane" else middle_facet(link, each.facets, centre)
 
 
 def _found(link: Link, kind: str, each: LinkFace, listed: Sequence[LinkFace]) -> tuple[int, ...]:
@@ -106,11 +102,8 @@ def _found(link: Link, kind: str, each: LinkFace, listed: Sequence[LinkFace]) ->
         facets = flat_face(link, point) if kind == "plane" else picked(link, "part", point, axis)
     except MeshError:
         return ()
-    return tuple(
-        number
-        for number, other in enumerate(listed, start=1)
-        if np.isin(other.facets, facets).mean() > MOSTLY
-    )
+    shares = (np.isin(other.facets, facets).mean() for other in listed)
+    return tuple(number for number, share in enumerate(shares, start=1) if share > MOSTLY)
 
 
 def axis_in_words(face: Face) -> str:

@@ -46,12 +46,8 @@ def surface_quadrature(link: Link, facets: Int[np.ndarray, " f"]) -> Surface:
     face = (1 << np.arange(len(corners))) @ on
     dofs = link.basis.element_dofs[:, elements].T
     gauss = len(_facet_rule(elem)[1])
-    x, normals, dA, N = (
-        np.empty((len(facets), gauss, 3)),
-        np.empty((len(facets), gauss, 3)),
-        np.empty((len(facets), gauss)),
-        np.empty((len(facets), gauss, dofs.shape[1])),
-    )
+    size = len(facets), gauss
+    x, normals, dA, N = (np.empty((*size, *more)) for more in ((3,), (3,), (), (dofs.shape[1],)))
     for which in np.unique(face):
         here = face == which
         shape, gradient, weights = _face_functions(kind, tuple(on[:, here.argmax()].tolist()))
@@ -60,11 +56,19 @@ def surface_quadrature(link: Link, facets: Int[np.ndarray, " f"]) -> Surface:
         N[here], x[here] = shape, np.einsum("qm,fmj->fqj", shape, nodes)
         # of a plane link the second tangent is z
         element = np.cross(tangents[0], tangents[1] if link.d == 3 else [0.0, 0.0, 1.0])
-        size = np.linalg.norm(element, axis=2)
-        dA[here] = link.thickness * size * weights
+        lengths = np.linalg.norm(element, axis=2)
+        dA[here] = link.thickness * lengths * weights
         outward = np.sign(np.einsum("fqk,fqk->f", element, x[here] - nodes.mean(axis=1)[:, None]))
-        normals[here] = element / size[:, :, None] * outward[:, None, None]
+        normals[here] = element / lengths[:, :, None] * outward[:, None, None]
     return Surface(x, dA, N, dofs, normals)
+
+
+def middle_facet(
+    link: Link, facets: Int[np.ndarray, " f"], centre: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "3"]:
+    """The middle of the facet whose middle is nearest to a place [m]."""
+    middles = link.X[link.basis.mesh.facets[:, facets]].mean(axis=0)
+    return np.asarray(middles[np.linalg.norm(middles - centre, axis=1).argmin()])
 
 
 @cache

@@ -34,12 +34,8 @@ def with_faces(gmsh: ModuleType, solid: Solid, mesh: SolidMesh) -> SolidMesh:
         return mesh
     sides = boundary_sides(mesh.cells)
     of_face = _nearest_faces(gmsh, solid, mesh.points, sides)
-    return replace(
-        mesh,
-        faces=joined_faces(
-            gmsh, solid, {face.tag: sides[of_face == i, :4] for i, face in enumerate(solid.faces)}
-        ),
-    )
+    of_tag = {face.tag: sides[of_face == i, :4] for i, face in enumerate(solid.faces)}
+    return replace(mesh, faces=joined_faces(gmsh, solid, of_tag))
 
 
 def joined_faces(

@@ -70,12 +70,9 @@ def step_text(path: Path) -> StepText:
 def step_unit(step: StepText) -> float | None:
     """Metres per unit of a STEP file; None if it does not say or says several."""
     contexts = [body for body in step.instances.values() if "GLOBAL_UNIT_ASSIGNED_CONTEXT" in body]
-    used = {
-        int(number)
-        for body in contexts
-        for part in re.findall(r"GLOBAL_UNIT_ASSIGNED_CONTEXT\s*\(\s*\((.*?)\)", body, re.DOTALL)
-        for number in _REFERENCE.findall(part)
-    }
+    given = re.compile(r"GLOBAL_UNIT_ASSIGNED_CONTEXT\s*\(\s*\((.*?)\)", re.DOTALL)
+    parts = (part for body in contexts for part in given.findall(body))
+    used = {int(number) for part in parts for number in _REFERENCE.findall(part)}
     units = {_length(step, number) for number in used if "LENGTH_UNIT" in step.instances.get(number, "")}
     return units.pop() if len(units) == 1 else None
 

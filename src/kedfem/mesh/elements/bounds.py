@@ -124,11 +124,22 @@ def _tables(k: int) -> tuple[Float[np.ndarray, "q k d"], Float[np.ndarray, "c q"
         return _tetrahedron_tables()
     nodes, p = NODES[k], _degree(k)
     d, ends = nodes.shape[1], -np.cos(np.pi * np.arange(p + 1) / p)
-    places = np.stack(np.meshgrid(*[ends] * d, indexing="ij"), axis=-1).reshape(-1, d)
-    transform = reduce(np.kron, [np.linalg.inv(_bernstein(p, ends))] * d)
+    places, transform = _sampled(p, ends, d)
     left, right = (np.linalg.inv(_bernstein(p, ends)) @ _bernstein(p, (ends + s) / 2) for s in (-1, 1))
     pieces = [reduce(np.kron, [left if (i >> j) & 1 else right for j in range(d)]) for i in range(2**d)]
     return shape_gradients(nodes, places), transform, np.concatenate(pieces).T
+
+
+def _grid(line: np.ndarray, d: int) -> np.ndarray:
+    """All places (q, d) with coordinates among some (p,)."""
+    return np.stack(np.meshgrid(*[line] * d, indexing="ij"), axis=-1).reshape(-1, d)
+
+
+def _sampled(
+    p: int, line: Float[np.ndarray, " p"], d: int
+) -> tuple[Float[np.ndarray, "q d"], Float[np.ndarray, "c q"]]:
+    """Places where a polynomial of degree p in each of d coordinates is sampled, and its coefficients from values."""
+    return _grid(line, d), reduce(np.kron, [np.linalg.inv(_bernstein(p, line))] * d)
 
 
 @cache
@@ -137,7 +148,7 @@ def _ends(k: int) -> Int[np.ndarray, " v"]:
     if k == len(TET10):
         return np.flatnonzero((_LATTICE == _CUBIC).any(axis=1))
     p, d = _degree(k), NODES[k].shape[1]
-    grid = np.stack(np.meshgrid(*[np.arange(p + 1)] * d, indexing="ij"), axis=-1).reshape(-1, d)
+    grid = _grid(np.arange(p + 1), d)
     return np.flatnonzero(((grid == 0) | (grid == p)).all(axis=1))
 
 
@@ -171,9 +182,7 @@ def _simplex_bernstein(b: Float[np.ndarray, "q 4"]) -> Float[np.ndarray, "q c"]:
 def _column_coefficients(k: int) -> list[Float[np.ndarray, "c k"]]:
     """From the nodes the Bernstein coefficients, of degree 2 in each coordinate, of each column of J."""
     nodes, p = NODES[k], 2
-    d, line = nodes.shape[1], np.linspace(-1, 1, p + 1)
-    places = np.stack(np.meshgrid(*[line] * d, indexing="ij"), axis=-1).reshape(-1, d)
-    transform = reduce(np.kron, [np.linalg.inv(_bernstein(p, line))] * d)
+    places, transform = _sampled(p, np.linspace(-1, 1, p + 1), nodes.shape[1])
     return [transform @ gradient for gradient in np.moveaxis(shape_gradients(nodes, places), 2, 0)]
 
 

@@ -35,12 +35,9 @@ class _Tip:
 
 def cusps(plan: Plan) -> list[Cusp]:
     """All corners of regions without an angle."""
-    return [
-        Cusp(number, k, int(place))
-        for number, region in enumerate(plan.regions)
-        for k, loop in enumerate(region.loops)
-        for place in np.flatnonzero(corner_angles(plan.curves, loop) < CUSP)
-    ]
+    every = ((n, k, loop) for n, region in enumerate(plan.regions) for k, loop in enumerate(region.loops))
+    sharp = ((n, k, np.flatnonzero(corner_angles(plan.curves, loop) < CUSP)) for n, k, loop in every)
+    return [Cusp(n, k, int(place)) for n, k, places in sharp for place in places]
 
 
 def without_cusps(plan: Plan, size: float) -> tuple[Plan, float]:
@@ -101,12 +98,9 @@ def _filled(plan: Plan, cusp: Cusp, width: float, share: float) -> tuple[Plan, f
 
 def _neighbour(plan: Plan, region: int, curve: int) -> int | None:
     """The region on the other side of a curve."""
-    others = (
-        number
-        for number, other in enumerate(plan.regions)
-        if number != region and any(i == curve for loop in other.loops for i, _ in loop)
-    )
-    return next(others, None)
+    others = ((number, x) for number, x in enumerate(plan.regions) if number != region)
+    on = (number for number, x in others if any(i == curve for loop in x.loops for i, _ in loop))
+    return next(on, None)
 
 
 def _tip(plan: Plan, loop: Loop, place: int, width: float, most: float, to_before: bool) -> _Tip | None:
@@ -134,11 +128,8 @@ def _without_tip(plan: Plan, cusp: Cusp, tip: _Tip, to_before: bool) -> Plan:
     far_i, tip_i = _cut(plan.curves[i], tip.before, came, vertex)
     far_j, tip_j = _cut(plan.curves[j], tip.after, not goes, vertex + 1)
     count = len(plan.curves)
-    line = _line(
-        far_i.places(far_i.lengths[[-1 if came else 0]])[0],
-        far_j.places(far_j.lengths[[0 if goes else -1]])[0],
-        vertex,
-    )
+    start = far_i.places(far_i.lengths[[-1 if came else 0]])[0]
+    line = _line(start, far_j.places(far_j.lengths[[0 if goes else -1]])[0], vertex)
     curves = list(plan.curves)
     curves[i], curves[j] = far_i, far_j
     curves += [tip_i, tip_j, line]  # count, count + 1, count + 2

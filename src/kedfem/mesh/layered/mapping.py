@@ -1,5 +1,6 @@
 """Regions of a plan that are mapped, four sides, rings and discs: which, the numbers their sides need, their cells."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -168,20 +169,15 @@ def _block(rim: Rim, mapping: Mapping) -> tuple[Float[np.ndarray, "_ 2"], Int[np
     starts = np.cumsum([0, *(len(curve) - 1 for curve in curves)])
     turned = np.roll(rim.nodes(0), -starts[mapping.corners[0]])
     bounds = [int(starts[c] - starts[mapping.corners[0]]) for c in mapping.corners] + [len(turned)]
-    south, east, north, west = (
-        np.append(turned, turned[0])[start : end + 1] for start, end in pairwise(bounds)
-    )
-    return _transfinite(rim.points, south, east, north[::-1], west[::-1])
+    return _transfinite(rim.points, turned, bounds)
 
 
 def _transfinite(
-    points: Float[np.ndarray, "n 2"],
-    south: Int[np.ndarray, " i"],
-    east: Int[np.ndarray, " j"],
-    north: Int[np.ndarray, " i"],
-    west: Int[np.ndarray, " j"],
+    points: Float[np.ndarray, "n 2"], around: Int[np.ndarray, " m"], bounds: Sequence[int]
 ) -> tuple[Float[np.ndarray, "_ 2"], Int[np.ndarray, "_ 4"]]:
-    """Coons' patch: nodes inside four sides, which run along i and j, and its cells."""
+    """Coons' patch: nodes inside four sides, of nodes around it between bounds, and its cells."""
+    sides = [np.append(around, around[0])[start : end + 1] for start, end in pairwise(bounds)]
+    south, east, north, west = sides[0], sides[1], sides[2][::-1], sides[3][::-1]
     i, j = len(south), len(west)
     grid = np.full((i, j), -1)
     grid[:, 0], grid[:, -1], grid[0], grid[-1] = south, north, west, east
@@ -238,11 +234,7 @@ def _disc(rim: Rim, _: Mapping) -> tuple[Float[np.ndarray, "_ 2"], Int[np.ndarra
     layers = max(1, int(np.rint(0.45 * count / (2 * np.pi))))
     points = np.concatenate([rim.points, square])
     inner = len(rim.points) + np.arange(count)
-    bounds = np.cumsum([0, i, j, i, j])
-    south, east, north, west = (
-        np.append(inner, inner[0])[start : end + 1] for start, end in pairwise(bounds)
-    )
-    middle, square_cells = _transfinite(points, south, east, north[::-1], west[::-1])
+    middle, square_cells = _transfinite(points, inner, [0, i, i + j, 2 * i + j, 2 * (i + j)])
     points = np.concatenate([points, middle])
     between, ring_cells = _between(points, outer, inner, layers)
     return np.concatenate([points, between])[len(rim.points) :], np.concatenate([square_cells, ring_cells])

@@ -51,12 +51,8 @@ def profile_outline(profile: Profile) -> Outline:
     edges = np.array(via[1:] + via[:1])  # an arc leads to its corner: it is the edge that starts one before
     if np.allclose(corners[0], corners[-1], rtol=0, atol=1e-9 * np.ptp(corners)):
         corners, edges = corners[:-1], edges[:-1]
-    return Outline(
-        corners,
-        edges,
-        np.array([hole.at[:2] for hole in profile.holes]).reshape(-1, 2),
-        np.array([hole.diameter / 2 for hole in profile.holes]),
-    )
+    centres = np.array([hole.at[:2] for hole in profile.holes]).reshape(-1, 2)
+    return Outline(corners, edges, centres, np.array([hole.diameter / 2 for hole in profile.holes]))
 
 
 def turned_outline(outline: Outline, origin: Float[np.ndarray, "2"], axis: Float[np.ndarray, "2"]) -> Outline:

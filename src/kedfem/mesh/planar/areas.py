@@ -60,12 +60,8 @@ def pillowed(mesh: PlaneQuads) -> PlaneQuads:
     inward = np.stack([np.bincount(nodes, centres[:, i], n) for i in (0, 1)], axis=1)
     inward = inward / np.bincount(nodes, minlength=n)[:, None] - mesh.points
     layer = np.column_stack([mesh.rim, inner[mesh.rim[:, ::-1]]])
-    return PlaneQuads(
-        np.concatenate([mesh.points, (mesh.points + 0.4 * inward)[outer]]),
-        np.concatenate([inner[mesh.cells], layer]),
-        mesh.rim,
-        mesh.middles,
-    )
+    points = np.concatenate([mesh.points, (mesh.points + 0.4 * inward)[outer]])
+    return PlaneQuads(points, np.concatenate([inner[mesh.cells], layer]), mesh.rim, mesh.middles)
 
 
 def quadratic_quads(mesh: PlaneQuads) -> QuadraticQuads:

@@ -36,15 +36,10 @@ def block_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
         try:
             mesh = _transfinite(copy, groups, counts)
         except Exception as error:  # gmsh raises nothing more special
-            raise OtherMethodError(
-                f"{solid.name}: one block must be mapped, got from gmsh: {error}"
-            ) from error
-    mesh = SolidMesh(
-        solid.extent * mesh.points,
-        mesh.cells,
-        method="one mapped block of {} × {} × {} elements".format(*sorted(counts, reverse=True)),
-    )
-    return not_too_bad(solid, mesh, "one block")
+            got = f"one block must be mapped, got from gmsh: {error}"
+            raise OtherMethodError(f"{solid.name}: {got}") from error
+    method = "one mapped block of {} × {} × {} elements".format(*sorted(counts, reverse=True))
+    return not_too_bad(solid, SolidMesh(solid.extent * mesh.points, mesh.cells, method=method), "one block")
 
 
 def _edge_groups(gmsh: ModuleType, solid: Solid) -> list[set[int]]:

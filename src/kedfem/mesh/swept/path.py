@@ -87,9 +87,8 @@ def path_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
         layers, each = sum(counts), len(flat.cells)
         mesh = stacked(flat.points, np.arange(2 * layers + 1.0), np.tile(flat.cells, (layers, 1)),
                        np.repeat(np.arange(layers), each))  # fmt: skip
-        points = np.concatenate(
-            [frame.origin + solid.extent * flat.points @ frame.axes[:2] for frame in frames]
-        )
+        placed = [frame.origin + solid.extent * flat.points @ frame.axes[:2] for frame in frames]
+        points = np.concatenate(placed)
         words = f"{flat.kind} carried along {_in_words(legs)} in {layers} elements"
         return without_spare_nodes(SolidMesh(points, mesh.cells, method=words))
 
@@ -187,11 +186,8 @@ def _leg(gmsh: ModuleType, solid: Solid, walls: list[Looks], frame: Frame) -> tu
     """The leg that walls make from a frame on, and the edges where it ends; None if they make none."""
     for leg in _motions(solid, walls, frame):
         slack = OFF * solid.extent / (leg.radius or 1.0)
-        passed = {
-            edge: leg.passed(_places(gmsh, edge))
-            for wall in walls
-            for edge in boundary(gmsh, 2, wall.face.tag)
-        }
+        edges = (edge for wall in walls for edge in boundary(gmsh, 2, wall.face.tag))
+        passed = {edge: leg.passed(_places(gmsh, edge)) for edge in edges}
         travel = float(max(each.max() for each in passed.values()))
         ends = {edge for edge, each in passed.items() if each.min() > travel - slack}
         through = {

@@ -87,11 +87,8 @@ def _mesh_about(gmsh: ModuleType, solid: Solid, turn: Frame, sizing: Sizing, sha
         for region in meridian.inside:
             mesh = _with_core(mesh, flat, meridian, region, around)
     about = direction_in_words(turn.axes[0])
-    return SolidMesh(
-        turn.origin + solid.extent * mesh.points @ turn.axes,
-        mesh.cells,
-        method=f"{flat.kind} swept about {about} in {around} elements{flat.made_by}",
-    )
+    method = f"{flat.kind} swept about {about} in {around} elements{flat.made_by}"
+    return SolidMesh(turn.origin + solid.extent * mesh.points @ turn.axes, mesh.cells, method=method)
 
 
 @contextmanager
