@@ -75,7 +75,9 @@ def test_all_records_that_kernels_are_given_are_in_it() -> None:
     """A class that moved was an AttributeError on every cache that had been made before."""
     files = compiled.ROOT.rglob("*.py")
     records = {
-        file for file in files if re.search(r"^class \w+\(NamedTuple\)", file.read_text(), re.MULTILINE)
+        file
+        for file in files
+        if re.search(r"^class \w+\((NamedTuple|namedtuple)\b", file.read_text(), re.MULTILINE)
     }
     assert records == {compiled.ROOT / name for name in compiled.RECORDS}
 

@@ -1,7 +1,7 @@
 """Tables of the elements of beams in space as compiled loops take them, see `dynamics.metric_kernel`."""
 
+from collections import namedtuple
 from collections.abc import Sequence
-from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,9 @@ DIMENSIONS = (1, 2, 2, 1, 2, 3, 2, 2, 2, 1, 1, 2, 2, 2)
 WHOLE_NUMBERS = (0, 3, 13)  # sizes, node, pairs
 
 
-class Elements(NamedTuple):
+class Elements(namedtuple("Elements", (
+    "number sizes tangents gradients node drawn directors N D bend stiffness drawn_strains rows share pairs"
+))):  # fmt: skip
     """All elements of beams in space, b of them, as `links.record.BeamElement` has each; filled up with zeros.
 
     number : (L,) of a segment's element among these, -1 of others
@@ -22,22 +24,6 @@ class Elements(NamedTuple):
     node, drawn, directors, N, D, bend, pairs : (b, K), (b, K, 3), (b, m, 2, 3), (b, E, m) twice, (b, E, 4), (b, P, 2)
     stiffness, drawn_strains : (b, s); rows, share : (b, s, 3 S), (b, 3 S, s) strains of coordinates, and back
     """
-
-    number: Any
-    sizes: Any
-    tangents: Any
-    gradients: Any
-    node: Any
-    drawn: Any
-    directors: Any
-    N: Any
-    D: Any
-    bend: Any
-    stiffness: Any
-    drawn_strains: Any
-    rows: Any
-    share: Any
-    pairs: Any
 
 
 def element_tables(links: Sequence[Link], parts: Sequence[Coordinates]) -> Elements:

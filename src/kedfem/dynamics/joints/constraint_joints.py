@@ -16,12 +16,13 @@ from kedfem.errors import MeshError
 from kedfem.links.record import Link
 from kedfem.links.stations import Stations
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface
-from kedfem.motion.constraints import perpendiculars
+from kedfem.motion.constraints import CONSTRAINED, perpendiculars
 from kedfem.motion.joint_equations import unit
 from kedfem.motion.newton import cross_matrix
 from kedfem.scene import GROUND, Joint, Scene, enforced_by_equations, moving_grounds
 
 Ports = Float[np.ndarray, "p 3"]
+NO_ROWS = np.zeros((0, 3))
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,18 +33,18 @@ class Side:
     origin : (3,) X₀ of the coupling surface [m]
     surface : (p, 6, d) u₀ and θ from the displacements at its ports
     stations : of the link along which a slot's pin slides; its ports are these
-    onto : (p, d, c) displacements at the ports, world components, from the interface unknowns z[columns]
     shared : whether the ports are the link's; not of a rigid slider, which rides on another link
     points : (p, 3) the ports in the reference position [m]
+    onto : (p, d, c) displacements at the ports, world components, from the interface unknowns z[columns]
     """
 
     body: int
     origin: Float[np.ndarray, "3"]
     surface: Float[np.ndarray, "p 6 d"]
-    onto: Float[np.ndarray, "p d c"]
+    points: Ports
     stations: Stations | None = None
     shared: bool = True
-    points: Float[np.ndarray, "p 3"] = field(default_factory=lambda: np.zeros((1, 3)))
+    onto: Float[np.ndarray, "p d c"] = field(default_factory=lambda: np.zeros((0, 0, 0)))
     columns: Int[np.ndarray, " c"] = field(default_factory=lambda: np.zeros(0, int))
 
 
@@ -55,10 +56,10 @@ class ConstraintJoint:
     name, at : of the joint, (3,) [m] in the reference position
     bodies : numbers of links i and j in the linkage; directions are fixed in j
     sides : what it has on both, None where a link has no unknowns (the ground, what the drive carries)
-    gap, turn : (r, 3) directions in the reference position [-, m]
-    cross : of a universal joint the axes in i and in j: the last row turns about the normal of both
-    stiffness, damping : (r,) of rows that are springs, infinite and zero of those that hold [N/m, N m; N s/m, N m s]
     axis : (3,) of the joint, in the reference position
+    gap, turn : (r, 3) directions in the reference position [-, m]
+    stiffness, damping : (r,) of rows that are springs, infinite and zero of those that hold [N/m, N m; N s/m, N m s]
+    cross : of a universal joint the axes in i and in j: the last row turns about the normal of both
     plus : rows of other joints that these are combined with, each with its coefficient: gears
     """
 
@@ -66,12 +67,12 @@ class ConstraintJoint:
     at: Float[np.ndarray, "3"]
     bodies: tuple[int, int]
     sides: tuple[Side | None, Side | None]
-    gap: Float[np.ndarray, "r 3"]
-    turn: Float[np.ndarray, "r 3"]
-    cross: tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]] | None
-    stiffness: Float[np.ndarray, " r"]
-    damping: Float[np.ndarray, " r"]
-    axis: Float[np.ndarray, "3"]
+    axis: Float[np.ndarray, "3"] = field(default_factory=lambda: np.eye(3)[2])
+    gap: Float[np.ndarray, "r 3"] = NO_ROWS
+    turn: Float[np.ndarray, "r 3"] = NO_ROWS
+    stiffness: Float[np.ndarray, " r"] = NO_ROWS[:, 0]
+    damping: Float[np.ndarray, " r"] = NO_ROWS[:, 0]
+    cross: tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]] | None = None
     plus: "tuple[tuple[float, ConstraintJoint], ...]" = ()
 
 
@@ -97,26 +98,23 @@ def bore_axis(joint: Joint, link: str) -> Float[np.ndarray, "3"] | None:
     return unit(joint.axis)
 
 
-def held_rows(joint: Joint, driven: bool) -> tuple[Float[np.ndarray, "r 3"], Float[np.ndarray, "r 3"]]:
-    """Directions of what a joint holds, in the reference position: gap and turn of each row."""
-    zero, frame = np.zeros(3), joint_frame(joint)
-    if joint.kind in {"spherical", "weld", "universal"}:
-        turns = {"spherical": [], "weld": list(frame), "universal": [zero]}[joint.kind]  # of a cross later
-        return _stacked(list(frame), turns)
-    *across, axis = frame
-    match joint.kind:
-        case "planar":
-            return _stacked([axis], across)
-        case "slot":
-            return _stacked(across, [])
-        case "prismatic":
-            return _stacked([*across, axis] if driven else across, [*across, axis])
-        case "revolute":
-            return _stacked([*across, axis], [*across, axis] if driven else across)
-    gap, turn = _stacked(across, across)
-    if joint.kind == "screw":
-        gap, turn = np.vstack([gap, axis]), np.vstack([turn, -(joint.lead or 0.0) / (2 * np.pi) * axis])
-    return gap, turn
+def held_rows(
+    joint: Joint, driven: bool
+) -> tuple[Float[np.ndarray, "r 3"], Float[np.ndarray, "r 3"], list[int]]:
+    """Directions of what a joint holds, in the reference position: gap and turn of each row, and the axis of its frame
+    that this is along or about, −1 of a screw's thread. That of a universal joint's cross is left open."""
+    frame, (gaps, turns) = joint_frame(joint), CONSTRAINED[joint.kind]
+    gaps += "z" * (driven and joint.kind == "prismatic")
+    turns += "z" * (driven and joint.kind == "revolute")
+    axes = ["xyz".index(axis) for axis in gaps + turns]
+    gap, turn = np.zeros((2, len(axes), 3))
+    gap[: len(gaps)], turn[len(gaps) :] = frame[axes[: len(gaps)]], frame[axes[len(gaps) :]]
+    if joint.kind in {"universal", "screw"}:
+        thread = joint.kind == "screw"
+        gap = np.vstack([gap, thread * frame[2]])
+        turn = np.vstack([turn, -thread * (joint.lead or 0.0) / (2 * np.pi) * frame[2]])
+        axes.append(-1 if thread else 2)
+    return gap, turn, axes
 
 
 def joint_frame(joint: Joint) -> Float[np.ndarray, "3 3"]:
@@ -127,40 +125,28 @@ def joint_frame(joint: Joint) -> Float[np.ndarray, "3 3"]:
     return np.stack([*perpendiculars(axis), axis])
 
 
+def mounted(joint: Joint, axis: int, turning: bool) -> tuple[float, float] | None:
+    """Stiffness and damping of a joint's bushing along, or about, an axis of its frame; None where it holds."""
+    of = joint.bushing
+    stiffness = None if of is None else (of.rotational_stiffness if turning else of.stiffness)
+    if of is None or stiffness is None:
+        return None
+    return stiffness[axis], (of.rotational_damping if turning else of.damping)[axis]
+
+
 def springs(
-    scene: Scene, name: str, gap: Float[np.ndarray, "r 3"], turn: Float[np.ndarray, "r 3"]
+    scene: Scene, name: str, gap: Float[np.ndarray, "r 3"], axes: list[int]
 ) -> tuple[Float[np.ndarray, " r"], Float[np.ndarray, " r"]]:
     """Stiffness and damping of a joint's rows: of its bushing, its drive's shaft; infinite and zero where they hold."""
     joint, drive = scene.joints[name], scene.driven_joints.get(name)
-    k, c = np.full(len(gap), np.inf), np.zeros(len(gap))
-    frame, of = joint_frame(joint), joint.bushing
-    for r in range(len(gap)):
-        if gap[r].any() and turn[r].any():
-            continue  # a screw's thread
-        along = (
-            2
-            if joint.kind == "universal" and turn[r].any()
-            else int(np.abs(frame @ (gap[r] + turn[r])).argmax())
-        )
-        if drive is not None and along == 2 and (gap if joint.kind == "prismatic" else turn)[r].any():
-            if drive.shaft_stiffness is not None:
-                k[r], c[r] = drive.shaft_stiffness, drive.shaft_damping
-            continue  # what the drive prescribes is none of the bushing's
-        if of is not None and gap[r].any() and of.stiffness is not None:
-            k[r], c[r] = of.stiffness[along], of.damping[along]
-        if of is not None and turn[r].any() and of.rotational_stiffness is not None:
-            k[r], c[r] = of.rotational_stiffness[along], of.rotational_damping[along]
-    return k, c
-
-
-def _stacked(
-    gaps: list[np.ndarray], turns: list[np.ndarray]
-) -> tuple[Float[np.ndarray, "r 3"], Float[np.ndarray, "r 3"]]:
-    gap = np.zeros((len(gaps) + len(turns), 3))
-    turn = np.zeros_like(gap)
-    gap[: len(gaps)] = np.reshape(gaps, (-1, 3))
-    turn[len(gaps) :] = np.reshape(turns, (-1, 3))
-    return gap, turn
+    out = np.tile([[np.inf], [0.0]], len(axes))
+    for r, (axis, turning) in enumerate(zip(axes, (not row.any() for row in gap), strict=True)):
+        found = None if axis < 0 else mounted(joint, axis, turning)
+        if drive is not None and axis == 2 and turning == (joint.kind != "prismatic"):
+            # what the drive prescribes is none of the bushing's
+            found = None if drive.shaft_stiffness is None else (drive.shaft_stiffness, drive.shaft_damping)
+        out[:, r] = found or out[:, r]
+    return out[0], out[1]
 
 
 def in_plane(gap: Float[np.ndarray, "r 3"], turn: Float[np.ndarray, "r 3"]) -> Bool[np.ndarray, " r"]:

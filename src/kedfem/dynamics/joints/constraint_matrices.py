@@ -1,13 +1,13 @@
 """Rows of joints over time: C(t) from the rigid motion, and what one time point needs of it."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from kedfem.arrays import Bool, Float, Int
+from kedfem.arrays import Float, Int
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side
 from kedfem.motion.constraints import cross
 from kedfem.motion.rigid import RigidMotion
@@ -34,22 +34,11 @@ class JointRows:
     stiffness: Float[np.ndarray, " r"]
     damping: Float[np.ndarray, " r"]
 
-    def part(self, first: int, end: int) -> "JointRows":
-        """The time points from one number up to another."""
-        return replace(self, entries=self.entries[first:end])
-
     def at(self, k: int) -> sp.csr_array:
         """C (r, k) at one time point."""
-        return self.matrix(self.entries[k])
-
-    def matrix(self, entries: Float[np.ndarray, " n"]) -> sp.csr_array:
-        """C (r, k) from its entries, or its rates from theirs."""
-        return sp.csr_array((entries, self.columns, self.row_at), (len(self.stiffness), self.unknowns))
-
-    @property
-    def soft(self) -> Bool[np.ndarray, " r"]:
-        """Which rows are springs."""
-        return np.asarray(np.isfinite(self.stiffness))
+        return sp.csr_array(
+            (self.entries[k], self.columns, self.row_at), (len(self.stiffness), self.unknowns)
+        )
 
 
 @dataclass(frozen=True, slots=True)

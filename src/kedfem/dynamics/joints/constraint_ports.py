@@ -8,6 +8,7 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.joints.constraint_joints import (
+    NO_ROWS,
     ConstraintJoint,
     Side,
     bore_axis,
@@ -42,20 +43,21 @@ class LinkageLayout:
 class Own:
     """Port points that one side of a joint has to itself.
 
-    key : of the link; slider : name of a rigid slider instead, whose one unknown is its travel
-    points, weights : (p, 3) in the reference position, and (n,) of each
-    selection : (dp, c) displacements there from the side's own unknowns, world components
+    key : of the link; points, weights : (p, 3) in the reference position, and (n,) of each
     keys : of each point, if they are on several segments of the link
+    slider : name of a rigid slider instead, whose one unknown is its travel along an axis
     """
 
-    key: str
-    slider: str
-    points: Float[np.ndarray, "p 3"]
-    weights: Float[np.ndarray, "p n"] | Sequence[Float[np.ndarray, " _"]]
-    selection: Float[np.ndarray, "m c"]
+    key: str = ""
+    points: Float[np.ndarray, "p 3"] = NO_ROWS
+    weights: Float[np.ndarray, "p n"] | Sequence[Float[np.ndarray, " _"]] = ()
     keys: tuple[str, ...] = ()
+    slider: str = ""
+    axis: Float[np.ndarray, "3"] | None = None
 
 
+Sides = tuple[Side | None, Own | None]
+ONLY_U = np.concatenate([np.eye(3), np.zeros((3, 3))])[None]
 Held = tuple[Float[np.ndarray, "r 3"], Float[np.ndarray, "r 3"]]
 
 
@@ -91,12 +93,8 @@ def row_joint(
     """
     joint = scene.joints[name]
     i, j = ordered(joint)
-    found = [
-        _side(scene, name, i, links, layout, slot=False),
-        _side(scene, name, j, links, layout, joint.kind == "slot"),
-    ]
-    sides, own = zip(*found, strict=True)
-    gap, turn = only or held_rows(joint, name in scene.driven_joints)
+    (first, own), (second, others) = (_side(scene, name, on, links, layout) for on in (i, j))
+    gap, turn, along = (*only, []) if only else held_rows(joint, name in scene.driven_joints)
     axes = None
     if joint.axes is not None and only is None:
         a, b = (np.asarray(bore_axis(joint, link)) for link in (i, j))
@@ -105,11 +103,12 @@ def row_joint(
     planar = bool(here) and all(link.planar for link in here)  # a slider on the ground is of no plane
     kept = in_plane(gap, turn) if planar else np.ones(len(gap), bool)
     hard = np.full(len(gap), np.inf), np.zeros(len(gap))
-    stiffness, damping = hard if only else springs(scene, name, gap, turn)
-    return ConstraintJoint(
-        name, np.asarray(joint.at), (layout.bodies[i], layout.bodies[j]), (sides[0], sides[1]), gap[kept], turn[kept],
-        axes, stiffness[kept], damping[kept], joint_axis(joint),
-    ), list(own)  # fmt: skip
+    stiffness, damping = hard if only else springs(scene, name, gap, along)
+    row = ConstraintJoint(
+        name, np.asarray(joint.at), (layout.bodies[i], layout.bodies[j]), (first, second), joint_axis(joint), gap[kept],
+        turn[kept], stiffness[kept], damping[kept], axes,
+    )  # fmt: skip
+    return row, [own, others]
 
 
 def element_joint(
@@ -117,20 +116,14 @@ def element_joint(
 ) -> tuple[ConstraintJoint, list[Own | None]]:
     """The two sides of a spring, motor or limit, as a joint without rows: on those of its joint, or at two points."""
     if not isinstance(element, LineSpring) or element.between is None:
-        row, own = row_joint(scene, str(element.joint), links, layout, (np.zeros((0, 3)), np.zeros((0, 3))))
+        row, own = row_joint(scene, str(element.joint), links, layout, (NO_ROWS, NO_ROWS))
         return replace(row, name=name), own
-    found = [
+    (one, first), (other, second) = (
         _point_side(f"{name}.between[{k}].at", scene, end.link, np.asarray(end.at), links, layout)
         for k, end in enumerate(element.between)
-    ]
-    (one, first), (other, second) = found
-    bodies = tuple(layout.bodies[end.link] for end in element.between)
-    none = np.zeros((0, 3))
-    row = ConstraintJoint(
-        name, np.asarray(element.between[0].at), (bodies[0], bodies[1]), (one, other), none, none, None,
-        np.zeros(0), np.zeros(0), np.eye(3)[2],
-    )  # fmt: skip
-    return row, [first, second]
+    )
+    i, j = (layout.bodies[end.link] for end in element.between)
+    return ConstraintJoint(name, np.asarray(element.between[0].at), (i, j), (one, other)), [first, second]
 
 
 def can_be_bars(link: Link) -> bool:
@@ -144,67 +137,53 @@ def rigid_points(link: Link, key: str, layout: LinkageLayout) -> tuple[Constrain
     surface, length = rigid_link_surface(link, centre), link.size / 2
     points = centre + length * np.concatenate([np.zeros((1, 3)), np.eye(3)])
     weights = surface.fit[0] + length * np.concatenate([np.zeros((1, link.n)), surface.fit[1:]])
-    none, every = np.zeros((0, 3)), np.zeros((4, 6, 3))
+    every = np.zeros((4, 6, 3))
     every[:, :3] = np.eye(3)
-    side = Side(layout.bodies[link.name], centre, every, np.zeros((4, 3, 0)), points=points)
-    row = ConstraintJoint(
-        f"rigid.{key}", centre, (layout.bodies[link.name], 0), (side, None), none, none, None, none[:, 0], none[:, 0],
-        np.eye(3)[2],
-    )  # fmt: skip
-    return row, [Own(key, "", points, weights, np.eye(12)), None]
+    body = layout.bodies[link.name]
+    row = ConstraintJoint(f"rigid.{key}", centre, (body, 0), (Side(body, centre, every, points), None))
+    return row, [Own(key, points, weights), None]
+
+
+def _without_ports(
+    scene: Scene, on: str, at: Float[np.ndarray, "3"], links: dict[str, Link], layout: LinkageLayout
+) -> Sides | None:
+    """A point of a rigid slider; nothing on the ground and on what the drive carries. None on links with ports."""
+    if on in scene.links and (axis := slider_axis(scene, on)) is not None:
+        return Side(layout.bodies[on], at, ONLY_U, at[None], shared=False), Own(slider=on, axis=axis)
+    return None if on in {link.name for link in links.values()} else (None, None)
 
 
 def _point_side(
-    where: str,
-    scene: Scene,
-    on: str,
-    at: Float[np.ndarray, "3"],
-    links: dict[str, Link],
-    layout: LinkageLayout,
-) -> tuple[Side | None, Own | None]:
-    """A point of a link; nothing on the ground and on what the drive carries."""
-    only_u = np.concatenate([np.eye(3), np.zeros((3, 3))])[None]
-    if on in scene.links and (axis := slider_axis(scene, on)) is not None:
-        side = Side(layout.bodies[on], at, only_u, np.zeros((1, 3, 0)), shared=False, points=at[None])
-        return side, Own("", on, at[None], np.zeros((1, 0)), axis[:, None])
-    if on not in {link.name for link in links.values()}:
-        return None, None
+    where: str, scene: Scene, on: str, at: Float[np.ndarray, "3"], links: dict[str, Link], layout: LinkageLayout
+) -> Sides:  # fmt: skip
+    """A point of a link."""
+    if (found := _without_ports(scene, on, at, links, layout)) is not None:
+        return found
     key, rows = on_part(links, on, at, lambda link: point_rows(link, where, at))
     link = links[key]
     require_on_axis(link, where, at, rows.X)
-    d = link.d
-    known = only_u[:, :, :d].copy()
+    known = ONLY_U[:, :, : link.d].copy()
     if link.kind == "beam":
         known[0, [2, 5], 2] = 0.0, 1.0  # (u, v, ψ)
-    side = Side(layout.bodies[on], rows.X, known, np.zeros((1, d, 0)), points=rows.X[None])
-    return side, Own(key, "", rows.X[None], rows.value[None], np.eye(d))
+    return Side(layout.bodies[on], rows.X, known, rows.X[None]), Own(key, rows.X[None], rows.value[None])
 
 
-def _side(
-    scene: Scene, name: str, on: str, links: dict[str, Link], layout: LinkageLayout, slot: bool
-) -> tuple[Side | None, Own | None]:
-    """What a joint has on one of its links; nothing on the ground and on what the drive carries."""
-    if on in scene.links and (axis := slider_axis(scene, on)) is not None:
-        rigid = np.concatenate([np.eye(3), np.zeros((3, 3))])[None]
-        side = Side(
-            layout.bodies[on], np.asarray(scene.joints[name].at), rigid, np.zeros((1, 3, 0)), shared=False
-        )
-        return side, Own("", on, np.zeros((1, 3)), np.zeros((1, 0)), axis[:, None])
-    if on not in {link.name for link in links.values()}:
-        return None, None
-    where, body = f"joints.{name}", layout.bodies[on]
-    if slot:
+def _side(scene: Scene, name: str, on: str, links: dict[str, Link], layout: LinkageLayout) -> Sides:
+    """What a joint has on one of its links: a coupling surface, or the line of a slot."""
+    joint, where = scene.joints[name], f"joints.{name}"
+    at = np.asarray(joint.at)
+    if (found := _without_ports(scene, on, at, links, layout)) is not None:
+        return found
+    if joint.kind == "slot" and on == ordered(joint)[1]:
         parts = {key: link for key, link in links.items() if link.name == on}
-        joint = scene.joints[name]
         line = layout.slots[name]
         if not isinstance(line, Stations):
             whole = not corotational_links(scene).isdisjoint(joint.links)
-            line = stations(parts, where, np.asarray(joint.at), joint_axis(joint), line, whole)
+            line = stations(parts, where, at, joint_axis(joint), line, whole)
         points, known = station_ports(line, next(iter(parts.values())))
-        side = Side(body, line.points[0], known, np.zeros((*known.shape[::2], 0)), line, points=points)
-        own = np.eye(known.shape[2] * len(points))
-        return side, Own(line.keys[0], "", points, line.weights, own, line.keys)
+        side = Side(layout.bodies[on], line.points[0], known, points, line)
+        return side, Own(line.keys[0], points, line.weights, line.keys)
     key, surface = part_surface(scene, name, links, on)
     points, known = surface_ports(surface, links[key], where)
-    side = Side(body, surface.origin, known, np.zeros((len(points), links[key].d, 0)), points=points)
-    return side, Own(key, "", points, port_weights(surface, points), np.eye(known.shape[2] * len(points)))
+    side = Side(layout.bodies[on], surface.origin, known, points)
+    return side, Own(key, points, port_weights(surface, points))

@@ -188,7 +188,7 @@ def _on(
 
     def on(row: ConstraintJoint, own: Iterator[Own | None]) -> ConstraintJoint:
         sides = [
-            None if side is None or each is None else _seeing(side, sp.csr_array(each.selection) @ Z[here])
+            None if side is None or each is None else _seeing(side, each, Z[here])
             for side, each, here in zip(row.sides, own, of_side, strict=False)
         ]
         return replace(
@@ -199,10 +199,10 @@ def _on(
         yield on(row, iter(own))
 
 
-def _seeing(side: Side, selection: sp.csr_array) -> Side:
-    """A side whose ports know the interface unknowns."""
-    columns, onto = used_columns(selection)
-    return replace(side, onto=onto.reshape(*side.onto.shape[:2], len(columns)), columns=columns)
+def _seeing(side: Side, own: Own, Z: sp.csr_array) -> Side:
+    """A side whose ports know the interface unknowns, from its own unknowns: a slider's along its axis."""
+    columns, onto = used_columns(Z if own.axis is None else sp.csr_array(own.axis[:, None]) @ Z)
+    return replace(side, onto=onto.reshape(*side.surface.shape[::2], len(columns)), columns=columns)
 
 
 def _mixed(scene: Scene, name: str, held: dict[str, tuple[_Ports, CouplingSurface]], first: int) -> int:

@@ -4,13 +4,13 @@ Bodies are solved in coordinates in which their mass is one, component first: al
 one after the other; `at` says where each begins.
 """
 
+from collections import namedtuple
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from kedfem.arrays import Int
-from kedfem.dynamics.metric import Elements
 
 
 def ends_of(sizes: Sequence[int]) -> Int[np.ndarray, " _"]:
@@ -47,19 +47,13 @@ class Coefficients(NamedTuple):
     single: bool
 
 
-class Beams(NamedTuple):
+class Beams(namedtuple("Beams", "segment body at stride rows tangent rigidity")):
     """Planar beams with strains at points, as `beams_kernel` takes them."""
 
-    segment: Any
-    body: Any
-    at: Any
-    stride: Any
-    rows: Any
-    tangent: Any
-    rigidity: Any
 
-
-class TurningLoads(NamedTuple):
+class TurningLoads(namedtuple("TurningLoads", (
+    "body force_at shown_at planar_beam drawn shown force axis fixed"
+))):  # fmt: skip
     """Loads that turn with bodies, as directions shown by the body turn; see `turning_loads`.
 
     body, at : (w,) number, and where its coordinates' share of `force` and twice its functions' of `shown` begin
@@ -69,46 +63,27 @@ class TurningLoads(NamedTuple):
     axis, fixed : (w, 3) in that frame and in the world, whose product a load's amount has for a factor; zero: none
     """
 
-    body: Any
-    force_at: Any
-    shown_at: Any
-    planar_beam: Any
-    drawn: Any
-    shown: Any
-    force: Any
-    axis: Any
-    fixed: Any
 
-
-class Stresses(NamedTuple):
+class Stresses(namedtuple("Stresses", "at P row_at row column_at column")):
     """Stress stiffness k g P of links with geometric stiffening, see `stresses`.
 
     at : (i + 1,) where the entries of k of each begin; P : (i, 3, 3) what they act on of components
     row_at, row, column_at, column : of sparse bodies k's pattern, row by row
     """
 
-    at: Any
-    P: Any
-    row_at: Any
-    row: Any
-    column_at: Any
-    column: Any
 
-
-class Masses(NamedTuple):
+class Masses(namedtuple("Masses", "of at row column value")):
     """Matrices of sparse bodies, whose coordinates are nodal: of components, row by row, one after the other.
 
     of : (i, 3) number of the matrix of each component; at : where its rows' ends begin in `row`
     """
 
-    of: Any
-    at: Any
-    row: Any
-    column: Any
-    value: Any
 
-
-class Bodies(NamedTuple):
+class Bodies(namedtuple("Bodies", (
+    "at functions components motion frame kind dense arrays passed port_at component group G_at Y_at S_at B_at "
+    "G Y W S B column_at columns place first row_at multiplier X one fit K beams elements mass turning "
+    "stiffness size rigid stresses"
+))):  # fmt: skip
     """All bodies as flat arrays, constant; i counts bodies.
 
     at : (i + 1,) where the coordinates of each begin; functions, components : n and d; motion : number in the linkage
@@ -129,48 +104,11 @@ class Bodies(NamedTuple):
     rigid : whether it is so stiff that passes foresee K of its strain, see `unforeseen`
     """
 
-    at: Any
-    functions: Any
-    components: Any
-    motion: Any
-    frame: Any
-    kind: Any
-    dense: Any
-    arrays: Any
-    passed: Any
-    port_at: Any
-    component: Any
-    group: Any
-    G_at: Any
-    Y_at: Any
-    S_at: Any
-    B_at: Any
-    G: Any
-    Y: Any
-    W: Any
-    S: Any
-    B: Any
-    column_at: Any
-    columns: Any
-    place: Any
-    first: Any
-    row_at: Any
-    multiplier: Any
-    X: Any
-    one: Any
-    fit: Any
-    K: Any
-    beams: Beams
-    elements: Elements
-    mass: Masses
-    turning: TurningLoads
-    stiffness: Masses
-    size: Any
-    rigid: Any
-    stresses: Stresses
 
-
-class Ends(NamedTuple):
+class Ends(namedtuple("Ends", (
+    "body form origin directions lengths known components column_at columns onto_at onto line line_at full_at "
+    "full number free axis knots cubic_at cubics weights slopes pin"
+))):  # fmt: skip
     """All ends as flat arrays; see `End`.
 
     line, line_at, full_at, full : ends on lines of slots, where their stations' weights begin, and what these stations
@@ -181,33 +119,11 @@ class Ends(NamedTuple):
     weights, slopes, pin : (n,) and (L,), where a step puts the stations' weights with their slopes, and the pins' places
     """
 
-    body: Any
-    form: Any
-    origin: Any
-    directions: Any
-    lengths: Any
-    known: Any
-    components: Any
-    column_at: Any
-    columns: Any
-    onto_at: Any
-    onto: Any
-    line: Any
-    line_at: Any
-    full_at: Any
-    full: Any
-    number: Any
-    free: Any
-    axis: Any
-    knots: Any
-    cubic_at: Any
-    cubics: Any
-    weights: Any
-    slopes: Any
-    pin: Any
 
-
-class Constraints(NamedTuple):
+class Constraints(namedtuple("Constraints", (
+    "term_at kind i j a a_j b factor linear law numbers drive over curve_at abscissa cubics period jumps place "
+    "column_at columns"
+))):  # fmt: skip
     """All constraints and laws as flat arrays; terms stand in order of their constraints.
 
     term_at : (r + 1,); kind, i, j, a, a_j, b, factor : of each term
@@ -216,25 +132,3 @@ class Constraints(NamedTuple):
     jumps : (r,) stops with damping, whose push begins at once: a step in which it does is divided
     place : (r,) row of each in the matrix of the interface; column_at, columns : interface unknowns that each couples
     """
-
-    term_at: Any
-    kind: Any
-    i: Any
-    j: Any
-    a: Any
-    a_j: Any
-    b: Any
-    factor: Any
-    linear: Any
-    law: Any
-    numbers: Any
-    drive: Any
-    over: Any
-    curve_at: Any
-    abscissa: Any
-    cubics: Any
-    period: Any
-    jumps: Any
-    place: Any
-    column_at: Any
-    columns: Any

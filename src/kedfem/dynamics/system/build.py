@@ -18,6 +18,7 @@ from kedfem.dynamics.joints.constraint_joints import (
     bore_axis,
     in_plane,
     joint_frame,
+    mounted,
     ordered,
 )
 from kedfem.dynamics.model import Model
@@ -156,22 +157,8 @@ class _Builder:
                     [end.link for end in points] if points else ordered(self.scene.joints[str(element.joint)])
                 )
                 i, j = (self.linkage.bodies.index(link) for link in links)
-                none, zero = np.zeros((0, 3)), np.zeros(3)
-                self.element(
-                    ConstraintJoint(
-                        f"{kind}.{name}",
-                        zero,
-                        (i, j),
-                        (None, None),
-                        none,
-                        none,
-                        None,
-                        zero[:0],
-                        zero[:0],
-                        zero,
-                    ),
-                    element,
-                )
+                none = ConstraintJoint(f"{kind}.{name}", np.zeros(3), (i, j), (None, None))
+                self.element(none, element)
 
     def element(self, joint: ConstraintJoint, element: object) -> None:
         """The law of a spring, motor or limit on its coordinate, which its links' own motion shows."""
@@ -228,8 +215,15 @@ class _Builder:
             if self.determines(joint, np.zeros(3), frame[n]):
                 law = self.bushing(joint.name, n, turning=True)
                 yield rotation_term(i, j, frame, n, law, tilt=len(turns) < 3), law
-        yield from self.threaded(joint, i, j, at)
-        yield from self.driven(joint)
+        if made.kind == "screw":  # its thread, a constraint of two terms
+            along, across = frame[2], frame[0]
+            turn = Term(ANGLE, i, j, across, across, along, -(made.lead or 0.0) / (2 * np.pi))
+            self.add(joint.name, (Term(GAP, i, j, at, at, along), turn), Held(), joint)
+        if (drive := self.scene.driven_joints.get(joint.name)) is not None:
+            number = list(self.scene.driven_joints).index(joint.name)
+            (term,) = self.coordinate(joint.name, joint, 1.0)
+            shaft, damping = drive.shaft_stiffness, drive.shaft_damping
+            yield term, Driven(number) if shaft is None else Spring(shaft, damping, drive=number)
 
     def determines(self, joint: ConstraintJoint, gap: Vector, turn: Vector) -> bool:
         """Whether a direction says something of a joint's links: of planar ones only what is in their plane."""
@@ -238,34 +232,8 @@ class _Builder:
 
     def bushing(self, name: str, axis: int, turning: bool) -> Law:
         """The law of a constraint along or about an axis of its joint."""
-        of = self.scene.joints[name].bushing
-        stiffness = None if of is None else (of.rotational_stiffness if turning else of.stiffness)
-        if of is None or stiffness is None:
-            return Held()
-        return Spring(stiffness[axis], (of.rotational_damping if turning else of.damping)[axis])
-
-    def threaded(self, joint: ConstraintJoint, i: int, j: int, at: Vector) -> Iterator[tuple[Term, Law]]:
-        """The thread of a screw, a constraint of two terms."""
-        made = self.scene.joints[joint.name]
-        if made.kind != "screw":
-            return
-        axis = joint_axis(made)
-        across = perpendiculars(axis)[0]
-        turn = Term(ANGLE, i, j, across, across, axis, -(made.lead or 0.0) / (2 * np.pi))
-        self.add(joint.name, (Term(GAP, i, j, at, at, axis), turn), Held(), joint)
-        yield from ()
-
-    def driven(self, joint: ConstraintJoint) -> Iterator[tuple[Term, Law]]:
-        """The coordinate that a drive prescribes, or turns over a shaft that gives."""
-        drives = self.scene.driven_joints
-        if joint.name not in drives:
-            return
-        drive, number = drives[joint.name], list(drives).index(joint.name)
-        (term,) = self.coordinate(joint.name, joint, 1.0)
-        if drive.shaft_stiffness is None:
-            yield term, Driven(number)
-        else:
-            yield term, Spring(drive.shaft_stiffness, drive.shaft_damping, drive=number)
+        found = mounted(self.scene.joints[name], axis, turning)
+        return Held() if found is None else Spring(*found)
 
     def end(self, joint: ConstraintJoint, side: int, at: Vector) -> int:
         """The number of an end of a joint: what it has on one of its links."""
@@ -286,8 +254,3 @@ class _Builder:
         """Numbers of the bodies whose frames are co-rotational."""
         every = zip(self.model.links, self.model.bodies, strict=True)
         return {n for link, n in every if link.fit is not None}
-
-    @property
-    def unknowns(self) -> int:
-        """Number of interface unknowns."""
-        return self.model.interface_unknowns

@@ -1,9 +1,12 @@
 """What changes as a system moves: its state, histories, and what a step works on."""
 
-from typing import Any, NamedTuple
+from collections import namedtuple
 
 
-class State(NamedTuple):
+class State(namedtuple("State", (
+    "time u v a F f damped momentum seen Q angle strain direction turn port_force z e turned bearing "
+    "multiplier pairs products last counts passes"
+))):  # fmt: skip
     """Everything that a step remembers, flat and with names; N coordinates, k interface unknowns, r constraints.
 
     time : (1,) [s]
@@ -22,39 +25,13 @@ class State(NamedTuple):
     passes : (3,) taken so far, steps whose tolerance was eased, largest in a step
     """
 
-    time: Any
-    u: Any
-    v: Any
-    a: Any
-    F: Any
-    f: Any
-    damped: Any
-    momentum: Any
-    seen: Any
-    Q: Any
-    angle: Any
-    strain: Any
-    direction: Any
-    turn: Any
-    port_force: Any
-    z: Any
-    e: Any
-    turned: Any
-    bearing: Any
-    multiplier: Any
-    pairs: Any
-    products: Any
-    last: Any
-    counts: Any
-    passes: Any
-
 
 def copied(state: State) -> State:
     """A state of its own arrays."""
     return State(*(x.copy() for x in state))
 
 
-class History(NamedTuple):
+class History(namedtuple("History", "u v a F g strain R port_force energy z e multiplier rate Kg Mv Cg")):
     """What a march records at each of T times; as in `State`, and R (T, bodies, 3, 3) the frames, link to world.
 
     g : (T, N) deformation; strain : (T, beams, 3, points) of planar beams; energy : (T, bodies) ½ gᵀ K0 g [J]
@@ -62,25 +39,10 @@ class History(NamedTuple):
     Mv, Cg : (T, N) M δ' in world components and C0 g of sparse ones among them, (0, N) without any
     """
 
-    u: Any
-    v: Any
-    a: Any
-    F: Any
-    g: Any
-    strain: Any
-    R: Any
-    port_force: Any
-    energy: Any
-    z: Any
-    e: Any
-    multiplier: Any
-    rate: Any
-    Kg: Any
-    Mv: Any
-    Cg: Any
 
-
-class Driving(NamedTuple):
+class Driving(namedtuple("Driving", (
+    "t R p v omega drives F amounts stations stiffness_factors factors terms_at entries_at entries"
+))):  # fmt: skip
     """The rigid-body motion and loads over T times.
 
     t : (T,); R, p : (T, M, 3, 3), (T, M, 3) of all bodies of the linkage; v, omega : (T, M, 3) their rates
@@ -92,23 +54,11 @@ class Driving(NamedTuple):
     entries_at, entries : (m + 1,) where the entries of each term begin
     """
 
-    t: Any
-    R: Any
-    p: Any
-    v: Any
-    omega: Any
-    drives: Any
-    F: Any
-    amounts: Any
-    stations: Any
-    stiffness_factors: Any
-    factors: Any
-    terms_at: Any
-    entries_at: Any
-    entries: Any
 
-
-class Trial(NamedTuple):
+class Trial(namedtuple("Trial", (
+    "u f damped seen Q angle base resisted strained r held reaction w force Rp RB SRB H K inverse x z e turned "
+    "C target compliance beside m right dz row change mixing fixed moving stress response foreseen"
+))):  # fmt: skip
     """The end of a step while it is sought; arrays as in `State`.
 
     r : (N,) right-hand sides or residuals in the bodies' frames; held : (N,) Ã⁻¹ r of sparse bodies
@@ -125,60 +75,6 @@ class Trial(NamedTuple):
     response, foreseen : (N,) K (g + β g') of rigid bodies, as it is and as the pass before foresaw it, in their frames
     """
 
-    u: Any
-    f: Any
-    damped: Any
-    seen: Any
-    Q: Any
-    angle: Any
-    base: Any
-    resisted: Any
-    strained: Any
-    r: Any
-    held: Any
-    reaction: Any
-    w: Any
-    force: Any
-    Rp: Any
-    RB: Any
-    SRB: Any
-    H: Any
-    K: Any
-    inverse: Any
-    x: Any
-    z: Any
-    e: Any
-    turned: Any
-    C: Any
-    target: Any
-    compliance: Any
-    beside: Any
-    m: Any
-    right: Any
-    dz: Any
-    row: Any
-    change: Any
-    mixing: Any
-    fixed: Any
-    moving: Any
-    stress: Any
-    response: Any
-    foreseen: Any
 
-
-class Work(NamedTuple):
+class Work(namedtuple("Work", "y turned strained room A U change points end vectors law element frame")):
     """Room for one body or end at a time."""
-
-    y: Any
-    turned: Any
-    strained: Any
-    room: Any
-    A: Any
-    U: Any
-    change: Any
-    points: Any
-    end: Any
-    vectors: Any
-    law: Any
-    element: Any
-    frame: Any
