@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from kedfem.accuracy.histories import histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed, training_motion
 from kedfem.accuracy.reduction import reduced
-from kedfem.dynamics.matrices.closed import coupled
+from kedfem.dynamics.matrices.closed import closed
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.bases import bases
 from kedfem.dynamics.modes.reduction import Basis, static_parts
@@ -118,8 +118,8 @@ def test_a_reduced_link_is_too_stiff_and_less_so_with_more_functions(kind: str) 
 
 def static_work(model: Model, full: Prepared) -> float:
     instant = instants(model, training_motion(full))[-1]
-    F = [now.F @ now.R for now in instant.at]
-    u = coupled(static_parts(model), [now.R for now in instant.at], F)[0]
+    F = [now.F[0] @ now.R[0] for now in instant.at]
+    u = closed(static_parts(model), [now.R[0] for now in instant.at], None).coupled(F)[0]
     return sum(float(np.vdot(x, f)) for x, f in zip(u, F, strict=True))
 
 

@@ -12,7 +12,7 @@ from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics import stiffening
 from kedfem.dynamics.joints.ports import add_port_forces
-from kedfem.dynamics.matrices.closed import coupled
+from kedfem.dynamics.matrices.closed import closed
 from kedfem.dynamics.rigid_body import forcings, motions
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.start import started
@@ -58,7 +58,7 @@ def loaded() -> dict[str, Any]:
 def test_stress_modes_hold_every_stress_of_the_rigid_body_motion(
     made: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Port forces are those of `coupled`; Σ s_i g_i is the static deflection but for rigid motion."""
+    """Port forces are those of `closed`; Σ s_i g_i is the static deflection but for rigid motion."""
     monkeypatch.setattr(stiffening, "NEGLIGIBLE", 0.0)  # bending of planar beams has no stress stiffness
     ready = meshed(scene_from(made()))
     model = ready.model
@@ -70,7 +70,7 @@ def test_stress_modes_hold_every_stress_of_the_rigid_body_motion(
     for k in range(len(t)):
         R = [each.R[k] for each in forcing]
         load = [each.F[k] @ each.R[k] for each in forcing]
-        g, forces = coupled(found.parts, R, load)
+        g, forces = closed(found.parts, R, None).coupled(load)
         for i, (link, joint, modes) in enumerate(zip(model.links, model.joints, found.modes, strict=True)):
             total = load[i].copy()
             add_port_forces(total, joint, forces[i])

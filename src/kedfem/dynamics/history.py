@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from kedfem.arrays import Float, Int
-from kedfem.dynamics.stepping.state import ForcingAt
 from kedfem.motion.rigid import RigidMotion
 
 
@@ -24,13 +23,17 @@ class Forcing:
     F: Float[np.ndarray, "T n d"]
     stress: Float[np.ndarray, "T m"] | None = None
 
-    def at(self, k: int) -> ForcingAt:
-        """At the k-th of the times."""
-        return ForcingAt(self.R[k], self.F[k], None if self.stress is None else self.stress[k])
+    def part(self, first: int, end: int) -> "Forcing":
+        """The time points from one number up to another."""
+        stress = None if self.stress is None else self.stress[first:end]
+        return Forcing(self.R[first:end], self.F[first:end], stress)
 
-    def first(self, T: int) -> "Forcing":
-        """Over the first of the times."""
-        return Forcing(self.R[:T], self.F[:T], None if self.stress is None else self.stress[:T])
+    @property
+    def factors(self) -> Float[np.ndarray, "T m"]:
+        """Those of the stress modes, with stiffening."""
+        if self.stress is None:
+            raise ValueError("stress factors must be there, got none")
+        return self.stress
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,6 @@ from kedfem.dynamics.joints.constraint_matrices import joint_rows
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.matrices.interface import Tie, static_tie
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.stepping.state import ForcingAt
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, joined, rigid_motion
@@ -82,9 +81,9 @@ def forcing_of(
 
 @dataclass(frozen=True, slots=True)
 class Instant:
-    """A linkage frozen at one time: per link R and F = P − M R0''; tie: of joints enforced by constraint equations."""
+    """A linkage frozen at one time: what acts on each link; tie: of joints enforced by constraint equations."""
 
-    at: Sequence[ForcingAt]
+    at: Sequence[Forcing]
     tie: Tie | None = None
 
 
@@ -93,7 +92,8 @@ def instants(model: Model, motion: RigidMotion) -> list[Instant]:
     forcing, out = forcings(model, motion), []
     for k in range(len(motion.t)):
         rows = joint_rows(model.rows, motion.part(k, k + 1), model.interface_unknowns)
-        out.append(Instant([each.at(k) for each in forcing], None if rows is None else static_tie(rows, 0)))
+        tie = None if rows is None else static_tie(rows, 0)
+        out.append(Instant([each.part(k, k + 1) for each in forcing], tie))
     return out
 
 

@@ -20,11 +20,12 @@ from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
 from kedfem.dynamics.joints.constraint_matrices import JointRows, joint_rows
 from kedfem.dynamics.joints.ports import Rotation, port_columns
 from kedfem.dynamics.loads import Pattern
-from kedfem.dynamics.matrices.interface import solved, static_tie
+from kedfem.dynamics.matrices.closed import turned_interface
+from kedfem.dynamics.matrices.interface import solver, static_tie
 from kedfem.dynamics.matrices.substructure import Substructure, factored, mass_matrix
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_elements import RigidElements, unit_loads_on, with_elements
-from kedfem.dynamics.stepping.state import ForcingAt, Nodal
+from kedfem.dynamics.stepping.state import Nodal
 from kedfem.links.record import Link, Matrix
 from kedfem.links.reduced import rigid_modes
 from kedfem.links.stress_stiffness import stress_stiffness, turned_directions
@@ -99,15 +100,17 @@ class Stiffening:
         _, forces = self.elements.over(motion)
         return [with_elements(k, each.F, self.elements, forces) for k, each in enumerate(forcing)]
 
-    def turnings(self, at: Sequence[ForcingAt]) -> list[Turning]:
-        """g → k g P of all links at one time."""
-        return [modes.turning(_given(now)) for modes, now in zip(self.modes, at, strict=True)]
+    def turnings(self, forcing: Sequence[Forcing], motion: RigidMotion) -> list[Turning]:
+        """g → k g P of all links at the first time of a motion."""
+        every = zip(self.modes, self.over(forcing, motion), strict=True)
+        return [modes.turning(now.factors[0]) for modes, now in every]
 
-    def stiffness(self, at: Sequence[ForcingAt]) -> list[Matrix]:
-        """k ⊗ R P Rᵀ of all links at one time, world frame, (dn, dn)."""
+    def stiffness(self, forcing: Sequence[Forcing], motion: RigidMotion) -> list[Matrix]:
+        """k ⊗ R P Rᵀ of all links at the first time of a motion, world frame, (dn, dn)."""
+        every = zip(self.modes, self.over(forcing, motion), strict=True)
         return [
-            sp.kron(modes.stiffness(_given(now)), now.R @ modes.P @ now.R.T, format="csr")
-            for modes, now in zip(self.modes, at, strict=True)
+            sp.kron(modes.stiffness(now.factors[0]), now.R[0] @ modes.P @ now.R[0].T, format="csr")
+            for modes, now in every
         ]
 
 
@@ -202,14 +205,14 @@ def port_forces(
     loads: Sequence[Float[np.ndarray, "T n d"]],
     rows: JointRows | None = None,
 ) -> list[Float[np.ndarray, "T _"]]:
-    """`coupled` for many times at once, port forces only: λ of all links, link frame.
+    """`Closed.coupled` for many times at once, port forces only: λ of all links, link frame.
 
     Parameters
     ----------
     rows : constraint equations, springs of bushings among them, on the interface unknowns
     """
     v = [x.reshape(len(x), -1) @ part.Y for x, part in zip(loads, parts, strict=True)]
-    RB = [_interface(part, each) for part, each in zip(parts, R, strict=True)]
+    RB = [turned_interface(part, each) for part, each in zip(parts, R, strict=True)]
     held, k = [part.attachment.columns for part in parts], parts[0].attachment.unknowns
     if k:
         H, f = np.zeros((len(v[0]), k, k)), np.zeros((len(v[0]), k))
@@ -221,27 +224,9 @@ def port_forces(
             z = np.linalg.solve(H, f[..., None])
         else:
             each = enumerate(zip(H, f, strict=True))
-            z = np.stack([solved(H_t, f_t, static_tie(rows, t))[0] for t, (H_t, f_t) in each])[..., None]
+            z = np.stack([solver(H_t, static_tie(rows, t))(f_t)[0] for t, (H_t, f_t) in each])[..., None]
         v = [x - (b @ z[:, c])[..., 0] for x, b, c in zip(v, RB, held, strict=True)]
     return [(-x @ part.S)[:, : len(part.attachment.keep)] for x, part in zip(v, parts, strict=True)]
-
-
-def _interface(part: Substructure, R: Float[np.ndarray, "T d d"]) -> Float[np.ndarray, "T c k"]:
-    """[Rᵀ B; 0] over time: port components in the link frame from the interface unknowns that the link has a share in."""
-    joint = part.attachment
-    (p, d), k = (len(joint.weights), joint.components), joint.B.shape[1]
-    B = np.zeros((p * d, k))
-    B[joint.keep] = joint.B
-    turned = np.einsum("tba,pbk->tpak", R, B.reshape(p, d, k)).reshape(len(R), p * d, k)
-    out = np.zeros((len(R), len(part.S), k))
-    out[:, : len(joint.keep)] = turned[:, joint.keep]
-    return out
-
-
-def _given(now: ForcingAt) -> Float[np.ndarray, " m"]:
-    if now.stress is None:
-        raise ValueError("stress factors must be there, got none")
-    return now.stress
 
 
 def _factors(

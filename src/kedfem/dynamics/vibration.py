@@ -1,12 +1,12 @@
 """The least damped vibration about a steady motion, as it goes on over a period: which link, how fast, what shape."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kedfem.arrays import Float, Int
-from kedfem.dynamics.history import LinkMoment, Snapshot
+from kedfem.dynamics.history import Snapshot, bent
 from kedfem.dynamics.system.march import displacements
 from kedfem.dynamics.system.period.map import PeriodMap
 from kedfem.dynamics.system.period.search import Periodic
@@ -65,7 +65,7 @@ def vibration(over: PeriodMap, solver: Steps, found: Periodic) -> Vibration:
     largest = max(float(np.linalg.norm(each, axis=-1).max()) for each in u) or 1.0
     snapshots = tuple(
         Snapshot(int(at[f]) + 1, base.motion, f, [
-            _moment(each[f] / largest, deformed[f] / largest, R[f])
+            replace(bent(each[f] / largest, R[f]), g=deformed[f] / largest)
             for each, deformed, R in zip(u, g, base.R, strict=True)
         ])
         for f in range(len(at))
@@ -80,12 +80,6 @@ def vibration(over: PeriodMap, solver: Steps, found: Periodic) -> Vibration:
     shares = {name: part / total for name, part in sorted(energy.items(), key=lambda each: -each[1])}
     squared = total / (sum(still) or 1.0) - (np.log(max(found.growth, 1e-300)) / over.period) ** 2
     return Vibration(float(np.sqrt(max(squared, 0.0))) / TURN, shares, snapshots)
-
-
-def _moment(
-    u: Float[np.ndarray, "n d"], g: Float[np.ndarray, "n d"], R: Float[np.ndarray, "d d"]
-) -> LinkMoment:
-    return LinkMoment(u, 0 * u, 0 * u, g, R, 0 * u, np.zeros(0), 0.0)
 
 
 def _mass_product(link: Link, x: Rows) -> float:

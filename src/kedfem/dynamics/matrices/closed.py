@@ -7,7 +7,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from kedfem.arrays import Float, Int
-from kedfem.dynamics.joints.ports import Rotation, port_rotation
+from kedfem.dynamics.joints.ports import Rotation
 from kedfem.dynamics.matrices.interface import MANY, Tie, solver
 from kedfem.dynamics.matrices.substructure import Substructure
 from kedfem.dynamics.stepping.state import NodalOf
@@ -30,11 +30,11 @@ class Closed:
     )
 
     def coupled(self, rhs: Sequence[NodalOf]) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]]]:
-        """g and forces for one more rhs; see the function."""
+        """g (n, d) of all links and λ (q,) on them at their ports, link frames, from right-hand sides (n, d) there."""
         return self.answer([part.solve(r) for part, r in zip(self.parts, rhs, strict=True)])
 
     def answer(self, y: Sequence[NodalOf]) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]]]:
-        """As `coupled`, from y = Ã⁻¹ r."""
+        """The same from y = Ã⁻¹ r."""
         v = [part.seen(x) for part, x in zip(self.parts, y, strict=True)]
         each = list(zip(self.parts, self.RB, self.held, v, strict=True))
         z = np.zeros(self.unknowns)
@@ -49,26 +49,6 @@ class Closed:
             for part, x, force in zip(self.parts, y, forces, strict=True)
         ]
         return g, [force[: len(part.attachment.keep)] for part, force in zip(self.parts, forces, strict=True)]
-
-
-def coupled(
-    parts: Sequence[Substructure], R: Sequence[Rotation], rhs: Sequence[NodalOf], tie: Tie | None = None
-) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]]]:
-    """Solve all links together: A g = r + Wᵀ λ, joints closed: R W g = B z, joint forces in balance: Σ Bᵀ R λ = 0.
-
-    The mechanism of [KED, eq. (19)]: joints make shared points move together.
-
-    Parameters
-    ----------
-    parts, R, rhs : per link; R link to world, rhs (n, d) in the link frame
-    tie : what joints enforced by constraint equations ask of z; then Σ Bᵀ R λ is what these exert
-
-    Returns
-    -------
-    g : per link (n, d), link frame
-    forces : per link (q,) λ on the link at its ports, link frame
-    """
-    return closed(parts, R, tie).coupled(rhs)
 
 
 def coupled_all(
@@ -88,9 +68,17 @@ def coupled_all(
 
 
 def closed(parts: Sequence[Substructure], R: Sequence[Rotation], tie: Tie | None) -> Closed:
-    """A linkage with its joints closed; `coupled` has what is asked for."""
+    """A linkage with its joints closed: A g = r + Wᵀ λ, R W g = B z, and joint forces in balance, Σ Bᵀ R λ = 0.
+
+    The mechanism of [KED, eq. (19)]: joints make shared points move together.
+
+    Parameters
+    ----------
+    R : per link, link to world
+    tie : what joints enforced by constraint equations ask of z; then Σ Bᵀ R λ is what these exert
+    """
     held = [part.attachment.columns for part in parts]
-    RB = [_interface(part, R_) for part, R_ in zip(parts, R, strict=True)]
+    RB = [turned_interface(part, each[None])[0] for part, each in zip(parts, R, strict=True)]
     k = parts[0].attachment.unknowns
     H = [b.T @ part.S @ b for part, b in zip(parts, RB, strict=True)]
     return Closed(parts, held, RB, k, solver(_common(held, H, k), tie) if k else None)
@@ -110,9 +98,13 @@ def _common(
     return H
 
 
-def _interface(part: Substructure, R: Rotation) -> Float[np.ndarray, "p c"]:
-    """[Rᵀ B; 0]: port components in the link frame from the interface unknowns that the link has a share in."""
-    B = part.attachment.B
-    out = np.zeros((len(part.S), B.shape[1]))
-    out[: len(B)] = port_rotation(part.attachment, R).T @ B
+def turned_interface(part: Substructure, R: Float[np.ndarray, "T d d"]) -> Float[np.ndarray, "T c k"]:
+    """[Rᵀ B; 0] over time: port components in the link frame from the interface unknowns that the link has a share in."""
+    joint = part.attachment
+    (p, d), k = (len(joint.weights), joint.components), joint.B.shape[1]
+    B = np.zeros((p * d, k))
+    B[joint.keep] = joint.B
+    turned = np.einsum("tba,pbk->tpak", R, B.reshape(p, d, k)).reshape(len(R), p * d, k)
+    out = np.zeros((len(R), len(part.S), k))
+    out[:, : len(joint.keep)] = turned[:, joint.keep]
     return out

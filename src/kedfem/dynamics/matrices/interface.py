@@ -8,10 +8,6 @@ spring beside each row that holds, is put into H' = H + Cᵀ σ C; with m' = m +
     (C H'⁻¹ Cᵀ + diag 1/(κ − σ)) m' = target − C H'⁻¹ f
 
 exact for every σ, one equation of springs and of what holds (1/κ = 0), and well conditioned however stiff springs are.
-
-In a step of generalised-α the forces balance as (1 − α_f) Cᵀ₁ μ₁ + α_f Cᵀ₀ μ₀, each along its own directions. The second
-part is known, and the new μ₁ acts along the new rows alone: joint forces at the end of a step are free of what else would
-swing from step to step.
 """
 
 from collections.abc import Callable
@@ -45,13 +41,6 @@ class Tie:
     compliance: Float[np.ndarray, " r"]
     target: Float[np.ndarray, " r"]
     force: Float[np.ndarray, " k"]
-
-
-def solved(
-    H: Float[np.ndarray, "k k"] | sp.csr_array, f: Float[np.ndarray, " k"], tie: Tie | None
-) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " r"]]:
-    """Interface unknowns z and the rows' forces m; see `solver`."""
-    return solver(H, tie)(f)
 
 
 def solver(

@@ -3,8 +3,7 @@
 Exact block elimination of the coupled system, because T M Tᵀ = M and K = T K0 Tᵀ [KED, eqs. (12)(14)].
 """
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -55,27 +54,33 @@ class Substructure:
 
 
 def substructure(
-    attachment: Attachment, n: int, solve: Callable[[Nodal], Nodal], solve_many: Callable[[np.ndarray], np.ndarray],
+    link: Link, attachment: Attachment, solve: Callable[[Nodal], Nodal], solve_many: Callable[[np.ndarray], np.ndarray],
     anchors: Int[np.ndarray, " e"] | None = None, kappa: Float[np.ndarray, " e"] | None = None,
 ) -> Substructure:  # fmt: skip
     """Condense a link onto its ports and anchors.
 
     Parameters
     ----------
-    n : functions of the link
     solve, solve_many : Ã⁻¹ for one state (n, d) and for columns (dn, k)
     anchors, kappa : components that Ã holds in addition to A, none if not given, and how stiffly [N/m]
     """
     held = np.zeros(0, int) if anchors is None else anchors
-    E = np.zeros((attachment.components * n, len(held)))
+    E = np.zeros((link.unknowns, len(held)))
     E[held, np.arange(len(held))] = 1.0
-    C = np.concatenate([port_columns(attachment, n), E], axis=1)
+    C = np.concatenate([port_columns(attachment, link.n), E], axis=1)
     Y = solve_many(C)
     F = C.T @ Y
     if kappa is not None:
         at = np.arange(len(F) - len(held), len(F))
         F[at, at] -= 1 / kappa
-    return Substructure(solve, solve_many, attachment, Y, _stiffness(F, len(held)), held)
+    try:
+        S = _stiffness(F, len(held))
+    except np.linalg.LinAlgError as error:
+        raise SolveError(
+            f"links.{link.name}: must have a flexibility at its joints that is more than rounding beside its least stiff "
+            "motion, got none: it may be very thin beside its length, or its sizes in other units than meant"
+        ) from error
+    return Substructure(solve, solve_many, attachment, Y, S, held)
 
 
 def _stiffness(F: Float[np.ndarray, "c c"], anchored: int) -> Float[np.ndarray, "c c"]:
@@ -102,34 +107,34 @@ def factored(link: Link, joint: Attachment, c_M: float, c_K: float) -> Substruct
 
 
 def _held(link: Link, joint: Attachment, c_M: float, c_K: float) -> Substructure:
-    anchors = anchors_of(link)
-    if link.full is not None:
-        return _dense_factored(link, joint, effective_matrix(link, c_M, c_K), anchors, c_K)
-    kappa = np.full(len(anchors), ANCHORAGE * c_K * float(link.K0.diagonal()[anchors].mean()))
+    anchors, diagonal = anchors_of(link), link.K0.diagonal()
+    mean = float((diagonal if link.full is not None else diagonal[anchors]).mean())
+    kappa = np.full(len(anchors), ANCHORAGE * c_K * mean)
     springs = sp.coo_array((kappa, (anchors, anchors)), shape=link.K0.shape)
-    factor = Cholesky(sp.csr_array(effective_matrix(link, c_M, c_K) + springs), f"links.{link.name}")
-    with _condensing(link):
-        made = substructure(
-            joint,
-            link.n,
-            lambda r: factor.solve(r.ravel()).reshape(r.shape),
-            factor.solve_many,
-            anchors,
-            kappa,
-        )
-    return replace(made, factor=factor)
+    A = sp.csr_array(effective_matrix(link, c_M, c_K) + springs)
+    factor = _Dense(A, link.name) if link.full is not None else Cholesky(A, f"links.{link.name}")
+    made = substructure(
+        link, joint, lambda r: factor.solve(r.ravel()).reshape(r.shape), factor.solve_many, anchors, kappa
+    )
+    return replace(made, factor=factor if isinstance(factor, Cholesky) else None)
 
 
-@contextmanager
-def _condensing(link: Link) -> Iterator[None]:
-    """Says which link has stiffnesses so far apart that nothing is left of its flexibility at its interface points."""
-    try:
-        yield
-    except np.linalg.LinAlgError as error:
-        raise SolveError(
-            f"links.{link.name}: must have a flexibility at its joints that is more than rounding beside its least stiff "
-            "motion, got none: it may be very thin beside its length, or its sizes in other units than meant"
-        ) from error
+class _Dense:
+    """As `Cholesky`, of a reduced link, whose matrices are dense."""
+
+    def __init__(self, A: sp.csr_array, name: str) -> None:
+        try:
+            self._factor = scipy.linalg.cho_factor(A.toarray(), check_finite=False)
+        except np.linalg.LinAlgError as error:
+            raise SolveError(
+                f"links.{name}: effective matrix must be positive definite, got {error}"
+            ) from error
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        """x with A x = b, of vectors and columns."""
+        return np.asarray(scipy.linalg.cho_solve(self._factor, b, check_finite=False))
+
+    solve_many = solve
 
 
 def mass_substructure(link: Link, joint: Attachment) -> Substructure:
@@ -145,31 +150,7 @@ def mass_substructure(link: Link, joint: Attachment) -> Substructure:
     def solve_many(B: Float[np.ndarray, "k q"]) -> Float[np.ndarray, "k q"]:
         return np.stack([solve(b.reshape(-1, link.d)).ravel() for b in B.T], axis=1) if B.shape[1] else B
 
-    with _condensing(link):
-        return substructure(joint, link.n, solve, solve_many)
-
-
-def _dense_factored(
-    link: Link, joint: Attachment, A: sp.csr_array, anchors: Int[np.ndarray, " e"], c_K: float
-) -> Substructure:
-    """`factored` of a reduced link, whose matrices are dense."""
-    kappa = np.full(len(anchors), ANCHORAGE * c_K * float(link.K0.diagonal().mean()))
-    dense = A.toarray()
-    dense[anchors, anchors] += kappa
-    try:
-        factor = scipy.linalg.cho_factor(dense, check_finite=False)
-    except np.linalg.LinAlgError as error:
-        raise SolveError(
-            f"links.{link.name}: effective matrix must be positive definite, got {error}"
-        ) from error
-
-    def solve_many(B: np.ndarray) -> np.ndarray:
-        return np.asarray(scipy.linalg.cho_solve(factor, B, check_finite=False))
-
-    with _condensing(link):
-        return substructure(
-            joint, link.n, lambda r: solve_many(r.ravel()).reshape(r.shape), solve_many, anchors, kappa
-        )
+    return substructure(link, joint, solve, solve_many)
 
 
 def anchors_of(link: Link) -> Int[np.ndarray, " e"]:

@@ -137,8 +137,8 @@ def _krylov(
     All instants go level by level, so that their solves go together.
     """
 
-    frozen = [closed(parts, [now.R for now in instant.at], instant.tie) for instant in instants]
-    loads = [[now.F @ now.R for now in instant.at] for instant in instants]
+    frozen = [closed(parts, [now.R[0] for now in instant.at], instant.tie) for instant in instants]
+    loads = [[now.F[0] @ now.R[0] for now in instant.at] for instant in instants]
     static = coupled_all(parts, list(zip(frozen, loads, strict=True)))
     found = [_Krylov(model, x, levels) for x in static]
     growing = list(zip(frozen, found, strict=True))

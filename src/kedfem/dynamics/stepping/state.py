@@ -1,4 +1,4 @@
-"""What acts on a link at a time, and its damping."""
+"""Nodal states of links, and what damps them."""
 
 from dataclasses import dataclass
 
@@ -22,20 +22,6 @@ class Rayleigh:
     def present(self) -> bool:
         """Whether there is any damping."""
         return self.alpha != 0 or self.beta != 0
-
-
-@dataclass(frozen=True, slots=True)
-class ForcingAt:
-    """What rigid motion and loads do to one link at one time.
-
-    R : (d, d) orientation, link to world, of a plane link in its plane
-    F : (n, d) P − M R0'', world components [N]
-    stress : (m,) factors of the link's stress modes; None without stiffening
-    """
-
-    R: Float[np.ndarray, "d d"]
-    F: Nodal
-    stress: Float[np.ndarray, " m"] | None = None
 
 
 def damping_times(link: Link, damping: Rayleigh, g: Nodal) -> Nodal:

@@ -20,7 +20,6 @@ from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.ports import port_columns
 from kedfem.dynamics.matrices.cholesky import Cholesky
 from kedfem.dynamics.matrices.dense import DensePart
-from kedfem.dynamics.matrices.held import held_substructure
 from kedfem.dynamics.matrices.substructure import Substructure
 from kedfem.dynamics.stepping.state import Nodal
 from kedfem.dynamics.system.arrays import Masses, ends_of
@@ -65,12 +64,19 @@ def sparse_part(link: Link, joint: Attachment, of: Substructure) -> SparsePart:
 
     A sparse factor that is not too large is taken from the substructure, which solves no more.
     """
-    seen, order = held_substructure(of), component_order(link)
-    W = port_columns(joint, link.n)[order].T
+    order, q = component_order(link), len(joint.keep)
+    W, S = port_columns(joint, link.n)[order].T, of.S[:, :q]
     factor = of.factor if link.unknowns <= TAKEN else None
     arrays = compiled_arrays(of, factor, order, W)
-    held = compiled_held(arrays, link.d, len(W)) if factor else seen.held
-    return SparsePart(link.d, held, of.solve, arrays, seen.Y[order], seen.S, W)
+
+    def held(r: Nodal) -> tuple[Nodal, Float[np.ndarray, " q"]]:
+        y = of.solve(r)
+        at_ports = of.S @ of.seen(y)
+        return y - (of.Y @ at_ports).reshape(y.shape), at_ports[:q]
+
+    return SparsePart(
+        link.d, compiled_held(arrays, link.d, q) if factor else held, of.solve, arrays, (of.Y @ S)[order], S[:q], W
+    )  # fmt: skip
 
 
 def compiled_arrays(

@@ -201,7 +201,7 @@ class Steps:
     ) -> tuple[list[LinkHistory], Multipliers]:
         """All links over the first time points of a block, as far as a history goes."""
         T = len(found.u)
-        forcing, motion = [x.first(T) for x in forcing], motion.part(0, T)
+        forcing, motion = [x.part(0, T) for x in forcing], motion.part(0, T)
         multipliers = multipliers_of(self.ready, found)
         acting = on_links(Supports(multipliers, motion), self.riders) if self.elements else {}
         every = [self._link(k, found, each, acting.get(k)) for k, each in enumerate(forcing)]

@@ -39,9 +39,7 @@ class Stressed:
         for each, entries, size in zip(
             self.stiffening.over(forcing, motion), self.entries, self.size, strict=True
         ):
-            if each.stress is None:
-                raise ValueError("stress factors must be there, got none")
-            every.append(fewer_terms(each.stress * size, entries / size[:, None]))
+            every.append(fewer_terms(each.factors * size, entries / size[:, None]))
         sizes = [k.shape[1] for _, k in every for _ in range(len(k))]
         flat = np.concatenate([np.zeros(0), *(k.ravel() for _, k in every)])
         factors = np.ascontiguousarray(np.concatenate([s for s, _ in every], axis=1))
@@ -49,8 +47,7 @@ class Stressed:
 
     def turnings(self, model: Model, motion: RigidMotion) -> list[Turning]:
         """g → k g P of all links at the first time of a motion."""
-        stressed = self.stiffening.over(forcings(model, motion), motion)
-        return self.stiffening.turnings([each.at(0) for each in stressed])
+        return self.stiffening.turnings(forcings(model, motion), motion)
 
 
 def stressed(stiffening: Stiffening, parts: Sequence[Part]) -> Stressed:

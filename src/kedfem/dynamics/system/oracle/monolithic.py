@@ -127,8 +127,7 @@ class Monolithic:
         stiffening = self.system.stiffening
         if stiffening is None:
             return ()
-        found = stiffening.over(forcings(self.system.model, at), at)
-        every: list[Matrix] = stiffening.stiffness([each.at(0) for each in found])
+        every: list[Matrix] = stiffening.stiffness(forcings(self.system.model, at), at)
         return every
 
     def _stepped(self, old: Now, at: RigidMotion, patience: int) -> Now:
