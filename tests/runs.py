@@ -44,7 +44,7 @@ class Ran:
     def displaced(self, link: str, at: Any, name: str = "u") -> np.ndarray:
         """Displacement from the rigid-body motion (T, 3), or its rates."""
         k, weights = on_segment(
-            self.ready.model, link, point(at), lambda part: point_rows(part, link, point(at)).value
+            self.ready.model.links, link, point(at), lambda part: point_rows(part, link, point(at)).value
         )
         part = self.ready.model.links[k]
         return in_space(part, np.einsum("n,tnd->td", weights, self.state(k, name)))

@@ -14,8 +14,6 @@ from kedfem.dynamics.inertias import (
     acting,
     inertias_of_links,
     inertias_of_model,
-    kinetic_energy,
-    load_power,
 )
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.rigid_body import motions
@@ -31,6 +29,7 @@ from kedfem.results.recording import recording
 from kedfem.scene import Scene, drive_angle, path_parameter, scene_from, time_grid
 
 from ..linkages import linkage_scene
+from ..rigid_energy import kinetic_energy, load_power
 from .test_dynamics import four_bar
 
 Array = np.ndarray

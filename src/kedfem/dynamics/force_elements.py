@@ -1,11 +1,12 @@
 """Motors, springs and limits of a scene as force elements on a model, and hinges whose turn is examined."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from kedfem.arrays import Float
 from kedfem.dynamics.force_element import (
     ANGLE,
     DISTANCE,
@@ -39,7 +40,7 @@ def force_elements(scene: Scene, model: Model) -> tuple[ForceElement, ...]:
     MeshError, SceneError
         If a point or joint is not on its link.
     """
-    return _all(_Ends(scene, model))
+    return _all(_on_model(scene, model))
 
 
 def rigid_elements(scene: Scene, bodies: Sequence[str]) -> tuple[ForceElement, ...]:
@@ -49,10 +50,10 @@ def rigid_elements(scene: Scene, bodies: Sequence[str]) -> tuple[ForceElement, .
     ----------
     bodies : their names by number in the linkage
     """
-    return _all(_RigidEnds(scene, bodies))
+    return _all(_Ends(scene, {name: k for k, name in enumerate(bodies)}))
 
 
-def _all(find: "_Ends | _RigidEnds") -> tuple[ForceElement, ...]:
+def _all(find: "_Ends") -> tuple[ForceElement, ...]:
     motors = [_motor(find, name, motor) for name, motor in find.scene.motors.items()]
     springs = [_spring(find, name, spring) for name, spring in find.scene.springs.items()]
     limits = [_limit(find, name, limit) for name, limit in find.scene.limits.items()]
@@ -61,86 +62,78 @@ def _all(find: "_Ends | _RigidEnds") -> tuple[ForceElement, ...]:
 
 def hinges(scene: Scene, model: Model) -> tuple[ForceElement, ...]:
     """A force element without a force for each revolute joint: its turn is examined."""
-    find = _Ends(scene, model)
+    find = _on_model(scene, model)
     names = [name for name, joint in scene.joints.items() if joint.kind == "revolute"]
     return tuple(_hinge(find, f"joints/{name}", name) for name in names)
 
 
+def _on_model(scene: Scene, model: Model) -> "_Ends":
+    fixed = {x.link.name: x.body for x in model.prescribed} | {GROUND: 0}
+    fixed |= {name: 0 for name in scene.links if slider_axis(scene, name) is not None}
+    return _Ends(scene, fixed, model.links, model.bodies, model.sliders)
+
+
 @dataclass(frozen=True, slots=True)
 class _Ends:
-    """Where ends are on the links of a model."""
+    """Where ends are.
+
+    fixed : links that only move as given, with the bodies that they move with
+    links, numbers, sliders : of a model
+    """
 
     scene: Scene
-    model: Model
-
-    def body(self, name: str) -> int | None:
-        """The body that a link without unknowns moves with; None of others."""
-        if name == GROUND or slider_axis(self.scene, name) is not None:
-            return 0
-        return next((x.body for x in self.model.prescribed if x.link.name == name), None)
+    fixed: Mapping[str, int]
+    links: Sequence[Link] = ()
+    numbers: Sequence[int] = ()
+    sliders: Sequence[Slider] = ()
 
     def point(self, where: str, name: str, at: Vector) -> End:
-        """A point of a link, the ground or a slider."""
-        slider = next((x for x in self.model.sliders if x.name == name), None)
-        if slider is not None:
-            return self.on_slider(slider, at)
-        body = self.body(name)
-        if body is not None:
-            return End(-1, body, POINT, np.zeros((1, 0)), at[None], link=name)
-        k, rows = on_segment(self.model, name, at, lambda link: point_rows(link, where, at))
-        link = self.model.links[k]
-        require_on_axis(link, where, at, rows.X)
-        return End(k, self.model.bodies[k], POINT, rows.value[None], rows.X[None], _plane(link))
-
-    def on_slider(self, slider: Slider, at: Vector) -> End:
-        """A point of a slider, which rides on its carrier and never turns."""
-        port = np.asarray(self.scene.joints[slider.joint].at)
-        k, link = slider.carrier, self.model.links[slider.carrier]
-        return End(
-            k, self.model.bodies[k], POINT, slider.weights[None], port[None], _plane(link), at - port, slider.name
-        )  # fmt: skip
+        """A point of a link, the ground or a slider, which rides on its carrier and never turns."""
+        for slider in self.sliders:
+            if slider.name == name:
+                port = np.asarray(self.scene.joints[slider.joint].at)
+                return self._end(slider.carrier, POINT, slider.weights[None], port[None], at - port, name)
+        if name in self.fixed:
+            return End(-1, self.fixed[name], POINT, np.zeros((1, 0)), at[None], link=name)
+        k, rows = on_segment(self.links, name, at, lambda link: point_rows(link, where, at))
+        require_on_axis(self.links[k], where, at, rows.X)
+        return self._end(k, POINT, rows.value[None], rows.X[None])
 
     def across(self, joint: str, name: str) -> End:
         """Directions of a link across the axis of a hinge."""
-        axis, at = joint_axis(self.scene.joints[joint]), np.asarray(self.scene.joints[joint].at)
+        axis = joint_axis(self.scene.joints[joint])
         both = np.array(perpendiculars(axis))
-        body = self.body(name)
-        if body is not None:
-            return End(-1, body, PAIR, np.zeros((2, 0)), both, link=name)
-        k, surface = on_segment(self.model, name, at, lambda link: surface_of(self.scene, joint, link))
-        link, here = self.model.links[k], self.model.bodies[k]
-        if link.kind == "beam":
-            return End(k, here, ANGLE, surface.fit[:1], np.zeros((1, 3)), (0.0, 0.0, 1.0))
+        if name in self.fixed:
+            return End(-1, self.fixed[name], PAIR, np.zeros((2, 0)), both, link=name)
+        k, surface = self.surface(joint, name)
+        if self.links[k].kind == "beam":
+            return replace(self._end(k, ANGLE, surface.fit[:1], np.zeros((1, 3))), mask=(0.0, 0.0, 1.0))
         if all(holds(surface, e) for e in both):
-            return End(k, here, PAIR, both @ surface.fit[1:], both, _plane(link))
-        known = np.array([_in_face(f"joints.{joint}", link, surface, axis), axis])
-        return End(k, here, SINGLE, known @ surface.fit[1:], known, _plane(link))
+            return self._end(k, PAIR, both @ surface.fit[1:], both)
+        known = np.array([_in_face(f"joints.{joint}", self.links[k], surface, axis), axis])
+        return self._end(k, SINGLE, known @ surface.fit[1:], known)
 
+    def port(self, joint: str, name: str, at: Vector) -> End:
+        """The middle of a joint on a link: the affine fit of its coupling surface, as where joints hold it."""
+        if name in self.fixed:
+            return self.point(f"joints.{joint}", name, at)
+        k, surface = self.surface(joint, name)
+        return self._end(k, POINT, port_weights(surface, at[None]), at[None])
 
-@dataclass(frozen=True, slots=True)
-class _RigidEnds:
-    """Where ends are on links that only move as given."""
+    def surface(self, joint: str, name: str) -> tuple[int, CouplingSurface]:
+        """The number of the link, or segment, on which a joint is, and its coupling surface there."""
+        at = np.asarray(self.scene.joints[joint].at)
+        return on_segment(self.links, name, at, lambda link: surface_of(self.scene, joint, link))
 
-    scene: Scene
-    bodies: Sequence[str]
-
-    def body(self, name: str) -> int:
-        """The number of a link."""
-        return list(self.bodies).index(name)
-
-    def point(self, where: str, name: str, at: Vector) -> End:
-        """A point of a link or the ground."""
-        return End(-1, self.body(name), POINT, np.zeros((1, 0)), at[None], link=name)
-
-    def across(self, joint: str, name: str) -> End:
-        """Directions of a link across the axis of a hinge."""
-        both = np.array(perpendiculars(joint_axis(self.scene.joints[joint])))
-        return End(-1, self.body(name), PAIR, np.zeros((2, 0)), both, link=name)
-
-
-def _plane(link: Link) -> tuple[float, float, float]:
-    """The components of a state's rows that are displacements."""
-    return (1.0, 1.0, 0.0) if link.planar else IN_SPACE
+    def _end(
+        self, k: int, form: int, weights: Float[np.ndarray, "m n"], X: Float[np.ndarray, "m 3"],
+        offset: Vector | None = None, link: str = "",
+    ) -> End:  # fmt: skip
+        """An end on link k; of a planar one without what its rows have beside displacements."""
+        mask = (1.0, 1.0, 0.0) if self.links[k].planar else IN_SPACE
+        return End(
+            k, self.numbers[k], form, weights, X, mask, np.zeros(3) if offset is None else offset, link
+        )
 
 
 def _in_face(where: str, link: Link, surface: CouplingSurface, axis: Vector) -> Vector:
@@ -158,39 +151,30 @@ def _ordered(links: tuple[str, str]) -> tuple[str, str]:
     return (links[1], links[0]) if links[0] == GROUND else links
 
 
-def _hinge(find: _Ends | _RigidEnds, name: str, joint: str) -> ForceElement:
+def _hinge(find: _Ends, name: str, joint: str) -> ForceElement:
     """A force element on the turn of a hinge, without a force yet."""
     one, other = _ordered(find.scene.joints[joint].links)
     ends = (find.across(joint, one), find.across(joint, other))
     return ForceElement(name, TURN, ends, axis=joint_axis(find.scene.joints[joint]))
 
 
-def _slide(find: _Ends | _RigidEnds, name: str, joint: str) -> ForceElement:
+def _slide(find: _Ends, name: str, joint: str) -> ForceElement:
     """A force element on the travel of a slide, without a force yet: the port of its link against the other."""
     at = np.asarray(find.scene.joints[joint].at)
     one, other = _ordered(find.scene.joints[joint].links)
     axis, end = joint_axis(find.scene.joints[joint]), find.point(f"joints.{joint}", other, at)
     if end.k < 0 and other != GROUND:  # it turns with what it is on
         end = replace(end, X=np.array([at, axis]), weights=np.zeros((2, 0)))
-    return ForceElement(name, SLIDE, (_port(find, joint, one, at), end), axis=axis)
+    return ForceElement(name, SLIDE, (find.port(joint, one, at), end), axis=axis)
 
 
-def _port(find: _Ends | _RigidEnds, joint: str, name: str, at: Vector) -> End:
-    """The middle of a joint on a link: the affine fit of its coupling surface, as where joints hold it."""
-    if isinstance(find, _RigidEnds) or find.body(name) is not None:
-        return find.point(f"joints.{joint}", name, at)
-    k, surface = on_segment(find.model, name, at, lambda link: surface_of(find.scene, joint, link))
-    link, weights = find.model.links[k], port_weights(surface, at[None])
-    return End(k, find.model.bodies[k], POINT, weights, at[None], _plane(link))
-
-
-def _motor(find: _Ends | _RigidEnds, name: str, motor: Motor) -> ForceElement:
+def _motor(find: _Ends, name: str, motor: Motor) -> ForceElement:
     curve = motor.curve
     made = (_hinge if motor.torque is not None else _slide)(find, f"motors/{name}", motor.joint)
     return replace(made, over=OVER[curve.over], curve=pieces(curve))
 
 
-def _spring(find: _Ends | _RigidEnds, name: str, spring: Spring) -> ForceElement:
+def _spring(find: _Ends, name: str, spring: Spring) -> ForceElement:
     factor = factor_law(spring.stiffness_factor)
     law: dict[str, Any] = {
         "stiffness": spring.stiffness, "damping": spring.damping, "free": spring.free, "factor": factor,
@@ -207,6 +191,6 @@ def _spring(find: _Ends | _RigidEnds, name: str, spring: Spring) -> ForceElement
     return ForceElement(f"springs/{name}", DISTANCE, (one, other), **law)
 
 
-def _limit(find: _Ends | _RigidEnds, name: str, limit: Limit) -> ForceElement:
+def _limit(find: _Ends, name: str, limit: Limit) -> ForceElement:
     made = (_slide if isinstance(limit, TravelLimit) else _hinge)(find, f"limits/{name}", limit.joint)
     return replace(made, stiffness=limit.stiffness, damping=limit.damping, limits=limit.range)

@@ -1,6 +1,6 @@
 """The elastic model of a scene: links with their attached bodies and sliders, joints, loads, damping."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -120,7 +120,7 @@ def mesh_methods(model: Model) -> dict[str, str]:
 
 
 def on_segment(
-    model: Model, name: str, at: Float[np.ndarray, "3"], found: Callable[[Link], T]
+    links: Sequence[Link], name: str, at: Float[np.ndarray, "3"], found: Callable[[Link], T]
 ) -> tuple[int, T]:
     """The number of the link of a name, or of its segment, that has something at a drawn point, and what was found.
 
@@ -129,5 +129,5 @@ def on_segment(
     MeshError, SceneError
         That of the nearest segment, if none has it.
     """
-    key, thing = on_part({str(k): link for k, link in enumerate(model.links)}, name, at, found)
+    key, thing = on_part({str(k): link for k, link in enumerate(links)}, name, at, found)
     return int(key), thing

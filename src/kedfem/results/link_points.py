@@ -61,7 +61,7 @@ def link_point(model: Model, linked: Linkage, where: str, name: str, at: Drawn) 
     if all(link.name != name for link in model.links):
         raise SceneError(f"{where.removesuffix('.at')}.link: must name a link with a shape, got {name!r}")
     try:
-        k, (value, X) = on_segment(model, name, at, lambda link: _value(link, where, at))
+        k, (value, X) = on_segment(model.links, name, at, lambda link: _value(link, where, at))
     except SceneError:
         held = _held(model, name, at)
         if held is None:

@@ -93,7 +93,7 @@ def _motion(probe: Probe, point: LinkPoint) -> Callable[[Block], Rows]:
 
 def _stress(scene: Scene, model: Model, where: str, name: str, probe: Probe) -> Recorded:
     drawn, kinks = np.asarray(probe.at), _kinks(scene, probe.link)
-    k, at = on_segment(model, probe.link, drawn, lambda link: point_rows(link, where, drawn, kinks))
+    k, at = on_segment(model.links, probe.link, drawn, lambda link: point_rows(link, where, drawn, kinks))
     dofs, dense = used_columns(at.stress)
     nodes, components = np.divmod(dofs, model.links[k].d)
 

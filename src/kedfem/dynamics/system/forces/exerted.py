@@ -3,7 +3,7 @@
 A multiplier is a force along its coordinate; `Supports` turns it into forces and moments at the displaced ends.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side
 from kedfem.dynamics.system.ends import end_of, same_end
 from kedfem.dynamics.system.forces.poses import Vectors
 from kedfem.dynamics.system.forces.supports import Supports
-from kedfem.dynamics.system.record import Constraint, End, Spring
+from kedfem.dynamics.system.record import Spring
 from kedfem.motion.constraints import cross
 
 ELEMENTS = ("motors.", "springs.", "limits.")
@@ -23,19 +23,11 @@ Rows = Float[np.ndarray, "T _ _"]
 def wrench(forces: Supports, joint: ConstraintJoint) -> tuple[Vectors, Vectors, Vectors]:
     """Force of a joint by constraint equations on its link i, moment about its point there, and that point."""
     force, moment, point = np.zeros((3, len(forces), 3))
-    for n, each in enumerate(forces.constraints):
-        for term, ends in _pairs(forces, each) if each.name == joint.name else ():
-            _, x, f, t = ends[0]
-            m = term.factor * forces.of.multiplier[:, n, None]
-            point = forces.point(each, term.i, joint.at)
-            force += m * f
-            moment += m * (t + cross(x - point, f))
+    for each, term, ((_, x, f, t), _) in forces.pushes(joint.name):
+        point = forces.point(each, term.i, joint.at)
+        force += f
+        moment += t + cross(x - point, f)
     return force, moment, point
-
-
-def _pairs(forces: Supports, each: Constraint) -> Iterator[tuple]:  # type: ignore[type-arg]
-    """Terms of a constraint, each with both its ends under a unit multiplier."""
-    return ((term, forces.exerted(each, term)) for term in each.terms)
 
 
 def effort(forces: Supports, name: str) -> Float[np.ndarray, " T"]:
@@ -56,11 +48,10 @@ def springs(forces: Supports) -> tuple[np.ndarray, ...]:
 
 def at_ends(forces: Supports, name: str) -> Float[np.ndarray, "2 2 T 3"]:
     """Force and moment about the world's origin at both ends of a force element."""
-    out, n = np.zeros((2, 2, len(forces), 3)), forces.number(name)
-    for term, ends in _pairs(forces, forces.constraints[n]):
-        m = term.factor * forces.of.multiplier[:, n, None]
+    out = np.zeros((2, 2, len(forces), 3))
+    for _, _, ends in forces.pushes(name):
         for side, (_, x, f, t) in enumerate(ends):
-            out[side] += m * f, m * (t + cross(x, f))
+            out[side] += f, t + cross(x, f)
     return out
 
 
@@ -89,7 +80,9 @@ def on_links(forces: Supports, riders: Mapping[int, tuple[int, np.ndarray]]) -> 
                 nodes = model.joints[k].nodes
             else:
                 k, weights = riders[side.body]
-                pull = _on_rider(forces, row.name, end_of(side, row))
+                end, pull = end_of(side, row), np.zeros((len(forces), 3))
+                for _, _, ends in forces.pushes(row.name):
+                    pull += sum(f for other, _, f, _ in ends if same_end(other, end))
                 pull[:, 2] *= not model.links[k].planar
                 f = np.einsum("n,td->tnd", weights, pull)
                 nodes = np.arange(len(weights))
@@ -110,14 +103,3 @@ def _placed(
             if (gaps.min(axis=0) == 0.0).all():
                 return k, joint.weights[here[gaps.argmin(axis=0)]]
     raise KeyError(name)
-
-
-def _on_rider(forces: Supports, name: str, end: End) -> Vectors:
-    """Force of an element on a rigid slider."""
-    total = np.zeros((len(forces), 3))
-    for n, each in enumerate(forces.constraints):
-        for term, ends in _pairs(forces, each) if each.name == name else ():
-            for other, _, f, _ in ends:
-                if same_end(other, end):
-                    total += term.factor * forces.of.multiplier[:, n, None] * f
-    return total

@@ -3,7 +3,7 @@
 A multiplier is a force along its coordinate: on an end i it is the force m ∂e/∂x_i and the moment m ∂e/∂θ_i.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,9 @@ from kedfem.dynamics.system.forces.poses import Vectors, point_forces, poses, tu
 from kedfem.dynamics.system.record import DISTANCE, GAP, OFFSET, Constraint, End, Term
 from kedfem.motion.constraints import cross
 from kedfem.motion.rigid import RigidMotion
+
+Pushed = tuple[End, Vectors, Vectors, Vectors]
+"""An end with its place, and the force and the moment on it there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +46,7 @@ class Supports:
         """Interface unknowns that a constraint sees; None where the rigid-body motion alone shows its directions."""
         return None if each.linear else self.of.z
 
-    def exerted(self, each: Constraint, term: Term) -> list[tuple[End, Vectors, Vectors, Vectors]]:
+    def exerted(self, each: Constraint, term: Term) -> list[Pushed]:
         """Both ends of a term with their places, and force and moment there of a unit multiplier."""
         ends = [self.of.system.ends[n] for n in (term.i, term.j)]
         if term.kind == OFFSET:
@@ -61,18 +64,17 @@ class Supports:
         turn = turning(term, Q_i, Q_j)
         return [(ends[0], x_i, 0 * x_i, turn), (ends[1], x_j, 0 * x_j, -turn)]
 
+    def pushes(self, name: str) -> Iterator[tuple[Constraint, Term, list[Pushed]]]:
+        """What constraints and laws of a name exert, term by term, on both ends."""
+        for n, each in enumerate(self.constraints):
+            for term in each.terms if each.name == name else ():
+                m = term.factor * self.of.multiplier[:, n, None]
+                yield each, term, [(end, x, m * f, m * t) for end, x, f, t in self.exerted(each, term)]
+
     def _off_line(self, each: Constraint, term: Term) -> OffLine:
         """A pin beside its line, which a term is about."""
         end = self.of.system.ends[term.j]
         return off_line(term.b, self.point(each, term.i, term.a), end, self.motion, self.of.z)
-
-    def _shared(
-        self, each: Constraint, term: Term, end: End, force: Vectors, moment: Vectors
-    ) -> Float[np.ndarray, "T p d"]:
-        """Forces at an end's interface points that do what a term's force and moment on it do."""
-        if term.kind == OFFSET and end.line is not None:
-            return self._off_line(each, term).at_stations(end.line.stations)[:, :, : end.onto.shape[1]]
-        return point_forces(end, self.motion, self.z(each), force, moment)
 
     def point(self, each: Constraint, n: int, at: Float[np.ndarray, "3"]) -> Vectors:
         """Where a point of the body of end n, in the reference position, is as a constraint sees it."""
@@ -104,10 +106,15 @@ class Supports:
         y = np.zeros((len(self), *end.onto.shape[:2]))
         for n, each in enumerate(self.constraints):
             for term in each.terms if each.name == name else ():
+                m = term.factor * self.of.multiplier[:, n, None, None]
                 for other, _, f, t in self.exerted(each, term):
-                    if same_end(other, end):
-                        m = term.factor * self.of.multiplier[:, n, None, None]
-                        y += m * self._shared(each, term, end, f, t)
+                    if not same_end(other, end):
+                        continue
+                    if term.kind == OFFSET and end.line is not None:
+                        on = self._off_line(each, term).at_stations(end.line.stations)
+                        y += m * on[:, :, : end.onto.shape[1]]
+                    else:
+                        y += m * point_forces(end, self.motion, self.z(each), f, t)
         return y
 
 
