@@ -14,9 +14,8 @@ from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics.matrices.substructure import factored
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_body import forcings, motions
-from kedfem.dynamics.segment import CONVERGED
 from kedfem.dynamics.stepping.scheme import generalised_alpha
-from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.solvers import CONVERGED, steps_of
 from kedfem.dynamics.stepping.start import started
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.build import system_of

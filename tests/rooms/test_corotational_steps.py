@@ -8,8 +8,7 @@ import pytest
 
 import kedfem.dynamics.stepping.solvers as runs
 from kedfem.accuracy.reduction import prepared
-from kedfem.dynamics.segment import FREE
-from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.solvers import FREE, steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system import layout
 from kedfem.dynamics.system.steps import Steps

@@ -9,8 +9,7 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy.histories import histories
 from kedfem.accuracy.prepared import meshed
-from kedfem.dynamics.frames import Deformed, deformation, frames_of, rotation
-from kedfem.dynamics.segment import internal_force, position
+from kedfem.dynamics.frames import Deformed, deformation, frame_force, frames_of, position, rotation
 from kedfem.links.beams.beam import beam_link
 from kedfem.links.beams.beam_segments import beam_segments
 from kedfem.links.beams.section import Section, rectangle
@@ -35,12 +34,12 @@ def force(parts: Sequence[Link], u: np.ndarray) -> np.ndarray:
     f, first = np.zeros_like(u), 0
     for part in parts:
         here = slice(first, first + part.n)
-        y, frames = position(part, u[here]), []
+        y = position(part, u[here])
         for frame in frames_of(part):
             Q, angle = rotation(part, frame.fit, y, float(u[here, 2].mean()))
             none = np.zeros_like(y)
-            frames.append(Deformed(Q, angle, deformation(part, y, Q, angle), none, none))
-        f[here] += internal_force(part, y, np.eye(3), frames, np.zeros((3, *y.shape)), 0.0)[0]
+            now = Deformed(Q, angle, deformation(part, y, Q, angle), none, none)
+            f[here] += frame_force(part, frame, now, y, 0.0)[0]
         first += part.n - 1
     return f
 

@@ -84,7 +84,7 @@ def elastic_model(
             on, carrier = with_scene_body(scene, f"bodies.{key}", body, links)
             links[on] = carrier
     prescribed = tuple(
-        PrescribedBody(_prescribed(links.pop(name)), linkage.bodies.index(name), hub, ())
+        PrescribedBody(x if (x := links.pop(name)).rigid else rigid(x), linkage.bodies.index(name), hub, ())
         for name in [*cut, *ground] if (hub := hub_of(scene, name)) is not None
     )  # fmt: skip
     if not links:
@@ -131,11 +131,6 @@ def _shared(name: str, link: Segments) -> list[SharedCut]:
         for cut in link.cuts
         for a, b in [cut.segments]
     ]
-
-
-def _prescribed(link: Link) -> Link:
-    """A rigid link, or a moving part of the ground, which is one already."""
-    return link if link.rigid else rigid(link)
 
 
 def hub_of(scene: Scene, name: str) -> str | None:

@@ -49,18 +49,11 @@ def rotation(
     ----------
     angle : an earlier one
     """
-    if link.planar:
-        A = y[:, :2].T @ fit[:, :2]
-        turn = np.arctan2(A[1, 0] - A[0, 1], A[0, 0] + A[1, 1])
-        turn += 2 * np.pi * np.round((angle - turn) / (2 * np.pi))
-        return planar_rotation(float(turn), link.d), float(turn)
-    A = y.T @ fit
-    left, _, right = np.linalg.svd(A)
-    Q = left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))]) @ right
-    # once more by Newton: a slender segment shows its twist by small numbers
-    U = Q.T @ A
-    axial = np.array([U[2, 1] - U[1, 2], U[0, 2] - U[2, 0], U[1, 0] - U[0, 1]])
-    return Q @ exponential(np.linalg.solve(np.trace(U) * np.eye(3) - (U + U.T) / 2, axial)), 0.0
+    Q = mean_rotations(link, fit, y[None])[0]
+    if not link.planar:
+        return Q, 0.0
+    turn = np.arctan2(Q[1, 0], Q[0, 0])
+    return Q, float(turn + 2 * np.pi * np.round((angle - turn) / (2 * np.pi)))
 
 
 def mean_rotations(
@@ -77,17 +70,11 @@ def mean_rotations(
     left, _, right = np.linalg.svd(A)
     left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
     Q = left @ right
+    # once more by Newton: a slender segment shows its twist by small numbers
     U = Q.transpose(0, 2, 1) @ A
     axial = np.stack([U[:, 2, 1] - U[:, 1, 2], U[:, 0, 2] - U[:, 2, 0], U[:, 1, 0] - U[:, 0, 1]], axis=1)
     G = np.trace(U, axis1=1, axis2=2)[:, None, None] * np.eye(3) - (U + U.transpose(0, 2, 1)) / 2
     return np.asarray(Q @ exponential(np.linalg.solve(G, axial[:, :, None])[:, :, 0]))
-
-
-def planar_rotation(angle: float, d: int) -> Float[np.ndarray, "d d"]:
-    """A turn about z, of rows (u, v) or (u, v, ψ)."""
-    Q = np.eye(d)
-    Q[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-    return Q
 
 
 def deformation(link: Link, y: Nodal, Q: Float[np.ndarray, "d d"], angle: float) -> Nodal:
@@ -150,3 +137,16 @@ def frame_force(link: Link, frame: Frame, now: Deformed, y: Nodal, beta: float) 
 
 def _times(K: np.ndarray, g: Nodal) -> Nodal:
     return np.asarray((K @ g.ravel()).reshape(g.shape))
+
+
+def position(link: Link, u: Float[np.ndarray, "... n d"]) -> Float[np.ndarray, "... n d"]:
+    """Position of a segment displaced by u, both in the rigid-body frame; of a planar beam (x, y, ψ)."""
+    X = link.X[:, : link.d]
+    return np.asarray((X * [1, 1, 0] if link.kind == "beam" else X) + u)
+
+
+def mean_orientation(link: Link, u: Nodal, R: Float[np.ndarray, "d d"]) -> Float[np.ndarray, "d d"]:
+    """Mean orientation of a segment displaced by u, link to world; R where it keeps the rigid-body frame."""
+    if link.fit is None:
+        return R
+    return np.asarray(R @ mean_rotations(link, link.fit, position(link, u @ R)[None])[0])

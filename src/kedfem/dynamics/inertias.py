@@ -11,7 +11,7 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.joints.places import slider_axis
-from kedfem.dynamics.loads import Pattern, Times, amounts, patterns
+from kedfem.dynamics.loads import Pattern, Times, patterns, shares
 from kedfem.dynamics.model import Model
 from kedfem.links.bodies import euler_tensor
 from kedfem.links.record import Link, in_space
@@ -179,7 +179,8 @@ def load_wrench(
     load: RigidLoad, motion: RigidMotion
 ) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]:
     """Force and moment of a load over time, about the point drawn at the linkage's centre."""
-    R, factor = motion.R[:, load.body], amounts(load, motion, load.body)[:, None]
+    R, factor = motion.R[:, load.body], load.factor(motion.t, motion.phi)
+    factor = (factor * shares(load.share, motion, load.body))[:, None]
     N = R @ load.moment
     force = np.broadcast_to(load.force, (len(R), 3))
     if load.follows:

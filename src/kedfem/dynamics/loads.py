@@ -5,7 +5,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -210,32 +209,20 @@ def rigid_acceleration(link: Link, motion: RigidMotion, body: int) -> Float[np.n
     return motion.p2[:, body, : link.d]
 
 
-class Varying(Protocol):
-    """A load whose amount varies over time."""
-
-    @property
-    def factor(self) -> Callable[[Times, Times], Times]:
-        """As in `Pattern`."""
-
-    @property
-    def share(self) -> tuple[Vector, Vector] | None:
-        """As in `Pattern`."""
-
-
-def amounts(load: Varying, motion: RigidMotion, body: int) -> Float[np.ndarray, " T"]:
+def amounts(load: Pattern, motion: RigidMotion, body: int) -> Float[np.ndarray, " T"]:
     """What a load's forces are multiplied by over time."""
-    factor = load.factor(motion.t, motion.phi)
-    if load.share is None:
-        return factor
-    drawn, fixed = load.share
-    return np.asarray(factor * (motion.R[:, body] @ drawn @ fixed))
+    return load.factor(motion.t, motion.phi) * shares(load.share, motion, body)
+
+
+def shares(
+    share: tuple[Vector, Vector] | None, motion: RigidMotion, body: int
+) -> Float[np.ndarray, " T"] | float:
+    """The cosine that a load's factor is multiplied by, see `Pattern`."""
+    return 1.0 if share is None else np.asarray(motion.R[:, body] @ share[0] @ share[1])
 
 
 def applied(
-    link: Link,
-    loads: tuple[Pattern, ...],
-    motion: RigidMotion,
-    body: int,
+    link: Link, loads: tuple[Pattern, ...], motion: RigidMotion, body: int
 ) -> Float[np.ndarray, "T n d"]:
     """P − M R0'' over time, world components, [KED, eqs. (17)(18)]: R0'' = 1 ⊗ p'' + X R''ᵀ.
 
@@ -264,14 +251,7 @@ def unit_forces(
     F = np.zeros((len(motion.t), link.n, link.d))
     for load in loads:
         if load.load == name:
-            share = amounts(replace(load, factor=_always), motion, body)
-            F += share[:, None, None] * _in_world(link, load, motion, body)
+            R = motion.R[:, body, : link.d, : link.d].transpose(0, 2, 1)
+            share = np.reshape(shares(load.share, motion, body), (-1, 1, 1))
+            F += share * (load.forces @ R if load.follows else load.forces)
     return F
-
-
-def _in_world(
-    link: Link, load: Pattern, motion: RigidMotion, body: int
-) -> Float[np.ndarray, "n d"] | Float[np.ndarray, "T n d"]:
-    """Its nodal forces, world components; as the rigid-body motion turns them, if they follow their link."""
-    R = motion.R[:, body, : link.d, : link.d].transpose(0, 2, 1)
-    return load.forces @ R if load.follows else load.forces

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.joints.attachments import Attachment, SharedCut
+from kedfem.dynamics.joints.attachments import SharedCut
 from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.model import Model, Slider, link_keys
 from kedfem.links.record import Link
@@ -21,7 +21,8 @@ def reduced_model(model: Model, functions: Sequence[Float[np.ndarray, "_ s"] | N
         if Q is not None:
             links[k] = link = reduced(model.links[k], Q)
             cuts = tuple(_cut_on(cut, names[k], link) for cut in cuts)
-            joints[k] = _joint_on(model.joints[k], link)
+            on, joint = on_functions(link), model.joints[k]
+            joints[k] = replace(joint, nodes=np.arange(link.n), weights=joint.weights @ on[joint.nodes])
             loads[k] = tuple(_load_on(load, link) for load in model.loads[k])
             sliders = [slider_on(slider, link) if slider.carrier == k else slider for slider in sliders]
     return replace(
@@ -44,11 +45,6 @@ def restored_model(model: Model) -> Model:
 def _with_links(model: Model, changed: Callable[[Link], Link]) -> Model:
     prescribed = tuple(replace(x, link=changed(x.link)) for x in model.prescribed)
     return replace(model, links=tuple(map(changed, model.links)), prescribed=prescribed)
-
-
-def _joint_on(joint: Attachment, link: Link) -> Attachment:
-    """A joint of the full link on the functions of the reduced one."""
-    return replace(joint, nodes=np.arange(link.n), weights=joint.weights @ on_functions(link)[joint.nodes])
 
 
 def _load_on(load: Pattern, link: Link) -> Pattern:

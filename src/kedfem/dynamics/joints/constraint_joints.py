@@ -68,10 +68,10 @@ class ConstraintJoint:
     bodies: tuple[int, int]
     sides: tuple[Side | None, Side | None]
     axis: Float[np.ndarray, "3"] = field(default_factory=lambda: np.eye(3)[2])
-    gap: Float[np.ndarray, "r 3"] = NO_ROWS
-    turn: Float[np.ndarray, "r 3"] = NO_ROWS
-    stiffness: Float[np.ndarray, " r"] = NO_ROWS[:, 0]
-    damping: Float[np.ndarray, " r"] = NO_ROWS[:, 0]
+    gap: Float[np.ndarray, "r 3"] = field(default_factory=lambda: NO_ROWS)
+    turn: Float[np.ndarray, "r 3"] = field(default_factory=lambda: NO_ROWS)
+    stiffness: Float[np.ndarray, " r"] = field(default_factory=lambda: NO_ROWS[:, 0])
+    damping: Float[np.ndarray, " r"] = field(default_factory=lambda: NO_ROWS[:, 0])
     cross: tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]] | None = None
     plus: "tuple[tuple[float, ConstraintJoint], ...]" = ()
 

@@ -2,7 +2,7 @@
 slot."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -49,7 +49,7 @@ class Own:
     """
 
     key: str = ""
-    points: Float[np.ndarray, "p 3"] = NO_ROWS
+    points: Float[np.ndarray, "p 3"] = field(default_factory=lambda: NO_ROWS)
     weights: Float[np.ndarray, "p n"] | Sequence[Float[np.ndarray, " _"]] = ()
     keys: tuple[str, ...] = ()
     slider: str = ""

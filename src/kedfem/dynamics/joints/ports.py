@@ -33,11 +33,11 @@ def port_rotation(attachment: Attachment, R: Rotation) -> Float[np.ndarray, "q q
     return np.where(port[:, None] == port, R[component[:, None], component], 0.0)
 
 
-def port_vectors(attachment: Attachment, force: Float[np.ndarray, " q"]) -> Float[np.ndarray, "p d"]:
+def port_vectors(attachment: Attachment, force: Float[np.ndarray, "*T q"]) -> Float[np.ndarray, "*T p d"]:
     """Port forces as one row per port, zero where a component is not held."""
-    full = np.zeros((len(attachment.weights), attachment.components))
-    full.ravel()[attachment.keep] = force
-    return full
+    full = np.zeros((*force.shape[:-1], len(attachment.weights) * attachment.components))
+    full[..., attachment.keep] = force
+    return full.reshape(*force.shape[:-1], -1, attachment.components)
 
 
 def add_port_forces(out: Nodal, attachment: Attachment, force: Float[np.ndarray, " q"]) -> None:
@@ -49,9 +49,7 @@ def turned_vectors(
     attachment: Attachment, R: Float[np.ndarray, "T d d"], force: Float[np.ndarray, "T q"]
 ) -> Float[np.ndarray, "T p d"]:
     """R λ over time, a row per port in world components, zero where a component is not held."""
-    vectors = np.zeros((len(force), len(attachment.weights), attachment.components))
-    vectors.reshape(len(force), -1)[:, attachment.keep] = force
-    return np.asarray(vectors @ R.transpose(0, 2, 1))
+    return np.asarray(port_vectors(attachment, force) @ R.transpose(0, 2, 1))
 
 
 def turned_ports(

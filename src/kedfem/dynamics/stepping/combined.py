@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.frames import mean_rotations
+from kedfem.dynamics.frames import mean_rotations, position
 from kedfem.dynamics.history import Block, LinkHistory, multipliers_together
 from kedfem.dynamics.joints.ports import turned_vectors
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.segment import position
 from kedfem.motion.rigid import RigidMotion
 
 SIXTH = 0.5  # least ρ∞ at which h⁴ is removed before h³ (docs/performance/levels.md)

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_body import POINTS, drive_range
 from kedfem.dynamics.rigid_elements import rigid_elements_of
-from kedfem.dynamics.segment import CONVERGED, FREE
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stiffening import Stiffening, stiffening
 from kedfem.dynamics.system.steps import Steps, scene_system
@@ -14,6 +13,8 @@ from kedfem.motion.path import path
 from kedfem.scene import Scene, corotational, time_grid
 
 BLOCK_BYTES = 64_000_000
+CONVERGED = 1e-7  # change of a iteration, of the largest that a step has made
+FREE = 1e-9  # the same where nothing holds the motion as a whole: what is left of each step adds up in it
 
 
 def steps_of(scene: Scene, model: Model) -> Steps:

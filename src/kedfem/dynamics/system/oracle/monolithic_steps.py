@@ -5,9 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.frames import frames_of
+from kedfem.dynamics.frames import frames_of, mean_orientation
 from kedfem.dynamics.matrices.dense import coordinates
-from kedfem.dynamics.segment import mean_orientation
 from kedfem.dynamics.system.blank import empty_history
 from kedfem.dynamics.system.layout import points_of
 from kedfem.dynamics.system.march import Motion, Ready, displacements

@@ -8,9 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from kedfem.arrays import Float
-from kedfem.dynamics.frames import Deformed, frames_of, seen_from
+from kedfem.dynamics.frames import Deformed, frame_force, frames_of, mean_orientation, position, seen_from
 from kedfem.dynamics.matrices.dense import component_first, coordinates, rows_of, work_on
-from kedfem.dynamics.segment import internal_force, mean_orientation, position
 from kedfem.dynamics.stepping.state import Nodal
 from kedfem.dynamics.system.blank import empty_state, empty_trial, room
 from kedfem.dynamics.system.layout import points_of
@@ -200,8 +199,11 @@ def inside(
         elastic = still.sprung(k, R, u)
         f = elastic + work_on(of.parts[k], damped[1] @ R[:d, :d].T).ravel()
         return Inside(f, mean, frames, damped, g, 0.5 * float(elastic @ u))
-    force, energy = internal_force(link, y, R[:d, :d], frames, damped, damping.beta)
-    return Inside(work_on(of.parts[k], force).ravel(), mean, frames, damped, g, energy)
+    force, energy = damped[1], 0.0
+    for frame, now in zip(frames_of(link), frames, strict=True):
+        own_force, own_energy = frame_force(link, frame, now, y, damping.beta)
+        force, energy = force + own_force, energy + own_energy
+    return Inside(work_on(of.parts[k], force @ R[:d, :d].T).ravel(), mean, frames, damped, g, energy)
 
 
 def remembered(of: Ready, k: int, found: Inside, state: State) -> None:

@@ -20,8 +20,8 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from kedfem.arrays import Bool, Float
+from kedfem.dynamics.frames import mean_orientation
 from kedfem.dynamics.matrices.dense import coordinates
-from kedfem.dynamics.segment import mean_orientation
 from kedfem.dynamics.system.record import COROTATIONAL
 from kedfem.dynamics.system.sparse import momentum
 from kedfem.dynamics.system.starts.instant import Flat, Instant
