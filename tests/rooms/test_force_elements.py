@@ -15,10 +15,8 @@ from kedfem.dynamics.force_element import (
     DISTANCE,
     PAIR,
     POINT,
-    POSITION,
     SINGLE,
     SLIDE,
-    SPEED,
     TURN,
     End,
     ForceElement,
@@ -33,6 +31,7 @@ from kedfem.dynamics.history import Block, LinkHistory
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.system.forces.exerted import at_ends
 from kedfem.dynamics.system.forces.supports import supports
+from kedfem.dynamics.system.record import COORDINATE, RATE, TIME, Curve, Law, Spring
 from kedfem.errors import MeshError, SceneError
 from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.linkage import linkage
@@ -57,12 +56,12 @@ def straight(at: tuple[float, ...], value: tuple[float, ...]) -> Pieces:
     return pieces(Factor(at=at, value=value))
 
 
-def hinge(one: int, other: int, axis: np.ndarray, **law: Any) -> ForceElement:
+def hinge(one: int, other: int, axis: np.ndarray, law: Law | None = None) -> ForceElement:
     """A hinge whose ends show themselves in two ways; the second is drawn turned by 0.4 rad about the axis."""
     e = np.array(perpendiculars(axis))
     aside = Rotation.from_rotvec(0.4 * axis).apply(e)
     X = {PAIR: (e, e), SINGLE: ([e[0], axis], [aside[0], axis]), ANGLE: (np.zeros(3), np.zeros(3))}
-    return ForceElement("h", TURN, (end(one, X[one][0]), end(other, X[other][1])), axis=axis, **law)
+    return ForceElement("h", TURN, (end(one, X[one][0]), end(other, X[other][1])), law, axis)
 
 
 def drawn(element: ForceElement) -> np.ndarray:
@@ -78,7 +77,7 @@ def found(
     """Forces (2, 2, 3), where no hub is deformed, and q, q', Q of one force element."""
     unit = unit_forces(element, x[None])[0]
     q, rate = coordinate(element, x[None], before), np.atleast_1d(0.0 if v is None else (unit * v).sum())
-    Q = effort(element, resting(1, np.array([t])), q, rate)
+    Q = effort(element.law, resting(1, np.array([t])), q, rate)
     return Q * unit, np.array([q[0], rate[0], Q[0]])
 
 
@@ -105,7 +104,6 @@ def turned(x: np.ndarray, element: ForceElement, turns: Sequence[np.ndarray]) ->
     return out
 
 
-LAWS = {"stiffness": 3.0, "free": 0.7}
 FORMS = [(PAIR, PAIR), (PAIR, SINGLE), (SINGLE, PAIR), (SINGLE, SINGLE)]
 UPRIGHT = [(ANGLE, ANGLE), (ANGLE, PAIR), (PAIR, ANGLE), (ANGLE, SINGLE), (SINGLE, ANGLE)]
 vectors = st.lists(st.floats(-1, 1), min_size=3, max_size=3).map(np.array)
@@ -145,7 +143,7 @@ def test_a_turn_does_not_depend_on_where_all_of_it_is_turned(
     one: int, other: int, seed: int, whole: np.ndarray, angle: float
 ) -> None:
     axis = unit(seed)
-    element = hinge(one, other, axis, **LAWS)
+    element = hinge(one, other, axis, Spring(3.0, free=0.7))
     x = turned(drawn(element), element, [angle * axis, 0 * axis])
     R = Rotation.from_rotvec(3 * whole)
     f, values = found(element, x, before=angle)
@@ -164,7 +162,7 @@ def test_the_work_of_a_torque_is_that_of_its_turn(one: int, other: int, seed: in
     """Forces · δx = Q δq by central differences, along any deformation."""
     rng = np.random.default_rng(seed)
     axis = unit(seed) if ANGLE not in (one, other) else Z
-    element = hinge(one, other, axis, curve=straight((0.0,), (2.5,)))
+    element = hinge(one, other, axis, Curve(TIME, straight((0.0,), (2.5,))))
     x = turned(drawn(element), element, [rng.uniform(-2, 2) * axis, 0 * axis])
     v = rng.normal(size=x.shape)
     f, values = found(element, x, v)
@@ -178,7 +176,7 @@ def test_the_work_of_a_torque_is_that_of_its_turn(one: int, other: int, seed: in
 def test_torques_on_both_ends_balance(one: int, other: int) -> None:
     """Σ x × f over all directions is the moment, T n on the first end."""
     axis = unit(3)
-    element = hinge(one, other, axis, curve=straight((0.0,), (2.5,)))
+    element = hinge(one, other, axis, Curve(TIME, straight((0.0,), (2.5,))))
     x = turned(drawn(element), element, [0.9 * axis, 0.2 * axis])
     moments = np.cross(x, found(element, x)[0]).sum(axis=1)
     np.testing.assert_allclose(moments, [2.5 * axis, -2.5 * axis], atol=1e-12)
@@ -186,7 +184,7 @@ def test_torques_on_both_ends_balance(one: int, other: int) -> None:
 
 def test_a_planar_beam_takes_the_torque_on_its_angle() -> None:
     for axis in (Z, -Z):
-        element = hinge(ANGLE, ANGLE, axis, curve=straight((0.0,), (2.5,)))
+        element = hinge(ANGLE, ANGLE, axis, Curve(TIME, straight((0.0,), (2.5,))))
         f, _ = found(element, turned(drawn(element), element, [4 * Z, 1 * Z]))
         np.testing.assert_allclose(f[:, 0], [2.5 * axis, -2.5 * axis], atol=1e-12)
         assert not f[:, 1].any()
@@ -196,7 +194,7 @@ def test_a_planar_beam_takes_the_torque_on_its_angle() -> None:
 
 
 def test_a_torsion_spring_turns_back() -> None:
-    element = hinge(PAIR, PAIR, Z, stiffness=3.0, damping=0.5, free=0.2)
+    element = hinge(PAIR, PAIR, Z, Spring(3.0, 0.5, 0.2))
     x0 = drawn(element)
     x = turned(x0, element, [1.2 * Z, 0 * Z])
     v = np.zeros_like(x)
@@ -206,7 +204,9 @@ def test_a_torsion_spring_turns_back() -> None:
 
 
 def test_a_spring_between_points_pulls_along_its_line() -> None:
-    element = ForceElement("s", DISTANCE, (end(POINT, [0, 0, 0]), end(POINT, [3, 4, 0])), 10.0, 2.0, 4.0)
+    element = ForceElement(
+        "s", DISTANCE, (end(POINT, [0, 0, 0]), end(POINT, [3, 4, 0])), Spring(10.0, 2.0, 4.0)
+    )
     x, v = drawn(element), np.zeros((2, 2, 3))
     v[1, 0] = [1, 0, 0]  # lengthens it by 3/5
     f, values = found(element, x, v)
@@ -215,7 +215,7 @@ def test_a_spring_between_points_pulls_along_its_line() -> None:
 
 
 def test_a_spring_of_no_length_has_no_direction() -> None:
-    element = ForceElement("s", DISTANCE, (end(POINT, [1, 0, 0]), end(POINT, [1, 0, 0])), 10.0, 2.0, 0.0)
+    element = ForceElement("s", DISTANCE, (end(POINT, [1, 0, 0]), end(POINT, [1, 0, 0])), Spring(10.0, 2.0))
     f, values = found(element, drawn(element))
     assert not f.any()
     assert not values.any()
@@ -224,7 +224,7 @@ def test_a_spring_of_no_length_has_no_direction() -> None:
 def test_a_slide_is_pushed_along_its_axis() -> None:
     axis = unit(5)
     element = ForceElement("m", SLIDE, (end(POINT, [1, 2, 3]), end(POINT, [1, 2, 3], -1)), axis=axis,
-                    over=POSITION, curve=straight((0.0, 1.0), (0.0, 8.0)))  # fmt: skip
+                           law=Curve(COORDINATE, straight((0.0, 1.0), (0.0, 8.0))))  # fmt: skip
     x = drawn(element)
     x[0, 0] += 0.25 * axis + 7 * np.array(perpendiculars(axis)[0])
     f, values = found(element, x)
@@ -232,21 +232,21 @@ def test_a_slide_is_pushed_along_its_axis() -> None:
     np.testing.assert_allclose(f[:, 0], [2 * axis, -2 * axis], atol=1e-12)
 
 
-@pytest.mark.parametrize("over", [0, SPEED, POSITION])
+@pytest.mark.parametrize("over", [TIME, RATE, COORDINATE])
 def test_a_curve_is_linear_between_its_points_and_held_outside(over: int) -> None:
     at, value = (-1.0, 0.5, 2.0), (5.0, -1.0, 3.0)
-    element = hinge(PAIR, PAIR, Z, over=over, curve=straight(at, value))
+    element = hinge(PAIR, PAIR, Z, Curve(over, straight(at, value)))
     x0 = drawn(element)
     for s in np.linspace(-2, 3, 21):
-        x = turned(x0, element, [(s if over == POSITION else 0.3) * Z, 0 * Z])
+        x = turned(x0, element, [(s if over == COORDINATE else 0.3) * Z, 0 * Z])
         v = np.zeros_like(x)
-        v[0] = np.cross((s if over == SPEED else 0.1) * Z, x[0])
-        got = found(element, x, v, t=s if not over else 9.0)[1][2]
+        v[0] = np.cross((s if over == RATE else 0.1) * Z, x[0])
+        got = found(element, x, v, t=s if over == TIME else 9.0)[1][2]
         assert got == pytest.approx(np.interp(s, at, value), abs=1e-12)
 
 
 def test_several_times_at_once_are_as_one_by_one() -> None:
-    spring_ = ForceElement("s", DISTANCE, (end(POINT, [0, 0, 0]), end(POINT, [1, 0, 0])), 2.0)
+    spring_ = ForceElement("s", DISTANCE, (end(POINT, [0, 0, 0]), end(POINT, [1, 0, 0])))
     t = np.linspace(0, 2, 9)
     for element in (hinge(PAIR, PAIR, Z), spring_, hinge(ANGLE, PAIR, Z)):
         x = np.array([turned(drawn(element), element, [2 * s * Z, -s * Z]) for s in t])
@@ -382,7 +382,7 @@ def test_a_spring_hangs_on_points_of_links_sliders_and_the_ground() -> None:
         "springs/tip",
         "springs/shoe",
     ]
-    assert (tip.free, shoe.free) == (2.0, 0.0)
+    assert (tip.law, shoe.law) == (Spring(10.0, free=2.0), Spring(10.0))
     x = state_of(tip, model, lambda k, X: np.array([[0.0, 0.5, 9.0]] * len(X)))
     np.testing.assert_allclose(found(tip, x)[1][0], 1.5)
     # shorter than free, it pushes down; and never by a moment on ψ
@@ -484,7 +484,7 @@ def test_channels_and_forces_are_those_of_laws_where_links_are(kind: str) -> Non
             q = coordinate(element, x, before[i])
             unit, before[i] = gradient(element, x, q), q[-1]
             rate = (unit * v).sum(axis=(1, 2, 3))
-            Q = effort(element, block.motion, q, rate)
+            Q = effort(element.law, block.motion, q, rate)
             values = {"angle": q, "length": q, "speed": rate, "torque": Q, "force": -Q}
             for what in values.keys() & {
                 x.rpartition("/")[2] for x in got if x.startswith(f"{element.name}/")

@@ -4,29 +4,22 @@ A force element has two ends. An end is up to two vectors of a link, linear in i
 hinge. Its coordinate q depends on these vectors alone, and its force Q acts on them as Q ∂q/∂x.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.history import LinkHistory
+from kedfem.dynamics.system.record import Curve, Factor, Law, Spring, Stop, Times
 from kedfem.motion.constraints import cross, perpendiculars
 from kedfem.motion.rigid import RigidMotion
-from kedfem.scene import Pieces
 
 TURN, SLIDE, DISTANCE = 0, 1, 2
 POINT, PAIR, SINGLE, ANGLE = 0, 1, 2, 3
-TIME, SPEED, POSITION = 0, 1, 2
-OVER = {"time": TIME, "speed": SPEED, "angle": POSITION, "travel": POSITION, "length": POSITION}
 IN_SPACE = (1.0, 1.0, 1.0)
 
 Vector = Float[np.ndarray, "3"]
-Times = Float[np.ndarray, " T"]
-Factor = Callable[[Times, Times], Times]
-
-
-NO_CURVE = Pieces()
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,24 +55,15 @@ class ForceElement:
     name : ``motors/NAME``, ``springs/NAME``, ``limits/NAME`` or ``joints/NAME``
     kind : TURN, SLIDE, DISTANCE
     ends : the coordinate is that of the first against the second
-    stiffness, damping, free : of a spring, free where it has no force
-    factor : of a spring, times (T,) and the drive's angles (T,) → what its stiffness is multiplied by; none: one
-    limits : of a stop, between which it has no force; none: no stop
+    law : of its force; none of a hinge whose turn alone is examined
     axis : of a hinge or slide, in the reference position
-    over, curve : force along the coordinate, of a motor or beside a spring's; none: no points
     """
 
     name: str
     kind: int
     ends: tuple[End, End]
-    stiffness: float = 0.0
-    damping: float = 0.0
-    free: float = 0.0
-    factor: Factor | None = None
-    limits: tuple[float, float] | None = None
+    law: Law | None = None
     axis: Vector = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
-    over: int = 0
-    curve: Pieces = NO_CURVE
 
 
 def stiffness_factors(every: Sequence[Factor | None], t: Times, phi: Times) -> Float[np.ndarray, "T A"]:
@@ -193,16 +177,20 @@ def unit_forces(element: ForceElement, x: Vectors) -> Vectors:
     return out
 
 
-def effort(element: ForceElement, motion: RigidMotion, q: Times, rate: Times) -> Times:
-    """Q along the coordinate at the times of a motion."""
-    stretch = q - np.clip(q, *(element.limits or (element.free, element.free)))
-    stiffness = element.stiffness * stiffness_factors([element.factor], motion.t, motion.phi)[:, 0]
-    Q = -stiffness * stretch - element.damping * rate
-    if element.limits:  # a stop pushes, and only beyond
-        Q = np.where(Q * stretch < 0.0, Q, 0.0)
-    if len(element.curve.at):
-        Q = Q + element.curve((motion.t, rate, q)[element.over])[0]
-    return np.asarray(Q)
+def effort(law: Law | None, motion: RigidMotion, q: Times, rate: Times) -> Times:
+    """The force of a law along its coordinate at the times of a motion."""
+    match law:
+        case Curve(over=over, force=force):
+            return force((motion.t, rate, q)[over])[0]
+        case Spring(stiffness=k, damping=c, free=free, factor=factor, curve=curve):
+            along = k * stiffness_factors([factor], motion.t, motion.phi)[:, 0] * (free - q) - c * rate
+            return along if curve is None else along + effort(curve, motion, q, rate)
+        case Stop(lower=lower, upper=upper, stiffness=k, damping=c):
+            beyond = q - np.clip(q, lower, upper)
+            Q = -k * beyond - c * rate
+            return np.where(Q * beyond < 0.0, Q, 0.0)  # it pushes, and only beyond
+        case _:
+            return np.zeros_like(q)
 
 
 def wrench(

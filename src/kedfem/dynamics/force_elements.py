@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -11,7 +10,6 @@ from kedfem.dynamics.force_element import (
     ANGLE,
     DISTANCE,
     IN_SPACE,
-    OVER,
     PAIR,
     POINT,
     SINGLE,
@@ -21,15 +19,31 @@ from kedfem.dynamics.force_element import (
     ForceElement,
     Vector,
 )
+from kedfem.dynamics.joints.constraint_joints import ordered
 from kedfem.dynamics.joints.places import slider_axis, surface_of
 from kedfem.dynamics.model import Model, Slider, on_segment
+from kedfem.dynamics.system.record import OVER, Curve, Law, Stop
+from kedfem.dynamics.system.record import Spring as SpringLaw
 from kedfem.errors import MeshError
 from kedfem.links.point_rows import point_rows, require_on_axis
 from kedfem.links.record import Link
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, face_normal, holds, port_weights
 from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.joint_equations import joint_axis
-from kedfem.scene import GROUND, Limit, LineSpring, Motor, Scene, Spring, TravelLimit, factor_law, pieces
+from kedfem.scene import (
+    GROUND,
+    AngleLimit,
+    Limit,
+    LineSpring,
+    Motor,
+    Scene,
+    Spring,
+    TorsionSpring,
+    TravelLimit,
+    factor_law,
+    is_constant,
+    pieces,
+)
 
 
 def force_elements(scene: Scene, model: Model) -> tuple[ForceElement, ...]:
@@ -54,10 +68,34 @@ def rigid_elements(scene: Scene, bodies: Sequence[str]) -> tuple[ForceElement, .
 
 
 def _all(find: "_Ends") -> tuple[ForceElement, ...]:
-    motors = [_motor(find, name, motor) for name, motor in find.scene.motors.items()]
-    springs = [_spring(find, name, spring) for name, spring in find.scene.springs.items()]
-    limits = [_limit(find, name, limit) for name, limit in find.scene.limits.items()]
-    return (*motors, *springs, *limits)
+    every = (("motors", find.scene.motors), ("springs", find.scene.springs), ("limits", find.scene.limits))
+    return tuple(_element(find, kind, name, each) for kind, of in every for name, each in of.items())
+
+
+def law_of(element: Spring | Motor | Limit) -> Law:
+    """The law of a spring, motor or limit of a scene."""
+    match element:
+        case TorsionSpring() | LineSpring():
+            given, factor = element.curve, element.stiffness_factor
+            curve = None if given is None else Curve(OVER[given.over], pieces(given).negative)
+            if is_constant(factor):
+                return SpringLaw(
+                    factor.value[0] * element.stiffness, element.damping, element.free, curve=curve
+                )
+            return SpringLaw(
+                element.stiffness, element.damping, element.free, factor=factor_law(factor), curve=curve
+            )
+        case AngleLimit() | TravelLimit():
+            return Stop(*element.range, element.stiffness, element.damping)
+        case _:
+            return Curve(OVER[element.curve.over], pieces(element.curve))
+
+
+def on_hinge(element: Spring | Motor | Limit) -> bool:
+    """Whether a spring, motor or limit acts on the turn of its joint, not on a travel or distance."""
+    if isinstance(element, Motor):
+        return element.torque is not None
+    return isinstance(element, TorsionSpring | AngleLimit)
 
 
 def hinges(scene: Scene, model: Model) -> tuple[ForceElement, ...]:
@@ -146,14 +184,9 @@ def _in_face(where: str, link: Link, surface: CouplingSurface, axis: Vector) -> 
     return np.asarray(t / np.linalg.norm(t))
 
 
-def _ordered(links: tuple[str, str]) -> tuple[str, str]:
-    """The links of a joint: the first that is not the ground, and the other."""
-    return (links[1], links[0]) if links[0] == GROUND else links
-
-
 def _hinge(find: _Ends, name: str, joint: str) -> ForceElement:
     """A force element on the turn of a hinge, without a force yet."""
-    one, other = _ordered(find.scene.joints[joint].links)
+    one, other = ordered(find.scene.joints[joint])
     ends = (find.across(joint, one), find.across(joint, other))
     return ForceElement(name, TURN, ends, axis=joint_axis(find.scene.joints[joint]))
 
@@ -161,36 +194,19 @@ def _hinge(find: _Ends, name: str, joint: str) -> ForceElement:
 def _slide(find: _Ends, name: str, joint: str) -> ForceElement:
     """A force element on the travel of a slide, without a force yet: the port of its link against the other."""
     at = np.asarray(find.scene.joints[joint].at)
-    one, other = _ordered(find.scene.joints[joint].links)
+    one, other = ordered(find.scene.joints[joint])
     axis, end = joint_axis(find.scene.joints[joint]), find.point(f"joints.{joint}", other, at)
     if end.k < 0 and other != GROUND:  # it turns with what it is on
         end = replace(end, X=np.array([at, axis]), weights=np.zeros((2, 0)))
     return ForceElement(name, SLIDE, (find.port(joint, one, at), end), axis=axis)
 
 
-def _motor(find: _Ends, name: str, motor: Motor) -> ForceElement:
-    curve = motor.curve
-    made = (_hinge if motor.torque is not None else _slide)(find, f"motors/{name}", motor.joint)
-    return replace(made, over=OVER[curve.over], curve=pieces(curve))
-
-
-def _spring(find: _Ends, name: str, spring: Spring) -> ForceElement:
-    factor = factor_law(spring.stiffness_factor)
-    law: dict[str, Any] = {
-        "stiffness": spring.stiffness, "damping": spring.damping, "free": spring.free, "factor": factor,
-    }  # fmt: skip
-    if spring.curve is not None:
-        law |= {"over": OVER[spring.curve.over], "curve": pieces(spring.curve).negative}
-    if not isinstance(spring, LineSpring) or spring.between is None:
-        made = _slide if isinstance(spring, LineSpring) else _hinge
-        return replace(made(find, f"springs/{name}", str(spring.joint)), **law)
-    one, other = (
-        find.point(f"springs.{name}.between[{i}].at", end.link, np.asarray(end.at))
-        for i, end in enumerate(spring.between)
-    )
-    return ForceElement(f"springs/{name}", DISTANCE, (one, other), **law)
-
-
-def _limit(find: _Ends, name: str, limit: Limit) -> ForceElement:
-    made = (_slide if isinstance(limit, TravelLimit) else _hinge)(find, f"limits/{name}", limit.joint)
-    return replace(made, stiffness=limit.stiffness, damping=limit.damping, limits=limit.range)
+def _element(find: _Ends, kind: str, name: str, element: Spring | Motor | Limit) -> ForceElement:
+    if isinstance(element, LineSpring) and element.between is not None:
+        one, other = (
+            find.point(f"{kind}.{name}.between[{i}].at", end.link, np.asarray(end.at))
+            for i, end in enumerate(element.between)
+        )
+        return ForceElement(f"{kind}/{name}", DISTANCE, (one, other), law_of(element))
+    made = (_hinge if on_hinge(element) else _slide)(find, f"{kind}/{name}", str(element.joint))
+    return replace(made, law=law_of(element))

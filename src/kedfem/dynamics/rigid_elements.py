@@ -55,7 +55,7 @@ class RigidElements:
             x[:, i], v = placed(element, motion)
             unit = unit_forces(element, x[:, i])
             rate = (unit * v).sum(axis=(1, 2, 3))
-            Q = effort(element, motion, coordinate(element, x[:, i], float(before)), rate)
+            Q = effort(element.law, motion, coordinate(element, x[:, i], float(before)), rate)
             forces[:, i] = Q[:, None, None, None] * unit
         return x, forces
 

@@ -1,11 +1,10 @@
 """Rows of joints over time: C(t) from the rigid motion, and what one time point needs of it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from kedfem.arrays import Float, Int
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side
@@ -83,35 +82,6 @@ def rows_over(
     size = np.sqrt(sum((on**2).sum(axis=(2, 3)) for _, on in shares))
     C[np.linalg.norm(C, axis=2) < REPEATED * size] = 0.0
     return C
-
-
-@dataclass(frozen=True, slots=True)
-class RowGroup:
-    """Joints whose rows share no interface unknown with those of others.
-
-    columns : the interface unknowns that the joints touch
-    """
-
-    joints: tuple[ConstraintJoint, ...]
-    columns: Int[np.ndarray, " c"]
-
-    def over(self, motion: RigidMotion) -> Float[np.ndarray, "T r c"]:
-        """Their rows at the times of a motion."""
-        return np.concatenate([rows_over(joint, motion, self.columns) for joint in self.joints], axis=1)
-
-
-def row_groups(joints: Sequence[ConstraintJoint]) -> Iterator[RowGroup]:
-    """All joints, in as many groups as there are."""
-    touched = [_columns(joint) for joint in joints]
-    number = np.repeat(np.arange(len(joints)), [len(x) for x in touched])
-    every = np.concatenate([*touched, np.zeros(0, int)])
-    n, k = len(joints), int(every.max(initial=-1)) + 1
-    graph = sp.coo_array((np.ones(len(every)), (number, n + every)), (n + k, n + k))
-    label = connected_components(graph, directed=False)[1]
-    for group in dict.fromkeys(label[:n].tolist()):
-        here = np.flatnonzero(label[:n] == group)
-        columns = np.unique(np.concatenate([touched[j] for j in here]))
-        yield RowGroup(tuple(joints[int(j)] for j in here), columns)
 
 
 def _columns(joint: ConstraintJoint) -> Int[np.ndarray, " c"]:

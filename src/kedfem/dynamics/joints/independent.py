@@ -48,7 +48,7 @@ def independent(
     if not all(kept.all() for kept, _ in relations):
         L = sp.block_diag([L for _, L in relations], format="csr")
         left = every_B - L @ every_B[np.concatenate([kept for kept, _ in relations])]
-        Z = _null_space(left, list(_blocks(left)))
+        Z = _null_space(left, list(blocks(left)))
         shares, from_rows, loose = _port_forces(L, every_B, own, riding)
     found, first = [], 0
     for each, own_B, (kept, _) in zip(every, selected, relations, strict=True):
@@ -102,9 +102,9 @@ def _port_forces(
     """
     determined = np.setdiff1d(np.arange(B.shape[1]), riding)  # what holds a slider is left open
     G = sp.vstack([L.T, B.T.tocsr()[determined]], format="csr")
-    blocks = list(_blocks(G))
+    of_G = list(blocks(G))
     parts = []
-    for rows, columns, dense in blocks:
+    for rows, columns, dense in of_G:
         part = np.linalg.pinv(dense, rcond=DEPENDENT)
         parts.append((columns, rows, np.where(np.abs(part) < DEPENDENT, 0.0, part)))  # rounding
     inverse = _assembled(parts, G.T.shape)
@@ -112,14 +112,14 @@ def _port_forces(
     return (
         inverse[:, :q],
         inverse[:, q + np.searchsorted(determined, np.asarray(own, int))],
-        _null_space(G, blocks),
+        _null_space(G, of_G),
     )
 
 
-def _null_space(A: sp.csr_array, blocks: Sequence[Block]) -> sp.csr_array:
+def _null_space(A: sp.csr_array, parts_of: Sequence[Block]) -> sp.csr_array:
     """Orthonormal basis of A x = 0, A of order one: each of its vectors within one block, so that few bodies share it."""
     alone, parts, count = np.ones(A.shape[1], bool), [], 0
-    for _, columns, dense in blocks:
+    for _, columns, dense in parts_of:
         _, s, Vt = np.linalg.svd(dense)
         part = Vt[int((s > DEPENDENT).sum()) :].T
         parts.append((columns, count + np.arange(part.shape[1]), part))
@@ -147,7 +147,7 @@ def _assembled(
     return out
 
 
-def _blocks(A: sp.csr_array) -> Iterator[Block]:
+def blocks(A: sp.csr_array) -> Iterator[Block]:
     """Each part of a matrix that shares neither rows nor columns with the others; columns of zeros are left out."""
     m, entries = A.shape[0], A.tocoo()
     large = np.abs(entries.data) > ROUNDING

@@ -7,12 +7,13 @@ motors and limits are laws on the same coordinates.
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.elastic_model import elastic_model
-from kedfem.dynamics.force_element import OVER
+from kedfem.dynamics.force_elements import law_of, on_hinge
 from kedfem.dynamics.joints.constraint_joints import (
     ConstraintJoint,
     bore_axis,
@@ -31,13 +32,11 @@ from kedfem.dynamics.system.record import (
     OFFSET,
     TURN,
     Constraint,
-    Curve,
     Driven,
     End,
     Held,
     Law,
     Spring,
-    Stop,
     System,
     Term,
     rotation_term,
@@ -47,17 +46,7 @@ from kedfem.motion.constraints import CONSTRAINED, perpendiculars
 from kedfem.motion.joint_equations import joint_axis
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
-from kedfem.scene import (
-    AngleLimit,
-    LineSpring,
-    Motor,
-    Scene,
-    TorsionSpring,
-    TravelLimit,
-    factor_law,
-    is_constant,
-    pieces,
-)
+from kedfem.scene import Scene
 
 ELEMENTS = ("springs", "motors", "limits")  # sections of a scene
 Vector = Float[np.ndarray, "3"]
@@ -93,15 +82,6 @@ def system_of(
     return System(names, tuple(found.ends), tuple(found.constraints), k, model)
 
 
-def spring_law(spring: LineSpring | TorsionSpring) -> Spring:
-    """The law of a spring of a scene."""
-    factor, given = spring.stiffness_factor, spring.curve
-    curve = None if given is None else Curve(OVER[given.over], pieces(given).negative)
-    if is_constant(factor):
-        return Spring(factor.value[0] * spring.stiffness, spring.damping, spring.free, curve=curve)
-    return Spring(spring.stiffness, spring.damping, spring.free, factor=factor_law(factor), curve=curve)
-
-
 def without_stiffness(link: Link, turned: bool = False) -> Link:
     """A rigid link whose bars hold it: it has no stiffness, and a frame of its own only if that turns its loads."""
     out = replace(link, K0=np.zeros_like(np.asarray(link.K0)))
@@ -126,7 +106,7 @@ class _Builder:
         elif kind == "gears":
             factor, first = joint.plus[0]
             of = scene.gears[name].joints
-            terms = (*self.coordinate(of[1], joint, 1.0), *self.coordinate(of[0], first, factor))
+            terms = self.coordinate(of[1], joint, 1.0), self.coordinate(of[0], first, factor)
             self.add(joint.name, terms, Held(), joint, first)
         elif kind in ELEMENTS:
             self.element(joint, getattr(scene, kind)[name])
@@ -160,40 +140,29 @@ class _Builder:
                 none = ConstraintJoint(f"{kind}.{name}", np.zeros(3), (i, j), (None, None))
                 self.element(none, element)
 
-    def element(self, joint: ConstraintJoint, element: object) -> None:
+    def element(self, joint: ConstraintJoint, element: Any) -> None:
         """The law of a spring, motor or limit on its coordinate, which its links' own motion shows."""
-        law: Law
-        if isinstance(element, Motor):
-            law = Curve(OVER[element.curve.over], pieces(element.curve))
-        elif isinstance(element, AngleLimit | TravelLimit):
-            law = Stop(*element.range, element.stiffness, element.damping)
-        else:
-            law = spring_law(element)  # type: ignore[arg-type]
-        if isinstance(element, LineSpring) and element.between is not None:
-            i, j = (self.end(joint, k, np.asarray(end.at)) for k, end in enumerate(element.between))
+        if (between := getattr(element, "between", None)) is not None:
+            i, j = (self.end(joint, k, np.asarray(end.at)) for k, end in enumerate(between))
             a, a_j = (self.ends[n].origin for n in (i, j))
-            terms: tuple[Term, ...] = (Term(DISTANCE, i, j, a, a_j, np.zeros(3)),)
+            term = Term(DISTANCE, i, j, a, a_j, np.zeros(3))
         else:
-            turns = isinstance(element, Motor) and element.torque is not None
-            turns = turns or not isinstance(element, Motor | LineSpring | TravelLimit)
-            terms = self.coordinate(str(element.joint), joint, 1.0, turns)  # type: ignore[attr-defined]
-        self.constraints.append(Constraint(joint.name, terms, law, linear=False))
+            term = self.coordinate(str(element.joint), joint, 1.0, on_hinge(element))
+        self.constraints.append(Constraint(joint.name, (term,), law_of(element), linear=False))
 
     def add(self, name: str, terms: tuple[Term, ...], law: Law, *joints: ConstraintJoint) -> None:
         """A constraint, linear where the frames of all its links are rigid-body ones."""
         numbers = {n for joint in joints for n in joint.bodies}
         self.constraints.append(Constraint(name, terms, law, linear=not numbers & self.own))
 
-    def coordinate(
-        self, name: str, joint: ConstraintJoint, factor: float, turns: bool | None = None
-    ) -> tuple[Term, ...]:
+    def coordinate(self, name: str, joint: ConstraintJoint, factor: float, turns: bool | None = None) -> Term:
         """Turn or travel of a joint; if not said which, the turn of all but slides."""
         axis, at = joint_axis(self.scene.joints[name]), np.asarray(self.scene.joints[name].at)
         i, j = self.end(joint, 0, at), self.end(joint, 1, at)
         if self.scene.joints[name].kind != "prismatic" if turns is None else turns:
             across = perpendiculars(axis)[0]
-            return (Term(ANGLE, i, j, across, across, axis, factor),)
-        return (Term(GAP, i, j, at, at, axis, factor),)
+            return Term(ANGLE, i, j, across, across, axis, factor)
+        return Term(GAP, i, j, at, at, axis, factor)
 
     def constrained(self, joint: ConstraintJoint) -> Iterator[tuple[Term, Law]]:
         """What a joint constrains, each with its law: held, a bushing's spring, the drive's motion or its shaft."""
@@ -221,7 +190,7 @@ class _Builder:
             self.add(joint.name, (Term(GAP, i, j, at, at, along), turn), Held(), joint)
         if (drive := self.scene.driven_joints.get(joint.name)) is not None:
             number = list(self.scene.driven_joints).index(joint.name)
-            (term,) = self.coordinate(joint.name, joint, 1.0)
+            term = self.coordinate(joint.name, joint, 1.0)
             shaft, damping = drive.shaft_stiffness, drive.shaft_damping
             yield term, Driven(number) if shaft is None else Spring(shaft, damping, drive=number)
 

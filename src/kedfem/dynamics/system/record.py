@@ -1,17 +1,18 @@
 """The record of a system: ends of constraints on bodies, coordinates, and the laws that these obey."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from kedfem.arrays import Float, Int
-from kedfem.dynamics.force_element import OVER, Factor, Times
 from kedfem.links.stations import Stations
 from kedfem.scene import Pieces
 
 HELD, DRIVEN, SPRING, CURVE, STOP = range(5)
-TIME, RATE, COORDINATE = OVER["time"], OVER["speed"], OVER["length"]
+TIME, RATE, COORDINATE = range(3)
+OVER = {"time": TIME, "speed": RATE, "angle": COORDINATE, "travel": COORDINATE, "length": COORDINATE}
 GAP, TURN, ANGLE, DISTANCE, ROTATION, TILT, OFFSET = range(7)
 RIGID, POINT, PLANAR_BEAM, PLANAR, FACE, SOLID, LINE = range(7)
 NOMINAL, STRESSED, COROTATIONAL, TANGENTIAL = range(4)
@@ -21,6 +22,8 @@ CLOSE = 1e-14  # of the line: a change of that place is rounding
 TURNED = 1e-24  # (2 − the angle from half a turn)²: the direction across a line turned back is any
 
 Vector = Float[np.ndarray, "3"]
+Times = Float[np.ndarray, " T"]
+Factor = Callable[[Times, Times], Times]
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,11 +5,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy.sparse as sp
 
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, in_plane
-from kedfem.dynamics.joints.constraint_matrices import RowGroup, row_groups
+from kedfem.dynamics.joints.constraint_matrices import joint_rows
+from kedfem.dynamics.joints.independent import blocks
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.system.forces.exerted import springs, wrench
 from kedfem.dynamics.system.forces.supports import supports
@@ -25,9 +27,20 @@ class ConstraintForces:
     model: Model
 
     @cached_property
-    def groups(self) -> tuple[RowGroup, ...]:
-        """Joints by constraint equations that share interface unknowns."""
-        return tuple(row_groups(self.model.rows))
+    def rows(self) -> tuple[Float[np.ndarray, "r k"], Float[np.ndarray, "r n"]]:
+        """Rows of all joints in the reference position, and the combinations of them that say nothing."""
+        still = resting(
+            1 + max((b for joint in self.model.rows for b in joint.bodies), default=0), np.zeros(1)
+        )
+        found = joint_rows(self.model.rows, still, self.model.interface_unknowns)
+        C = sp.csr_array((0, 0)) if found is None else found.at(0)
+        silent, null = np.ones(C.shape[0], bool), []
+        for here, _, dense in blocks(C):
+            U, s, _ = np.linalg.svd(dense / np.linalg.norm(dense, axis=1, keepdims=True))
+            part = np.zeros((len(silent), len(here) - int((s > DEPENDENT).sum())))
+            part[here], silent[here] = U[:, len(here) - part.shape[1] :], False
+            null.append(part)
+        return C.toarray(), np.concatenate([np.eye(len(silent))[:, silent], *null], axis=1)
 
     def wrench(
         self, name: str, block: Block
@@ -40,11 +53,9 @@ class ConstraintForces:
 
         What a planar link holds of a solid out of the plane, other joints hold already; nothing there loads either.
         """
-        group = next((x for x in self.groups if any(joint.name == name for joint in x.joints)), None)
-        if group is None:
+        if all(joint.name != name for joint in self.model.rows):
             return True, True
-        C, null = _null_space(group)
-        joint, here = of_joint(group.joints, name)
+        (C, null), (joint, here) = self.rows, of_joint(self.model.rows, name)
         loose = np.abs(null[here]).max(axis=1, initial=0.0) > 1e3 * DEPENDENT
         planar = {body for link, body in zip(self.model.links, self.model.bodies, strict=True) if link.planar}
         if planar.intersection(joint.bodies):
@@ -54,13 +65,12 @@ class ConstraintForces:
 
     def shared(self, name: str) -> list[str]:
         """Joints whose constraints repeat those of a joint, in the reference position."""
-        for group in self.groups:
-            if any(joint.name == name for joint in group.joints):
-                null = np.abs(_null_space(group)[1]) > 1e3 * DEPENDENT
-                columns = null[of_joint(group.joints, name)[1]].any(axis=0)
-                each = ((joint.name, of_joint(group.joints, joint.name)[1]) for joint in group.joints)
-                return [other for other, here in each if null[here][:, columns].any()]
-        return []
+        if all(joint.name != name for joint in self.model.rows):
+            return []
+        null = np.abs(self.rows[1]) > 1e3 * DEPENDENT
+        columns = null[of_joint(self.model.rows, name)[1]].any(axis=0)
+        each = ((joint.name, of_joint(self.model.rows, joint.name)[1]) for joint in self.model.rows)
+        return [other for other, here in each if null[here][:, columns].any()]
 
 
 def of_joint(joints: Sequence[ConstraintJoint], name: str) -> tuple[ConstraintJoint, slice]:
@@ -71,15 +81,6 @@ def of_joint(joints: Sequence[ConstraintJoint], name: str) -> tuple[ConstraintJo
             return joint, slice(first, first + len(joint.gap))
         first += len(joint.gap)
     raise KeyError(name)
-
-
-def _null_space(group: RowGroup) -> tuple[Float[np.ndarray, "r c"], Float[np.ndarray, "r n"]]:
-    """Rows of joints in the reference position, and the combinations of them that say nothing."""
-    bodies = 1 + max(b for joint in group.joints for b in joint.bodies)
-    C = group.over(resting(bodies, np.zeros(1)))[0]
-    size = np.linalg.norm(C, axis=1, keepdims=True)
-    U, s, _ = np.linalg.svd(C / np.where(size > 0, size, 1.0))
-    return C, U[:, int((s > DEPENDENT).sum()) :]
 
 
 @dataclass(frozen=True, slots=True)
