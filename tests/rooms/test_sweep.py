@@ -92,6 +92,37 @@ def test_a_range_a_list_and_their_grid() -> None:
     assert words.numbers is None
 
 
+@pytest.mark.parametrize(
+    ("over", "unit"),
+    [
+        ("drive.speed=10,20", "rad/s"),
+        ("drives.S.motion.speed=1:3:3", "m/s"),
+        ("analysis.initial_speeds.S=1,2", "m/s"),
+        ("analysis.initial_speeds.A=1,2", "rad/s"),
+        ("motors.m.torque=1,2", "N*m"),
+        ("gravity[1]=-9.81,0", "m/s^2"),
+        ("damping.frequencies[0]=5,10", "Hz"),
+        ("links.arm.shape.width=0.01:0.02:2", "m"),
+        ("damping.ratio=0.01,0.02", ""),
+        ("links.arm.mesh.elements=2,3", ""),
+        ("analysis.initial=rest,quasi-static", ""),
+        ("L=0.4,0.5", ""),
+    ],
+)
+def test_numbers_without_a_unit_have_that_of_the_scene(over: str, unit: str) -> None:
+    raw = arm() | {"gravity": [0, 0, 0], "motors": {"m": {"joint": "A", "torque": 1.0}}}
+    raw["joints"]["S"] = {"kind": "prismatic", "links": ["arm", "ground"], "at": [0, 0], "axis": "x"}
+    raw["drives"] = {"S": {"joint": "S", "motion": {"kind": "constant_speed", "speed": 1.0}}}
+    raw["analysis"]["initial_speeds"] = {"A": 1.0, "S": 1.0}
+    (axis,) = axes_of([over], raw)
+    assert axis.unit == unit
+    if axis.numbers is not None:
+        assert_array_equal(axis.values, axis.numbers)  # as they were given
+    if ":" not in over and unit:
+        (other,) = axes_of([over.replace(",", ":")], raw, samples=2)
+        assert other.unit == unit
+
+
 def test_a_latin_hypercube_has_one_point_in_each_slice_and_is_the_same_again() -> None:
     over = ["drive.speed=100rpm:300rpm", "L=0.4:0.6"]
     axes = axes_of(over, arm(), samples=10)

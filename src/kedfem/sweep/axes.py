@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -11,8 +11,10 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.errors import SceneError, Where, place
 from kedfem.scene import Scene
-from kedfem.scene.checks.hints import below, known_keys
-from kedfem.scene.records.units import NUMBER, UNIT, UNREADABLE, unit_registry
+from kedfem.scene.checks.hints import below, known_keys, marks, models
+from kedfem.scene.records.curves import Curve
+from kedfem.scene.records.drives import EitherSpeed
+from kedfem.scene.records.units import NUMBER, UNIT, UNREADABLE, Quantity, unit_registry
 from kedfem.scene.records.wording import nearest, shown
 
 Value = bool | int | float | str
@@ -29,7 +31,7 @@ class Axis:
     where : the key's place in the scene
     values : as a scene would state them
     numbers : the same in one unit; None if they are words
-    unit : as it was given, ``rpm``; empty of plain numbers
+    unit : as it was given, ``rpm``; of numbers without one that of SI; empty of counts and ratios, and of parameters
     """
 
     where: Where
@@ -67,8 +69,9 @@ def axes_of(texts: Sequence[str], raw: Mapping[str, Any], samples: int | None = 
     if not named:
         raise SceneError("--over: must be given at least once, got nothing")
     if samples is not None:
-        return _hypercube([(where, *_ends(where, spec.split(":"))) for where, spec in named], samples)
-    single = [_axis(where, spec) for where, spec in named]
+        cube = _hypercube([(where, *_ends(where, spec.split(":"))) for where, spec in named], samples)
+        return [_with_unit(axis, raw) for axis in cube]
+    single = [_with_unit(_axis(where, spec), raw) for where, spec in named]
     count = int(np.prod([float(len(axis.values)) for axis in single]))
     if count > MOST:
         raise SceneError(f"--over: must make at most {MOST:,} points, got {count:,}")
@@ -104,6 +107,44 @@ def _axis(where: Where, spec: str) -> Axis:
     first, last, unit, whole = _ends(where, parts[:2])
     numbers = np.linspace(first, last, int(parts[2]))
     return Axis(where, tuple(stated(x, unit, whole) for x in numbers), numbers, unit)
+
+
+def _with_unit(axis: Axis, raw: Mapping[str, Any]) -> Axis:
+    """An axis of plain numbers with the unit that the scene takes them in."""
+    if axis.unit or axis.numbers is None:
+        return axis
+    hint: Any = Scene
+    held: Any = raw
+    for part in axis.where:
+        hint = below(hint, part, held)
+        held = _item(held, part)
+    quantities = marks(hint, Quantity) if hint else ()
+    units = {x.unit for x in quantities} | {x.what[1] for x in models(hint) if issubclass(x, Curve)}
+    if "initial_speeds" in axis.where[1:2] or any(isinstance(x, EitherSpeed) for x in quantities):
+        units = {_speed_unit(axis.where, raw)}
+    return replace(axis, unit=units.pop()) if len(units) == 1 and units != {"1"} else axis
+
+
+def _speed_unit(where: Where, raw: Mapping[str, Any]) -> str:
+    """The unit of a drive's or a joint's speed, by the kind of its joint; empty where the joint is not known."""
+    at = where[:1] if where[0] == "drive" else where[:2]
+    joint = where[-1] if where[0] == "analysis" else _item(_at(raw, at), "joint")
+    kind = _item(_at(raw, ("joints", joint)), "kind")
+    return "" if kind is None else "m/s" if kind in {"prismatic", "cylindrical"} else "rad/s"
+
+
+def _at(raw: Any, where: Where) -> Any:
+    for part in where:
+        raw = _item(raw, part)
+    return raw
+
+
+def _item(held: Any, part: Any) -> Any:
+    """What a table or list holds, None if it does not."""
+    try:
+        return held[part]
+    except (KeyError, IndexError, TypeError):
+        return None
 
 
 def _ends(where: Where, parts: Sequence[str]) -> tuple[float, float, str, bool]:
