@@ -12,7 +12,8 @@ from kedfem.dynamics.anderson_kernel import mixed
 from kedfem.dynamics.beams_kernel import begun
 from kedfem.dynamics.matrices.profile_kernel import profile_solved
 from kedfem.dynamics.system.algebra_kernel import add_transposed, frame_copied, product, turned, turned_back
-from kedfem.dynamics.system.bodies_kernel import internal_forces, newmark, orientation
+from kedfem.dynamics.system.bodies_kernel import internal_forces, orientation
+from kedfem.dynamics.system.corotational_kernel import newmark
 from kedfem.dynamics.system.interface_kernel import gathered, offset, pushed
 from kedfem.dynamics.system.rigid_frame_kernel import ported
 from kedfem.dynamics.system.step_kernel import asked, taken

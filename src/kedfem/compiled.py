@@ -13,14 +13,17 @@ kernels, and where it is reported that it compiles.
 import atexit
 import os
 import re
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import numba
+from llvmlite.binding import get_host_cpu_name
 from numba.core import codegen, event, types
 from numba.core.runtime.nrt import rtsys
 
@@ -54,6 +57,45 @@ def _imported(kernel: Path, root: Path) -> set[Path]:
     files = (root / Path(*name.split(".")) for name in names)
     found = (file for path in files for file in (path.with_suffix(".py"), path / "__init__.py"))
     return {file for file in found if file.is_file()}
+
+
+def all_compiled() -> Path:
+    """A file that stands in numba's folder once all of these kernels have been compiled for this processor.
+
+    Numba keeps code for one installation, and while its files' times stay: of another, or after an upgrade that left the
+    kernels alone, nothing that it kept is used.
+    """
+    stamps = [f"{kernel_folder(ROOT).name} {numba.__version__} {sys.version}"]
+    for kernel in sorted(ROOT.rglob("*kernel.py")):
+        stat = kernel.stat()
+        stamps.append(f"{kernel} {stat.st_mtime_ns} {stat.st_size}")
+    options = vars(numba.config)
+    processor = options["CPU_NAME"] or get_host_cpu_name()
+    digest = sha256("\n".join(stamps).encode()).hexdigest()[:16]
+    return Path(options["CACHE_DIR"], f"all-{digest}-{processor}")
+
+
+def compiles_for_all() -> bool:
+    """Whether loops are those that all scenes may take: where these are kept. Else each kind of scene has its own."""
+    return _for_all.get() or _kept_for_all()
+
+
+@cache
+def _kept_for_all() -> bool:
+    return all_compiled().exists()
+
+
+@contextmanager
+def for_all_scenes() -> Iterator[None]:
+    """Have loops compiled that all scenes may take."""
+    outside = _for_all.set(True)
+    try:
+        yield
+    finally:
+        _for_all.reset(outside)
+
+
+_for_all: ContextVar[bool] = ContextVar("for all", default=False)
 
 
 @contextmanager

@@ -4,7 +4,6 @@ import subprocess
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -62,7 +61,9 @@ LINEAR = ("rigid-body frames", "rigid-body frames and bushings")
 
 def precompile(watch: Callable[[str, int, int], None]) -> None:
     """Run a few steps of each kind, in two processes: all that they need is compiled and kept, once."""
-    done = _all_compiled()
+    from kedfem.compiled import all_compiled
+
+    done = all_compiled()
     if done.exists():
         return
     others = [kind for kind in KINDS if kind not in LINEAR]
@@ -83,11 +84,12 @@ def precompile(watch: Callable[[str, int, int], None]) -> None:
 
 
 def few_steps(*kinds: str) -> None:
-    """Steps of some kinds, in a folder that does not stay."""
+    """Steps of some kinds, in a folder that does not stay, by loops that all scenes may take."""
     from kedfem.analysis import analyse
+    from kedfem.compiled import for_all_scenes
     from kedfem.scene import read_scene
 
-    with TemporaryDirectory() as folder:
+    with TemporaryDirectory() as folder, for_all_scenes():
         for number, kind in enumerate(kinds):
             scene = Path(folder, f"{number}.toml")
             scene.write_text(ARM + KINDS[kind], encoding="utf-8")
@@ -103,24 +105,3 @@ def _count_cycles() -> None:
     counted(
         np.zeros((1, 4)), 0.0, np.array([-1.0, 0.0, 1.0]), np.array([9.0, 0.0, -5.0]), 0.0, np.zeros((1, 4))
     )
-
-
-def _all_compiled() -> Path:
-    """A file that stands in numba's folder once all of these kernels have been compiled for this processor.
-
-    Numba keeps code for one installation, and while its files' times stay: of another, or after an upgrade that left the
-    kernels alone, nothing that it kept is used.
-    """
-    import numba
-    from llvmlite.binding import get_host_cpu_name
-
-    from kedfem.compiled import ROOT, kernel_folder
-
-    stamps = [f"{kernel_folder(ROOT).name} {numba.__version__} {sys.version}"]
-    for kernel in sorted(ROOT.rglob("*kernel.py")):
-        stat = kernel.stat()
-        stamps.append(f"{kernel} {stat.st_mtime_ns} {stat.st_size}")
-    options = vars(numba.config)
-    processor = options["CPU_NAME"] or get_host_cpu_name()
-    digest = sha256("\n".join(stamps).encode()).hexdigest()[:16]
-    return Path(options["CACHE_DIR"], f"all-{digest}-{processor}")

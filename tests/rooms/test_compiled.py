@@ -140,7 +140,7 @@ def test_an_installation_whose_kernels_are_newer_or_elsewhere_is_compiled_for_an
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Numba uses nothing that it kept of these; `kedfem compile` once said that all was there, and scenes compiled."""
-    from kedfem.precompile import _all_compiled
+    from kedfem.compiled import all_compiled
 
     def marker(folder: str, time: int) -> Path:
         kernel = tmp_path / folder / "loop_kernel.py"
@@ -148,7 +148,7 @@ def test_an_installation_whose_kernels_are_newer_or_elsewhere_is_compiled_for_an
         kernel.write_text("x = 1\n")
         os.utime(kernel, (time, time))
         monkeypatch.setattr(compiled, "ROOT", kernel.parent)
-        return _all_compiled()
+        return all_compiled()
 
     assert marker("first", 1) == marker("first", 1)
     assert len({marker("first", 1), marker("first", 2), marker("second", 1)}) == 3

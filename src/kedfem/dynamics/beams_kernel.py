@@ -15,7 +15,8 @@ exactly what `dynamics.frames` finds with a frame at each point, see `links.segm
     rigidity (b, 3, E) : EA, κGA, EI times the length that belongs to a point; 0 where a segment has fewer points
     strain (3, b, 3, E) and rates, direction (b, 2, E) of the tangents in the rigid-body frame, turn (b, E) : state
 
-One call does all segments: a call costs as much as a short beam.
+One call does all segments: a call costs as much as a short beam. Without any, `beams` may be None: nothing of this is
+compiled then.
 """
 
 import numpy as np
@@ -36,6 +37,8 @@ def begun(rates, beams, R, strain, direction, base, resisted):  # type: ignore[n
     base : (b, 4, E) becomes R t and the directions, world
     resisted : (b, 3, E) becomes β times the rate of strains that vanish at the end of the step
     """
+    if beams is None:
+        return
     _, body, _, _, _, tangent, _ = beams
     n0, n1, n2, h1, h0, beta = rates
     E = tangent.shape[2]
@@ -64,6 +67,8 @@ def bent(stiffer, beams, u, base, resisted, turn0, seen, f, w):  # type: ignore[
     seen : (b, 6, E) becomes ε, γ, κ, the tangent (2) and the turn at u
     w : (5, E)
     """
+    if beams is None:
+        return
     _, _, begin, stride, rows, _, rigidity = beams
     E = rows.shape[2]
     for b in range(len(begin)):
@@ -114,6 +119,8 @@ def bent(stiffer, beams, u, base, resisted, turn0, seen, f, w):  # type: ignore[
 @inner
 def ended(t, rates, beams, R, seen, strain, direction, turn, strains, energies):  # type: ignore[no-untyped-def]
     """The settled end of a step becomes the state, and row t of the history: strains (T, b, 3, E), energies (T, L)."""
+    if beams is None:
+        return
     segment, body, _, _, _, _, rigidity = beams
     n0, n1, n2, h1, h0, _ = rates
     E = turn.shape[1]

@@ -20,6 +20,8 @@ def metric_force(rates, i, e, elements, X, fit, R, u, before, now, Q, angle, f, 
     X, fit, before, now, Q : as in `frames_kernel.strained`; g is a displacement that has the strains
     work : of `frames_kernel.strained`
     """
+    if elements is None:
+        return
     n0, n1, n2, h1, h0, beta = rates
     y, forces, strained, A, U, change = work
     rows, share, tangents, gradients = elements.rows, elements.share, elements.tangents, elements.gradients

@@ -7,10 +7,10 @@ import numpy as np
 
 from kedfem.compiled import inlined, inner
 from kedfem.dynamics.beams_kernel import bent
-from kedfem.dynamics.frames_kernel import balanced, entry, strained
-from kedfem.dynamics.metric_kernel import metric_force
+from kedfem.dynamics.frames_kernel import entry
 from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, turned, turned_back
-from kedfem.dynamics.system.products_kernel import mass_times, stiffness_times
+from kedfem.dynamics.system.corotational_kernel import corotational_end, corotational_force, unforeseen
+from kedfem.dynamics.system.products_kernel import mass_times
 from kedfem.dynamics.system.record import COROTATIONAL, RIGID_BODY, TANGENTIAL
 from kedfem.dynamics.system.turning_kernel import turned_loads
 
@@ -49,7 +49,7 @@ def rigid_frame_end(c, bodies, i, R, F, g, Ag, state, history, t, work):  # type
     if bodies.dense[i]:
         copied(g, Mg)
     else:
-        mass_times(bodies, i, u, Mg)
+        mass_times(bodies.mass, bodies, i, u, Mg)
         momentum = state.momentum[3 * first : 3 * last]
         carried_on(c, Mg, momentum)
         copied(momentum[N : 2 * N], history.Mv[t, first:last])
@@ -115,78 +115,14 @@ def internal_forces(c, bodies, R, amounts, state, trial, work, first):  # type: 
         if bodies.frame[i] > RIGID_BODY:
             for x in range(bodies.at[i], bodies.at[i + 1]):
                 f[x] = 0.0
-    if len(beams.segment):
-        bent(1 + c.beta * c.late * c.acceleration[0], beams, trial.u, trial.base, trial.resisted, state.turn,
-             trial.strained, f, work.points)  # fmt: skip
+    bent(1 + c.beta * c.late * c.acceleration[0], beams, trial.u, trial.base, trial.resisted, state.turn,
+         trial.strained, f, work.points)  # fmt: skip
     for i in range(len(bodies.motion)):
         if bodies.frame[i] == COROTATIONAL:
-            corotational_force(c, bodies, i, R, state, trial, work, first)
+            corotational_force(bodies.K, c, bodies, i, R, state, trial, work, first)
         if bodies.frame[i] > RIGID_BODY and c.alpha != 0.0:
             mass_damped(c, bodies, i, R[bodies.motion[i]], trial.u, state, trial, work)
-    turned_loads(bodies, R, amounts, trial.u, f, work.frame)
-
-
-@inner
-def newmark(c):  # type: ignore[no-untyped-def]
-    """Newmark's numbers as `frames_kernel` and `beams_kernel` take them."""
-    n0, n1, n2 = c.acceleration
-    return n0, n1, n2, c.late, c.early, c.beta
-
-
-@inlined
-def corotational_force(c, bodies, i, R, state, trial, work, first_pass):  # type: ignore[no-untyped-def]
-    """Add the internal force of a body with one frame, and keep what that sees."""
-    first, last, d, n = bodies.at[i], bodies.at[i + 1], bodies.components[i], bodies.functions[i]
-    N, body = last - first, bodies.motion[i]
-    moved, f = trial.u[first:last].reshape(1, d, n), trial.f[first:last].reshape(1, d, n)
-    X, one = bodies.X[first:last].reshape(1, d, n), bodies.one[first:last].reshape(1, d, n)
-    fit = bodies.fit[first:last].reshape(1, d, n)
-    before = state.seen[3 * first : 3 * last].reshape(3, 1, N)
-    now = trial.seen[3 * first : 3 * last].reshape(3, 1, N)
-    rooms = (
-        work.y[:N].reshape(d, n), work.turned[:N].reshape(d, n), work.strained[:N], work.A, work.U, work.change,
-    )  # fmt: skip
-    if bodies.elements.number[i] >= 0:
-        metric_force(newmark(c), 0, bodies.elements.number[i], bodies.elements, X, fit, R[body : body + 1], moved, before,
-                     now, trial.Q[i : i + 1], trial.angle[i : i + 1], f, rooms, work.element)  # fmt: skip
-        return
-    strained(newmark(c), 0, bodies.kind[i], (X, one), fit, R[body : body + 1], moved, before, now, trial.Q[i : i + 1],
-             trial.angle[i : i + 1], work.strained, rooms)  # fmt: skip
-    stiffness_times(bodies, i, work.strained, work.turned)
-    if bodies.rigid[i]:
-        copied(work.turned[:N], trial.response[first:last])
-        if first_pass:
-            copied(work.turned[:N], trial.foreseen[first:last])
-        copied(trial.foreseen[first:last], work.turned[:N])
-        unforeseen(bodies, i, trial, work)
-        for x in range(N):
-            trial.f[first + x] += work.room[x]
-    balanced(0, bodies.kind[i], fit, R[body : body + 1], now, trial.Q[i : i + 1], f, rooms)
-
-
-@inner
-def unforeseen(bodies, i, trial, work):  # type: ignore[no-untyped-def]
-    """work.room becomes what a rigid body resists more than foreseen, world components by the frame of its factor.
-
-    The factor takes just that back, however stiff the body is. In its new frame, K of an error of the second order in
-    the pass's rotation would push along other directions than the factor resists, and passes would diverge.
-    """
-    first, last = bodies.at[i], bodies.at[i + 1]
-    N = last - first
-    for x in range(N):
-        work.strained[x] = trial.response[first + x] - trial.foreseen[first + x]
-    turned(trial.Rp[i], bodies.components[i], work.strained[:N], work.room[:N])
-
-
-@inlined
-def foresee(c, bodies, i, change, trial, work):  # type: ignore[no-untyped-def]
-    """What a rigid body will resist once displaced by what a pass asks for (N,), in the frame of its factor."""
-    first, last = bodies.at[i], bodies.at[i + 1]
-    N = last - first
-    stiffness_times(bodies, i, change[:N], work.turned[:N])
-    late = 1 + c.beta * c.late * c.acceleration[0]
-    for x in range(N):
-        trial.foreseen[first + x] = trial.response[first + x] + late * work.turned[x]
+    turned_loads(bodies.turning, bodies, R, amounts, trial.u, f, work.frame)
 
 
 @inlined
@@ -197,7 +133,7 @@ def mass_damped(c, bodies, i, R, u, state, trial, work):  # type: ignore[no-unty
     if bodies.dense[i]:
         turned_back(R, d, u[first:last], work.y[:N])
     else:
-        mass_times(bodies, i, u[first:last], work.turned)
+        mass_times(bodies.mass, bodies, i, u[first:last], work.turned)
         turned_back(R, d, work.turned[:N], work.y[:N])
     for x in range(N):
         work.y[x] *= c.alpha
@@ -253,7 +189,7 @@ def residual(c, bodies, i, R, F, u, state, trial, out, work):  # type: ignore[no
             room[x - first] = r + alpha_f * (F0[x] - f0[x]) - alpha_m * a0[x]
     else:
         N, momentum = last - first, state.momentum[3 * first : 3 * last]
-        mass_times(bodies, i, u[first:last], out[first:last])
+        mass_times(bodies.mass, bodies, i, u[first:last], out[first:last])
         for x in range(N):
             later = n0 * (out[first + x] - momentum[x]) - n1 * momentum[x + N] - n2 * momentum[x + 2 * N]
             r = c_f * (F[first + x] - f1[first + x]) - c_m * later
@@ -268,7 +204,7 @@ def own_end(c, bodies, i, R, F, u, state, trial, history, t, work):  # type: ign
     N = last - first
     moved_to(c, first, last, u[first:last], F, state, history, t)
     if not bodies.dense[i]:
-        mass_times(bodies, i, u[first:last], work.y)
+        mass_times(bodies.mass, bodies, i, u[first:last], work.y)
         carried_on(c, work.y[:N], state.momentum[3 * first : 3 * last])
     copied(trial.f[first:last], state.f[first:last])
     if bodies.rigid[i]:
@@ -278,14 +214,7 @@ def own_end(c, bodies, i, R, F, u, state, trial, history, t, work):  # type: ign
     if c.alpha != 0.0:
         copied(trial.damped[3 * first : 3 * last], state.damped[3 * first : 3 * last])
     if bodies.frame[i] == COROTATIONAL:
-        g = trial.seen[3 * first : 3 * first + N]
-        copied(trial.seen[3 * first : 3 * last], state.seen[3 * first : 3 * last])
-        copied(g, history.g[t, first:last])
-        energy = 0.0
-        stiffness_times(bodies, i, g, work.y)
-        for x in range(N):
-            energy += 0.5 * g[x] * work.y[x]
-        history.energy[t, i] = energy
+        corotational_end(bodies.K, bodies, i, trial, state, history, t, work)
     orientation(bodies, i, R, u, trial, history.R[t, i])
     frame_copied(trial.Q[i], state.Q[i])
     state.angle[i] = trial.angle[i]

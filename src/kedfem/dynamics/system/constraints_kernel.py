@@ -39,11 +39,11 @@ def coordinate(ends, of, r, rigid_motion, place, turned, row, y, w):  # type: ig
     for t in range(of.term_at[r], of.term_at[r + 1]):
         i, j, kind, factor = of.i[t], of.j[t], of.kind[t], of.factor[t]
         if kind == OFFSET:
-            value, turning = off_line(ends, of, t, rigid_motion, place, w)
+            value, turning = off_line(ends.knots, ends, of, t, rigid_motion, place, w)
             total += factor * value
             rate += factor * turning
             rate += borne(ends, i, w[6], w[7], factor, rigid_motion, place, row, y, w)
-            rate += borne_by_line(ends, j, w[6], w[8], factor, rigid_motion, row, w)
+            rate += borne_by_line(ends.knots, ends, j, w[6], w[8], factor, rigid_motion, row, w)
             continue
         if kind in (GAP, DISTANCE):
             value = between(kind, ends, of, t, x, Q, w)

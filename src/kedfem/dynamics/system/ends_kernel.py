@@ -6,6 +6,8 @@ moment τ on Q is
 
     τ · ω = Σ q_k · δD_k,   q_k = Q (t × e_k),   t = G⁻¹ Qᵀ τ
 
+Without any line, `ends.knots` may be None: nothing of lines is compiled then.
+
     place : x (E, 3), Q (E, 3, 3), D (E, 3, 3), U (E, 3, 3) of all ends; X (n, 3) of the stations of all lines
 """
 
@@ -82,14 +84,23 @@ def placed(ends, R, p, z, place, y, w):  # type: ignore[no-untyped-def]
         elif form != POINT:
             directed(ends, e, R[body], y, D[e], w[0])
             oriented(ends.directions[e], D[e], Q[e], U[e], w)
+    stationed(ends.knots, ends, R, p, z, X, w)
+
+
+@inner
+def stationed(knots, ends, R, p, z, X, w):  # type: ignore[no-untyped-def]
+    """X becomes the positions of the stations of all lines whose pins are where both links are."""
+    if knots is None:
+        return
     for n in range(len(ends.line)):
         if ends.free[n]:
-            stationed(ends, n, R[ends.body[ends.line[n]]], p[ends.body[ends.line[n]]], z, X, w)
+            body = ends.body[ends.line[n]]
+            on_line(ends, n, R[body], p[body], z, X, w)
 
 
 @inlined
-def stationed(ends, n, R, p, z, X, w):  # type: ignore[no-untyped-def]
-    """X becomes the positions of the stations of line n."""
+def on_line(ends, n, R, p, z, X, w):  # type: ignore[no-untyped-def]
+    """The same of line n."""
     e, first, at = ends.line[n], ends.line_at[n], ends.full_at[n]
     d, column, c = ends.components[e], ends.column_at[e], ends.column_at[e + 1] - ends.column_at[e]
     for k in range(first, ends.line_at[n + 1]):
@@ -105,8 +116,10 @@ def stationed(ends, n, R, p, z, X, w):  # type: ignore[no-untyped-def]
 
 
 @inner
-def on_lines(ends, weights):  # type: ignore[no-untyped-def]
+def on_lines(knots, ends, weights):  # type: ignore[no-untyped-def]
     """`onto` of ends on lines becomes what is at their pins, from the weights (n,) of all stations."""
+    if knots is None:
+        return
     for n in range(len(ends.line)):
         at = ends.onto_at[ends.line[n]]
         size = ends.onto_at[ends.line[n] + 1] - at
@@ -124,7 +137,7 @@ def unmoved(ends, of, driving, t, trial, work):  # type: ignore[no-untyped-def]
     if of is None:
         return
     if of.linear.any():
-        on_lines(ends, driving.stations[t])
+        on_lines(ends.knots, ends, driving.stations[t])
         placed(ends, driving.R[t], driving.p[t], trial.row, trial.fixed, work.end, work.vectors)
 
 

@@ -82,11 +82,13 @@ def tilt_along(Qi, Qj, axis, b, w):  # type: ignore[no-untyped-def]
 
 
 @inner
-def off_line(ends, of, t, rigid_motion, place, w):  # type: ignore[no-untyped-def]
+def off_line(knots, ends, of, t, rigid_motion, place, w):  # type: ignore[no-untyped-def]
     """How far the pin i is off the line of j, and the rate of that as the direction turns with the line's body.
 
     w[6:8] become the force F and its moment on i, w[8] what the line's slopes bear, q + κ d.
     """
+    if knots is None:
+        return 0.0, 0.0
     x, Q, _, _, X = place
     R, _, omega = rigid_motion
     i, j = of.i[t], of.j[t]
@@ -170,8 +172,10 @@ def spline_at(ends, n, s, X, w):  # type: ignore[no-untyped-def]
 
 
 @inner
-def borne_by_line(ends, e, force, slope, factor, rigid_motion, row, w):  # type: ignore[no-untyped-def]
+def borne_by_line(knots, ends, e, force, slope, factor, rigid_motion, row, w):  # type: ignore[no-untyped-def]
     """As `ends_kernel.borne`: what the stations of the line of end e bear, N' `slope` − N `force`."""
+    if knots is None:
+        return 0.0
     R, v, omega = rigid_motion
     n, d, body = ends.number[e], ends.components[e], ends.body[e]
     first, column, c = ends.line_at[n], ends.column_at[e], ends.column_at[e + 1] - ends.column_at[e]

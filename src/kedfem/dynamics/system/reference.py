@@ -31,6 +31,10 @@ from numba.extending import (
 )
 from numba.np.arrayobj import populate_array
 
+from kedfem.compiled import compiles_for_all
+from kedfem.dynamics.system.arrays import Bodies, Ends
+from kedfem.dynamics.system.record import COROTATIONAL, STRESSED
+
 
 class Reference(types.Type):
     """A record, a named tuple, by its address; its name is short, as it stands in those of all functions."""
@@ -113,6 +117,8 @@ def _lay_out(x: Any, numbers: list[int]) -> None:
     elif isinstance(x, tuple):
         for each in x:
             _lay_out(each, numbers)
+    elif x is None:
+        numbers.append(0)
     elif isinstance(x, float):
         numbers.append(int.from_bytes(struct.pack("=d", x), sys.byteorder, signed=True))
     else:
@@ -120,8 +126,32 @@ def _lay_out(x: Any, numbers: list[int]) -> None:
 
 
 def handed(record: Any) -> Any:
-    """What compiled functions are given for a record; None stays None."""
-    return None if record is None else Handed(record)
+    """What compiled functions are given for a record; None stays None.
+
+    Of bodies and ends without what none of them has: what that needs is not compiled, but in loops for all scenes.
+    """
+    if record is None:
+        return None
+    unused = () if compiles_for_all() else _unused(record)
+    return Handed(record._replace(**dict.fromkeys(unused)) if unused else record)
+
+
+def _unused(record: Any) -> list[str]:
+    """What a record has none of."""
+    none: dict[str, Any] = {}
+    if isinstance(record, Bodies):
+        none = {
+            "beams": not len(record.beams.segment),
+            "K": not (record.frame == COROTATIONAL).any(),
+            "elements": (record.elements.number < 0).all(),
+            "turning": not len(record.turning.body),
+            "stresses": not (record.frame == STRESSED).any(),
+            "mass": record.dense.all(),
+            "arrays": record.dense.all(),
+        }
+    elif isinstance(record, Ends):
+        none = {"knots": not len(record.line)}
+    return [name for name, yes in none.items() if yes]
 
 
 def _array_at(number: Any) -> Any:

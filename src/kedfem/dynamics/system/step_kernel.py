@@ -19,13 +19,12 @@ from kedfem.dynamics.system.algebra_kernel import (
     turned_back,
 )
 from kedfem.dynamics.system.bodies_kernel import (
-    foresee,
     internal_forces,
-    newmark,
     orientation,
     own_end,
     residual,
 )
+from kedfem.dynamics.system.corotational_kernel import foresee, newmark
 from kedfem.dynamics.system.ends_kernel import unmoved
 from kedfem.dynamics.system.interface_kernel import (
     evaluated,
@@ -95,6 +94,14 @@ def left(ends, of):  # type: ignore[no-untyped-def]
     """The first line whose pin is beyond its ends, −1 without any."""
     if of is None:
         return -1
+    return beyond(ends.knots, ends)
+
+
+@inner
+def beyond(knots, ends):  # type: ignore[no-untyped-def]
+    """The same where there are constraints."""
+    if knots is None:
+        return -1
     for n in range(len(ends.line)):
         first, last = ends.knots[ends.line_at[n]], ends.knots[ends.line_at[n + 1] - 1]
         slack = SLACK * (last - first)
@@ -118,7 +125,9 @@ def begin(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type:
         for x in range(bodies.at[i], bodies.at[i + 1]):
             trial.u[x] = state.u[x] + h * state.v[x] + h * h / 2 * state.a[x]
         if bodies.frame[i] == STRESSED:
-            stressed_begin(c, bodies, i, R[bodies.motion[i]], driving.F[t], state, trial, work.room)
+            stressed_begin(
+                bodies.stresses, c, bodies, i, R[bodies.motion[i]], driving.F[t], state, trial, work.room
+            )
             continue
         frame_copied(state.Q[i], trial.Q[i])
         trial.angle[i] = state.angle[i]
@@ -176,13 +185,13 @@ def asked(c, bodies, ends, of, driving, t, iteration, state, trial, work, solved
         if own:
             residual(c, bodies, i, trial.Rp[i], driving.F[t], trial.u, state, trial, trial.r, work)
         elif bodies.frame[i] == STRESSED:
-            stressed_side(c, bodies, i, trial, work)
+            stressed_side(bodies.stresses, c, bodies, i, trial, work)
         if bodies.frame[i] != NOMINAL:
             if bodies.dense[i]:
                 reaction = trial.reaction[bodies.port_at[i] : bodies.port_at[i + 1]]
                 product(bodies.Y, bodies.Y_at[i], q, N, trial.r[first:last], reaction)
             else:
-                sparse_held(bodies, i, trial, solved)
+                sparse_held(bodies.arrays, bodies, i, trial, solved)
         if own:
             turned_back(trial.Rp[i], d, trial.u[first:last], work.y[:N])
         offset(bodies, i, work.y, trial, own)
@@ -200,7 +209,7 @@ def asked(c, bodies, ends, of, driving, t, iteration, state, trial, work, solved
                 before = trial.u[first + x] if bodies.frame[i] == STRESSED else 0.0
                 trial.change[to + x] = bodies.size[i] * (trial.change[to + x] - before)
             if bodies.rigid[i]:
-                foresee(c, bodies, i, work.y, trial, work)
+                foresee(bodies.K, c, bodies, i, work.y, trial, work)
     k = len(trial.z)
     for m in range(k):
         trial.change[len(trial.change) - k + m] = c.weight * trial.dz[m]
@@ -261,7 +270,7 @@ def finish(c, bodies, ends, of, driving, t, state, trial, work, history):  # typ
         else:
             rigid_frame_finish(c, bodies, i, F, trial, state, history, t, work)
         if bodies.frame[i] == STRESSED:
-            stressed_end(bodies, i, trial, state, history.g[t], work)
+            stressed_end(bodies.stresses, bodies, i, trial, state, history.g[t], work)
         ports_end(c, bodies, i, trial, state, history, t, work.room)
     ended(t, newmark(c), bodies.beams, R, trial.strained, state.strain, state.direction, state.turn, history.strain,
           history.energy)  # fmt: skip

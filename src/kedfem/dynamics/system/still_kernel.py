@@ -3,7 +3,8 @@ and gradients of coordinates. They are those of a step, without rates."""
 
 from kedfem.compiled import compiled
 from kedfem.dynamics.beams_kernel import begun
-from kedfem.dynamics.system.bodies_kernel import internal_forces, newmark, orientation
+from kedfem.dynamics.system.bodies_kernel import internal_forces, orientation
+from kedfem.dynamics.system.corotational_kernel import newmark
 from kedfem.dynamics.system.ends_kernel import on_lines, placed
 from kedfem.dynamics.system.interface_kernel import differentiated
 from kedfem.dynamics.system.record import RIGID_BODY
@@ -19,8 +20,7 @@ def still_forces(c, bodies, R, amounts, state, trial, work):  # type: ignore[no-
     R : (M, 3, 3) of the rigid-body motion; amounts : (w,) of loads that turn with bodies
     state : in the reference position
     """
-    if len(bodies.beams.segment):
-        begun(newmark(c), bodies.beams, R, state.strain, state.direction, trial.base, trial.resisted)
+    begun(newmark(c), bodies.beams, R, state.strain, state.direction, trial.base, trial.resisted)
     internal_forces(c, bodies, R, amounts, state, trial, work, True)
     for i in range(len(bodies.motion)):
         if bodies.frame[i] > RIGID_BODY:
@@ -36,7 +36,7 @@ def still_gradients(ends, of, rigid_motion, p, stations, z, trial, work):  # typ
     rigid_motion, p : R (M, 3, 3), v and ω (M, 3), and origins (M, 3) of all bodies of the linkage
     stations : weights of ends on lines
     """
-    on_lines(ends, stations)
+    on_lines(ends.knots, ends, stations)
     placed(ends, rigid_motion[0], p, trial.row, trial.fixed, work.end, work.vectors)
     placed(ends, rigid_motion[0], p, z, trial.moving, work.end, work.vectors)
     for a in range(len(of.law)):

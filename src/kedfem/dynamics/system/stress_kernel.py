@@ -1,13 +1,18 @@
-"""Geometric stiffening of bodies with rigid-body frames, compiled by numba: k g P is taken from their right-hand side."""
+"""Geometric stiffening of bodies with rigid-body frames, compiled by numba: k g P is taken from their right-hand side.
+
+Without any, `of` may be None: nothing of this is compiled then.
+"""
 
 from kedfem.compiled import inlined, inner
 from kedfem.dynamics.system.algebra_kernel import frame_copied, turned, turned_back
 from kedfem.dynamics.system.bodies_kernel import right_hand_side
 
 
-@inlined
+@inner
 def combined(of, driving, t, out):  # type: ignore[no-untyped-def]
     """out becomes the entries of k = Σ s_j k_j of all bodies at one time."""
+    if of is None:
+        return
     for i in range(len(of.at) - 1):
         k = out[of.at[i] : of.at[i + 1]]
         k[:] = 0.0
@@ -20,41 +25,47 @@ def combined(of, driving, t, out):  # type: ignore[no-untyped-def]
                 k[m] += s * of_j[m]
 
 
-@inlined
-def stressed_begin(c, bodies, i, R, F, state, trial, room):  # type: ignore[no-untyped-def]
+@inner
+def stressed_begin(of, c, bodies, i, R, F, state, trial, room):  # type: ignore[no-untyped-def]
     """trial.f becomes the right-hand side of a body without its stress stiffness."""
+    if of is None:
+        return
     frame_copied(R, trial.Rp[i])
     right_hand_side(c, bodies, i, trial.Rp[i], F, state, trial.f, room)
 
 
-@inlined
-def stressed_side(c, bodies, i, trial, work):  # type: ignore[no-untyped-def]
+@inner
+def stressed_side(of, c, bodies, i, trial, work):  # type: ignore[no-untyped-def]
     """trial.r becomes the right-hand side, k g P taken from it at trial.u."""
+    if of is None:
+        return
     first, last = bodies.at[i], bodies.at[i + 1]
     N, share = last - first, 1 - c.alpha_f
     turned_back(trial.Rp[i], bodies.components[i], trial.u[first:last], work.y[:N])
     work.strained[:N] = 0.0
-    add_stress(bodies, i, trial.stress, work.y, work.turned, work.strained)
+    add_stress(of, bodies, i, trial.stress, work.y, work.turned, work.strained)
     for x in range(N):
         trial.r[first + x] = trial.f[first + x] - share * work.strained[x]
 
 
-@inlined
-def stressed_end(bodies, i, trial, state, g, work):  # type: ignore[no-untyped-def]
+@inner
+def stressed_end(of, bodies, i, trial, state, g, work):  # type: ignore[no-untyped-def]
     """The internal force gets k g P."""
+    if of is None:
+        return
     first, last = bodies.at[i], bodies.at[i + 1]
     N = last - first
     work.strained[:N] = 0.0
-    add_stress(bodies, i, trial.stress, g[first:last], work.turned, work.strained)
+    add_stress(of, bodies, i, trial.stress, g[first:last], work.turned, work.strained)
     turned(trial.Rp[i], bodies.components[i], work.strained[:N], work.y[:N])
     for x in range(N):
         state.f[first + x] += work.y[x]
 
 
 @inner
-def add_stress(bodies, i, entries, g, room, out):  # type: ignore[no-untyped-def]
+def add_stress(of, bodies, i, entries, g, room, out):  # type: ignore[no-untyped-def]
     """out + k g P of body i."""
-    of, n, d = bodies.stresses, bodies.functions[i], bodies.components[i]
+    n, d = bodies.functions[i], bodies.components[i]
     P, k, row = of.P[i], entries[of.at[i] : of.at[i + 1]], room[:n]
     for b in range(d):
         row[:] = 0.0

@@ -5,8 +5,8 @@ import numpy as np
 from kedfem.compiled import inlined, inner
 
 
-@inlined
-def turned_loads(bodies, R, amounts, u, f, frame):  # type: ignore[no-untyped-def]
+@inner
+def turned_loads(loads, bodies, R, amounts, u, f, frame):  # type: ignore[no-untyped-def]
     """Subtract loads from internal forces f (N,), world components, of bodies displaced by u (N,).
 
     Parameters
@@ -14,13 +14,14 @@ def turned_loads(bodies, R, amounts, u, f, frame):  # type: ignore[no-untyped-de
     R : (M, 3, 3) of the rigid-body motion
     frame : (3, 3) room
     """
-    loads = bodies.turning
+    if loads is None:
+        return
     for w in range(len(loads.body)):
         if amounts[w] == 0.0:
             continue
         i = loads.body[w]
         first, n, turned = bodies.at[i], bodies.functions[i], bodies.components[i]
-        shown_frame(bodies, w, R[bodies.motion[i]], u, frame)
+        shown_frame(loads, bodies, w, R[bodies.motion[i]], u, frame)
         amount, share, along = amounts[w], 0.0, 0.0
         for b in range(3):
             along += abs(loads.axis[w, b])
@@ -41,9 +42,8 @@ def turned_loads(bodies, R, amounts, u, f, frame):  # type: ignore[no-untyped-de
 
 
 @inlined
-def shown_frame(bodies, w, R, u, frame):  # type: ignore[no-untyped-def]
+def shown_frame(loads, bodies, w, R, u, frame):  # type: ignore[no-untyped-def]
     """frame becomes the axes of the directions that show how load w has turned, in columns, world components."""
-    loads = bodies.turning
     i, at = loads.body[w], loads.shown_at[w]
     first, n, d = bodies.at[i], bodies.functions[i], bodies.components[i]
     for b in range(3):
