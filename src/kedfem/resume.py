@@ -28,9 +28,8 @@ from kedfem.store import contents, software
 STATE = "state.kept"
 EVERY = 10.0  # seconds between two states: what a kill may cost
 SHARE = 20.0  # times what storing takes: a twentieth of a run's time at most
-OVERDUE = (
-    4.0  # times `every`, after which a state is stored though it is large: steps wait for their stresses
-)
+# times `every`, after which a state is stored though it is large: steps wait for their stresses
+OVERDUE = 4.0
 FORMAT = 2
 ROUNDING = 1e-9  # of a model's numbers, on another machine
 

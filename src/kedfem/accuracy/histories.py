@@ -18,9 +18,8 @@ from kedfem.results import Channel
 from kedfem.results.recording import recording, rows
 from kedfem.results.records import largest_by_unit
 
-FAINT = (
-    3e-3  # of the largest force at the linkage's size: a torque below is what is left of others that cancel
-)
+# of the largest force at the linkage's size: a torque below is what is left of others that cancel
+FAINT = 3e-3
 ROUGHLY = 1e-6  # of its size: what a steady motion that is compared may leave in a period
 NOTHING = 1e-6  # of the largest value of the same unit: a channel below holds rounding, not results
 

@@ -7,9 +7,8 @@ from kedfem.motion.linkage import drawn_linkage
 from kedfem.motion.released_motions import free_motions
 from kedfem.scene import time_grid, without_vibration
 
-LOST = (
-    0.01  # of the speed of what moves freely over the run, and of the energy exchanged: less is not reported
-)
+# of the speed of what moves freely over the run, and of the energy exchanged: less is not reported
+LOST = 0.01
 
 
 def mass_damping_warning(ready: Prepared, taken: float | None = None) -> tuple[str, ...]:

@@ -35,9 +35,8 @@ from kedfem.results import Peak
 REPORTED = 1e-5  # of the forces: what is less is not reported; scenes of links of one stiffness have 1e-9
 LEFT = {"beam": 1.0, "plane": 4.0, "solid": 4.0, "spatial_beam": 4.0}
 """Times what S leaves: in the mean of a two- or four-link scene errors are a tenth to ten times that (test_rounding)."""
-NODAL = (
-    8.0  # of what K0 leaves: the monolithic solver's factor loses more than its matrix (measured, 5 to 17)
-)
+# of what K0 leaves: the monolithic solver's factor loses more than its matrix (measured, 5 to 17)
+NODAL = 8.0
 IDLE = "no link is stressed at all: the scene has no gravity, load, spring or acceleration that acts on them"
 #: of the least E: more than rounding leaves where nothing acts (3e-14), less than a grain feels of its weight
 UNSTRESSED = 1e-12

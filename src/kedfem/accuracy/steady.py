@@ -11,9 +11,8 @@ from kedfem.dynamics.system.period.search import Periodic
 from kedfem.dynamics.system.steps import Steps
 from kedfem.scene import Scene, time_grid, turn_steps
 
-RESOLVED = (
-    0.2  # oscillations in a step, five steps each: of faster ones a step does not determine whether they grow
-)
+# oscillations in a step, five steps each: of faster ones a step does not determine whether they grow
+RESOLVED = 0.2
 GROWS = 1e-6  # by which a period multiplies more than one: rounding and the step's error are less
 SLOW = 0.999  # a vibration that falls by less in a period is as good as undamped
 APART = 0.1  # of logarithms of growth, by which levels of a step that resolves what grows differ at most

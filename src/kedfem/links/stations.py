@@ -18,9 +18,8 @@ from kedfem.links.record import Link
 BESIDE = 1e-6  # of the link's size: nodes so far off a line are on it
 SPARE = 2  # stations beyond the travel of the slider, where the link has them
 FEWEST, MOST = 4, 48
-SAME = (
-    1e-6  # relative: what rounding must not decide, as of elements as long as stations are apart, or at a cut
-)
+# relative: what rounding must not decide, as of elements as long as stations are apart, or at a cut
+SAME = 1e-6
 KNOWN = 1e-3  # of the ball: a spread below cannot determine a gradient
 Directed = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]
 """Origin and axis of a line."""

@@ -32,9 +32,8 @@ from kedfem.motion.released_motions import remedy as held_by
 from kedfem.motion.values import Poses, features, jacobian
 from kedfem.scene import Scene, corotational_links
 
-FIRST = (
-    1e-6  # by so much less counts each further joint motion, so that rounding chooses none that is to be held
-)
+# by so much less counts each further joint motion, so that rounding chooses none that is to be held
+FIRST = 1e-6
 MANY = 12  # bodies up to which the rows are solved as one matrix: about as fast then, and in the least squares of QR
 
 

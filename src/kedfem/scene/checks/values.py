@@ -36,9 +36,8 @@ def key_hint(hint: Any) -> Any:
 
 
 TURN = 2.0 * math.pi
-FAST = (
-    60.0  # rad/s, from which a round number is rather one of rpm, or m/s, from which it is rather one of mm/s
-)
+# rad/s, from which a round number is rather one of rpm, or m/s, from which it is rather one of mm/s
+FAST = 60.0
 
 
 def bare_numbers(raw: Any, hint: Any) -> Iterator[str]:
