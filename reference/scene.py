@@ -136,11 +136,7 @@ SECTIONS: list[tuple[str, str, Sequence[type[BaseModel]]]] = [
     ("[analysis]", "", [analysis.Analysis]),
     ("[analysis.initial_motions.NAME]", "", [analysis.InitialMotion]),
     ("[analysis.initial_deflection.NAME]", "", [analysis.InitialForce]),
-    (
-        "[fatigue]",
-        "See [fatigue.md](fatigue.md).",
-        [fatigue.Fatigue],
-    ),
+    ("[fatigue]", "See [fatigue.md](fatigue.md).", [fatigue.Fatigue]),
     ("[fatigue.materials.NAME], [fatigue.links.NAME]", "", [fatigue.FatigueData]),
     ("strain_life of a material", "", [fatigue.StrainLife]),
     ("[output]", "", [analysis.Output]),

@@ -17,13 +17,7 @@ def bar(model: str, a: Sequence[float], b: Sequence[float], along: int = 8, **mo
     """A steel bar, 30 mm by 20 mm."""
     elements: Any = {"beam": along, "plane": [along, 2], "solid": [along, 2, 1], "rigid": [1, 1, 1]}[model]
     shape = {"kind": "bar", "between": [list(a), list(b)], "width": 0.03, "thickness": 0.02}
-    return {
-        "model": model,
-        "material": "steel",
-        "shape": shape,
-        "mesh": {"elements": elements},
-        **more,
-    }
+    return {"model": model, "material": "steel", "shape": shape, "mesh": {"elements": elements}, **more}
 
 
 def turning(speed: str = "120 rpm") -> dict[str, Any]:

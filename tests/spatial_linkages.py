@@ -17,10 +17,7 @@ def quick_return(r: float, d: float, angle: float, block: bool = False) -> Joint
     along = pin / np.linalg.norm(pin)
     slide: Joints = {"B": ("slot", "crank", "arm", pin, along)}
     if block:
-        slide = {
-            "B": ("revolute", "crank", "block", pin, Z),
-            "C": ("prismatic", "block", "arm", pin, along),
-        }
+        slide = {"B": ("revolute", "crank", "block", pin, Z), "C": ("prismatic", "block", "arm", pin, along)}
     return {
         "A": ("revolute", "ground", "crank", (0.0, d, 0.0), Z),
         **slide,
@@ -42,11 +39,7 @@ def inverted_slider_crank(r: float, d: float, angle: float) -> Joints:
 def universal_cardan(beta: float) -> Joints:
     """`cardan` with one universal joint instead of the cross and its two hinges."""
     hinged = cardan(beta)
-    return {
-        "A": hinged["A"],
-        "U": ("universal", "shaft1", "shaft2", np.zeros(3), (Y, Z)),
-        "D": hinged["D"],
-    }
+    return {"A": hinged["A"], "U": ("universal", "shaft1", "shaft2", np.zeros(3), (Y, Z)), "D": hinged["D"]}
 
 
 def double_cardan(beta: float, crossed: bool = False) -> Joints:

@@ -46,10 +46,7 @@ def arm(
 
 
 def reduced(raw: dict[str, Any], modes: int | str = "modal") -> dict[str, Any]:
-    return {
-        **raw,
-        "links": {name: {**link, "reduction": modes} for name, link in raw["links"].items()},
-    }
+    return {**raw, "links": {name: {**link, "reduction": modes} for name, link in raw["links"].items()}}
 
 
 def run(raw: dict[str, Any]) -> Histories:

@@ -6,13 +6,7 @@ import pytest
 from kedfem.links.beams.section import rectangle
 from tests.rooms.test_dynamics import run, worst_difference
 from tests.verification.linear import free_map, frequencies
-from tests.verification.spatial_beams import (
-    ROOT,
-    bent_cantilever,
-    straight,
-    tip_displacement,
-    wanted_modes,
-)
+from tests.verification.spatial_beams import ROOT, bent_cantilever, straight, tip_displacement, wanted_modes
 
 
 @pytest.mark.parametrize("slenderness", [500, 1000])

@@ -101,9 +101,7 @@ def test_no_answer_depends_on_which_axis_of_the_world_a_joint_lies_along(kind: s
 
 
 @pytest.mark.parametrize("model", ["beam", "plane", "solid"])
-def test_the_force_on_a_slider_without_a_shape_is_the_same_in_all_directions_of_a_plane(
-    model: str,
-) -> None:
+def test_the_force_on_a_slider_without_a_shape_is_the_same_in_all_directions_of_a_plane(model: str) -> None:
     """Along x, y and askew: a ram pushes a planar beam, a plane link, a solid; of which a bar lies as it likes."""
     force = []
     for angle in (0.0, np.pi / 2, 0.7):

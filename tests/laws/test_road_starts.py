@@ -137,9 +137,7 @@ def test_a_start_turns_with_the_scene(start: tuple[Steps, Motion, np.ndarray]) -
         assert_allclose(ASKEW.T @ travel(askew, found, name), there, atol=1e-6 * np.abs(u).max())
 
 
-def test_positions_of_a_static_analysis_are_its_starts(
-    start: tuple[Steps, Motion, np.ndarray],
-) -> None:
+def test_positions_of_a_static_analysis_are_its_starts(start: tuple[Steps, Motion, np.ndarray]) -> None:
     """Rigid links of steps and of positions differ in stiffness: 1e-4 of what they move by."""
     solver, _, u = start
     still, motion = made(corner(np.eye(3), kind="static", step=0.5))

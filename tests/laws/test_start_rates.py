@@ -22,10 +22,7 @@ def damped(guided: str, way: str, **analysis: Any) -> tuple[Raw, np.ndarray]:
     R = Rotation.from_euler("xyz", TURNS[way], degrees=True).as_matrix()
     times = {"initial": "quasi-static", "step": 1e-5, "end_time": 4e-5}
     raw = mounted(guided, "none", R, **times, **analysis)
-    raw["joints"]["M"]["bushing"] |= {
-        "damping": FADES * MOUNT,
-        "rotational_damping": FADES * MOUNT * ARM**2,
-    }
+    raw["joints"]["M"]["bushing"] |= {"damping": FADES * MOUNT, "rotational_damping": FADES * MOUNT * ARM**2}
     raw["loads"]["F"]["factor"] = {"over": "time", "at": [0.0, 0.1], "value": [1.0, 1.0 + 0.1 * GROWS]}
     raw["output"]["probes"]["v"] = {**raw["output"]["probes"]["b"], "quantity": "velocity"}
     return raw, R[:, 2 if guided in HINGED else 0]

@@ -267,13 +267,7 @@ def test_multipliers_of_a_shaft_that_spins(axis: str, ratio: float, section: Any
     assert_allclose(of.growth, exact, rtol=1e-6)
     assert of.unstable == (exact > 1 + 1e-6)
     if section[0] == section[1]:  # both frequencies are one, so that growth is known from them alone
-        published = {
-            0.5: 0.88192800,
-            0.9: 0.98613910,
-            1.1: 1.01148414,
-            1.5: 1.04274486,
-            2.0: 1.06476769,
-        }
+        published = {0.5: 0.88192800, 0.9: 0.98613910, 1.1: 1.01148414, 1.5: 1.04274486, 2.0: 1.06476769}
         assert_allclose(of.growth, published[ratio], rtol=1e-6)
 
 

@@ -15,11 +15,7 @@ RISE: Raw = {"joint": "A", "motion": {"kind": "ramp", "speed": 200.0, "time": 0.
 
 def spinning(arm: Raw, step: float) -> Raw:
     """An arm that is brought to a speed at which stiffening is a seventh of its stiffness, under gravity."""
-    hinge = {
-        "kind": "revolute",
-        "links": ["ground", "arm"],
-        "at": [0, 0, 0][: 3 if arm.get("beam") else 2],
-    }
+    hinge = {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0, 0][: 3 if arm.get("beam") else 2]}
     if arm.get("beam"):
         hinge["axis"] = [0, 0, 1]
     return {

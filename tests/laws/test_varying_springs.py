@@ -39,12 +39,7 @@ def hill(form: str, axis: str, zeta: float, **analysis: Any) -> Raw:
         "Mathieu": (phi, np.cos(phi)),
         "Meissner": (np.pi * np.array([1e-8, 1 - 1e-8, 1 + 1e-8, 2 - 1e-8]), np.array([1, 1, -1, -1])),
     }[form]
-    factor = {
-        "over": "angle",
-        "at": at.tolist(),
-        "value": (1 + swing * f).tolist(),
-        "period": "360 deg",
-    }
+    factor = {"over": "angle", "at": at.tolist(), "value": (1 + swing * f).tolist(), "period": "360 deg"}
     spring = {"kind": "spring", "joint": "S", "stiffness": share, "damping": 2 * zeta * OMEGA * MASS}
     between = {"links": ["block", "ground"], "at": [0.3, 0, 0]}
 

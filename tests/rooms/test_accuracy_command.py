@@ -190,10 +190,7 @@ def test_a_fidelity_that_cannot_be_built_is_one_row_that_says_why(whip: Path) ->
     ],
 )
 def test_options_that_mean_nothing(
-    run_kedfem: Command,
-    whip: Path,
-    option: tuple[str, str],
-    message: str,
+    run_kedfem: Command, whip: Path, option: tuple[str, str], message: str
 ) -> None:
     said = run_kedfem("accuracy", whip, *option)
     assert (said.code, said.err) == (USER_ERROR, message)

@@ -40,13 +40,7 @@ def shaft(along: Any, kind: str = "static", **fatigue: Any) -> dict[str, Any]:
         "points": [[0, 0, 0], tip],
         "section": {"kind": "round", "diameter": 2 * RADIUS},
     }
-    link = {
-        "material": "steel",
-        "model": "beam",
-        "shape": shape,
-        "mesh": {"elements": 4},
-        "beam": "spatial",
-    }
+    link = {"material": "steel", "model": "beam", "shape": shape, "mesh": {"elements": 4}, "beam": "spatial"}
     force = (FORCE * across + AXIAL * e).tolist()
     return {
         "links": {"arm": link},

@@ -203,12 +203,7 @@ def test_nodes_of_one_cross_section_are_never_parted_by_rounding(degrees: float,
     raw = arm()
     end = [L * np.cos(np.radians(degrees)), L * np.sin(np.radians(degrees))]
     raw["links"]["arm"] = {"material": "steel", "mesh": {"elements": elements}}
-    raw["links"]["arm"]["shape"] = {
-        "kind": "bar",
-        "between": [[0, 0], end],
-        "width": SIDE,
-        "thickness": SIDE,
-    }
+    raw["links"]["arm"]["shape"] = {"kind": "bar", "between": [[0, 0], end], "width": SIDE, "thickness": SIDE}
     ready = meshed(scene_from(raw))
     of = slices(ready.model.links[0], ready.model.joints[0])
     assert of.gaps.min() >= 0.99 * L / max(8, 2 * elements[0])
@@ -255,17 +250,10 @@ def lifted_boom(cylinder: dict[str, Any]) -> dict[str, Any]:
             "A": {"kind": "revolute", "links": ["ground", "boom"], "at": list(A)},
             "P": {"kind": "revolute", "links": ["ground", "barrel"], "at": list(P)},
             "Q": {"kind": "revolute", "links": ["rod", "boom"], "at": list(Q)},
-            "cyl": {
-                "kind": "prismatic",
-                "links": ["rod", "barrel"],
-                "at": list(middle),
-                "axis": [*axis, 0],
-            },
+            "cyl": {"kind": "prismatic", "links": ["rod", "barrel"], "at": list(middle), "axis": [*axis, 0]},
         },
         "drive": {"joint": "cyl", "motion": {"kind": "cycloidal", "travel": 0.1, "rise": 1.0}},
-        "loads": {
-            "dig": {"kind": "force", "link": "boom", "at": [*E, 0], "vector": [0, -5e3, 0]},
-        },
+        "loads": {"dig": {"kind": "force", "link": "boom", "at": [*E, 0], "vector": [0, -5e3, 0]}},
         "damping": {"ratio": 0.05, "frequencies": [5, 200]},
         "analysis": {"end_time": 1.0, "step": 0.01, "initial": "quasi-static", "rho_inf": 0.5},
     }

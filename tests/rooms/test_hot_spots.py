@@ -37,11 +37,7 @@ def numbers(rows: list[dict[str, str]], *names: str) -> np.ndarray:
     return np.array([[float(row[name] or "nan") for name in names] for row in rows])
 
 
-PLACE = (
-    "reference x [m]",
-    "reference y [m]",
-    "reference z [m]",
-)
+PLACE = ("reference x [m]", "reference y [m]", "reference z [m]")
 
 
 def test_the_first_of_each_link_is_its_peak(run: Run) -> None:

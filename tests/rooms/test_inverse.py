@@ -74,10 +74,7 @@ def balance(
 
 def pin(column: int, arm: Array, sign: float = 1.0) -> dict[int, Array]:
     """A pin's two unknown force components at an arm from a link's centre, with their moments."""
-    return {
-        column: sign * np.array([1.0, 0.0, -arm[1]]),
-        column + 1: sign * np.array([0.0, 1.0, arm[0]]),
-    }
+    return {column: sign * np.array([1.0, 0.0, -arm[1]]), column + 1: sign * np.array([0.0, 1.0, arm[0]])}
 
 
 def vector(z: complex) -> Array:
@@ -153,10 +150,7 @@ def slider_crank_by_hand(t: float) -> Array:
     q = np.pi / 2 + w * t
     s = r / rod_length * np.sin(q)
     c = np.sqrt(1 - s**2)
-    s1, s2 = (
-        r / rod_length * w * np.cos(q),
-        -r / rod_length * w**2 * np.sin(q),
-    )  # the rates of s
+    s1, s2 = (r / rod_length * w * np.cos(q), -r / rod_length * w**2 * np.sin(q))  # the rates of s
     b1 = -s1 / c  # the rod's angle is −asin(s)
     b2 = -(s2 / c + s * s1**2 / c**3)
     B = r * np.array([np.cos(q), np.sin(q)])

@@ -218,8 +218,7 @@ def test_a_run_that_is_ended_twice_goes_on_twice(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changed", "key"),
-    [({"revolutions": 3}, "analysis.revolutions"), ({"rho_inf": 0.5}, "analysis.rho_inf")],
+    ("changed", "key"), [({"revolutions": 3}, "analysis.revolutions"), ({"rho_inf": 0.5}, "analysis.rho_inf")]
 )
 def test_another_scene_is_refused_with_the_key_that_differs(
     tmp_path: Path, changed: dict[str, Any], key: str

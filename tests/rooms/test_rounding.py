@@ -89,12 +89,7 @@ def corotational(stiff: str, model: str, direction: str, ratio: float) -> dict[s
     def bar(name: str) -> dict[str, Any]:
         shape = {"kind": "bar", "between": [at[x] for x in ends[name]], "width": 0.02, "thickness": 0.02}
         material = "stiffer" if name == stiff else "plain"
-        return {
-            "model": model,
-            "material": material,
-            "shape": shape,
-            "mesh": {"elements": ELEMENTS[model]},
-        }
+        return {"model": model, "material": material, "shape": shape, "mesh": {"elements": ELEMENTS[model]}}
 
     return {
         "materials": {"plain": STEEL, "stiffer": {**STEEL, "youngs_modulus": ratio * 2e11}},

@@ -106,9 +106,7 @@ def swinging(frame: str = "world") -> Raw:
             "B": {"kind": "revolute", "links": ["one", "two"], "at": [0.3, 0]},
         },
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1e-9}},
-        "springs": {
-            "b": {"kind": "torsion", "joint": "B", "stiffness": 900.0, "damping": 1.0},
-        },
+        "springs": {"b": {"kind": "torsion", "joint": "B", "stiffness": 900.0, "damping": 1.0}},
         "motors": {"m": {"joint": "B", "torque": {**RAMP, "value": [0.0, 0.02]}}},
         "loads": {
             "f": {

@@ -262,12 +262,7 @@ def test_ends_are_those_of_the_part_not_of_what_is_missing(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(
-    ("power", "starts"),
-    [
-        (0.5, (0.3, 1.0)),
-        (1.0, (0.05, 0.5, 1.9, 5.0)),
-        (1.5, (0.05, 0.5, 1.9, 5.0)),
-    ],
+    ("power", "starts"), [(0.5, (0.3, 1.0)), (1.0, (0.05, 0.5, 1.9, 5.0)), (1.5, (0.05, 0.5, 1.9, 5.0))]
 )
 def test_the_search_for_a_number_of_unknowns_passes_over_sizes_that_change_nothing(
     power: float, starts: tuple[float, ...]

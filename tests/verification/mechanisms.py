@@ -115,8 +115,7 @@ def solids() -> list[Row]:
     hinges that hold an end face in the mean, beside the mesh's own error. Frequencies differ by parts of a percent,
     and the curves run apart with the turns."""
     scene = four_bar(
-        {"revolutions": 1, "steps_per_revolution": 720},
-        {"model": "solid", "mesh": {"elements": [16, 2, 1]}},
+        {"revolutions": 1, "steps_per_revolution": 720}, {"model": "solid", "mesh": {"elements": [16, 2, 1]}}
     )
     _, (curve,) = histories(scene, STRESS)
     error = difference(curve[:, 0] / 1e6, stress(16, 720)[:721])

@@ -42,11 +42,7 @@ def mapped_mesh(
 
 def box(lengths: tuple[float, float, float], start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Mapping:
     """The unit cube stretched and moved."""
-    return lambda r, s, t: (
-        start[0] + lengths[0] * r,
-        start[1] + lengths[1] * s,
-        start[2] + lengths[2] * t,
-    )
+    return lambda r, s, t: (start[0] + lengths[0] * r, start[1] + lengths[1] * s, start[2] + lengths[2] * t)
 
 
 def mapped_link(

@@ -70,10 +70,7 @@ def bent(parts: Sequence[Link], load: np.ndarray, shares: int) -> np.ndarray:
 # Digits in print 5e-7, stretch and shear 1e-6; a single element of 5 nodes is that good while it bends by less than 60°.
 @pytest.mark.parametrize(
     ("elements", "nodes", "cap"),
-    [
-        pytest.param(1, 5, 8e-4, marks=pytest.mark.long),
-        pytest.param(1, 7, 6e-6, marks=pytest.mark.long),
-    ],
+    [pytest.param(1, 5, 8e-4, marks=pytest.mark.long), pytest.param(1, 7, 6e-6, marks=pytest.mark.long)],
 )
 def test_few_elements_of_many_nodes_bend_into_the_elastica(elements: int, nodes: int, cap: float) -> None:
     parts = cantilever(elements, nodes)
