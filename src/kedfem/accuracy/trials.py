@@ -77,9 +77,8 @@ class Trials:
         joined, along = self._moving(scene)
         key = scene.model_dump_json(exclude={"analysis"})
         if key not in self.models:
-            self.models[key] = self._reduced(
-                Prepared(scene, joined, along, elastic_model(scene, joined, self._bare(scene), along))
-            )
+            model = elastic_model(scene, joined, self._bare(scene), along)
+            self.models[key] = self._reduced(Prepared(scene, joined, along, model))
         return replace(self.models[key], scene=scene, path=along)
 
     def _moving(self, scene: Scene) -> tuple[Linkage, Path]:

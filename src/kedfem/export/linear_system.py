@@ -132,9 +132,8 @@ def _require(scene: Scene, modes: int, at: float, free: bool) -> None:
             "by --free"
         )
     if not (free or scene.output.probes or scene.motors):
-        raise SceneError(
-            "--state-space: must have an output, got a scene without probes and motors: add [output.probes.NAME]"
-        )
+        got = "got a scene without probes and motors: add [output.probes.NAME]"
+        raise SceneError(f"--state-space: must have an output, {got}")
 
 
 def _motors(scene: Scene) -> tuple[_Element, ...]:

@@ -136,9 +136,8 @@ def _check(scene: Scene, name: str, joint: str) -> None:
         )
     kind = scene.joints[joint].kind
     if kind not in HELD:
-        raise SceneError(
-            f"--hold: must be a joint of kind {either(list(HELD))}, got '{joint}', which is {kind}"
-        )
+        got = f"got '{joint}', which is {kind}"
+        raise SceneError(f"--hold: must be a joint of kind {either(list(HELD))}, {got}")
     if scene.joints[joint].bushing is not None:
         raise SceneError(f"--hold: must be a joint that holds rigidly, got '{joint}', which has a bushing")
 

@@ -101,9 +101,8 @@ def bare_link(
     if link.family == "plane":
         from kedfem.mesh import plane_mesh
 
-        return plane_link(
-            name, plane_mesh(name, link, scene.folder, touched(scene, name)), material, link_axes(link)
-        )
+        flat = plane_mesh(name, link, scene.folder, touched(scene, name))
+        return plane_link(name, flat, material, link_axes(link))
     return scene_beam(scene, name, spatial_beams(scene) if spatial is None else spatial)
 
 

@@ -45,9 +45,8 @@ def nodal_gradients(link: Link, elements: Int[np.ndarray, " e"] | None = None) -
     for k in range(link.d):
         grad = np.stack([np.asarray(shape[0].grad)[k] for shape in at_gauss.basis])  # (b, e, q)
         local = np.einsum("aq,beq->eab", extension, grad, optimize=True) / count[rows]
-        out.append(
-            sp.csr_array(sp.coo_array((local.ravel(), (rows.ravel(), columns.ravel())), shape=(link.n,) * 2))
-        )
+        entries = local.ravel(), (rows.ravel(), columns.ravel())
+        out.append(sp.csr_array(sp.coo_array(entries, shape=(link.n, link.n))))
     return tuple(out)
 
 

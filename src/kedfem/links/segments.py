@@ -224,9 +224,8 @@ def _slice(
     # the function space numbers its functions in its own way
     distance, same = cKDTree(link.X).query(part.X)
     if distance.max() > SAME * link.size:
-        raise MeshError(
-            f"links.{link.name}.segments: must keep the nodes of the link, got some that it does not have"
-        )
+        got = "got some that it does not have"
+        raise MeshError(f"links.{link.name}.segments: must keep the nodes of the link, {got}")
     return part, same
 
 

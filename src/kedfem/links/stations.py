@@ -163,9 +163,8 @@ def _in_balls(
             reached += [corners.min(), corners.max()]
             longs.append(np.ptp(corners, axis=1))
     if not reached:
-        raise MeshError(
-            f"{where}: its line must run along link '{links[0].name}', got one that nowhere comes near it"
-        )
+        got = "got one that nowhere comes near it"
+        raise MeshError(f"{where}: its line must run along link '{links[0].name}', {got}")
     reach = (float(min(reached)), float(max(reached)))
     _check_travel(where, links[0].name, reach, travel, BESIDE * max(link.size for link in links))
     apart = max(width, float(np.concatenate(longs).mean()))
@@ -181,9 +180,8 @@ def _in_balls(
         weights.append(_mean_at(on[keys[-1]], parts[keys[-1]], point, radius))
     gaps = [point for point, each in zip(points, weights, strict=True) if not each.any()]
     if gaps:
-        raise MeshError(
-            f"{where}: link '{links[0].name}' must have material along its line, got none at {gaps[0]} m"
-        )
+        got = f"got none at {gaps[0]} m"
+        raise MeshError(f"{where}: link '{links[0].name}' must have material along its line, {got}")
     return Stations(s, points, tuple(weights), tuple(keys))
 
 

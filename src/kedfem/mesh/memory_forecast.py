@@ -50,14 +50,12 @@ def size_key(where: str, given: float | None) -> str:
 def check_size(where: str, given: float | None, size: float, extent: float) -> None:
     """Refuse elements that are longer than the whole link [m]."""
     if size > extent:
-        raise MeshError(
-            f"{size_key(where, given)}: must be below the link's own size {extent:.6g} [m], got {size:.6g}"
-        )
+        wanted = f"must be below the link's own size {extent:.6g} [m]"
+        raise MeshError(f"{size_key(where, given)}: {wanted}, got {size:.6g}")
 
 
 def check_count(key: str, count: float) -> None:
     """Refuse meshes that no computer here could solve, before they are made."""
     if count > MOST_ELEMENTS:
-        raise MeshError(
-            f"{key}: must give at most {MOST_ELEMENTS:,} elements, got about {count:,.0f}; take a coarser mesh"
-        )
+        got = f"got about {count:,.0f}; take a coarser mesh"
+        raise MeshError(f"{key}: must give at most {MOST_ELEMENTS:,} elements, {got}")

@@ -86,12 +86,10 @@ def made_mesh(
     """What `cad_mesh` keeps, made in this process."""
     with solid_model(keys, file, name, shape) as (gmsh, solid):
         if link.mesh.size is not None and link.mesh.size > solid.extent:
-            raise MeshError(
-                f"{keys.file}: must be larger than its mesh.size {link.mesh.size:.6g} [m], got {solid.extent:.6g}"
-            )
-        mesh = with_faces(
-            gmsh, solid, _sized_or_healed(keys.file, gmsh, solid, link, _wanted(link, shape, kept_whole))
-        )
+            wanted = f"must be larger than its mesh.size {link.mesh.size:.6g} [m]"
+            raise MeshError(f"{keys.file}: {wanted}, got {solid.extent:.6g}")
+        sizing = _wanted(link, shape, kept_whole)
+        mesh = with_faces(gmsh, solid, _sized_or_healed(keys.file, gmsh, solid, link, sizing))
         if solid.mended:
             mesh = replace(mesh, method=f"{mesh.method}; {solid.mended}")
     return placed(mesh, np.array(shape.origin), file_axes(shape))

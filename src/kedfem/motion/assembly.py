@@ -88,9 +88,8 @@ def _closed(scene: Scene) -> tuple[Scene, Assembly]:
         name: Shift(c + middle, size * x[:3], x[3:])
         for name, c, x in zip(scene.links, centres, change, strict=True)
     }
-    return closed_scene(scene, shifts), Assembly(
-        misfits, {name: _way(scene, name, shifts[name]) for name in shifts}
-    )
+    ways = {name: _way(scene, name, shift) for name, shift in shifts.items()}
+    return closed_scene(scene, shifts), Assembly(misfits, ways)
 
 
 def assembly_warning(assembly: Assembly) -> tuple[str, ...]:

@@ -230,9 +230,8 @@ def _up(where: str, up: XYZ | None, segments: list[tuple[XYZ, XYZ]], shift: Shif
     if _tilt(shift, *ups) == 0.0:
         return up
     if len(ups) > 1:
-        raise MotionError(
-            f"{where}.up: is required where closing the joints turns a line with steep parts, got nothing"
-        )
+        wanted = "is required where closing the joints turns a line with steep parts"
+        raise MotionError(f"{where}.up: {wanted}, got nothing")
     return shift.turned(ups[0])
 
 

@@ -52,9 +52,8 @@ def _counting(scene: Scene) -> Iterator[tuple[str, str]]:
             yield f"limits.{name}", limit.joint
     if corotational(scene):
         for name, gear in scene.gears.items():
-            yield from (
-                (f"gears.{name}", joint) for joint in gear.joints if scene.joints[joint].kind != "prismatic"
-            )
+            turning = [joint for joint in gear.joints if scene.joints[joint].kind != "prismatic"]
+            yield from ((f"gears.{name}", joint) for joint in turning)
         yield from ((f"joints.{name}", name) for name, joint in scene.joints.items() if joint.kind == "screw")
 
 

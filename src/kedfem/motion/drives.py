@@ -57,9 +57,8 @@ class Drives:
             return 2 * np.pi if self.turning[0] else np.inf
         if not self.laws or not all(self.turning) or any(x.kind != "constant_speed" for x in self.laws):
             return np.inf
-        slowest = min(
-            (abs(x.speed) for x in self.laws if x.kind == "constant_speed" and x.speed), default=0.0
-        )
+        steady = (abs(x.speed) for x in self.laws if x.kind == "constant_speed" and x.speed)
+        slowest = min(steady, default=0.0)
         return 2 * np.pi / slowest if slowest else np.inf
 
 

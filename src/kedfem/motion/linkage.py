@@ -72,9 +72,8 @@ class Linkage:
         """Joints whose rows repeat what others already hold in the reference position, by rank-revealing QR of Jᵀ."""
         if not self.joints:
             return ()
-        _, r, pivot = scipy.linalg.qr(
-            _jacobian(self.rows, len(self.bodies), self.size).T, pivoting=True, mode="economic"
-        )
+        J = _jacobian(self.rows, len(self.bodies), self.size)
+        _, r, pivot = scipy.linalg.qr(J.T, pivoting=True, mode="economic")
         rank = int((np.abs(np.diag(r)) > RANK_TOLERANCE * abs(r[0, 0])).sum())
         return tuple(sorted({self.joints[k] for k in pivot[rank:]}))
 
@@ -91,9 +90,8 @@ def linkage(scene: Scene) -> Linkage:
         rigid-body frames.
     """
     if not scene.checked:
-        raise SceneError(
-            "the scene: must be made by scene_from or read_scene, got a record that nobody checked"
-        )
+        wanted = "must be made by scene_from or read_scene"
+        raise SceneError(f"the scene: {wanted}, got a record that nobody checked")
     if any(joint.open for joint in scene.joints.values()):
         raise ValueError("a scene whose links are drawn apart must be assembled first")
     rows, driven = _all_rows(scene)
@@ -202,9 +200,8 @@ def _check_mobility(scene: Scene, drawn: Drawn) -> int:
             "is an axis askew, or one joint too many?)"
         )
     if mobility < drives:
-        raise MotionError(
-            f"{driven}: there must be no more drives than the linkage's mobility, {mobility}, got {drives}"
-        )
+        wanted = f"there must be no more drives than the linkage's mobility, {mobility}"
+        raise MotionError(f"{driven}: {wanted}, got {drives}")
     if free == 0:
         return 0
     if mobility == drives:

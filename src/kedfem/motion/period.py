@@ -55,9 +55,7 @@ def over_one_period(scene: Scene) -> Scene:
     if end is not None and abs(end - time) > WHOLE * time:
         message = f"must be left out, or the period of the steady motion, {time:.9g} [s], got {end:.9g}"
         raise SceneError(f"analysis.end_time: {message}")
-    keys = (
-        {"revolutions": float(count), "end_time": None} if turns else {"revolutions": None, "end_time": time}
-    )
+    keys = {"revolutions": float(count) if turns else None, "end_time": None if turns else time}
     return scene.model_copy(update={"analysis": scene.analysis.model_copy(update=keys)})
 
 
@@ -72,12 +70,10 @@ def repeats_after(scene: Scene) -> float:
     scene = _sped_up(scene)
     base = cycle(scene.motion)
     if base is None:
-        got = (
-            "several drives" if len(scene.driven_joints) > 1 else "one that does not go on turning or return"
-        )
-        raise SceneError(
-            f"fatigue.period: is required [s] but with a drive that repeats its motion, got {got}"
-        )
+        several = len(scene.driven_joints) > 1
+        got = "several drives" if several else "one that does not go on turning or return"
+        wanted = "is required [s] but with a drive that repeats its motion"
+        raise SceneError(f"fatigue.period: {wanted}, got {got}")
     return _periods(scene, linkage(scene), base, FATIGUE)[1]
 
 

@@ -124,12 +124,10 @@ class BlockReactions:
         self, joint: str, body: int, at: Float[np.ndarray, "3"]
     ) -> tuple[Int[np.ndarray, " e"], Float[np.ndarray, "2 T e 3"]]:
         """Rows of a joint with a share on a body, and force and moment there of their scaled λ."""
-        blocks = self.blocks
-        first, end = np.searchsorted(
-            blocks.row, np.flatnonzero(rows_of(self.linkage, joint))[[0, -1]] + [0, 1]
-        )
+        blocks, rows = self.blocks, rows_of(self.linkage, joint)
+        first, end = np.searchsorted(blocks.row, np.flatnonzero(rows)[[0, -1]] + [0, 1])
         here = first + np.flatnonzero(blocks.body[first:end] == blocks.place[body - 1])
-        here = here[rows_of(self.linkage, joint)[blocks.row[here]]]
+        here = here[rows[blocks.row[here]]]
         own = self.values[:, here] / self.column
         arm = (self.motion.R[:, body] @ (at - self.linkage.centre))[:, None]
         force = own[..., :3]

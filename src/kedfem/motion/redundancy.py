@@ -78,9 +78,8 @@ def changed(drawn: Drawn, joint: str, rows: Float[np.ndarray, "m k"]) -> Drawn:
     kept = np.array([name != joint for name in drawn.rows], bool) | drawn.driven
     J = np.concatenate([rows, drawn.J[kept]])
     names = (joint,) * len(rows) + tuple(np.array(drawn.rows)[kept].tolist())
-    return replace(
-        drawn, J=J, rows=names, driven=np.concatenate([np.zeros(len(rows), bool), drawn.driven[kept]])
-    )
+    driven = np.concatenate([np.zeros(len(rows), bool), drawn.driven[kept]])
+    return replace(drawn, J=J, rows=names, driven=driven)
 
 
 def without_redundancy(drawn: Drawn, looser: Looser) -> tuple[list[tuple[str, str]], int]:

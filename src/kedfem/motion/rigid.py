@@ -65,19 +65,16 @@ class RigidMotion:
 
 def joined(parts: Sequence["RigidMotion"]) -> "RigidMotion":
     """Successive time points, one after the other."""
-    return RigidMotion(
-        *(np.concatenate([getattr(p, field.name) for p in parts]) for field in fields(RigidMotion))
-    )
+    names = [field.name for field in fields(RigidMotion)]
+    return RigidMotion(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
 
 
 def resting(bodies: int, t: Float[np.ndarray, " T"]) -> RigidMotion:
     """Rigid-body motion of a linkage that nothing drives: all rest in the reference position, at given times (T,) [s]."""
     R = np.broadcast_to(np.eye(3), (len(t), bodies, 3, 3)).copy()
-    p, omega, alpha, v, p2, omega_phi, v_phi = np.zeros((7, len(t), bodies, 3))
-    none = np.zeros((len(t), 0))
-    return RigidMotion(
-        t, np.zeros(len(t)), R, p, omega, alpha, v, np.zeros_like(R), p2, none, omega_phi, v_phi
-    )
+    p, omega, alpha, v, p2, *rates = np.zeros((7, len(t), bodies, 3))
+    phi, none = np.zeros(len(t)), np.zeros((len(t), 0))
+    return RigidMotion(t, phi, R, p, omega, alpha, v, np.zeros_like(R), p2, none, *rates)
 
 
 Along = tuple[Float[np.ndarray, " T"], Float[np.ndarray, " T"], Float[np.ndarray, " T"]]

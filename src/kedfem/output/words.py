@@ -53,9 +53,8 @@ def number_in(row: Mapping[str, float], name: str) -> str:
     '≈ 0'
     """
     x, unit = row.get(name, np.nan), name.rpartition(" [")[2]
-    largest = max(
-        (abs(value) for other, value in row.items() if other.rpartition(" [")[2] == unit), default=0.0
-    )
+    alike = (abs(value) for other, value in row.items() if other.rpartition(" [")[2] == unit)
+    largest = max(alike, default=0.0)
     return "≈ 0" if abs(x) < NOTHING * largest else with_prefix(x, unit.removesuffix("]"))
 
 

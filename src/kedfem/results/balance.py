@@ -117,9 +117,8 @@ def fields_of(
             elastic[:, i] = crossed(k, history.g, product.Kg)
         powers[0, i], powers[1, i] = dot(v, product.Mv), dot(v, F)
         if rows_work:
-            powers[2, i] = dot(
-                x.joint.weights @ (v if len(x.joint.nodes) == x.link.n else v[:, x.joint.nodes]), f
-            )
+            there = v if len(x.joint.nodes) == x.link.n else v[:, x.joint.nodes]
+            powers[2, i] = dot(x.joint.weights @ there, f)
     return Fields(rows, elastic, powers)
 
 

@@ -30,9 +30,8 @@ def deflection(
 
         return from_mean, "deflection from the link's mean rigid motion,"
     where = f"output.probes.{name}.chord"
-    first, second = (
-        link_point(model, linked, f"{where}[{i}]", probe.link, np.asarray(P)) for i, P in enumerate(chord)
-    )
+    drawn_ends = [(f"{where}[{i}]", np.asarray(P)) for i, P in enumerate(chord)]
+    first, second = (link_point(model, linked, at, probe.link, P) for at, P in drawn_ends)
     drawn = second.X - first.X
 
     def from_chord(block: Block) -> Rows:

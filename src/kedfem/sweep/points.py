@@ -55,9 +55,8 @@ class Chosen:
 
     def applied(self, scene: Scene) -> Scene:
         """A scene with these choices."""
-        links = {
-            name: link.model_copy(update=dict(self.links.get(name, {}))) for name, link in scene.links.items()
-        }
+        chosen, every = self.links, scene.links.items()
+        links = {name: link.model_copy(update=dict(chosen.get(name, {}))) for name, link in every}
         analysis = scene.analysis.model_copy(update=dict(self.analysis))
         return scene.model_copy(update={"links": links, "analysis": analysis})
 

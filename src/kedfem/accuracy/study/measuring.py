@@ -165,9 +165,8 @@ class _Bench:
 
     def expected(self, variant: Variant) -> float:
         """Seconds that a variant may take, judged by the most similar one that ran; infinite without one."""
-        alike = [
-            row for row in self.rows.values() if row.seconds and row.variant.fidelity == variant.fidelity
-        ]
+        ran = (row for row in self.rows.values() if row.seconds)
+        alike = [row for row in ran if row.variant.fidelity == variant.fidelity]
         if not alike:
             return self.in_full.get(variant, float("inf"))
         row = max(alike, key=lambda row: (row.variant.fineness <= variant.fineness, row.variant.fineness))

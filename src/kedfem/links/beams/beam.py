@@ -208,6 +208,5 @@ def assembled(blocks: list[np.ndarray], dofs: Int[np.ndarray, "e k"], size: int)
         return sp.csr_array((size, size))
     rows = np.repeat(dofs, dofs.shape[1], axis=1).ravel()
     columns = np.tile(dofs, (1, dofs.shape[1])).ravel()
-    return sp.csr_array(
-        sp.coo_array((np.concatenate([b.ravel() for b in blocks]), (rows, columns)), shape=(size, size))
-    )
+    entries = np.concatenate([b.ravel() for b in blocks]), (rows, columns)
+    return sp.csr_array(sp.coo_array(entries, shape=(size, size)))

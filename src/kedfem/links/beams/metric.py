@@ -85,13 +85,10 @@ def strains_of(element: BeamElement, y: Vectors) -> Column:
     kappa2 = _dot(x, s2) - b2 * (eps + a22) - b4 * gamma1 - b1 * a12
     tau = (_dot(d2, s1) - _dot(d1, s2)) / 2 - b3 * (a11 + a22)
     i, j = element.pairs.T
-    within = _pair_factors(element) * (
-        _dot(g[..., i, :], g[..., j, :]) - _dot(element.drawn[i], element.drawn[j])
-    )
+    change = _dot(g[..., i, :], g[..., j, :]) - _dot(element.drawn[i], element.drawn[j])
     beam = np.stack([eps, gamma1, gamma2, kappa1, kappa2, tau], axis=-1)
-    return np.asarray(
-        np.concatenate([beam.reshape(*beam.shape[:-2], -1), within], axis=-1) - element.drawn_strains
-    )
+    every = [beam.reshape(*beam.shape[:-2], -1), _pair_factors(element) * change]
+    return np.asarray(np.concatenate(every, axis=-1) - element.drawn_strains)
 
 
 def pulled_back(element: BeamElement, y: Vectors, stress: Column) -> Vectors:

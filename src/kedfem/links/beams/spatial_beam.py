@@ -138,9 +138,8 @@ def spatial_beam_link(
     vectors = sp.csr_array(sp.kron(triples, sp.eye_array(3)))
     cube = np.sqrt(section.area) * min(section.second_moment, section.second_moment_z)
     hubs = hub_functions(one)
-    m = sp.csr_array(
-        triples.T @ m @ triples + _diagonal(hubs[:, 0], HUB_INERTIA * material.density * cube, n)
-    )
+    lumped = _diagonal(hubs[:, 0], HUB_INERTIA * material.density * cube, n)
+    m = sp.csr_array(triples.T @ m @ triples + lumped)
     K0 = sp.csr_array(
         vectors.T @ K @ vectors
         + hub_stiffness(X, hubs, hubs_stiff * rigidity[0] * length_of(axis.frame[:, 0], cells))

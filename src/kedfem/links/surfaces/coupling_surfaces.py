@@ -99,9 +99,8 @@ def joint_surface(
         return _node_surface(link, where, point)
     if link.kind == "spatial_beam":
         return _section_surface(link, where, point)
-    return facet_surface(
-        link, named_facets(link, where, faces) if faces else picked(link, where, point, axis)
-    )
+    facets = named_facets(link, where, faces) if faces else picked(link, where, point, axis)
+    return facet_surface(link, facets)
 
 
 def rigid_link_surface(link: Link, at: Float[np.ndarray, "3"]) -> CouplingSurface:
@@ -227,9 +226,8 @@ def _section_surface(link: Link, where: str, point: Float[np.ndarray, "3"]) -> C
     fit[1:, slopes] = link.X[slopes].T
     y, z = link.X[slopes[-2:]]
     known = np.array([1.0, 1.0, len(slopes) - 2.0])
-    return CouplingSurface(
-        fit, link.X[node], np.stack([y, z, np.cross(y, z)]), known * link.size / np.sqrt(12)
-    )
+    axes = np.stack([y, z, np.cross(y, z)])
+    return CouplingSurface(fit, link.X[node], axes, known * link.size / np.sqrt(12))
 
 
 def facet_surface(

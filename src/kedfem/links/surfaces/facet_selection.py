@@ -32,18 +32,13 @@ def named_facets(link: Link, where: str, faces: Sequence[str]) -> Facets:
     for name in faces:
         if name not in known:
             own = [each.face.name for each in link.faces if not each.face.chosen]
-            there = (
-                ", ".join(map(repr, own)) or "none (a part from CAD, or a mesh file with groups, has some)"
-            )
-            raise MeshError(
-                f"{where}.faces: must name faces of link '{link.name}', got {name!r}; it has {there}"
-            )
+            none = "none (a part from CAD, or a mesh file with groups, has some)"
+            got = f"got {name!r}; it has {', '.join(map(repr, own)) or none}"
+            raise MeshError(f"{where}.faces: must name faces of link '{link.name}', {got}")
     facets = np.unique(np.concatenate([known[name] for name in faces]))
     if not len(facets):
-        names = ", ".join(map(repr, faces))
-        raise MeshError(
-            f"{where}.faces: must name faces of link '{link.name}' that have elements, got {names}"
-        )
+        got = f"got {', '.join(map(repr, faces))}"
+        raise MeshError(f"{where}.faces: must name faces of link '{link.name}' that have elements, {got}")
     return facets
 
 

@@ -171,13 +171,10 @@ def _together(group: list[Meeting]) -> Meeting:
     alike = [each for each in group if abs(each.faces[0].radius - hole.radius) <= SAME * hole.radius]
     if longest.ball or len(alike) == 1:
         return longest
-    along = [(each.at - hole.centre) @ hole.direction for each in alike]
-    ends = [
-        (x - max(each.share, 0) / 2, x + max(each.share, 0) / 2) for x, each in zip(along, alike, strict=True)
-    ]
-    middle = (min(low for low, _ in ends) + max(high for _, high in ends)) / 2
-    at = hole.centre + middle * hole.direction
-    return replace(longest, at=at)
+    along = np.array([(each.at - hole.centre) @ hole.direction for each in alike])
+    half = np.array([max(each.share, 0) / 2 for each in alike])
+    middle = ((along - half).min() + (along + half).max()) / 2
+    return replace(longest, at=hole.centre + middle * hole.direction)
 
 
 def _same_axis(a: CadFace, b: CadFace) -> bool:

@@ -54,14 +54,11 @@ def _face(solid: Solid, group: list[int], sides: Int[np.ndarray, "f c"]) -> Face
     first = parts[0]
     centre = first.centre
     if first.kind == "cylinder":
-        along = [(face.centre - centre) @ first.direction for face in parts]
-        ends = [(a - face.length / 2, a + face.length / 2) for a, face in zip(along, parts, strict=True)]
-        middle = (min(low for low, _ in ends) + max(high for _, high in ends)) / 2
-        centre = centre + middle * first.direction
-    words = face_form(first)
-    return Face(
-        first.name, first.kind, centre, first.direction, first.radius, first.inward, sides, words=words
-    )
+        along = np.array([(face.centre - centre) @ first.direction for face in parts])
+        half = np.array([face.length / 2 for face in parts])
+        centre = centre + ((along - half).min() + (along + half).max()) / 2 * first.direction
+    form = first.kind, centre, first.direction, first.radius, first.inward
+    return Face(first.name, *form, sides, words=face_form(first))
 
 
 def one_surface(gmsh: ModuleType, solid: Solid) -> list[list[int]]:
@@ -111,9 +108,8 @@ def _nearest_faces(
         near = _in_box(gmsh, face, all_sides)
         far[near, i] = _distances(gmsh, face, all_sides.chosen(near))
     nearest = far.argmin(axis=1)
-    slack = np.maximum(
-        _FLAT * solid.extent, _NEARLY * all_sides.sizes * (far.min(axis=1) > _FLAT * solid.extent)
-    )
+    flat = _FLAT * solid.extent
+    slack = np.maximum(flat, _NEARLY * all_sides.sizes * (far.min(axis=1) > flat))
     rivals = far <= (far.min(axis=1) + slack)[:, None]
     lost = ~np.isfinite(far).any(axis=1)
     rivals[lost] = True

@@ -58,9 +58,8 @@ def one_kind(
         pairs, middles = _middles(points, blocks)
         edges = np.array(EDGES_OF[8])
         return _with_middles(points, corners, corners[:, edges], pairs, middles)
-    fours = np.concatenate(
-        [_tetrahedra(cells[:, :count], count) for count, each in blocks.items() for cells in each]
-    )
+    every = ((count, cells) for count, each in blocks.items() for cells in each)
+    fours = np.concatenate([_tetrahedra(cells[:, :count], count) for count, cells in every])
     _check_fit(fours, blocks)
     pairs, middles = _middles(points, blocks)
     return _with_middles(points, fours, fours[:, EDGES], pairs, middles)

@@ -88,21 +88,17 @@ def _check_cells(where: str, path: Path, raw: RawMesh, points: np.ndarray) -> No
     wrong = [kind for kind in found if kind not in _ACCEPTED or raw.cells[kind].shape[1] != _ACCEPTED[kind]]
     if wrong or not found:
         got = ", ".join(f"{count} {kind}" for kind, count in sorted(found.items())) or "no solid elements"
-        raise MeshError(
-            f"{where}: must hold tetrahedra, hexahedra, wedges or pyramids of order 1 or 2, got {got} in {path}"
-        )
+        wanted = "must hold tetrahedra, hexahedra, wedges or pyramids of order 1 or 2"
+        raise MeshError(f"{where}: {wanted}, got {got} in {path}")
     for cells in raw.cells.values():
         if cells.size and (cells.min() < 0 or cells.max() >= len(points)):
-            node = cells.min() if cells.min() < 0 else cells.max()
-            raise MeshError(
-                f"{where}: elements must use nodes 0 to {len(points) - 1}, got node {node} in {path}"
-            )
+            got = f"got node {cells.min() if cells.min() < 0 else cells.max()} in {path}"
+            raise MeshError(f"{where}: elements must use nodes 0 to {len(points) - 1}, {got}")
         used = np.unique(cells)
         if not np.isfinite(points[used]).all():
             bad = used[~np.isfinite(points[used]).all(axis=1)][0]
-            raise MeshError(
-                f"{where}: coordinates must be finite, got {points[bad].tolist()} at node {bad} of {path}"
-            )
+            got = f"got {points[bad].tolist()} at node {bad} of {path}"
+            raise MeshError(f"{where}: coordinates must be finite, {got}")
 
 
 def _cells(

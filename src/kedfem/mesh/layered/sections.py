@@ -243,9 +243,8 @@ def _curve(gmsh: ModuleType, chain: list[_Piece], axes: Float[np.ndarray, "3 3"]
 
     ends = chain[0].ends[0], chain[-1].ends[1]
     samples = np.concatenate([chain[0].samples[:1], *(piece.samples[1:] for piece in chain)])
-    lengths = np.concatenate(
-        [[0.0], *(start + piece.lengths[1:] for start, piece in zip(starts[:-1], chain, strict=True))]
-    )
+    begun = zip(starts[:-1], chain, strict=True)
+    lengths = np.concatenate([[0.0], *(start + piece.lengths[1:] for start, piece in begun)])
     bends = np.concatenate([chain[0].bends[:1], *(piece.bends[1:] for piece in chain)])
     return Curve(ends, ends[0] == ends[1] and met[ends[0]] == 2, lengths, samples, bends, places)
 

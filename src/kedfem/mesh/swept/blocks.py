@@ -55,9 +55,8 @@ def _edge_groups(gmsh: ModuleType, solid: Solid) -> list[set[int]]:
             groups = [group for group in groups if group not in ours] + [set().union(*ours)]
     vertices = set().union(*ends.values()) if ends else set()
     if (len(faces), len(vertices), [len(group) for group in groups]) != (6, 8, [4, 4, 4]):
-        raise OtherMethodError(
-            f"{solid.name}: one block must have six faces with four edges each, got {len(faces)} faces"
-        )
+        wanted = "one block must have six faces with four edges each"
+        raise OtherMethodError(f"{solid.name}: {wanted}, got {len(faces)} faces")
     return groups
 
 

@@ -104,12 +104,10 @@ def _in_words(legs: tuple[Leg, ...]) -> str:
 
 def _count(leg: Leg, size: float, sizing: Sizing) -> int:
     """Elements along a leg."""
-    longest, turn = (
-        (size, sizing.turn) if sizing.size is not None else (_LONG * size, min(_TURN, sizing.turn))
-    )
-    return max(
-        1, sizing.layers, round(leg.length / longest), int(np.ceil(leg.travel / turn * (leg.radius > 0)))
-    )
+    asked = sizing.size is not None
+    longest, turn = (size, sizing.turn) if asked else (_LONG * size, min(_TURN, sizing.turn))
+    bent = int(np.ceil(leg.travel / turn * (leg.radius > 0)))
+    return max(1, sizing.layers, round(leg.length / longest), bent)
 
 
 @contextmanager

@@ -129,9 +129,8 @@ def _cut(
 ) -> list[tuple[int, int]]:
     """The faces of a section divided along a line at a radius."""
     occ = gmsh.model.occ
-    low, high = (
-        np.array([np.reshape(occ.getBoundingBox(*face), (2, 3)) @ axes[0] for face in faces]).reshape(-1, 2).T
-    )
+    boxes = np.reshape([occ.getBoundingBox(*face) for face in faces], (-1, 2, 3))
+    low, high = (boxes @ axes[0]).T
     ends = [min(low.min(), high.min()) - 1, max(low.max(), high.max()) + 1]
     line = occ.addLine(*(occ.addPoint(*(np.array([x, radius, 0]) @ axes)) for x in ends))
     pieces = occ.fragment(faces, [(1, line)])[1][: len(faces)]
@@ -196,9 +195,8 @@ def _with_core(
     number[shared] = nearest[shared]
     number[~shared] = len(mesh.points) + np.arange((~shared).sum())
     _check_shared(shared, core, meridian, int(nodes.sum()) * 2 * around)
-    return SolidMesh(
-        np.concatenate([mesh.points, core.points[~shared]]), np.concatenate([mesh.cells, number[core.cells]])
-    )
+    points = np.concatenate([mesh.points, core.points[~shared]])
+    return SolidMesh(points, np.concatenate([mesh.cells, number[core.cells]]))
 
 
 def _check_shared(shared: Bool[np.ndarray, " n"], core: SolidMesh, meridian: _Meridian, wanted: int) -> None:

@@ -27,9 +27,8 @@ def halved(link: Linkage, along: Path) -> tuple[Path, bool, Factor | BlockFactor
         phi, near, old = phi[1::2], near[1::2], along
     else:
         old = replace(along, phi=phi[:0], shape=along.shape[:, :0], near=near[:0])
-    got = settled(
-        link, Choice(link.rows), predicted(along, phi), target(link, phi, near), link.drives.at(phi)[1:]
-    )
+    wanted, rates = target(link, phi, near), link.drives.at(phi)[1:]
+    got = settled(link, Choice(link.rows), predicted(along, phi), wanted, rates)
     fine = got.gap <= OPEN
     kept = fine | np.isin(phi, along.phi)
     closes = bool(fine.all())

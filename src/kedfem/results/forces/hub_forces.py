@@ -43,9 +43,8 @@ def hub_wrench(
         if link.name in joint.links and elastic and name not in sliding:
             held.append((holder(model, elastic[0], name), name, np.asarray(joint.at)))
     others = [(port_wrench(model, *each, forces), each[2]) for each in held]
-    riders = [
-        (x, *hub_wrench(scene, model, x, forces)) for x in model.prescribed if partner(scene, x) == link.name
-    ]
+    carried = [x for x in model.prescribed if partner(scene, x) == link.name]
+    riders = [(x, *hub_wrench(scene, model, x, forces)) for x in carried]
     held += [each for _, _, below in riders for each in below]
 
     def wrench(block: Block) -> tuple[Rows, Rows]:

@@ -184,9 +184,8 @@ class Probe(Record):
         wanted = "link" if self.quantity == "stress" else "world" if self.quantity in TOTAL else None
         if wanted and self.frame not in {None, wanted}:
             got = f"got {self.frame!r}"
-            faults.append(
-                Fault(("frame",), f"must be {wanted!r} for a {self.quantity.replace('_', ' ')}, {got}")
-            )
+            quantity = self.quantity.replace("_", " ")
+            faults.append(Fault(("frame",), f"must be {wanted!r} for a {quantity}, {got}"))
         if self.chord is not None and self.quantity != "deflection":
             got = f"got one for a {self.quantity.replace('_', ' ')}"
             faults.append(Fault(("chord",), f"must be given for a deflection only, {got}"))

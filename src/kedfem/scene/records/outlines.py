@@ -162,9 +162,8 @@ def arc_points(
     twice_area = p[0] * q[1] - p[1] * q[0]
     if abs(twice_area) <= NEAR * (p @ p + q @ q):
         return None
-    centre = V + np.array([q[1] * (p @ p) - p[1] * (q @ q), p[0] * (q @ q) - q[0] * (p @ p)]) / (
-        2.0 * twice_area
-    )
+    across = np.array([q[1] * (p @ p) - p[1] * (q @ q), p[0] * (q @ q) - q[0] * (p @ p)])
+    centre = V + across / (2.0 * twice_area)
     radius = np.linalg.norm(P - centre)
     start, via, end = (np.arctan2(*(point - centre)[::-1]) for point in (P, V, Q))
     turn = (end - start) % (2.0 * np.pi)

@@ -65,9 +65,8 @@ def placed(value: object, coordinates: ValidatorFunctionWrapHandler) -> Any:
     if points is None:
         raise fault(f"must be coordinates in a record that is made outside a scene, got {value!r}")
     if value not in points:
-        raise fault(
-            unknown_name("a point", value, [name for name in points if ("." in name) == ("." in value)])
-        )
+        alike = [name for name in points if ("." in name) == ("." in value)]
+        raise fault(unknown_name("a point", value, alike))
     return points[value]
 
 

@@ -115,9 +115,8 @@ class PlateLink(Record):
         length = math.dist(*self.between)
         faults: list[Fault] = []
         if eye < self.width:
-            faults.append(
-                Fault(("eye_diameter",), f"must be at least the width {self.width:.6g} [m], got {eye:.6g}")
-            )
+            wanted = f"must be at least the width {self.width:.6g} [m]"
+            faults.append(Fault(("eye_diameter",), f"{wanted}, got {eye:.6g}"))
         if self.bore_diameter >= eye:
             message = f"must be smaller than the eye {eye:.6g} [m], got {self.bore_diameter:.6g}"
             faults.append(Fault(("bore_diameter",), message))

@@ -112,9 +112,8 @@ def si_number(text: str, unit: str) -> float:
     wanted: Any = unit_registry().parse_units(unit)
     got = quantity.units
     if crossed(quantity._units, unit):
-        raise ValueError(
-            f"turns or radians per second? give it in {'rpm or rad/s' if unit == 'rad/s' else 'Hz'}"
-        )
+        clear = "rpm or rad/s" if unit == "rad/s" else "Hz"
+        raise ValueError(f"turns or radians per second? give it in {clear}")
     turns = revolutions(got._units)
     if isinstance(text, Evaluated) and not (
         unit == "rad" and turns < 0.0
