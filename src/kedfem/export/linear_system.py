@@ -179,11 +179,8 @@ def _space(
     square = found.omega**2
     A = np.block([[np.zeros((m, m)), np.eye(m)], [-np.diag(square), -found.damping]])
     moves = [each.moves for each in elements]
-    outputs = [
-        *((f"{x.channel.name}/{c}", x.channel.unit) for x in channels for c in _columns(x)),
-        *(x for x, _ in moves),
-        *(x for _, x in moves),
-    ]
+    outputs = [(f"{x.channel.name}/{c}", x.channel.unit) for x in channels for c in _columns(x)]
+    outputs += [*(x for x, _ in moves), *(x for _, x in moves)]
     inputs = [*((f"loads/{name}", "1") for name in scene.loads), *(each.effort for each in elements)]
     return StateSpace(
         A, np.vstack([np.zeros_like(f), f]), np.hstack([U - W * square, V - W @ found.damping]), W @ f + rest,

@@ -26,12 +26,9 @@ class Campbell:
         self, speeds: Float[np.ndarray, " x"]
     ) -> tuple[Float[np.ndarray, "f x"], Float[np.ndarray, "f x"]]:
         """The least and the greatest frequency of all positions."""
-        every = np.array(
-            [
-                [np.interp(speeds**2, self.speeds**2, f**2) for f in at.T]
-                for at in self.values.transpose(1, 0, 2)
-            ]
-        )
+        squares = np.moveaxis(self.values**2, 0, -1).reshape(-1, len(self.speeds))
+        found = [np.interp(speeds**2, self.speeds**2, f) for f in squares]
+        every = np.reshape(found, (*self.values.shape[1:], len(speeds)))
         return np.sqrt(every.min(axis=0)), np.sqrt(every.max(axis=0))
 
     def meets(self, harmonic: int, place: int, mode: int) -> float:

@@ -129,11 +129,8 @@ def _check(scene: Scene, name: str, joint: str) -> None:
     """Refuse joints that do not say on their own what they hold of a link."""
     own = [key for key, each in scene.joints.items() if name in each.links]
     if joint not in own:
-        raise SceneError(
-            f"--hold: {one_of(own, joint)}, the joints of link '{name}'"
-            if own
-            else f"--hold: must be left out for a link without joints, got {joint!r}"
-        )
+        wanted = f"{one_of(own, joint)}, the joints of link '{name}'" if own else ""
+        raise SceneError(f"--hold: {wanted or f'must be left out for a link without joints, got {joint!r}'}")
     kind = scene.joints[joint].kind
     if kind not in HELD:
         got = f"got '{joint}', which is {kind}"

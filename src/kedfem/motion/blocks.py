@@ -7,6 +7,7 @@ hundred four-bars, or loops in a row, cost a hundred times what one does.
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
@@ -167,13 +168,8 @@ def blocks(rows: Rows, bodies: int, size: float) -> Blocks:
         updates += [(number[i, j], number[i, k], number[j, k]) for n, j in enumerate(here) for i in here[n:]]
         of_column.append(len(updates))
     body = place[[each[4] for each in entries]] if entries else np.zeros(0, int)
-    pairs = [
-        (number[int(body[a]), int(body[b])], a, b)
-        for here in of_row.values()
-        for a in here
-        for b in here
-        if body[a] >= body[b]
-    ]
+    every = (pair for here in of_row.values() for pair in product(here, here))
+    pairs = [(number[int(body[a]), int(body[b])], a, b) for a, b in every if body[a] >= body[b]]
     row, term, side, share, _ = (np.array(x) for x in zip(*entries, strict=True))
     return Blocks(
         bodies - 1, row, term, side, share.astype(float), body, place, np.array(columns), np.array(below),

@@ -201,11 +201,8 @@ def _placing(shape: Cad | MeshFile, shift: Shift) -> dict[str, Any]:
     flat = math.hypot(*along[:2]) / math.hypot(*along)
     z = shape.z or ((0.0, 0.0, 1.0) if flat > 1e-9 else (1.0, 0.0, 0.0))
     origin, turned = shift.point(shape.origin), shift.turned(z)
-    return {
-        "origin": origin,
-        "towards": _three(np.add(origin, shift.turned(along))),
-        "z": shape.z if turned == z else turned,
-    }
+    towards = _three(np.add(origin, shift.turned(along)))
+    return {"origin": origin, "towards": towards, "z": shape.z if turned == z else turned}
 
 
 def _directions(line: Polyline) -> list[tuple[XYZ, XYZ]]:

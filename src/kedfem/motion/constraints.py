@@ -154,13 +154,10 @@ class Rows:
     def __post_init__(self) -> None:
         k = np.flatnonzero(self.kind == ANGLE)
         i, j, a, a_j, b = self.i[k], self.j[k], self.a[k], self.a_j[k], self.b[k]
-        derived = {
-            "gaps": np.flatnonzero(self.kind == GAP),
-            "angles": k,
-            "driven": np.flatnonzero(self.drive >= 0),
-            "body": np.concatenate([self.i, self.j, self.j, i, i, j, j]),
-            "vector": np.concatenate([self.a, self.a_j, self.b, a, cross(b, a), a_j, cross(b, a_j)]),
-        }
+        body = np.concatenate([self.i, self.j, self.j, i, i, j, j])
+        vector = np.concatenate([self.a, self.a_j, self.b, a, cross(b, a), a_j, cross(b, a_j)])
+        gaps, driven = np.flatnonzero(self.kind == GAP), np.flatnonzero(self.drive >= 0)
+        derived = {"gaps": gaps, "angles": k, "driven": driven, "body": body, "vector": vector}
         for name, value in derived.items():
             object.__setattr__(self, name, value)
 

@@ -50,13 +50,8 @@ class LinkField:
     def arrays(self) -> dict[str, np.ndarray]:
         """What each node has, by names with units."""
         least, most = self.principal.T
-        return {
-            DISPLACEMENT: self.displacement,
-            VON_MISES: self.von_mises,
-            STRESS: self.stress,
-            LARGEST: most,
-            SMALLEST: least,
-        }
+        principal = {LARGEST: most, SMALLEST: least}
+        return {DISPLACEMENT: self.displacement, VON_MISES: self.von_mises, STRESS: self.stress} | principal
 
 
 @dataclass(frozen=True, slots=True)

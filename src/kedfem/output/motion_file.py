@@ -68,12 +68,8 @@ def continuous_quaternions(
 
 
 def _columns(links: Sequence[str]) -> list[str]:
-    return [
-        f"links/{name}/{quantity} {component} [{unit}]"
-        for name in links
-        for quantity, components, unit in QUANTITIES
-        for component in components
-    ]
+    every = [f"{quantity} {x} [{unit}]" for quantity, components, unit in QUANTITIES for x in components]
+    return [f"links/{name}/{column}" for name in links for column in every]
 
 
 def _rows(

@@ -12,11 +12,8 @@ from kedfem.scene import LineSpring
 WIDTH = 0.012  # radius of a coil, of what is drawn
 SLENDER = 0.15  # most that it is of the length between the two points in the reference position
 WIRE = 0.2  # radius of its wire, of the coil's
-TURNS, AROUND, STRAIGHT = (
-    6,
-    12,
-    0.15,
-)  # turns, points on each, part of the length at each end that is straight
+# turns, points on each, part of the length at each end that is straight
+TURNS, AROUND, STRAIGHT = 6, 12, 0.15
 RIM = 5  # points around a wire
 # along a damper: parts of its length, and radii there as parts of the coil's
 DAMPER = np.array([[0, 0.2], [0.3, 0.2], [0.3, 0.65], [0.65, 0.65], [0.65, 0.12], [1, 0.12]])

@@ -66,11 +66,8 @@ def write_envelope(folder: Path, extremes: Extremes, table: bool) -> None:
 def write_top(folder: Path, every: Mapping[str, Sequence[Peak]], drive: str) -> None:
     """The highest stresses of each link at places apart as CSV; nothing where no link has stress."""
     header = ["link", "rank", "von Mises stress [Pa]", *PLACE, "time [s]", drive, "node", "near"]
-    rows = [
-        [link, rank, peak.stress, *peak.place, peak.time, peak.angle, peak.node, peak.near]
-        for link, peaks in every.items()
-        for rank, peak in enumerate(peaks, start=1)
-    ]
+    ranked = ((link, *each) for link, peaks in every.items() for each in enumerate(peaks, start=1))
+    rows = [[link, k, x.stress, *x.place, x.time, x.angle, x.node, x.near] for link, k, x in ranked]
     if every:
         write_rows(folder / TOP, header, rows)
 

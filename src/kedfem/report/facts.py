@@ -107,12 +107,11 @@ def peak_rows(peaks: Mapping[str, Peak], moment: Callable[[float, float], str]) 
     ----------
     moment : a time [s] and the drive's position there [rad or m] in words
     """
+    every = (row for name, x in peaks.items() for row in ((name, x), ("  away from it", x.away)))
     return [
         (label, with_prefix(x.stress, "Pa"), place_of(x.place), moment(x.time, x.angle), x.near)
-        for name, peak in peaks.items()
-        for label, x in ((name, peak), ("  away from it", peak.away))
-        if x is not None
-    ]
+        for label, x in every if x is not None
+    ]  # fmt: skip
 
 
 def frequencies_table(found: Summary) -> Table:

@@ -46,19 +46,11 @@ UNBALANCED = 0.02  # resolved motion leaves 1e-6 to 3e-3, too long steps 0.1 (do
 ENERGIES = (
     ("kinetic", ("kinetic",), "kinetic energy of the absolute motion of all links"),
     ("strain", ("strain",), "strain energy of all links, [KED, eq. (13)], and of springs in joints"),
-    (
-        "work",
-        ("loads", "supports"),
-        "work done by loads, motors and springs; by the drive and the other supports",
-    ),
+    ("work", ("loads", "supports"), "work done by the loads, motors and springs; by the drive and the other supports"),
     ("dissipated", ("dissipated",), "energy that damping took"),
-    (
-        "neglected",
-        ("neglected",),
-        "work of the elastic forces' moment on bent links, which the equation neglects",
-    ),
+    ("neglected", ("neglected",), "work of the elastic forces' moment on bent links, which the equation neglects"),
     ("residual", ("residual",), "residual energy of the integration"),
-)
+)  # fmt: skip
 NONE = np.zeros(0, int)
 NO_PORTS = Attachment(NONE, np.zeros((0, 0)), 3, np.zeros((0, 3)), (), NONE, NONE, np.zeros((0, 0)), 0)
 

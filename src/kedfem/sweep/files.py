@@ -112,11 +112,8 @@ def column_units(rows: Sequence[Row]) -> dict[str, str]:
 def plain_quantities(names: Sequence[str]) -> list[str]:
     """Names to be shown: of vectors the magnitude alone, nothing of the rigid mechanism, stresses first."""
     whole = {name.rpartition("/")[0] for name in names if name.endswith(f"/{MAGNITUDE}")}
-    some = [
-        name
-        for name in names
-        if "/rigid_" not in name and (name.rpartition("/")[0] not in whole or name.endswith(f"/{MAGNITUDE}"))
-    ]
+    elastic = (name for name in names if "/rigid_" not in name)
+    some = [x for x in elastic if x.rpartition("/")[0] not in whole or x.endswith(f"/{MAGNITUDE}")]
     return sorted(some, key=lambda name: not name.startswith("stress/"))
 
 

@@ -262,9 +262,6 @@ def change(results: Results, turn: float) -> float:
     largest: dict[str, float] = {}
     for unit, size in (*now.values(), *then.values()):
         largest[unit] = max(largest.get(unit, 0.0), size)
-    changes = [
-        abs(size - then[name][1]) / max(size, then[name][1])
-        for name, (unit, size) in now.items()
-        if max(size, then[name][1]) > NOTHING * largest[unit]
-    ]
+    pairs = ((unit, size, then[name][1]) for name, (unit, size) in now.items())
+    changes = [abs(a - b) / max(a, b) for unit, a, b in pairs if max(a, b) > NOTHING * largest[unit]]
     return float(max(changes, default=0.0))

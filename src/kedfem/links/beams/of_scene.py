@@ -10,7 +10,7 @@ from kedfem.links.beams.beam_axis import Axis, smooth_axis, straight_axis
 from kedfem.links.beams.section import scene_section
 from kedfem.links.beams.spatial_beam import spatial_beam_link
 from kedfem.links.record import Link
-from kedfem.scene import Bar, Joint, LinkScene, PointMass, Polyline, RectangleSection, Scene
+from kedfem.scene import Bar, Joint, LinkScene, PointMass, Polyline, RectangleSection, Scene, SectionShape
 
 SAME = 1e-6  # of a segment's length: what is so near is at one place
 
@@ -21,11 +21,10 @@ def scene_beam(scene: Scene, name: str, spatial: frozenset[str]) -> Link:
     shape, material = link.shape, scene.materials[str(link.material)]
     if not isinstance(shape, Bar | Polyline):
         raise TypeError(f"links.{name}: a beam is a bar or a polyline")  # refused by the scene already
-    of_section = (
-        shape.of_section
-        if isinstance(shape, Polyline)
-        else RectangleSection(width=shape.width, thickness=shape.thickness)
-    )
+    if isinstance(shape, Polyline):
+        of_section: SectionShape = shape.of_section
+    else:
+        of_section = RectangleSection(width=shape.width, thickness=shape.thickness)
     section = scene_section(of_section, link.shear_coefficient, material.poisson_ratio)
     if name in spatial:
         return spatial_beam_link(name, scene_axis(scene, name), section, material)

@@ -85,11 +85,8 @@ def measured_elements(scene: Scene, model: Model) -> Measured:
 
 def acting(scene: Scene, measured: Measured) -> list[Recorded]:
     """How motors, springs, limits and, without a drive, hinges move, and what force they exert."""
-    elements = [
-        Recorded(channel, partial(_column, element, which, sign))
-        for element in measured.every
-        for channel, which, sign in _channels(element)
-    ]
+    every = ((element, *each) for element in measured.every for each in _channels(element))
+    elements = [Recorded(channel, partial(_column, x, which, sign)) for x, channel, which, sign in every]
     return elements + [
         Recorded(_turn(scene, hinge), partial(lambda i, block: measured.turns(block)[:, i, None], i))
         for i, hinge in enumerate(measured.hinges)

@@ -28,11 +28,8 @@ def undetermined(scene: Scene, model: Model, channels: Collection[str]) -> dict[
 
 def undetermined_warning(found: dict[str, str]) -> tuple[str, ...]:
     """A warning for each force; moments are in the notes of the results only."""
-    return tuple(
-        f"{name}: not reported, {reason}"
-        for name, reason in found.items()
-        if name.endswith(("force", "torque"))
-    )
+    forces = {name: reason for name, reason in found.items() if name.endswith(("force", "torque"))}
+    return tuple(f"{name}: not reported, {reason}" for name, reason in forces.items())
 
 
 def _on_slider(model: Model, name: str) -> bool:

@@ -171,11 +171,8 @@ class Polyline(Record):
             faults.append(Fault(("section",), f"cannot be combined with {' and '.join(given)}, got both"))
         elif self.section is None:
             other = "a section instead of width and thickness"
-            faults += [
-                Fault((key,), f"is required [m], or {other}, got nothing")
-                for key in ("width", "thickness")
-                if key not in given
-            ]
+            lacking = [key for key in ("width", "thickness") if key not in given]
+            faults += [Fault((key,), f"is required [m], or {other}, got nothing") for key in lacking]
         if self.smooth and is_closed(self.points):
             wanted = "must be left out of a line that ends where it begins"
             faults.append(Fault(("smooth",), f"{wanted}, whose corners are straight, got true"))
