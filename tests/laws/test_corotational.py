@@ -90,7 +90,7 @@ def force(
     total, energy, zero = np.zeros_like(y), 0.0, np.zeros_like(y)
     for frame in frames_of(link):
         Q, a = rotation(link, frame.fit, y, angle)
-        f, e = frame_force(link, frame, Deformed(Q, a, deformation(link, y, Q, a), zero, zero), y, 0.0)
+        f, e = frame_force(link, frame, Deformed(Q, a, deformation(link, y, Q, a), zero), y, 0.0)
         total, energy = total + f, energy + e
     return total, energy
 

@@ -180,8 +180,8 @@ def test_multipliers_of_the_system_are_what_bears_the_port_forces(kind: str) -> 
                 assert_allclose(effort(forces, row.name), own[:, 0], rtol=0, atol=near)
                 continue
             force, moment, point = wrench(forces, row)
-            assert_allclose(point, along.point, rtol=0, atol=1e-12)
-            for got, n in ((force, along.gap), (moment, along.turn)):
+            assert_allclose(point, along[0], rtol=0, atol=1e-12)
+            for got, n in ((force, along[1]), (moment, along[2])):
                 wanted = np.einsum("tr,trk->tk", own, n)
                 assert_allclose(got, wanted, rtol=0, atol=near)
             if row.name in ready.scene.driven_joints:

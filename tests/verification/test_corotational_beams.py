@@ -38,7 +38,7 @@ def force(parts: Sequence[Link], u: np.ndarray) -> np.ndarray:
         for frame in frames_of(part):
             Q, angle = rotation(part, frame.fit, y, float(u[here, 2].mean()))
             none = np.zeros_like(y)
-            now = Deformed(Q, angle, deformation(part, y, Q, angle), none, none)
+            now = Deformed(Q, angle, deformation(part, y, Q, angle), none)
             f[here] += frame_force(part, frame, now, y, 0.0)[0]
         first += part.n - 1
     return f

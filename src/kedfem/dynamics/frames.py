@@ -31,13 +31,12 @@ def frames_of(link: Link) -> tuple[Frame, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Deformed:
-    """One frame at one time: Q (d, d), the angle of a planar link [rad], deformation g and its rates, (n, d) each."""
+    """One frame at one time: Q (d, d), the angle of a planar link [rad], deformation g and its rate, (n, d) each."""
 
     Q: Float[np.ndarray, "d d"]
     angle: float
     g: Nodal
     g1: Nodal
-    g2: Nodal
 
 
 def rotation(
@@ -108,7 +107,7 @@ def seen_from(link: Link, frame: Frame, y: Nodal, y1: Nodal | None = None) -> De
             deformation(link, z, *rotation(link, frame.fit, z, angle)) for z in (y + part * y1, y - part * y1)
         )
         g1 = (ahead - behind) / (2 * part)
-    return Deformed(Q, angle, g, g1, np.zeros_like(g))
+    return Deformed(Q, angle, g, g1)
 
 
 def frame_force(link: Link, frame: Frame, now: Deformed, y: Nodal, beta: float) -> tuple[Nodal, float]:

@@ -94,14 +94,15 @@ class Inertias:
         self.second[body] += arms.T @ moments
         self.spin[body] += float(link.one @ link.m1[:, 2]) if link.kind == "beam" else 0.0
 
-    def add_load(self, body: int, link: Link, load: Pattern) -> None:
-        """A load on a link or segment."""
-        f = in_space(link, load.forces)
+    def add_loads(self, body: int, link: Link, loads: Iterable[Pattern]) -> None:
+        """Loads on a link or segment."""
         arms = (link.X - np.outer(link.one, self.centre)) * [1, 1, 0 if link.planar else 1]
-        couple = float(link.one @ load.forces[:, 2]) if link.kind == "beam" else 0.0
-        self.loads.append(
-            RigidLoad(body, link.one @ f, arms.T @ f, couple, load.follows, load.factor, load.share)
-        )
+        for load in loads:
+            f = in_space(link, load.forces)
+            couple = float(link.one @ load.forces[:, 2]) if link.kind == "beam" else 0.0
+            self.loads.append(
+                RigidLoad(body, link.one @ f, arms.T @ f, couple, load.follows, load.factor, load.share)
+            )
 
     def centre_of(self, body: int) -> Vector | None:
         """Centre of mass of a body, in the reference position [m]; None without mass."""
@@ -117,10 +118,10 @@ def inertias_of_model(scene: Scene, linkage: Linkage, model: Model) -> Inertias:
     riding = [sum(len(x.loads) for x in model.sliders if x.carrier == k) for k in range(len(model.links))]
     for link, body, loads, last in zip(model.links, model.bodies, model.loads, riding, strict=True):
         out.add_link(body, link)
-        _add_loads(out, body, link, loads[first : len(loads) - last])
+        out.add_loads(body, link, loads[first : len(loads) - last])
     for prescribed in model.prescribed:
         out.add_link(prescribed.body, prescribed.link)
-        _add_loads(out, prescribed.body, prescribed.link, prescribed.loads[first:])
+        out.add_loads(prescribed.body, prescribed.link, prescribed.loads[first:])
     for slider in model.sliders:
         carrier = model.links[slider.carrier]
         at = slider.weights @ carrier.X
@@ -142,7 +143,7 @@ def inertias_of_links(scene: Scene, linkage: Linkage, links: Mapping[str, Link])
     for name, link in links.items():
         body = linkage.bodies.index(name)
         out.add_link(body, link)
-        _add_loads(out, body, link, loads[name][int(any(scene.gravity)) :])
+        out.add_loads(body, link, loads[name][int(any(scene.gravity)) :])
     for each in scene.bodies.values():
         if slider_axis(scene, each.link) is None:
             _add_body(out, scene, linkage, each)
@@ -203,11 +204,6 @@ def _none(scene: Scene, linkage: Linkage) -> Inertias:
 def _flat(link: Link, at: Vector, centre: Vector) -> Vector:
     """A point of a link; of a planar one at the height of the linkage's centre, as all its mass."""
     return np.where([True, True, not link.planar], at, centre)
-
-
-def _add_loads(out: Inertias, body: int, link: Link, loads: Iterable[Pattern]) -> None:
-    for load in loads:
-        out.add_load(body, link, load)
 
 
 def _add_sliders(out: Inertias, scene: Scene, linkage: Linkage) -> None:

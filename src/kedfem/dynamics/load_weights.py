@@ -16,12 +16,7 @@ from kedfem.links.surfaces.coupling_surfaces import (
     same_face,
     surface_weights,
 )
-from kedfem.scene import (
-    BodyLoad,
-    ForceLoad,
-    PressureLoad,
-    SurfaceLoad,
-)
+from kedfem.scene import BodyLoad, ForceLoad, PressureLoad, SurfaceLoad
 
 Vector = Float[np.ndarray, "3"]
 

@@ -13,11 +13,7 @@ from kedfem.dynamics.joints.places import on_part, surface_of
 from kedfem.dynamics.load_weights import Vector, at_point, face, load_weights, point_weights
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import Link, as_rows
-from kedfem.links.surfaces.coupling_surfaces import (
-    face_normals,
-    joint_surface,
-    surface_couples,
-)
+from kedfem.links.surfaces.coupling_surfaces import face_normals, joint_surface, surface_couples
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import (
     BodyLoad,

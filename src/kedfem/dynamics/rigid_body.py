@@ -9,7 +9,8 @@ from kedfem.arrays import Float
 from kedfem.dynamics.history import Forcing
 from kedfem.dynamics.joints.constraint_matrices import joint_rows
 from kedfem.dynamics.loads import applied
-from kedfem.dynamics.matrices.interface import Tie, static_tie
+from kedfem.dynamics.matrices.bordered import Asked
+from kedfem.dynamics.matrices.interface import static_tie
 from kedfem.dynamics.model import Model
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
@@ -84,7 +85,7 @@ class Instant:
     """A linkage frozen at one time: what acts on each link; tie: of joints enforced by constraint equations."""
 
     at: Sequence[Forcing]
-    tie: Tie | None = None
+    tie: Asked | None = None
 
 
 def instants(model: Model, motion: RigidMotion) -> list[Instant]:

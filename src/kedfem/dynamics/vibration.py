@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from kedfem.dynamics.system.period.search import Periodic
 from kedfem.dynamics.system.starts.instant import TURN, Flat
 from kedfem.dynamics.system.steps import Steps
 from kedfem.links.record import Link, mass_times
-from kedfem.motion.rigid import RigidMotion, joined
+from kedfem.motion.rigid import joined
 
 FRAMES = 48  # over a period
 SMALL = 1e-4  # of the size of the state: differences by which it is found where states are no sums
@@ -56,17 +57,17 @@ def vibration(over: PeriodMap, solver: Steps, found: Periodic) -> Vibration:
     x, model = over.vector(found.state), solver.model
     at = np.unique(np.round(np.linspace(1, over.steps, FRAMES)).astype(int)) - 1
     by = 1.0 if over.linear else SMALL * over.size(x) / over.size(found.shape)
-    base = _states(over, solver, x, at)
-    moved = _states(over, solver, over.possible(x + by * found.shape), at)
+    motion, *base, frames = _states(over, solver, x, at)
+    _, *moved, _ = _states(over, solver, over.possible(x + by * found.shape), at)
     u, v, g = (
-        [after - before for after, before in zip(getattr(moved, name), getattr(base, name), strict=True)]
-        for name in ("u", "v", "g")
+        [after - before for after, before in zip(*each, strict=True)]
+        for each in zip(moved, base, strict=True)
     )
     largest = max(float(np.linalg.norm(each, axis=-1).max()) for each in u) or 1.0
     snapshots = tuple(
-        Snapshot(int(at[f]) + 1, base.motion, f, [
+        Snapshot(int(at[f]) + 1, motion, f, [
             replace(bent(each[f] / largest, R[f]), g=deformed[f] / largest)
-            for each, deformed, R in zip(u, g, base.R, strict=True)
+            for each, deformed, R in zip(u, g, frames, strict=True)
         ])
         for f in range(len(at))
     )  # fmt: skip
@@ -87,19 +88,9 @@ def _mass_product(link: Link, x: Rows) -> float:
     return sum(float(np.vdot(each, mass_times(link.mass, each))) for each in x)
 
 
-@dataclass(frozen=True, slots=True)
-class _States:
-    """Displacements, rates, deformations (f, n, d) and frames (f, d, d) of all links at some steps."""
-
-    motion: RigidMotion
-    u: list[Rows]
-    v: list[Rows]
-    g: list[Rows]
-    R: list[Rows]
-
-
-def _states(over: PeriodMap, solver: Steps, x: Flat, at: Int[np.ndarray, " f"]) -> _States:
-    """What a march over the period passes through."""
+def _states(over: PeriodMap, solver: Steps, x: Flat, at: Int[np.ndarray, " f"]) -> tuple[Any, ...]:
+    """What a march over the period passes through at some steps: the rigid motion, and of all links displacements, rates,
+    deformations (f, n, d) and frames (f, d, d)."""
     motions, out, done, links = [], [], 0, solver.links
     for motion, found in over.histories(x):
         here = at[(at >= done) & (at < done + len(motion.t))] - done
@@ -111,4 +102,4 @@ def _states(over: PeriodMap, solver: Steps, x: Flat, at: Int[np.ndarray, " f"]) 
             for k, link in enumerate(links)
         ])  # fmt: skip
     every = [[np.concatenate([part[k][j] for part in out]) for k in range(len(links))] for j in range(4)]
-    return _States(joined(motions) if len(motions) > 1 else motions[0], *every)
+    return joined(motions) if len(motions) > 1 else motions[0], *every

@@ -58,7 +58,7 @@ class ConstraintJoint:
     sides : what it has on both, None where a link has no unknowns (the ground, what the drive carries)
     axis : (3,) of the joint, in the reference position
     gap, turn : (r, 3) directions in the reference position [-, m]
-    stiffness, damping : (r,) of rows that are springs, infinite and zero of those that hold [N/m, N m; N s/m, N m s]
+    stiffness : (r,) of rows that are springs, infinite of those that hold [N/m, N m]
     cross : of a universal joint the axes in i and in j: the last row turns about the normal of both
     plus : rows of other joints that these are combined with, each with its coefficient: gears
     """
@@ -71,7 +71,6 @@ class ConstraintJoint:
     gap: Float[np.ndarray, "r 3"] = field(default_factory=lambda: NO_ROWS)
     turn: Float[np.ndarray, "r 3"] = field(default_factory=lambda: NO_ROWS)
     stiffness: Float[np.ndarray, " r"] = field(default_factory=lambda: NO_ROWS[:, 0])
-    damping: Float[np.ndarray, " r"] = field(default_factory=lambda: NO_ROWS[:, 0])
     cross: tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]] | None = None
     plus: "tuple[tuple[float, ConstraintJoint], ...]" = ()
 
@@ -134,19 +133,18 @@ def mounted(joint: Joint, axis: int, turning: bool) -> tuple[float, float] | Non
     return stiffness[axis], (of.rotational_damping if turning else of.damping)[axis]
 
 
-def springs(
+def stiffnesses(
     scene: Scene, name: str, gap: Float[np.ndarray, "r 3"], axes: list[int]
-) -> tuple[Float[np.ndarray, " r"], Float[np.ndarray, " r"]]:
-    """Stiffness and damping of a joint's rows: of its bushing, its drive's shaft; infinite and zero where they hold."""
-    joint, drive = scene.joints[name], scene.driven_joints.get(name)
-    out = np.tile([[np.inf], [0.0]], len(axes))
+) -> Float[np.ndarray, " r"]:
+    """Stiffness of a joint's rows: of its bushing, its drive's shaft; infinite where they hold."""
+    joint, drive, out = scene.joints[name], scene.driven_joints.get(name), np.full(len(axes), np.inf)
     for r, (axis, turning) in enumerate(zip(axes, (not row.any() for row in gap), strict=True)):
-        found = None if axis < 0 else mounted(joint, axis, turning)
         if drive is not None and axis == 2 and turning == (joint.kind != "prismatic"):
             # what the drive prescribes is none of the bushing's
-            found = None if drive.shaft_stiffness is None else (drive.shaft_stiffness, drive.shaft_damping)
-        out[:, r] = found or out[:, r]
-    return out[0], out[1]
+            out[r] = np.inf if drive.shaft_stiffness is None else drive.shaft_stiffness
+        elif axis >= 0 and (found := mounted(joint, axis, turning)) is not None:
+            out[r] = found[0]
+    return out
 
 
 def in_plane(gap: Float[np.ndarray, "r 3"], turn: Float[np.ndarray, "r 3"]) -> Bool[np.ndarray, " r"]:
@@ -206,10 +204,7 @@ def _turning(link: Link, directions: list[np.ndarray]) -> list[Float[np.ndarray,
         return None
     e1, e2 = directions
     n = np.cross(e1, e2)
-    return [
-        -np.outer(e2, n) + 0.5 * np.outer(n, e2),
-        np.outer(e1, n) - 0.5 * np.outer(n, e1),
-    ]
+    return [-np.outer(e2, n) + 0.5 * np.outer(n, e2), np.outer(e1, n) - 0.5 * np.outer(n, e1)]
 
 
 def station_ports(found: Stations, link: Link) -> tuple[Ports, Float[np.ndarray, "p 6 d"]]:

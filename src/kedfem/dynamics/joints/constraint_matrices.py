@@ -23,7 +23,7 @@ class JointRows:
     entries : (T, n) of C, row by row [-, 1/m]
     row_at, columns : (r + 1,) where each row's begin, and (n,) the unknown of each
     unknowns : k of all z
-    stiffness, damping : (r,) of rows that are springs, infinite and zero of those that hold, e = 0
+    stiffness : (r,) of rows that are springs, infinite of those that hold, e = 0
     """
 
     entries: Float[np.ndarray, "T n"]
@@ -31,7 +31,6 @@ class JointRows:
     columns: Int[np.ndarray, " n"]
     unknowns: int
     stiffness: Float[np.ndarray, " r"]
-    damping: Float[np.ndarray, " r"]
 
     def at(self, k: int) -> sp.csr_array:
         """C (r, k) at one time point."""
@@ -40,17 +39,8 @@ class JointRows:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Directions:
-    """What a joint's rows are along, at T time points, world axes.
-
-    point : (T, 3) its point, on link i [m]
-    gap, turn : (T, r, 3)
-    """
-
-    point: Float[np.ndarray, "T 3"]
-    gap: Float[np.ndarray, "T r 3"]
-    turn: Float[np.ndarray, "T r 3"]
+Directions = tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T r 3"], Float[np.ndarray, "T r 3"]]
+"""Where a joint's point is on link i [m], and the gap and turn of its rows, at T time points, world axes."""
 
 
 def joint_rows(joints: Sequence[ConstraintJoint], motion: RigidMotion, unknowns: int) -> JointRows | None:
@@ -67,7 +57,6 @@ def joint_rows(joints: Sequence[ConstraintJoint], motion: RigidMotion, unknowns:
         np.concatenate([np.tile(columns, len(joint.gap)) for joint, columns in every]),
         unknowns,
         np.concatenate([joint.stiffness for joint in joints]),
-        np.concatenate([joint.damping for joint in joints]),
     )
 
 
@@ -116,7 +105,7 @@ def directions(joint: ConstraintJoint, motion: RigidMotion) -> Directions:
     if joint.cross is not None:
         a, b = motion.R[:, i] @ joint.cross[0], motion.R[:, j] @ joint.cross[1]
         turn[:, -1] = cross(a, b)
-    return Directions(motion.p[:, i] + motion.R[:, i] @ joint.at, gap, turn)
+    return motion.p[:, i] + motion.R[:, i] @ joint.at, gap, turn
 
 
 def travel(joint: ConstraintJoint, motion: RigidMotion) -> Float[np.ndarray, " T"]:
@@ -138,13 +127,13 @@ def _side_rows(
 ) -> Float[np.ndarray, "T r p d"]:
     """gap · u + turn · θ of one link at the joint's point: with r from the coupling surface, gap · u₀ + (r × gap + turn)
     · θ."""
-    d, R = side.onto.shape[1], motion.R[:, side.body]
+    d, R, (point, gap, turn) = side.onto.shape[1], motion.R[:, side.body], along
     if side.stations is not None:
         N = side.stations.at(travel(joint, motion))
-        c = np.einsum("tp,trb,pba->trpa", N, along.gap @ R, side.surface[:, :3])
+        c = np.einsum("tp,trb,pba->trpa", N, gap @ R, side.surface[:, :3])
     else:
         origin = motion.p[:, side.body] + R @ side.origin
-        r = (along.point - origin)[:, None]
-        on = np.concatenate([along.gap @ R, (cross(r, along.gap) + along.turn) @ R], axis=2)
+        r = (point - origin)[:, None]
+        on = np.concatenate([gap @ R, (cross(r, gap) + turn) @ R], axis=2)
         c = np.einsum("trb,pba->trpa", on, side.surface)
     return np.asarray(c @ R[:, None, :d, :d].transpose(0, 1, 3, 2))

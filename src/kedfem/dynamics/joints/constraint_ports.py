@@ -15,8 +15,8 @@ from kedfem.dynamics.joints.constraint_joints import (
     held_rows,
     in_plane,
     ordered,
-    springs,
     station_ports,
+    stiffnesses,
     surface_ports,
 )
 from kedfem.dynamics.joints.places import on_part, part_surface, slider_axis
@@ -102,11 +102,10 @@ def row_joint(
     here = [link for link in links.values() if link.name in (i, j)]
     planar = bool(here) and all(link.planar for link in here)  # a slider on the ground is of no plane
     kept = in_plane(gap, turn) if planar else np.ones(len(gap), bool)
-    hard = np.full(len(gap), np.inf), np.zeros(len(gap))
-    stiffness, damping = hard if only else springs(scene, name, gap, along)
+    stiffness = np.full(len(gap), np.inf) if only else stiffnesses(scene, name, gap, along)
     row = ConstraintJoint(
         name, np.asarray(joint.at), (layout.bodies[i], layout.bodies[j]), (first, second), joint_axis(joint), gap[kept],
-        turn[kept], stiffness[kept], damping[kept], axes,
+        turn[kept], stiffness[kept], axes,
     )  # fmt: skip
     return row, [own, others]
 

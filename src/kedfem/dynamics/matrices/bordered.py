@@ -1,5 +1,6 @@
 """Unknowns under constraints and laws, by one sparse factor of both: H z = f + Cᵀ m, C z + m / κ = target."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,21 @@ INDEPENDENT = 1e-10  # least eigenvalue of products of constraints of unit size:
 MANY = 100  # constraints from which that is asked first: a dense decomposition takes the time of their cube
 
 Flat = Float[np.ndarray, " _"]
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What constraints and laws ask of one solution.
+
+    C : (r, k) gradients by interface unknowns
+    target : (r,) of C z; compliance : (r,) 1/κ, zero of constraints
+    known : (k,) forces on the interface
+    """
+
+    C: Any
+    target: Flat
+    compliance: Flat
+    known: Flat
 
 
 class Bordered:

@@ -8,7 +8,8 @@ import scipy.sparse as sp
 
 from kedfem.arrays import Float, Int
 from kedfem.dynamics.joints.ports import Rotation
-from kedfem.dynamics.matrices.interface import MANY, Tie, solver
+from kedfem.dynamics.matrices.bordered import Asked
+from kedfem.dynamics.matrices.interface import MANY, solver
 from kedfem.dynamics.matrices.substructure import Substructure
 from kedfem.dynamics.stepping.state import NodalOf
 
@@ -67,7 +68,7 @@ def coupled_all(
     ]
 
 
-def closed(parts: Sequence[Substructure], R: Sequence[Rotation], tie: Tie | None) -> Closed:
+def closed(parts: Sequence[Substructure], R: Sequence[Rotation], tie: Asked | None) -> Closed:
     """A linkage with its joints closed: A g = r + Wᵀ λ, R W g = B z, and joint forces in balance, Σ Bᵀ R λ = 0.
 
     The mechanism of [KED, eq. (19)]: joints make shared points move together.

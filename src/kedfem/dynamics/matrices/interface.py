@@ -11,7 +11,6 @@ exact for every σ, one equation of springs and of what holds (1/κ = 0), and we
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ import scipy.sparse as sp
 
 from kedfem.arrays import Float
 from kedfem.dynamics.joints.constraint_matrices import JointRows
-from kedfem.dynamics.matrices.bordered import Bordered
+from kedfem.dynamics.matrices.bordered import Asked, Bordered
 from kedfem.dynamics.matrices.cholesky import Cholesky
 from kedfem.errors import SolveError
 
@@ -28,23 +27,8 @@ MANY = 400  # interface unknowns above which few links share each, and their mat
 DEPENDENT = 1e-11  # what is left of a row's own compliance where other rows hold what it holds
 
 
-@dataclass(frozen=True, slots=True)
-class Tie:
-    """What rows ask at one solution of the interface system.
-
-    C : (r, k); compliance : (r,) 1/κ, zero of rows that hold
-    target : (r,) C z of rows that hold; zero of springs
-    force : (k,) known forces on the interface
-    """
-
-    C: Any
-    compliance: Float[np.ndarray, " r"]
-    target: Float[np.ndarray, " r"]
-    force: Float[np.ndarray, " k"]
-
-
 def solver(
-    H: Float[np.ndarray, "k k"] | sp.csr_array, tie: Tie | None
+    H: Float[np.ndarray, "k k"] | sp.csr_array, tie: Asked | None
 ) -> Callable[[Float[np.ndarray, " k"]], tuple[Float[np.ndarray, " k"], Float[np.ndarray, " r"]]]:
     """What gives interface unknowns z and the rows' forces m for any f; of a sparse H by a sparse factor of both.
 
@@ -58,7 +42,7 @@ def solver(
         return lambda f: (alone(f), np.zeros(0))
     if sp.issparse(H):
         bordered = Bordered(H, sp.csr_array(tie.C), tie.compliance)
-        return lambda f: bordered.solved(f + tie.force, tie.target, closes=True)
+        return lambda f: bordered.solved(f + tie.known, tie.target, closes=True)
     C: Any = tie.C.toarray() if sp.issparse(tie.C) else tie.C
     beside = _beside(H, C, tie.compliance)
     inverse = _factor(H + (C.T * beside) @ C)
@@ -67,7 +51,7 @@ def solver(
     L, kept = semidefinite_factor((G + G.T) / 2 + np.diag(compliance))
 
     def of(f: Float[np.ndarray, " k"]) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " r"]]:
-        z, m = inverse(f + tie.force), np.zeros(len(compliance))
+        z, m = inverse(f + tie.known), np.zeros(len(compliance))
         for _ in range(2):  # the second closes joints to rounding
             left = tie.target - C @ z - compliance * m
             change = np.zeros(len(m))
@@ -122,7 +106,7 @@ def semidefinite_factor(G: Float[np.ndarray, "r r"]) -> tuple[Float[np.ndarray, 
     return L[: len(kept), : len(kept)], np.array(kept, int)
 
 
-def static_tie(rows: JointRows, at: int) -> Tie:
+def static_tie(rows: JointRows, at: int) -> Asked:
     """What the rows ask of a linkage at rest."""
     none = np.zeros(len(rows.stiffness))
-    return Tie(rows.at(at), 1 / rows.stiffness, none, np.zeros(rows.unknowns))
+    return Asked(rows.at(at), none, 1 / rows.stiffness, np.zeros(rows.unknowns))

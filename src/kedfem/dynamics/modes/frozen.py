@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kedfem.arrays import Float
+from kedfem.dynamics.matrices.bordered import Asked
 from kedfem.dynamics.modes.lanczos import Block, lanczos
 from kedfem.dynamics.modes.preloads import with_preloads
 from kedfem.dynamics.stepping.scheme import generalised_alpha
@@ -26,7 +27,7 @@ from kedfem.dynamics.system.record import TIME, Stop, System, curve_of
 from kedfem.dynamics.system.sparse import SparsePart, momentum
 from kedfem.dynamics.system.starts.instant import Instant, sizes
 from kedfem.dynamics.system.starts.internal_forces import own, rows
-from kedfem.dynamics.system.starts.linear_equations import Asked, HeldBody, LinearEquations, stepped_body
+from kedfem.dynamics.system.starts.linear_equations import HeldBody, LinearEquations, stepped_body
 from kedfem.errors import SceneError, SolveError
 from kedfem.links.reduced import wave_frequency
 from kedfem.motion.rigid import RigidMotion

@@ -9,10 +9,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from kedfem.arrays import Float
+from kedfem.dynamics.matrices.bordered import Asked
 from kedfem.dynamics.system.record import Constraint
 from kedfem.dynamics.system.starts.coordinate_rates import coordinate, moved_by
 from kedfem.dynamics.system.starts.instant import Instant
-from kedfem.dynamics.system.starts.linear_equations import Asked
 
 ROUNDING = 1e-12  # of the largest eigenvalue of a law's second derivatives
 

@@ -23,14 +23,9 @@ from kedfem.dynamics.joints.constraint_joints import (
     ordered,
 )
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.system import record
 from kedfem.dynamics.system.ends import corners, end_of, rigid_end, same_end
 from kedfem.dynamics.system.record import (
-    ANGLE,
-    DISTANCE,
-    GAP,
-    LINE,
-    OFFSET,
-    TURN,
     Constraint,
     Driven,
     End,
@@ -123,8 +118,10 @@ class _Builder:
         ends = [self._numbered(each) for each in corners(side)]
         for i, j in combinations(range(len(ends)), 2):
             a, b = side.points[i], side.points[j]
-            long = Term(DISTANCE, ends[i], ends[j], a, b, zero)
-            self.add(joint.name, (long, Term(DISTANCE, ground, ground, a, b, zero, -1.0)), Held(), joint)
+            long = Term(record.DISTANCE, ends[i], ends[j], a, b, zero)
+            self.add(
+                joint.name, (long, Term(record.DISTANCE, ground, ground, a, b, zero, -1.0)), Held(), joint
+            )
 
     def between_prescribed(self, known: set[str]) -> None:
         """Springs, motors and limits between the ground and what drives carry: no unknowns, but hubs bear them."""
@@ -145,7 +142,7 @@ class _Builder:
         if (between := getattr(element, "between", None)) is not None:
             i, j = (self.end(joint, k, np.asarray(end.at)) for k, end in enumerate(between))
             a, a_j = (self.ends[n].origin for n in (i, j))
-            term = Term(DISTANCE, i, j, a, a_j, np.zeros(3))
+            term = Term(record.DISTANCE, i, j, a, a_j, np.zeros(3))
         else:
             term = self.coordinate(str(element.joint), joint, 1.0, on_hinge(element))
         self.constraints.append(Constraint(joint.name, (term,), law_of(element), linear=False))
@@ -161,8 +158,8 @@ class _Builder:
         i, j = self.end(joint, 0, at), self.end(joint, 1, at)
         if self.scene.joints[name].kind != "prismatic" if turns is None else turns:
             across = perpendiculars(axis)[0]
-            return Term(ANGLE, i, j, across, across, axis, factor)
-        return Term(GAP, i, j, at, at, axis, factor)
+            return Term(record.ANGLE, i, j, across, across, axis, factor)
+        return Term(record.GAP, i, j, at, at, axis, factor)
 
     def constrained(self, joint: ConstraintJoint) -> Iterator[tuple[Term, Law]]:
         """What a joint constrains, each with its law: held, a bushing's spring, the drive's motion or its shaft."""
@@ -170,15 +167,15 @@ class _Builder:
         at = np.asarray(made.at)
         i, j = self.end(joint, 0, at), self.end(joint, 1, at)
         gaps, turns = CONSTRAINED[made.kind]
-        slides = self.ends[j].form == LINE and bool(set(joint.bodies) & self.own)
+        slides = self.ends[j].form == record.LINE and bool(set(joint.bodies) & self.own)
         for axis in gaps:
             n = "xyz".index(axis)
             if self.determines(joint, frame[n], np.zeros(3)):
-                kind = OFFSET if slides else GAP
+                kind = record.OFFSET if slides else record.GAP
                 yield Term(kind, i, j, at, at, frame[n]), self.bushing(joint.name, n, turning=False)
         if made.kind == "universal":
             one, other = (np.asarray(bore_axis(made, link)) for link in ordered(made))
-            yield Term(TURN, i, j, one, one, other), self.bushing(joint.name, 2, turning=True)
+            yield Term(record.TURN, i, j, one, one, other), self.bushing(joint.name, 2, turning=True)
         for axis in turns:
             n = "xyz".index(axis)
             if self.determines(joint, np.zeros(3), frame[n]):
@@ -186,8 +183,8 @@ class _Builder:
                 yield rotation_term(i, j, frame, n, law, tilt=len(turns) < 3), law
         if made.kind == "screw":  # its thread, a constraint of two terms
             along, across = frame[2], frame[0]
-            turn = Term(ANGLE, i, j, across, across, along, -(made.lead or 0.0) / (2 * np.pi))
-            self.add(joint.name, (Term(GAP, i, j, at, at, along), turn), Held(), joint)
+            turn = Term(record.ANGLE, i, j, across, across, along, -(made.lead or 0.0) / (2 * np.pi))
+            self.add(joint.name, (Term(record.GAP, i, j, at, at, along), turn), Held(), joint)
         if (drive := self.scene.driven_joints.get(joint.name)) is not None:
             number = list(self.scene.driven_joints).index(joint.name)
             term = self.coordinate(joint.name, joint, 1.0)

@@ -5,18 +5,8 @@ import numpy as np
 from kedfem.arrays import Float, Int
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side
 from kedfem.dynamics.joints.constraint_matrices import seen_from
-from kedfem.dynamics.system.record import (
-    FACE,
-    LINE,
-    PLANAR,
-    PLANAR_BEAM,
-    POINT,
-    RIGID,
-    SOLID,
-    End,
-    Line,
-    System,
-)
+from kedfem.dynamics.system import record
+from kedfem.dynamics.system.record import End, Line, System
 from kedfem.motion.rigid import RigidMotion
 
 NOTHING = 1e-12  # entries of a selection that are rounding
@@ -27,7 +17,7 @@ def corners(side: Side) -> list[End]:
     """The points of a rigid link, each an end."""
     every = zip(side.points, side.onto, strict=True)
     return [
-        End(side.body, POINT, X, np.eye(3), np.ones(3), 0, *_selected(onto[None], side.columns))
+        End(side.body, record.POINT, X, np.eye(3), np.ones(3), 0, *_selected(onto[None], side.columns))
         for X, onto in every
     ]
 
@@ -51,7 +41,7 @@ def _selected(
 
 def rigid_end(body: int, at: Vector) -> End:
     """An end on the ground or on a prescribed body."""
-    return End(body, RIGID, at, np.eye(3), np.ones(3), 0, np.zeros((1, 3, 0)), np.zeros(0, int))
+    return End(body, record.RIGID, at, np.eye(3), np.ones(3), 0, np.zeros((1, 3, 0)), np.zeros(0, int))
 
 
 def end_of(side: Side, joint: ConstraintJoint) -> End:
@@ -62,7 +52,14 @@ def end_of(side: Side, joint: ConstraintJoint) -> End:
         line = Line(side.stations, joint.axis, joint.bodies[0], joint.at)
         onto = onto * np.atleast_1d(side.surface[:, :3].any(axis=(0, 1)))[:, None]  # of a planar beam not ψ
         return End(
-            side.body, LINE, side.points[0], np.eye(3), np.ones(3), 0, *_selected(onto, side.columns), line
+            side.body,
+            record.LINE,
+            side.points[0],
+            np.eye(3),
+            np.ones(3),
+            0,
+            *_selected(onto, side.columns),
+            line,
         )
     directions, lengths, known = np.eye(3), np.ones(3), p - 1
     arms = side.points[1:] - side.points[0]
@@ -112,5 +109,5 @@ def left_line(system: System, end: int, t: float) -> str:
 def _form(side: Side, d: int, known: int) -> int:
     """What an end knows of its orientation."""
     if known:
-        return PLANAR if d == 2 else {2: FACE, 3: SOLID}[known]
-    return PLANAR_BEAM if side.shared and d == 3 and side.surface[0, 5].any() else POINT
+        return record.PLANAR if d == 2 else {2: record.FACE, 3: record.SOLID}[known]
+    return record.PLANAR_BEAM if side.shared and d == 3 and side.surface[0, 5].any() else record.POINT

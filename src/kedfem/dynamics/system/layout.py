@@ -13,33 +13,11 @@ from kedfem.dynamics.matrices.substructure import factored as condensed
 from kedfem.dynamics.metric import element_tables
 from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.dynamics.stepping.state import Rayleigh
+from kedfem.dynamics.system import record
 from kedfem.dynamics.system.arrays import Beams, Bodies, Coefficients, Constraints, Ends, ends_of
 from kedfem.dynamics.system.forces.stresses import stress_tables
 from kedfem.dynamics.system.forces.turning_loads import turning_loads
-from kedfem.dynamics.system.record import (
-    COORDINATE,
-    COROTATIONAL,
-    CURVE,
-    DRIVEN,
-    HELD,
-    LINE,
-    NOMINAL,
-    OFFSET,
-    POINT,
-    SPRING,
-    STOP,
-    STRESSED,
-    TANGENTIAL,
-    Constraint,
-    Curve,
-    Driven,
-    Held,
-    Law,
-    Spring,
-    Stop,
-    System,
-    curve_of,
-)
+from kedfem.dynamics.system.record import Constraint, Curve, Driven, Held, Law, Spring, Stop, System, curve_of
 from kedfem.dynamics.system.sparse import (
     Part,
     SparsePart,
@@ -81,8 +59,8 @@ def points_of(link: Link) -> tuple[BeamPoint, ...]:
 def frame_of(link: Link) -> int:
     """Which frame a body's internal force is seen from."""
     if link.fit is None:
-        return NOMINAL
-    return TANGENTIAL if points_of(link) else COROTATIONAL
+        return record.NOMINAL
+    return record.TANGENTIAL if points_of(link) else record.COROTATIONAL
 
 
 def body_arrays(system: System, parts: Sequence[Part], profile: Profile) -> Bodies:
@@ -90,20 +68,22 @@ def body_arrays(system: System, parts: Sequence[Part], profile: Profile) -> Bodi
     model, stiffening = system.model, system.stiffening
     links, joints, numbers = model.links, model.joints, model.bodies
     columns = [joint.columns for joint in joints]
-    frames = [frame_of(link) if stiffening is None else STRESSED for link in links]
+    frames = [frame_of(link) if stiffening is None else record.STRESSED for link in links]
     sizes, ports = [link.unknowns for link in links], [len(joint.keep) for joint in joints]
-    beams = [k for k, frame in enumerate(frames) if frame == TANGENTIAL]
+    beams = [k for k, frame in enumerate(frames) if frame == record.TANGENTIAL]
     at = ends_of(sizes)
     passed, place = np.full(len(links), -1), 0
     for k, frame in enumerate(frames):
-        if frame != NOMINAL:
+        if frame != record.NOMINAL:
             passed[k], place = place, place + sizes[k]
     fits = [_fitted(link, part) for link, part in zip(links, parts, strict=True)]
     dense = np.array([not isinstance(part, SparsePart) for part in parts], bool)
     Y, W = ([x[:0] if isinstance(part, SparsePart) else x for x, part in zip(each, parts, strict=True)]
             for each in ([part.Y.T for part in parts], [part.W for part in parts]))  # fmt: skip
     stiff = [
-        component_first(part.T, link.K0) if frame == COROTATIONAL and part.G.size else np.zeros(part.G.shape)
+        component_first(part.T, link.K0)
+        if frame == record.COROTATIONAL and part.G.size
+        else np.zeros(part.G.shape)
         for link, part, frame in zip(links, parts, frames, strict=True)
     ]
     return Bodies(
@@ -126,9 +106,9 @@ def body_arrays(system: System, parts: Sequence[Part], profile: Profile) -> Bodi
         ),
         elements=element_tables(links, parts), mass=mass_tables(links, parts),
         turning=turning_loads(links, parts, model.loads),
-        stiffness=stiffness_tables(links, parts, [frame == COROTATIONAL for frame in frames]),
+        stiffness=stiffness_tables(links, parts, [frame == record.COROTATIONAL for frame in frames]),
         size=np.array([1.0 if whole else mass_of(link) for link, whole in zip(links, dense, strict=True)]),
-        rigid=np.array([link.rigid and frame == COROTATIONAL for link, frame in zip(links, frames, strict=True)], bool),
+        rigid=np.array([x.rigid and frame == record.COROTATIONAL for x, frame in zip(links, frames, strict=True)], bool),
         stresses=stress_tables(stiffening, parts),
     )  # fmt: skip
 
@@ -176,14 +156,14 @@ def end_arrays(system: System, number: Int[np.ndarray, " k"]) -> Ends:
     """All ends as flat arrays on the renumbered interface unknowns."""
     ends = system.ends
     columns, every = [end.columns for end in ends], [end.onto for end in ends]
-    lines = [n for n, end in enumerate(ends) if end.form == LINE]
+    lines = [n for n, end in enumerate(ends) if end.form == record.LINE]
     full = [every[n] for n in lines]
     onto = [x[:1] if n in lines else x for n, x in enumerate(every)]
-    forms = [POINT if end.form == LINE else end.form for end in ends]
+    forms = [record.POINT if end.form == record.LINE else end.form for end in ends]
     of_lines = [(end.line.axis, end.line.stations) for end in ends if end.line is not None]
     cubics = [_cardinal(along.s) for _, along in of_lines]
     terms = [term for each in system.constraints for term in each.terms]
-    free = {term.j for term in terms if term.kind == OFFSET}
+    free = {term.j for term in terms if term.kind == record.OFFSET}
     return Ends(
         body=np.array([end.body for end in ends], int), form=np.array(forms, int),
         origin=_rows([end.origin for end in ends]),
@@ -210,7 +190,7 @@ def constraint_arrays(constraints: Sequence[Constraint], profile: Profile) -> Co
     """All constraints and laws as flat arrays."""
     terms = [term for each in constraints for term in each.terms]
     laws = [_law(each.law) for each in constraints]
-    curves = [curve_of(each.law) or Curve(COORDINATE, Pieces()) for each in constraints]
+    curves = [curve_of(each.law) or Curve(record.COORDINATE, Pieces()) for each in constraints]
     return Constraints(
         term_at=ends_of([len(each.terms) for each in constraints]), kind=np.array([x.kind for x in terms], int),
         i=np.array([x.i for x in terms], int), j=np.array([x.j for x in terms], int),
@@ -233,15 +213,15 @@ def _law(law: Law) -> tuple[int, tuple[float, float, float, float], int]:
     """Kind, numbers and drive of a law."""
     match law:
         case Held():
-            return HELD, (0.0, 0.0, 0.0, 0.0), -1
+            return record.HELD, (0.0, 0.0, 0.0, 0.0), -1
         case Driven():
-            return DRIVEN, (0.0, 0.0, 0.0, 0.0), law.drive
+            return record.DRIVEN, (0.0, 0.0, 0.0, 0.0), law.drive
         case Spring():
-            return SPRING, (law.stiffness, law.damping, law.free, 0.0), law.drive
+            return record.SPRING, (law.stiffness, law.damping, law.free, 0.0), law.drive
         case Stop():
-            return STOP, (law.lower, law.upper, law.stiffness, law.damping), -1
+            return record.STOP, (law.lower, law.upper, law.stiffness, law.damping), -1
         case Curve():
-            return CURVE, (0.0, 0.0, 0.0, 0.0), -1
+            return record.CURVE, (0.0, 0.0, 0.0, 0.0), -1
 
 
 def _rows(vectors: Sequence[np.ndarray]) -> Float[np.ndarray, "r 3"]:
@@ -266,7 +246,7 @@ def is_large(link: Link) -> bool:
     Beams in space with rigid-body frames do, however small: in coordinates in which mass is one their stiff hubs, which
     have next to none, would be 1e11 times as stiff as they bend.
     """
-    if frame_of(link) == TANGENTIAL or link.element is not None:
+    if frame_of(link) == record.TANGENTIAL or link.element is not None:
         return False
     hubs = link.kind == "spatial_beam" and link.full is None and link.fit is None
     return link.unknowns > SMALL or hubs

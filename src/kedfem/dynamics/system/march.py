@@ -105,6 +105,7 @@ def driving(of: Ready, motion: RigidMotion, loads: Loads | None = None) -> Drivi
     stations = [line_weights(end, motion) for end in of.system.ends if end.line is not None]
     weights = np.concatenate([np.zeros((len(motion.t), 0)), *stations], axis=1)
     varied = [getattr(each.law, "factor", None) for each in of.system.constraints]
+    springs = stiffness_factors(varied, motion.t, motion.phi)
     rows = (
         motion.t,
         motion.R,
@@ -114,12 +115,10 @@ def driving(of: Ready, motion: RigidMotion, loads: Loads | None = None) -> Drivi
         drives,
         np.concatenate(F, axis=1),
         amounts(of, motion),
-        weights,
-        stiffness_factors(varied, motion.t, motion.phi),
     )
     terms = NO_TERMS if of.stressed is None else of.stressed.over(forcing, motion)
     # other strides would be compiled for anew
-    return Driving(*(np.ascontiguousarray(x) for x in (*rows, *terms)))
+    return Driving(*(np.ascontiguousarray(x) for x in (*rows, weights, springs, *terms)))
 
 
 def amounts(of: Ready, motion: RigidMotion) -> Float[np.ndarray, "T w"]:

@@ -3,21 +3,10 @@
 import numpy as np
 
 from kedfem.arrays import Float
+from kedfem.dynamics.system import record
 from kedfem.dynamics.system.ends import line_weights
 from kedfem.dynamics.system.forces.rotations import rotation_moment, tilt_moment
-from kedfem.dynamics.system.record import (
-    FACE,
-    LINE,
-    PLANAR,
-    PLANAR_BEAM,
-    POINT,
-    RIGID,
-    ROTATION,
-    TILT,
-    TURN,
-    End,
-    Term,
-)
+from kedfem.dynamics.system.record import End, Term
 from kedfem.motion.constraints import cross
 from kedfem.motion.rigid import RigidMotion
 
@@ -27,11 +16,11 @@ Vectors = Float[np.ndarray, "T 3"]
 def turning(term: Term, Q_i: Float[np.ndarray, "T 3 3"], Q_j: Float[np.ndarray, "T 3 3"]) -> Vectors:
     """Moment on end i of a unit multiplier on a turn, an angle or a rotation; on j it is the opposite."""
     a, b = Q_i @ term.a, Q_j @ term.b
-    if term.kind == TURN:
+    if term.kind == record.TURN:
         return cross(a, b)
-    if term.kind == ROTATION:
+    if term.kind == record.ROTATION:
         return rotation_moment(Q_i, Q_j, b)
-    if term.kind == TILT:
+    if term.kind == record.TILT:
         return tilt_moment(a, Q_j @ term.a_j, b)
     a_j, e, e_j = Q_j @ term.a_j, Q_i @ cross(term.b, term.a), Q_j @ cross(term.b, term.a_j)
     along = (a * a_j + e * e_j).sum(axis=1)[:, None]
@@ -46,17 +35,17 @@ def poses(
     """Place and orientation of an end over time; without z those that the rigid-body motion shows."""
     R = motion.R[:, end.body]
     x = motion.p[:, end.body] + R @ end.origin
-    if end.form == RIGID or z is None:
+    if end.form == record.RIGID or z is None:
         return x, R
     d = end.onto.shape[1]
     u = np.einsum("pdc,tc->tpd", end.onto, z[:, end.columns])
     if end.line is not None:
         u = np.einsum("tp,tpd->td", line_weights(end, motion), u)[:, None]
-    flat = 2 if end.form == PLANAR_BEAM else d
+    flat = 2 if end.form == record.PLANAR_BEAM else d
     x[:, :flat] += u[:, 0, :flat]
-    if end.form in (POINT, LINE):
+    if end.form in (record.POINT, record.LINE):
         return x, R
-    if end.form == PLANAR_BEAM:
+    if end.form == record.PLANAR_BEAM:
         c, s, Q = np.cos(u[:, 0, 2]), np.sin(u[:, 0, 2]), np.zeros_like(R)
         Q[:, 0, 0], Q[:, 0, 1], Q[:, 1, 0], Q[:, 1, 1], Q[:, 2, 2] = c, -s, s, c, 1.0
         return x, Q @ R
@@ -72,11 +61,11 @@ def _directions(
     for k in range(end.known):
         D[:, k] = R @ end.directions[k]
         D[:, k, :d] += (u[:, k + 1] - u[:, 0]) / end.lengths[k]
-    if end.form == PLANAR:
+    if end.form == record.PLANAR:
         if end.known == 1:
             D[:, 1] = cross(np.array([0.0, 0.0, 1.0]), D[:, 0])
         D[:, 2] = [0, 0, 1]
-    if end.form == FACE:
+    if end.form == record.FACE:
         D[:, 2] = cross(D[:, 0], D[:, 1])
         D[:, 2] /= np.linalg.norm(D[:, 2], axis=1)[:, None]
     return D
@@ -95,13 +84,13 @@ def point_forces(
     """Forces at an end's interface points that do what a force and a moment on it do: q_k of `ends_kernel`."""
     p, d, _ = end.onto.shape
     y = np.zeros((len(force), p, d))
-    flat = 2 if end.form == PLANAR_BEAM else d
+    flat = 2 if end.form == record.PLANAR_BEAM else d
     y[:, 0, :flat] = force[:, :flat]
     if end.line is not None:
         return np.asarray(np.einsum("tp,td->tpd", line_weights(end, motion), y[:, 0]))
-    if end.form == PLANAR_BEAM:
+    if end.form == record.PLANAR_BEAM:
         y[:, 0, 2] = moment[:, 2]
-    if end.form in (POINT, PLANAR_BEAM):
+    if end.form in (record.POINT, record.PLANAR_BEAM):
         return y
     R = motion.R[:, end.body]
     u = np.zeros_like(y) if z is None else np.einsum("pdc,tc->tpd", end.onto, z[:, end.columns])
@@ -111,9 +100,9 @@ def point_forces(
     G = np.trace(U, axis1=1, axis2=2)[:, None, None] * np.eye(3) - U
     turn = np.linalg.solve(G, (Q.transpose(0, 2, 1) @ moment[:, :, None]))[:, :, 0]
     q = [(Q @ cross(turn, e)[:, :, None])[:, :, 0] for e in end.directions]
-    if end.form == PLANAR and end.known == 1:
+    if end.form == record.PLANAR and end.known == 1:
         q[0] = q[0] + cross(q[1], np.array([0.0, 0.0, 1.0]))
-    if end.form == FACE:
+    if end.form == record.FACE:
         size = np.linalg.norm(cross(D[:, 0], D[:, 1]), axis=1)[:, None]
         n = D[:, 2]
         q[0] = q[0] - (q[2] * cross(D[:, 1], n)).sum(axis=1)[:, None] / size * n

@@ -8,9 +8,7 @@ import scipy.sparse as sp
 
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Forcing
-from kedfem.dynamics.model import Model
-from kedfem.dynamics.rigid_body import forcings
-from kedfem.dynamics.stiffening import Stiffening, StressModes, Turning
+from kedfem.dynamics.stiffening import Stiffening, StressModes
 from kedfem.dynamics.system.arrays import Stresses, ends_of
 from kedfem.dynamics.system.sparse import Part, SparsePart
 from kedfem.motion.rigid import RigidMotion
@@ -44,10 +42,6 @@ class Stressed:
         flat = np.concatenate([np.zeros(0), *(k.ravel() for _, k in every)])
         factors = np.ascontiguousarray(np.concatenate([s for s, _ in every], axis=1))
         return factors, ends_of([len(k) for _, k in every]), ends_of(sizes), flat
-
-    def turnings(self, model: Model, motion: RigidMotion) -> list[Turning]:
-        """g → k g P of all links at the first time of a motion."""
-        return self.stiffening.turnings(forcings(model, motion), motion)
 
 
 def stressed(stiffening: Stiffening, parts: Sequence[Part]) -> Stressed:

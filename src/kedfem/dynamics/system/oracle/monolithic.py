@@ -225,7 +225,7 @@ class Monolithic:
             Q, turn = rotation(link, frame.fit, y, angle)
             g = deformation(link, y, Q, turn)
             rates = self.rates(g, *g0)
-            f += frame_force(link, frame, Deformed(Q, turn, g, *rates), y, damping.beta)[0]
+            f += frame_force(link, frame, Deformed(Q, turn, g, rates[0]), y, damping.beta)[0]
             seen.append((turn, np.stack([g, *rates])))
         own = [load for load in self.system.model.loads[k] if load.own]
         x = u.reshape(link.n, link.d)

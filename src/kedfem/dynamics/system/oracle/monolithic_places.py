@@ -9,29 +9,9 @@ from scipy.linalg import expm
 
 from kedfem.arrays import Float
 from kedfem.dynamics.loads import Pattern
+from kedfem.dynamics.system import record
 from kedfem.dynamics.system.forces.turning_loads import shown_by
-from kedfem.dynamics.system.record import (
-    ANGLE,
-    DISTANCE,
-    FACE,
-    LINE,
-    PLANAR,
-    PLANAR_BEAM,
-    POINT,
-    RATE,
-    RIGID,
-    ROTATION,
-    TILT,
-    TIME,
-    Constraint,
-    Curve,
-    End,
-    Spring,
-    Stop,
-    System,
-    Term,
-    law_at,
-)
+from kedfem.dynamics.system.record import Constraint, Curve, End, Spring, Stop, System, Term, law_at
 from kedfem.links.record import Link
 from kedfem.motion.constraints import ConstraintEquation, stacked
 from kedfem.motion.rigid import RigidMotion
@@ -62,7 +42,10 @@ def _on_curve(curve: Curve | None, at: RigidMotion, e: float, rate: float) -> fl
     """Force along the coordinate."""
     if curve is None:
         return 0.0
-    of, x = curve.force, float(at.t[0]) if curve.over == TIME else (rate if curve.over == RATE else e)
+    of, x = (
+        curve.force,
+        float(at.t[0]) if curve.over == record.TIME else (rate if curve.over == record.RATE else e),
+    )
     x = of.at[0] + (x - of.at[0]) % of.period if of.period else max(x, of.at[0])
     return float(PPoly(np.array(of.coefficients).T[::-1], [*of.at, max(x, of.at[-1]) + 1.0])(x))
 
@@ -108,7 +91,7 @@ def placed(end: End, R: Any, p: Any, z: Column) -> Pose:
     pin = R[end.line.pin] if end.line is not None else None
     R, x = R[end.body], p[end.body] + R[end.body] @ end.origin
     by_x, by_Q = np.zeros((3, k)), np.zeros((3, k))
-    if end.form == RIGID:
+    if end.form == record.RIGID:
         return Pose(x, R, by_x, by_Q)
     onto = np.zeros((count, d, k))
     onto[:, :, end.columns] = end.onto
@@ -119,25 +102,25 @@ def placed(end: End, R: Any, p: Any, z: Column) -> Pose:
         s = float((away @ R - end.line.at) @ end.line.axis)
         onto = np.einsum("p,pdk->dk", CubicSpline(end.line.stations.s, np.eye(len(onto)))(s), onto)[None]
     u = onto @ z
-    flat = 2 if end.form == PLANAR_BEAM else d
+    flat = 2 if end.form == record.PLANAR_BEAM else d
     x[:flat] += u[0, :flat]
     by_x[:flat] = onto[0, :flat]
-    if end.form == PLANAR_BEAM:
+    if end.form == record.PLANAR_BEAM:
         c, s = np.cos(u[0, 2]), np.sin(u[0, 2])
         by_Q[2] = onto[0, 2]
         return Pose(x, np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ R, by_x, by_Q)
-    if end.form in (POINT, LINE):
+    if end.form in (record.POINT, record.LINE):
         return Pose(x, R, by_x, by_Q)
     D, by = np.zeros((3, 3)), np.zeros((3, 3, k))  # direction, component
     for n in range(end.known):
         D[n] = R @ end.directions[n]
         D[n, :d] += (u[n + 1] - u[0]) / end.lengths[n]
         by[n, :d] = (onto[n + 1] - onto[0]) / end.lengths[n]
-    if end.form == PLANAR:
+    if end.form == record.PLANAR:
         if end.known == 1:
             D[1], by[1] = np.cross([0, 0, 1], D[0]), np.cross([0, 0, 1], by[0], axisb=0, axisc=0)
         D[2] = [0, 0, 1]
-    if end.form == FACE:
+    if end.form == record.FACE:
         normal = np.cross(D[0], D[1])
         size = np.linalg.norm(normal)
         D[2] = normal / size
@@ -163,7 +146,7 @@ def point(
 def valued(system: System, term: Term, poses: list[Pose], near: float) -> tuple[float, Column, float]:
     """A term's value, its gradient by z, and an angle to be near the next time."""
     one, other = poses
-    if term.kind == DISTANCE:
+    if term.kind == record.DISTANCE:
         ends = system.ends[term.i], system.ends[term.j]
         arms = [
             pose.Q @ (a - end.origin) for pose, a, end in zip(poses, (term.a, term.a_j), ends, strict=True)
@@ -173,8 +156,8 @@ def valued(system: System, term: Term, poses: list[Pose], near: float) -> tuple[
         n = gap / size
         by = [n @ pose.by_x + np.cross(arm, n) @ pose.by_Q for pose, arm in zip(poses, arms, strict=True)]
         return size, by[0] - by[1], near
-    if term.kind in (ROTATION, TILT):
-        along = _rotation_along if term.kind == ROTATION else _tilt_along
+    if term.kind in (record.ROTATION, record.TILT):
+        along = _rotation_along if term.kind == record.ROTATION else _tilt_along
         value, moment = along(term, one.Q, other.Q)
         return value, moment @ (one.by_Q - other.by_Q), near
     origin = [x.x - x.Q @ system.ends[n].origin for x, n in zip(poses, (term.i, term.j), strict=True)]
@@ -187,7 +170,7 @@ def valued(system: System, term: Term, poses: list[Pose], near: float) -> tuple[
         # the twist of a body at the origin of its drawn coordinates: v = δx − δθ × (x − start)
         row += of[:3] @ pose.by_x + (of[3:] - np.cross(pose.x - start, of[:3])) @ pose.by_Q
     value = float(f.value[0, 0])
-    return value, row, value if term.kind == ANGLE else near
+    return value, row, value if term.kind == record.ANGLE else near
 
 
 def _rotation_along(term: Term, Q_i: Any, Q_j: Any) -> tuple[float, Float[np.ndarray, "3"]]:

@@ -81,7 +81,7 @@ def begun(of: Ready, state: State, motion_at: Motion | None) -> Now:
     seen: list[list[Seen]] = [[] for _ in links]
     if motion_at is not None:
         inside = Instant(of, motion_at, float(state.time[0])).inside(state.u, state.v)
-        seen = [[(x.angle, np.stack([x.g, x.g1, x.g2])) for x in each.frames] for each in inside]
+        seen = [[(x.angle, np.stack([x.g, x.g1, 0 * x.g])) for x in each.frames] for each in inside]
     return Now(
         u, v, a, f, F, seen, state.z[0, number], state.e.copy(), state.turned.copy(),
         state.bearing[number], damped, state.z[:, number], state.multiplier.copy(), state.port_force.copy(),

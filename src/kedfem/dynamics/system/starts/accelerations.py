@@ -13,17 +13,12 @@ from dataclasses import replace
 import numpy as np
 
 from kedfem.arrays import Float
+from kedfem.dynamics.matrices.bordered import Asked
 from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.system.sparse import SparsePart
 from kedfem.dynamics.system.starts.instant import Flat, Instant
 from kedfem.dynamics.system.starts.internal_forces import drawn, own, rows, turned_rate
-from kedfem.dynamics.system.starts.linear_equations import (
-    Asked,
-    LinearEquations,
-    Solved,
-    held_body,
-    stepped_body,
-)
+from kedfem.dynamics.system.starts.linear_equations import LinearEquations, Solved, held_body, stepped_body
 from kedfem.links.record import Link
 from kedfem.motion.newton import cross_matrix
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kedfem.arrays import Float
+from kedfem.dynamics.matrices.bordered import Asked
 from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.record import RATE, Spring, Stop, curve_of
@@ -21,7 +22,6 @@ from kedfem.dynamics.system.starts.accelerations import accelerations, own_spin
 from kedfem.dynamics.system.starts.initial_states import as_coordinates, begun
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
 from kedfem.dynamics.system.starts.internal_forces import own, rows, turned_rate
-from kedfem.dynamics.system.starts.linear_equations import Asked
 from kedfem.dynamics.system.starts.modified_newton import FREE, NoBalanceError, equilibrium
 from kedfem.dynamics.system.starts.turning_bodies import CONVERGED, Spins
 from kedfem.dynamics.system.state import State

@@ -10,13 +10,13 @@ from dataclasses import replace
 import numpy as np
 
 from kedfem.arrays import Bool, Float
+from kedfem.dynamics.matrices.bordered import Asked
 from kedfem.dynamics.system.arrays import Constraints
 from kedfem.dynamics.system.march import Motion, Ready, march, shortened
 from kedfem.dynamics.system.sparse import SparsePart, momentum
 from kedfem.dynamics.system.starts.accelerations import in_a_step
 from kedfem.dynamics.system.starts.instant import Instant
 from kedfem.dynamics.system.starts.internal_forces import own
-from kedfem.dynamics.system.starts.linear_equations import Asked
 from kedfem.dynamics.system.state import History, State, copied
 
 NEAR = 1e-3  # of a step: a stop that is met so near to its beginning or end is met there

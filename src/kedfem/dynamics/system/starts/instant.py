@@ -12,6 +12,7 @@ from kedfem.arrays import Bool, Float, Int
 from kedfem.dynamics.joints.attachments import interface_matrix
 from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.matrices.substructure import factored
+from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.system.ends import left_line, line_of
 from kedfem.dynamics.system.forces.turning_loads import turned as turned_load
 from kedfem.dynamics.system.forces.turning_loads import turning
@@ -91,7 +92,9 @@ class Instant:
         self.R, self.omega = motion.R[0][of.bodies.motion], motion.omega[0][of.bodies.motion]
         self.travels = travels(of.system, self.at)
         self.always: Always = always(of) if like is None else like.always
-        self._turnings = None if of.stressed is None else of.stressed.turnings(of.system.model, motion)
+        self._turnings = of.stressed and of.stressed.stiffening.turnings(
+            forcings(of.system.model, motion), motion
+        )
 
     def stress(self, u: Flat) -> Flat:
         """Forces by the stresses of the rigid-body motion, R (k g P), at a displacement; none without stiffening."""

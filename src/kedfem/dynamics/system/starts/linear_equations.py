@@ -21,7 +21,7 @@ from scipy.sparse.linalg import LinearOperator
 from kedfem.arrays import Float
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.ports import port_rotation
-from kedfem.dynamics.matrices.bordered import Bordered
+from kedfem.dynamics.matrices.bordered import Asked, Bordered
 from kedfem.dynamics.matrices.substructure import Substructure, mass_substructure
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.sparse import SparsePart, sparse_part
@@ -29,21 +29,6 @@ from kedfem.errors import SolveError
 from kedfem.links.record import Link
 
 Flat = Float[np.ndarray, " _"]
-
-
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """What constraints and laws ask of one solution.
-
-    C : (r, k) gradients, in the order of the system's interface unknowns
-    target : (r,) of C z; compliance : (r,) 1/κ, zero of constraints
-    known : (k,) forces on the interface
-    """
-
-    C: sp.csr_array
-    target: Flat
-    compliance: Flat
-    known: Flat
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,9 @@ from collections.abc import Callable
 import numpy as np
 
 from kedfem.dynamics.anderson import Mixing
+from kedfem.dynamics.matrices.bordered import Asked
 from kedfem.dynamics.system.starts.instant import Flat, Instant
-from kedfem.dynamics.system.starts.linear_equations import Asked, LinearEquations
+from kedfem.dynamics.system.starts.linear_equations import LinearEquations
 from kedfem.dynamics.system.starts.newton_krylov import Equilibrium, solution, stands_off
 from kedfem.dynamics.system.starts.turning_bodies import CONVERGED, Spins, TurningBodies
 from kedfem.errors import SolveError

@@ -21,13 +21,14 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from kedfem.arrays import Bool, Float
 from kedfem.dynamics.frames import mean_orientation
+from kedfem.dynamics.matrices.bordered import Asked
 from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.system.record import COROTATIONAL
 from kedfem.dynamics.system.sparse import momentum
 from kedfem.dynamics.system.starts.instant import Flat, Instant
 from kedfem.dynamics.system.starts.internal_forces import Frames as Sought
 from kedfem.dynamics.system.starts.internal_forces import drawn, own, rows
-from kedfem.dynamics.system.starts.linear_equations import Asked, LinearEquations
+from kedfem.dynamics.system.starts.linear_equations import LinearEquations
 from kedfem.dynamics.system.starts.turning_bodies import CONVERGED, Spins, TurningBodies
 from kedfem.errors import SolveError
 from kedfem.links.reduced import reach
