@@ -8,11 +8,10 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.dynamics.joints.attachments import SharedCut
 from kedfem.dynamics.joints.constraint_joints import needs_rows
-from kedfem.dynamics.joints.constraint_ports import LinkageLayout
+from kedfem.dynamics.joints.constraint_ports import LinkageLayout, slot_travels
 from kedfem.dynamics.joints.coupling import joined
 from kedfem.dynamics.joints.places import on_part, part_surface, slider_axis, slider_guide
 from kedfem.dynamics.joints.rigid_couplings import with_stiff_ports
-from kedfem.dynamics.joints.slots import slot_travels
 from kedfem.dynamics.loads import patterns, slider_pattern
 from kedfem.dynamics.model import Model, PrescribedBody, Slider
 from kedfem.dynamics.moving_ground import moving_ground

@@ -7,6 +7,7 @@ joint holds. A coupling surface is seen as a rigid piece: the mean displacement 
 both linear in the port points, so that the point of the coupling surface's frame at X moves by u₀ + θ × (X − X₀).
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -30,20 +31,22 @@ class Side:
     """What a joint has on one of its links; all in the link frame, in the reference position.
 
     body : number in the linkage
-    origin : (3,) X₀ of the coupling surface [m]
+    points : (p, 3) its ports in the reference position, the first at X₀ of the coupling surface [m]
     surface : (p, 6, d) u₀ and θ from the displacements at its ports
     stations : of the link along which a slot's pin slides; its ports are these
-    shared : whether the ports are the link's; not of a rigid slider, which rides on another link
-    points : (p, 3) the ports in the reference position [m]
+    keys, weights : of each port the link, or segment of one, and (n,) weights on it; none once z is known
+    slider, axis : name of a rigid slider, which rides on another link and has no ports, and along which it slides
     onto : (p, d, c) displacements at the ports, world components, from the interface unknowns z[columns]
     """
 
     body: int
-    origin: Float[np.ndarray, "3"]
-    surface: Float[np.ndarray, "p 6 d"]
     points: Ports
+    surface: Float[np.ndarray, "p 6 d"]
     stations: Stations | None = None
-    shared: bool = True
+    keys: tuple[str, ...] = ()
+    weights: Float[np.ndarray, "p n"] | Sequence[Float[np.ndarray, " _"]] = ()
+    slider: str = ""
+    axis: Float[np.ndarray, "3"] | None = None
     onto: Float[np.ndarray, "p d c"] = field(default_factory=lambda: np.zeros((0, 0, 0)))
     columns: Int[np.ndarray, " c"] = field(default_factory=lambda: np.zeros(0, int))
 
@@ -73,6 +76,12 @@ class ConstraintJoint:
     stiffness: Float[np.ndarray, " r"] = field(default_factory=lambda: NO_ROWS[:, 0])
     cross: tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]] | None = None
     plus: "tuple[tuple[float, ConstraintJoint], ...]" = ()
+
+    @property
+    def all_sides(self) -> Iterator[Side]:
+        """Those that it has, and of joints that it is combined with."""
+        for joint in (self, *(other for _, other in self.plus)):
+            yield from (side for side in joint.sides if side is not None)
 
 
 def needs_rows(scene: Scene, name: str) -> bool:

@@ -49,14 +49,11 @@ def joint_rows(joints: Sequence[ConstraintJoint], motion: RigidMotion, unknowns:
         return None
     every = [(joint, _columns(joint)) for joint in joints]
     width = np.concatenate([np.full(len(joint.gap), len(columns)) for joint, columns in every])
+    entries = [rows_over(joint, motion, x).reshape(len(motion.t), -1) for joint, x in every]
+    columns = np.concatenate([np.tile(x, len(joint.gap)) for joint, x in every])
+    stiffness = np.concatenate([joint.stiffness for joint in joints])
     return JointRows(
-        np.concatenate(
-            [rows_over(joint, motion, x).reshape(len(motion.t), -1) for joint, x in every], axis=1
-        ),
-        np.append(0, np.cumsum(width)),
-        np.concatenate([np.tile(columns, len(joint.gap)) for joint, columns in every]),
-        unknowns,
-        np.concatenate([joint.stiffness for joint in joints]),
+        np.concatenate(entries, axis=1), np.append(0, np.cumsum(width)), columns, unknowns, stiffness
     )
 
 
@@ -75,14 +72,7 @@ def rows_over(
 
 def _columns(joint: ConstraintJoint) -> Int[np.ndarray, " c"]:
     """Interface unknowns that a joint's rows touch."""
-    return np.unique(np.concatenate([side.columns for side in _sides(joint)]))
-
-
-def _sides(joint: ConstraintJoint) -> list[Side]:
-    """All sides of a joint, and of those that it is combined with."""
-    return [
-        side for x in (joint, *(other for _, other in joint.plus)) for side in x.sides if side is not None
-    ]
+    return np.unique(np.concatenate([side.columns for side in joint.all_sides]))
 
 
 def port_rows(joint: ConstraintJoint, motion: RigidMotion) -> list[tuple[Side, Float[np.ndarray, "T r _ _"]]]:
@@ -132,7 +122,7 @@ def _side_rows(
         N = side.stations.at(travel(joint, motion))
         c = np.einsum("tp,trb,pba->trpa", N, gap @ R, side.surface[:, :3])
     else:
-        origin = motion.p[:, side.body] + R @ side.origin
+        origin = motion.p[:, side.body] + R @ side.points[0]
         r = (point - origin)[:, None]
         on = np.concatenate([gap @ R, (cross(r, gap) + turn) @ R], axis=2)
         c = np.einsum("trb,pba->trpa", on, side.surface)

@@ -1,8 +1,8 @@
 """What joints enforced by constraint equations have on their links: coupling surfaces, or stations along the line of a
 slot."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,12 +19,16 @@ from kedfem.dynamics.joints.constraint_joints import (
     stiffnesses,
     surface_ports,
 )
+from kedfem.dynamics.joints.constraint_matrices import seen_from
 from kedfem.dynamics.joints.places import on_part, part_surface, slider_axis
 from kedfem.links.point_rows import point_rows, require_on_axis
 from kedfem.links.record import Link
 from kedfem.links.stations import Stations, stations
 from kedfem.links.surfaces.coupling_surfaces import port_weights, rigid_link_surface
 from kedfem.motion.joint_equations import joint_axis
+from kedfem.motion.linkage import Linkage
+from kedfem.motion.path import Path
+from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import Limit, LineSpring, Motor, Scene, Spring, corotational_links
 
 
@@ -39,48 +43,25 @@ class LinkageLayout:
     slots: Mapping[str, tuple[float, float] | Stations]
 
 
-@dataclass(frozen=True, slots=True)
-class Own:
-    """Port points that one side of a joint has to itself.
-
-    key : of the link; points, weights : (p, 3) in the reference position, and (n,) of each
-    keys : of each point, if they are on several segments of the link
-    slider : name of a rigid slider instead, whose one unknown is its travel along an axis
-    """
-
-    key: str = ""
-    points: Float[np.ndarray, "p 3"] = field(default_factory=lambda: NO_ROWS)
-    weights: Float[np.ndarray, "p n"] | Sequence[Float[np.ndarray, " _"]] = ()
-    keys: tuple[str, ...] = ()
-    slider: str = ""
-    axis: Float[np.ndarray, "3"] | None = None
-
-
-Sides = tuple[Side | None, Own | None]
+FINER = 8  # looks between two points of a path, for how far pins go along slots
 ONLY_U = np.concatenate([np.eye(3), np.zeros((3, 3))])[None]
 Held = tuple[Float[np.ndarray, "r 3"], Float[np.ndarray, "r 3"]]
 
 
-def gear_joint(
-    scene: Scene, name: str, links: dict[str, Link], layout: LinkageLayout
-) -> tuple[ConstraintJoint, list[Own | None]]:
+def gear_joint(scene: Scene, name: str, links: dict[str, Link], layout: LinkageLayout) -> ConstraintJoint:
     """The row of a pair of gears: motion of the second joint less its transmission times that of the first."""
-    gear, zero = scene.gears[name], np.zeros((1, 3))
-    found = []
+    gear, zero, found = scene.gears[name], np.zeros((1, 3)), []
     for each in gear.joints:
         axis = joint_axis(scene.joints[each])[None]
         slides = scene.joints[each].kind == "prismatic"
         found.append(row_joint(scene, each, links, layout, (axis, zero) if slides else (zero, axis)))
-    (first, own), (second, others) = found
-    row = replace(second, name=f"gears.{name}", plus=((-gear.transmission, first),))
-    return row, [*others, *own]
+    return replace(found[1], name=f"gears.{name}", plus=((-gear.transmission, found[0]),))
 
 
 def row_joint(
     scene: Scene, name: str, links: dict[str, Link], layout: LinkageLayout, only: Held | None = None
-) -> tuple[ConstraintJoint, list[Own | None]]:
-    """A joint enforced by constraint equations, still without the interface unknowns, and the port points of its two
-    sides.
+) -> ConstraintJoint:
+    """A joint enforced by constraint equations, still without the interface unknowns.
 
     Parameters
     ----------
@@ -93,7 +74,7 @@ def row_joint(
     """
     joint = scene.joints[name]
     i, j = ordered(joint)
-    (first, own), (second, others) = (_side(scene, name, on, links, layout) for on in (i, j))
+    first, second = (_side(scene, name, on, links, layout) for on in (i, j))
     gap, turn, along = (*only, []) if only else held_rows(joint, name in scene.driven_joints)
     axes = None
     if joint.axes is not None and only is None:
@@ -103,26 +84,24 @@ def row_joint(
     planar = bool(here) and all(link.planar for link in here)  # a slider on the ground is of no plane
     kept = in_plane(gap, turn) if planar else np.ones(len(gap), bool)
     stiffness = np.full(len(gap), np.inf) if only else stiffnesses(scene, name, gap, along)
-    row = ConstraintJoint(
+    return ConstraintJoint(
         name, np.asarray(joint.at), (layout.bodies[i], layout.bodies[j]), (first, second), joint_axis(joint), gap[kept],
         turn[kept], stiffness[kept], axes,
     )  # fmt: skip
-    return row, [own, others]
 
 
 def element_joint(
     scene: Scene, name: str, element: Spring | Motor | Limit, links: dict[str, Link], layout: LinkageLayout
-) -> tuple[ConstraintJoint, list[Own | None]]:
+) -> ConstraintJoint:
     """The two sides of a spring, motor or limit, as a joint without rows: on those of its joint, or at two points."""
     if not isinstance(element, LineSpring) or element.between is None:
-        row, own = row_joint(scene, str(element.joint), links, layout, (NO_ROWS, NO_ROWS))
-        return replace(row, name=name), own
-    (one, first), (other, second) = (
+        return replace(row_joint(scene, str(element.joint), links, layout, (NO_ROWS, NO_ROWS)), name=name)
+    one, other = (
         _point_side(f"{name}.between[{k}].at", scene, end.link, np.asarray(end.at), links, layout)
         for k, end in enumerate(element.between)
     )
     i, j = (layout.bodies[end.link] for end in element.between)
-    return ConstraintJoint(name, np.asarray(element.between[0].at), (i, j), (one, other)), [first, second]
+    return ConstraintJoint(name, np.asarray(element.between[0].at), (i, j), (one, other))
 
 
 def can_be_bars(link: Link) -> bool:
@@ -130,49 +109,46 @@ def can_be_bars(link: Link) -> bool:
     return link.rigid and link.d == 3 and link.n == 4 and link.kind != "beam"
 
 
-def rigid_points(link: Link, key: str, layout: LinkageLayout) -> tuple[ConstraintJoint, list[Own | None]]:
+def rigid_points(link: Link, key: str, layout: LinkageLayout) -> ConstraintJoint:
     """Four points of a rigid link, its centre of mass and one along each axis, as a joint without rows."""
     centre = link.centre
     surface, length = rigid_link_surface(link, centre), link.size / 2
     points = centre + length * np.concatenate([np.zeros((1, 3)), np.eye(3)])
     weights = surface.fit[0] + length * np.concatenate([np.zeros((1, link.n)), surface.fit[1:]])
-    every = np.zeros((4, 6, 3))
-    every[:, :3] = np.eye(3)
-    body = layout.bodies[link.name]
-    row = ConstraintJoint(f"rigid.{key}", centre, (body, 0), (Side(body, centre, every, points), None))
-    return row, [Own(key, points, weights), None]
+    side = Side(
+        layout.bodies[link.name], points, np.repeat(ONLY_U, 4, axis=0), keys=(key,) * 4, weights=weights
+    )
+    return ConstraintJoint(f"rigid.{key}", centre, (side.body, 0), (side, None))
 
 
-def _without_ports(
-    scene: Scene, on: str, at: Float[np.ndarray, "3"], links: dict[str, Link], layout: LinkageLayout
-) -> Sides | None:
-    """A point of a rigid slider; nothing on the ground and on what the drive carries. None on links with ports."""
-    if on in scene.links and (axis := slider_axis(scene, on)) is not None:
-        return Side(layout.bodies[on], at, ONLY_U, at[None], shared=False), Own(slider=on, axis=axis)
-    return None if on in {link.name for link in links.values()} else (None, None)
+def _slider_side(scene: Scene, on: str, at: Float[np.ndarray, "3"], layout: LinkageLayout) -> Side | None:
+    """A point of a rigid slider; None on what is none."""
+    axis = slider_axis(scene, on) if on in scene.links else None
+    return None if axis is None else Side(layout.bodies[on], at[None], ONLY_U, slider=on, axis=axis)
 
 
 def _point_side(
     where: str, scene: Scene, on: str, at: Float[np.ndarray, "3"], links: dict[str, Link], layout: LinkageLayout
-) -> Sides:  # fmt: skip
-    """A point of a link."""
-    if (found := _without_ports(scene, on, at, links, layout)) is not None:
-        return found
+) -> Side | None:  # fmt: skip
+    """A point of a link; nothing on the ground and on what the drive carries."""
+    if (rider := _slider_side(scene, on, at, layout)) or all(link.name != on for link in links.values()):
+        return rider
     key, rows = on_part(links, on, at, lambda link: point_rows(link, where, at))
     link = links[key]
     require_on_axis(link, where, at, rows.X)
     known = ONLY_U[:, :, : link.d].copy()
     if link.kind == "beam":
         known[0, [2, 5], 2] = 0.0, 1.0  # (u, v, ψ)
-    return Side(layout.bodies[on], rows.X, known, rows.X[None]), Own(key, rows.X[None], rows.value[None])
+    return Side(layout.bodies[on], rows.X[None], known, keys=(key,), weights=rows.value[None])
 
 
-def _side(scene: Scene, name: str, on: str, links: dict[str, Link], layout: LinkageLayout) -> Sides:
-    """What a joint has on one of its links: a coupling surface, or the line of a slot."""
+def _side(scene: Scene, name: str, on: str, links: dict[str, Link], layout: LinkageLayout) -> Side | None:
+    """What a joint has on one of its links: a coupling surface, or the line of a slot; nothing where links have no
+    unknowns."""
     joint, where = scene.joints[name], f"joints.{name}"
     at = np.asarray(joint.at)
-    if (found := _without_ports(scene, on, at, links, layout)) is not None:
-        return found
+    if (rider := _slider_side(scene, on, at, layout)) or all(link.name != on for link in links.values()):
+        return rider
     if joint.kind == "slot" and on == ordered(joint)[1]:
         parts = {key: link for key, link in links.items() if link.name == on}
         line = layout.slots[name]
@@ -180,9 +156,33 @@ def _side(scene: Scene, name: str, on: str, links: dict[str, Link], layout: Link
             whole = not corotational_links(scene).isdisjoint(joint.links)
             line = stations(parts, where, at, joint_axis(joint), line, whole)
         points, known = station_ports(line, next(iter(parts.values())))
-        side = Side(layout.bodies[on], line.points[0], known, points, line)
-        return side, Own(line.keys[0], points, line.weights, line.keys)
+        return Side(layout.bodies[on], points, known, line, line.keys, line.weights)
     key, surface = part_surface(scene, name, links, on)
     points, known = surface_ports(surface, links[key], where)
-    side = Side(layout.bodies[on], surface.origin, known, points)
-    return side, Own(key, points, port_weights(surface, points))
+    weights = port_weights(surface, points)
+    return Side(layout.bodies[on], points, known, keys=(key,) * len(points), weights=weights)
+
+
+def slot_travels(scene: Scene, linkage: Linkage, along: Path | None = None) -> dict[str, tuple[float, float]]:
+    """Least and greatest place of each slot's pin along its line, from where it is drawn [m]; that alone without a drive.
+
+    Parameters
+    ----------
+    along : path over the drive's range, needed with slots and a drive
+    """
+    slots = {name: joint for name, joint in scene.joints.items() if joint.kind == "slot"}
+    if not slots:
+        return {}
+    if not linkage.drives:
+        return dict.fromkeys(slots, (0.0, 0.0))
+    if along is None:
+        raise ValueError("the path of a linkage with slots must be given, got none")
+    angles = np.linspace(along.phi[0], along.phi[-1], FINER * len(along.phi))
+    still = np.zeros_like(angles)
+    motion = rigid_motion(linkage, along, angles, (angles, still, still))
+    out = {}
+    for name, joint in slots.items():
+        bodies = [linkage.bodies.index(link) for link in ordered(joint)]
+        s = seen_from(motion, (bodies[0], bodies[1]), np.asarray(joint.at)) @ joint_axis(joint)
+        out[name] = (float(s.min()), float(s.max()))
+    return out

@@ -4,8 +4,8 @@ Weights commute with rotation, so joints hold for displacement, velocity and acc
 vary in time have port points of each link's own, and is enforced by constraint equations over these (`row_joints`).
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,7 +15,6 @@ from kedfem.dynamics.joints.attachments import Attachment, SharedCut, used_colum
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side, needs_rows
 from kedfem.dynamics.joints.constraint_ports import (
     LinkageLayout,
-    Own,
     can_be_bars,
     element_joint,
     gear_joint,
@@ -34,52 +33,37 @@ from kedfem.scene import Joint, Scene
 ACROSS = 0.2  # of what points of a slide lie apart sideways: along it less is no lever that holds a rotation
 
 
-@dataclass
-class _Ports:
-    """Ports of one link while they are collected."""
+@dataclass(frozen=True, slots=True)
+class _Port:
+    """A port of one link: its point and weights, the joint's name, held components, and B of these: a block from the
+    first of its unknowns on."""
 
-    link: Link
-    weights: list[np.ndarray] = field(default_factory=list)
-    points: list[np.ndarray] = field(default_factory=list)
-    joints: list[str] = field(default_factory=list)
-    keep: list[int] = field(default_factory=list)
-    selection: list[tuple[int, np.ndarray]] = field(
-        default_factory=list
-    )  # first unknown, (components, unknowns)
+    weights: Float[np.ndarray, " n"]
+    point: Float[np.ndarray, "3"]
+    joint: str
+    held: Sequence[int]
+    first: int
+    block: Float[np.ndarray, "h c"]
 
-    def add(
-        self,
-        weights: np.ndarray,
-        point: np.ndarray,
-        joint: str,
-        held: list[int],
-        first: int,
-        block: np.ndarray,
-    ) -> None:
-        self.keep.extend(self.link.d * len(self.weights) + c for c in held)
-        self.weights.append(weights)
-        self.points.append(point)
-        self.joints.append(joint)
-        self.selection.append((first, block))
 
-    def attachment(self) -> Attachment:
-        """Without what the interface unknowns are to its components."""
-        q, d = len(self.keep), self.link.d
-        W = np.array(self.weights) if self.weights else np.zeros((0, 0))
-        nodes = np.flatnonzero(W.any(axis=0))
-        points = np.array(self.points) if self.points else np.zeros((0, 3))
-        keep = np.array(self.keep, int)
-        none = np.zeros(0, int)
-        return Attachment(nodes, W[:, nodes], d, points, tuple(self.joints), keep, none, np.zeros((q, 0)), 0)
+def _attachment(link: Link, ports: Sequence[_Port]) -> Attachment:
+    """Without what the interface unknowns are to its components."""
+    W = np.array([port.weights for port in ports]) if ports else np.zeros((0, 0))
+    nodes = np.flatnonzero(W.any(axis=0))
+    points = np.array([port.point for port in ports]).reshape(-1, 3)
+    keep = np.array([link.d * p + c for p, port in enumerate(ports) for c in port.held], int)
+    names, none = tuple(port.joint for port in ports), np.zeros(0, int)
+    return Attachment(nodes, W[:, nodes], link.d, points, names, keep, none, np.zeros((len(keep), 0)), 0)
 
-    def selected(self, unknowns: int) -> sp.csr_array:
-        """Held components from all interface unknowns."""
-        B = sp.lil_array((len(self.keep), unknowns))
-        row = 0
-        for first, block in self.selection:
-            B[row : row + block.shape[0], first : first + block.shape[1]] = block
-            row += block.shape[0]
-        return sp.csr_array(B)
+
+def _selected(ports: Sequence[_Port], unknowns: int) -> sp.csr_array:
+    """Held components from all interface unknowns."""
+    B, row = sp.lil_array((sum(len(port.held) for port in ports), unknowns)), 0
+    for port in ports:
+        h, c = port.block.shape
+        B[row : row + h, port.first : port.first + c] = port.block
+        row += h
+    return sp.csr_array(B)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,12 +91,10 @@ def joined(
     MeshError
         If a joint finds no bore, face or node on one of its links.
     """
-    ports = {name: _Ports(link) for name, link in links.items()}
+    ports: dict[str, list[_Port]] = {name: [] for name in links}
     sliders = {name: axis for name in scene.links if (axis := slider_axis(scene, name)) is not None}
     first_of: dict[str, int] = {name: k for k, name in enumerate(sliders)}
     unknowns = len(sliders)
-    rows: list[tuple[ConstraintJoint, list[Own | None]]] = []
-    columns: list[list[int]] = []  # of each side's own unknowns
     held_by_rows = [row_joint(scene, name, links, layout) for name in scene.joints if needs_rows(scene, name)]
     geared = [gear_joint(scene, name, links, layout) for name in scene.gears]
     acting = [
@@ -121,13 +103,21 @@ def joined(
         for name, element in (every.items() if elements else ())
     ]
     stiff = [rigid_points(link, key, layout) for key, link in links.items() if bars and can_be_bars(link)]
-    for row, own in [*held_by_rows, *geared, *acting, *stiff]:
-        if all(each is None for each in own):
-            continue
-        for each in own:
-            columns.append(_own_columns(ports, row.name, each, first_of, unknowns))
-            unknowns += len(columns[-1]) if each is not None and each.key else 0
-        rows.append((row, own))
+    rows = [row for row in (*held_by_rows, *geared, *acting, *stiff) if any(row.all_sides)]
+    sides = [(row.name, side) for row in rows for side in row.all_sides]
+    columns: dict[
+        int, list[int]
+    ] = {}  # of each side's own unknowns: all components of its ports; a slider's own travel
+    for name, side in sides:
+        d = side.surface.shape[2]
+        columns[id(side)] = (
+            [first_of[side.slider]] if side.slider else [*range(unknowns, unknowns + d * len(side.keys))]
+        )
+        for key, weights, point in zip(
+            side.keys, side.weights, side.points if side.keys else (), strict=True
+        ):
+            ports[key].append(_Port(weights, point, name, range(d), unknowns, np.eye(d)))
+            unknowns += d
     for name, joint in scene.joints.items():
         if needs_rows(scene, name):
             continue
@@ -136,7 +126,7 @@ def joined(
         held = list(surfaces)
         others = [link for link in joint.links if link not in elastic]
         if len({links[link].planar for link in held}) == 2:
-            unknowns += _mixed(scene, name, {link: (ports[link], surfaces[link]) for link in held}, unknowns)
+            unknowns += _mixed(scene, name, surfaces, links, ports, unknowns)
             continue
         points = port_points(scene, name, joint, surfaces, links) if held else np.zeros((0, 3))
         across, travel = _lies_across(joint, points), unknowns
@@ -147,92 +137,65 @@ def joined(
                 first, new = travel, 0
             for link in held:
                 weights = port_weights(surfaces[link], point[None, :])[0]
-                ports[link].add(weights, point, name, components, first, block)
+                ports[link].append(_Port(weights, point, name, components, first, block))
             unknowns += new
     for cut in cuts:
         for point, *weights in zip(cut.points, *cut.weights, strict=True):
             for key, row_ in zip(cut.keys, weights, strict=True):
-                d = ports[key].link.d
-                ports[key].add(row_, point, "", list(range(d)), unknowns, np.eye(d))
+                d = links[key].d
+                ports[key].append(_Port(row_, point, "", range(d), unknowns, np.eye(d)))
             unknowns += d
-    every = [ports[name].attachment() for name in links]
-    sides = list(zip((side for _, both in rows for side in both), columns, strict=True))
-    bear = [k for side, here in sides if side is not None and not side.slider for k in here]
-    riding = [k for side, here in sides if side is not None and side.slider for k in here]
-    found, Z = independent(every, [ports[name].selected(unknowns) for name in links], bear, riding)
-    return Joined(dict(zip(links, found, strict=True)), tuple(_on(rows, columns, Z)))
+    every = [_attachment(links[name], ports[name]) for name in links]
+    bear = [k for _, side in sides if not side.slider for k in columns[id(side)]]
+    riding = [k for _, side in sides if side.slider for k in columns[id(side)]]
+    found, Z = independent(every, [_selected(ports[name], unknowns) for name in links], bear, riding)
+    return Joined(dict(zip(links, found, strict=True)), tuple(_on(row, columns, Z) for row in rows))
 
 
-def _own_columns(
-    ports: dict[str, _Ports], name: str, own: Own | None, first_of: dict[str, int], unknowns: int
-) -> list[int]:
-    """The unknowns of one side of a joint enforced by constraint equations: all components of its ports; a slider's own
-    travel."""
-    if own is None:
-        return []
-    if own.slider:
-        return [first_of[own.slider]]
-    d = ports[own.key].link.d
-    for k, (weights, point) in enumerate(zip(own.weights, own.points, strict=True)):
-        ports[own.keys[k] if own.keys else own.key].add(
-            weights, point, name, list(range(d)), unknowns + d * k, np.eye(d)
-        )
-    return list(range(unknowns, unknowns + d * len(own.points)))
+def _on(row: ConstraintJoint, columns: Mapping[int, list[int]], Z: sp.csr_array) -> ConstraintJoint:
+    """A joint with rows on the interface unknowns, as these turned out."""
+    one, other = (side and _seeing(side, Z[columns[id(side)]]) for side in row.sides)
+    return replace(row, sides=(one, other), plus=tuple((c, _on(each, columns, Z)) for c, each in row.plus))
 
 
-def _on(
-    rows: Sequence[tuple[ConstraintJoint, list[Own | None]]], columns: Sequence[list[int]], Z: sp.csr_array
-) -> Iterator[ConstraintJoint]:
-    """Joints with rows on the interface unknowns, as these turned out."""
-    of_side = iter(columns)
-
-    def on(row: ConstraintJoint, own: Iterator[Own | None]) -> ConstraintJoint:
-        sides = [
-            None if side is None or each is None else _seeing(side, each, Z[here])
-            for side, each, here in zip(row.sides, own, of_side, strict=False)
-        ]
-        return replace(
-            row, sides=(sides[0], sides[1]), plus=tuple((c, on(other, own)) for c, other in row.plus)
-        )
-
-    for row, own in rows:
-        yield on(row, iter(own))
-
-
-def _seeing(side: Side, own: Own, Z: sp.csr_array) -> Side:
+def _seeing(side: Side, Z: sp.csr_array) -> Side:
     """A side whose ports know the interface unknowns, from its own unknowns: a slider's along its axis."""
-    columns, onto = used_columns(Z if own.axis is None else sp.csr_array(own.axis[:, None]) @ Z)
-    return replace(side, onto=onto.reshape(*side.surface.shape[::2], len(columns)), columns=columns)
+    columns, onto = used_columns(Z if side.axis is None else sp.csr_array(side.axis[:, None]) @ Z)
+    onto = onto.reshape(*side.surface.shape[::2], len(columns))
+    return replace(side, onto=onto, columns=columns, weights=())
 
 
-def _mixed(scene: Scene, name: str, held: dict[str, tuple[_Ports, CouplingSurface]], first: int) -> int:
+def _mixed(
+    scene: Scene, name: str, surfaces: dict[str, CouplingSurface], links: dict[str, Link],
+    ports: dict[str, list[_Port]], first: int,
+) -> int:  # fmt: skip
     """A joint between a planar link and one in space, which stays upright, as a point of it beside the plane goes with
     the one in it: a hinge by the ends of its pin, two new unknowns; a weld by two for each point of the planar link.
     """
     joint, welds = scene.joints[name], scene.joints[name].kind == "weld"
     if not welds and joint.kind not in {"revolute", "spherical"}:
-        kinds = " and ".join(f"'{link}' ({ports.link.kind})" for link, (ports, _) in held.items())
+        kinds = " and ".join(f"'{link}' ({links[link].kind})" for link in surfaces)
         raise MeshError(
             f"joints.{name}: must be a hinge or a weld between a planar link and one in space, "
             f"got a {joint.kind} joint of {kinds}"
         )
-    links = {link: ports.link for link, (ports, _) in held.items()}
-    surfaces = {link: held[link][1] for link in sorted(held, key=lambda each: not links[each].planar)}
+    planar_first = {
+        link: surfaces[link] for link in sorted(surfaces, key=lambda each: not links[each].planar)
+    }
     unknowns = 0
-    for link, (ports, surface) in held.items():
-        points = port_points(scene, name, joint, surfaces if welds else {link: surface}, links)
+    for link, surface in surfaces.items():
+        points = port_points(scene, name, joint, planar_first if welds else {link: surface}, links)
         of_point = 2 * np.arange(len(points)) if welds else np.zeros(len(points), int)
         unknowns = max(unknowns, 2 + int(of_point.max()))
-        components = [[0, 1] if ports.link.planar else [0, 1, 2]] * len(points)
-        if welds and not ports.link.planar:  # whose thickness may change
-            points, of_point = (
-                np.vstack([points, points[0] + [0.0, 0.0, ports.link.size]]),
-                np.append(of_point, 0),
-            )
+        components = [[0, 1] if links[link].planar else [0, 1, 2]] * len(points)
+        if welds and not links[link].planar:  # whose thickness may change
+            points = np.vstack([points, points[0] + [0.0, 0.0, links[link].size]])
+            of_point = np.append(of_point, 0)
             components.append([0, 1])
-        for point, column, held_ in zip(points, of_point, components, strict=True):
+        for point, column, held in zip(points, of_point, components, strict=True):
             weights = port_weights(surface, point[None, :])[0]
-            ports.add(weights, point, name, held_, first + int(column), np.eye(3)[held_, :2])
+            block = np.eye(3)[held, :2]
+            ports[link].append(_Port(weights, point, name, held, first + int(column), block))
     return unknowns
 
 

@@ -32,12 +32,8 @@ def with_preloads(now: Instant, asked: Asked) -> Asked:
             rows.append(sp.csr_array(row))
             stiffness.append(values[some])
     more = 1 / np.concatenate(stiffness)
-    return Asked(
-        sp.vstack(rows, format="csr"),
-        np.append(asked.target, 0 * more),
-        np.append(asked.compliance, more),
-        asked.known,
-    )
+    target, compliance = np.append(asked.target, 0 * more), np.append(asked.compliance, more)
+    return Asked(sp.vstack(rows, format="csr"), target, compliance, asked.known)
 
 
 def _second_derivatives(now: Instant, each: Constraint) -> tuple[list[int], Float[np.ndarray, "m m"]]:

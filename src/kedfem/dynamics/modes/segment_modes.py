@@ -50,14 +50,8 @@ def segment_basis(
     """
     modes = rigid_modes(link)
     deflections = [_relative(link, modes, x) for x in deflections]
-    shapes = _shapes(
-        link,
-        [
-            *_answers(link, joint, part, deflections),
-            *_turned_ports(link, joint, part, deflections),
-            *deflections,
-        ],
-    )
+    of_ports = *_answers(link, joint, part, deflections), *_turned_ports(link, joint, part, deflections)
+    shapes = _shapes(link, [*of_ports, *deflections])
     rigid = mass_orthonormal(link, rigid_functions(link))
     H = energy_product(link)
     S = np.concatenate(list(shapes), axis=1)

@@ -47,13 +47,8 @@ def level_scenes(scene: Scene) -> list[Scene]:
     grid, analysis = time_grid(scene), scene.analysis
     out = [scene]
     for k in range(1, analysis.extrapolation_levels or 1):
-        keys = {
-            "step": grid.step / 2**k,
-            "end_time": grid.end,
-            "revolutions": None,
-            "steps_per_revolution": None,
-            "extrapolation_levels": 1,
-        }
+        keys = {"step": grid.step / 2**k, "end_time": grid.end, "extrapolation_levels": 1}
+        keys |= dict.fromkeys(("revolutions", "steps_per_revolution"))
         out.append(scene.model_copy(update={"analysis": analysis.model_copy(update=keys)}))
     return out
 

@@ -71,15 +71,8 @@ def end_of(side: Side, joint: ConstraintJoint) -> End:
             directions[2] = [0, 0, 1]
         elif known == 2:
             directions[2] = np.cross(directions[0], directions[1])
-    return End(
-        side.body,
-        _form(side, d, known),
-        side.points[0],
-        directions,
-        lengths,
-        known,
-        *_selected(onto, side.columns),
-    )
+    form, moved = _form(side, d, known), _selected(onto, side.columns)
+    return End(side.body, form, side.points[0], directions, lengths, known, *moved)
 
 
 def line_of(end: End) -> Line:
@@ -110,4 +103,4 @@ def _form(side: Side, d: int, known: int) -> int:
     """What an end knows of its orientation."""
     if known:
         return record.PLANAR if d == 2 else {2: record.FACE, 3: record.SOLID}[known]
-    return record.PLANAR_BEAM if side.shared and d == 3 and side.surface[0, 5].any() else record.POINT
+    return record.PLANAR_BEAM if side.axis is None and d == 3 and side.surface[0, 5].any() else record.POINT

@@ -227,17 +227,12 @@ class Steps:
             force = force @ to_ports.T
             if acting is not None:
                 force = force - (acting @ R).reshape(len(R), -1) @ inverse.T
-        return LinkHistory(
-            u,
-            v,
-            a,
+        g, energy, products = (
             self.deformation(k, found),
-            R,
-            F,
-            force,
             found.energy[:, k].copy(),
             self._products(found, k, v),
         )
+        return LinkHistory(u, v, a, g, R, F, force, energy, products)
 
     def deformation(self, k: int, found: History) -> Rows:
         """What stresses of link k come from; of a co-rotational planar beam with the strains that its points see."""

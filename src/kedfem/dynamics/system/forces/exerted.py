@@ -73,7 +73,7 @@ def on_links(forces: Supports, riders: Mapping[int, tuple[int, np.ndarray]]) -> 
         for side in row.sides if row.name.startswith(ELEMENTS) else ():
             if side is None:
                 continue
-            if side.shared:
+            if side.axis is None:
                 k, W = _placed(model.joints, model.bodies, row.name, side)
                 y = forces.on_end(row.name, end_of(side, row))
                 f = np.einsum("pn,tpd->tnd", W, y)
