@@ -21,11 +21,10 @@ from kedfem.dynamics.anderson import Mixing
 from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.stepping.scheme import Scheme as Newmark
 from kedfem.dynamics.system.arrays import Coefficients
-from kedfem.dynamics.system.blank import empty_trial, room
 from kedfem.dynamics.system.march import Ready, driving, ready
 from kedfem.dynamics.system.reference import handed
 from kedfem.dynamics.system.sparse import solver
-from kedfem.dynamics.system.state import copied
+from kedfem.dynamics.system.state import copied, empty_trial, room
 
 LARGE = 100  # unknowns from which on marches are shorter
 COUNT, SOLVES = 500, 25  # solves that are timed together, how often

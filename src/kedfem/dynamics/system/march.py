@@ -12,14 +12,13 @@ from kedfem.dynamics.matrices.dense import rows_of, work_over_time
 from kedfem.dynamics.rigid_body import forcing_of, forcings
 from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.dynamics.system.arrays import Bodies, Coefficients, Constraints, Ends
-from kedfem.dynamics.system.blank import empty_history, empty_trial, room
 from kedfem.dynamics.system.ends import left_line, line_weights
 from kedfem.dynamics.system.forces.stresses import NO_TERMS, Stressed, stressed
 from kedfem.dynamics.system.forces.turning_loads import turning
 from kedfem.dynamics.system.layout import TOLERANCE, as_arrays, coefficients, factored
 from kedfem.dynamics.system.record import System, is_affine, without_unknowns
 from kedfem.dynamics.system.sparse import Part, solver
-from kedfem.dynamics.system.state import Driving, History, State, copied
+from kedfem.dynamics.system.state import Driving, History, State, copied, empty_history, empty_trial, room
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import RigidMotion
 

@@ -21,7 +21,6 @@ from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.model import Model, link_keys
 from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.dynamics.stiffening import Stiffening
-from kedfem.dynamics.system.blank import empty_history
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.forces.exerted import on_links
 from kedfem.dynamics.system.forces.supports import Supports
@@ -37,7 +36,7 @@ from kedfem.dynamics.system.starts.deflected import plucked, quasi_static
 from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.dynamics.system.starts.instant import Instant, renumbered
 from kedfem.dynamics.system.starts.internal_forces import own
-from kedfem.dynamics.system.state import History, State
+from kedfem.dynamics.system.state import History, State, empty_history
 from kedfem.links.stations import Stations
 from kedfem.motion.linkage import linkage
 from kedfem.motion.rigid import RigidMotion

@@ -10,13 +10,12 @@ import scipy.sparse as sp
 
 from kedfem.dynamics.matrices.bordered import Asked
 from kedfem.dynamics.matrices.dense import coordinates
-from kedfem.dynamics.system.blank import empty_state
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.starts.accelerations import accelerations
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
 from kedfem.dynamics.system.starts.internal_forces import own, put_momenta, remembered
 from kedfem.dynamics.system.starts.linear_equations import LinearEquations, Solved
-from kedfem.dynamics.system.state import State
+from kedfem.dynamics.system.state import State, empty_state
 
 Accelerated = Callable[[Instant, Flat, Flat, Flat, Asked], Solved]
 

@@ -11,12 +11,11 @@ from kedfem.arrays import Float
 from kedfem.dynamics.frames import Deformed, frame_force, frames_of, mean_orientation, position, seen_from
 from kedfem.dynamics.matrices.dense import component_first, coordinates, rows_of, work_on
 from kedfem.dynamics.stepping.state import Nodal
-from kedfem.dynamics.system.blank import empty_state, empty_trial, room
 from kedfem.dynamics.system.layout import points_of
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.record import RIGID_BODY
 from kedfem.dynamics.system.sparse import SparsePart, component_order, momentum
-from kedfem.dynamics.system.state import State
+from kedfem.dynamics.system.state import State, empty_state, empty_trial, room
 from kedfem.links.record import Link, mass_times
 from kedfem.links.reduced import rigid_modes
 from kedfem.motion.rigid import RigidMotion
