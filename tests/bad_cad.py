@@ -111,22 +111,17 @@ def wires(folder: Path) -> Path:
 
 def two_solids(folder: Path) -> Path:
     """Two solids apart, with the products' names left and right."""
-
-    def pair(occ: ModuleType) -> None:
-        bored_plate(occ)
-        box(occ, (100, 120), (0, 20), (0, 10))
-
-    return _step(folder / "two_solids.step", pair, ("left", "right"))
+    return _step(folder / "two_solids.step", _pair, ("left", "right"))
 
 
 def same_names(folder: Path) -> Path:
     """Two solids apart with one name."""
+    return _step(folder / "same_names.step", _pair, ("arm", "arm"))
 
-    def pair(occ: ModuleType) -> None:
-        bored_plate(occ)
-        box(occ, (100, 120), (0, 20), (0, 10))
 
-    return _step(folder / "same_names.step", pair, ("arm", "arm"))
+def _pair(occ: ModuleType) -> None:
+    bored_plate(occ)
+    box(occ, (100, 120), (0, 20), (0, 10))
 
 
 def overlapping(folder: Path) -> Path:

@@ -153,6 +153,15 @@ def revolute_loop(a: np.ndarray, alpha: np.ndarray, theta: np.ndarray) -> dict[s
     }
 
 
+def bennett(alpha: float, beta: float, theta: float) -> tuple[dict[str, tuple[Any, ...]], float, float]:
+    """Four skew revolutes, a = 0.3 m, a / sin α = b / sin β, and θ1: their table, θ2 and tan(θ1/2) tan(θ2/2)."""
+    a, b = 0.3, 0.3 * np.sin(beta) / np.sin(alpha)
+    K = np.sin((beta + alpha) / 2) / np.sin((beta - alpha) / 2)
+    t2 = 2 * np.arctan2(K * np.cos(theta / 2), np.sin(theta / 2))
+    every = np.array([[a, b, a, b], [alpha, beta, alpha, beta], [theta, t2, -theta, -t2]])
+    return revolute_loop(*every), t2, K
+
+
 def cardan(beta: float) -> dict[str, tuple[Any, ...]]:
     """Shafts along x and at β to it in the xy plane; the cross's arm in the first fork drawn within that plane."""
     out = np.array([np.cos(beta), np.sin(beta), 0.0])

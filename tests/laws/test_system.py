@@ -9,12 +9,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from kedfem.dynamics.stepping.solvers import steps_of
-from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.march import displacements, march, ready
 from kedfem.dynamics.system.record import COROTATIONAL, TANGENTIAL, Driven, Held, Spring, Stop
 from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.scene import Gear, Motor
+from tests.cells import run_of
 from tests.moving import bar, beam_in_space, cardan, channels, geared, inverted, ran, rising, screwed, turned
 from tests.spatial_joints import BEAMS
 from tests.systems import Begun, against_oracle, begun, by_oracle, marched, rows
@@ -56,21 +55,12 @@ def elements() -> Raw:
     }  # fmt: skip
 
 
-def monolithic_displacements(of: Begun) -> np.ndarray:
-    """As a run by the monolithic solver, all bodies' rows over the steps."""
-    made, analysis = of.prepared, of.prepared.scene.analysis.model_copy(update={"solver": "monolithic"})
-    solver = steps_of(made.scene.model_copy(update={"analysis": analysis}), made.model)
-    blocks = list(transient(made.scene, made.linkage, made.path, made.model, solver))
-    every = [np.concatenate([block.links[k].u for block in blocks])[1:] for k in range(len(made.model.links))]
-    return np.concatenate([u.reshape(len(u), -1) for u in every], axis=1)
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_of_joint_moves_as_by_the_monolithic_step(kind: str) -> None:
     """In rigid-body frames, gravity askew; that step keeps eight digits of beams in space."""
     raw = BEAMS[kind]()
     of = begun({**raw, "analysis": {**raw["analysis"], "end_time": 0.005}})
-    wanted = monolithic_displacements(of)
+    wanted = run_of(of, monolithic=True)
     state, history = marched(of, len(wanted))
     assert np.abs(rows(of.ready, history.u) - wanted).max() < 3e-8 * np.abs(wanted).max()
     assert state.passes[2] == 1  # linear: done after one pass
@@ -103,7 +93,7 @@ def test_a_drive_holds_its_joint_firmly_whatever_its_bushing(kind: str, turn: st
         raw = on_bushing(kind)
         raw["joints"]["A"]["bushing"] |= {"stiffness": 1e6 / softer, "rotational_stiffness": 2e3 / softer}
         of = begun(turned(raw, R, (0.1, 0.2, -0.3)))
-        wanted = monolithic_displacements(of)
+        wanted = run_of(of, monolithic=True)
         _, history = marched(of, len(wanted))
         assert np.abs(rows(of.ready, history.u) - wanted).max() < 1e-6 * np.abs(wanted).max()
         driven = next(n for n, x in enumerate(of.ready.system.constraints) if isinstance(x.law, Driven))
@@ -118,7 +108,7 @@ def test_planar_beams_move_as_by_other_steps(frames: str, within: float) -> None
     of = begun({**raw, "analysis": {**raw["analysis"], "frames": frames}})
     assert (TANGENTIAL in of.ready.bodies.frame) == (frames == "co-rotational")
     count = 10
-    wanted = monolithic_displacements(of) if frames == "rigid-body" else by_oracle(of, count)[0]
+    wanted = run_of(of, monolithic=True) if frames == "rigid-body" else by_oracle(of, count)[0]
     _, history = marched(of, count)
     assert np.abs(rows(of.ready, history.u) - wanted).max() < within * np.abs(wanted).max()
 

@@ -25,18 +25,19 @@ from tests.linkages import (
     JointTable,
     Z,
     bar,
+    bennett,
     cardan,
     four_bar,
     joint,
     linkage_scene,
     motion_at,
-    revolute_loop,
     rssr,
     slider_crank,
 )
 from tests.spatial_linkages import double_cardan, oldham, quick_return, universal_rssr
 
 TURN, LITTLE = 2.2 * np.pi, 0.1
+SKEW, *_ = bennett(np.radians(40), np.radians(75), 1.0)
 BAR = four_bar(0.3, 0.9, 0.7, 0.9, 1.0)
 
 
@@ -47,14 +48,6 @@ def found(joints: JointTable, high: float = LITTLE, sliders: tuple[str, ...] = (
     return mobility(scene, link, path(link, 0.0, high))
 
 
-def bennett() -> JointTable:
-    a, alpha, beta, t1 = 0.3, np.radians(40), np.radians(75), 1.0
-    b = a * np.sin(beta) / np.sin(alpha)
-    K = np.sin((beta + alpha) / 2) / np.sin((beta - alpha) / 2)
-    t2 = 2 * np.arctan2(K * np.cos(t1 / 2), np.sin(t1 / 2))
-    return revolute_loop(*np.array([[a, b, a, b], [alpha, beta, alpha, beta], [t1, t2, -t1, -t2]]))
-
-
 # -- redundancy: Kutzbach's count 6 (links) − equations against the mobility that the linkage has -------------
 
 
@@ -63,7 +56,7 @@ def bennett() -> JointTable:
     [
         (BAR, 20, ()),
         (slider_crank(0.1, 0.3, 0.7), 20, ("slider",)),
-        (bennett(), 20, ()),
+        (SKEW, 20, ()),
         (cardan(0.6), 20, ()),
         (oldham(0.04, 0.5), 20, ()),
         (oldham(0.04, 0.5, "planar"), 18, ()),
@@ -149,7 +142,7 @@ def test_a_double_cardan_joint_holds_its_middle_shaft_along_twice() -> None:
 
 
 def test_bennett_hinges_hold_all_but_their_turn_twice() -> None:
-    told = found(bennett())
+    told = found(SKEW)
     words = {name: each.words for each in told.redundant for name in each.joints}
     assert words["A"] == "forces in all directions, moments about x and y"  # its axis is z
     assert words["B"] == words["C"] == words["D"] == "forces in all directions, moments across its axis"
@@ -157,7 +150,7 @@ def test_bennett_hinges_hold_all_but_their_turn_twice() -> None:
 
 def test_self_stress_balances_on_every_link_and_does_no_work_in_its_joint() -> None:
     """Equilibrium by hand: forces, and moments about the centre, of the joints of each link sum to zero."""
-    drawn = drawn_linkage(linkage_scene(bennett()))
+    drawn = drawn_linkage(linkage_scene(SKEW))
     stress = np.linalg.svd(drawn.J.T)[2][-3:].T
     for link in drawn.links:
         total = np.zeros((6, 3))
@@ -173,7 +166,7 @@ def test_self_stress_balances_on_every_link_and_does_no_work_in_its_joint() -> N
 
 
 @pytest.mark.parametrize(
-    ("joints", "sliders"), [(BAR, ()), (bennett(), ()), (slider_crank(0.1, 0.3, 0.7), ("slider",))]
+    ("joints", "sliders"), [(BAR, ()), (SKEW, ()), (slider_crank(0.1, 0.3, 0.7), ("slider",))]
 )
 def test_the_remedy_leaves_the_motion_as_it_was_and_nothing_redundant(
     joints: JointTable, sliders: tuple[str, ...]

@@ -11,6 +11,7 @@ from tests.linkages import (
     RSSR_PIVOT,
     RSSR_ROCKER,
     JointTable,
+    bennett,
     body,
     cardan,
     four_bar,
@@ -169,13 +170,10 @@ def universal_joint() -> list[Row]:
     "Bennett linkage",
     "G. T. Bennett, A new mechanism, Engineering 76 (1903): a/sin α = b/sin β, four skew revolutes",
 )
-def bennett() -> list[Row]:
+def bennett_linkage() -> list[Row]:
     """a = 0.3 m, α = 40°, β = 75°: tan(θ1/2) tan(θ2/2) = sin((β+α)/2) / sin((β−α)/2); a full turn, over-constrained."""
-    a, alpha, beta, t1 = 0.3, np.radians(40), np.radians(75), 1.0
-    b = a * np.sin(beta) / np.sin(alpha)
-    K = np.sin((beta + alpha) / 2) / np.sin((beta - alpha) / 2)
-    t2 = 2 * np.arctan2(K * np.cos(t1 / 2), np.sin(t1 / 2))
-    joints = revolute_loop(*np.array([[a, b, a, b], [alpha, beta, alpha, beta], [t1, t2, -t1, -t2]]))
+    t1 = 1.0
+    joints, t2, K = bennett(np.radians(40), np.radians(75), t1)
     got, drive = angle_of(joints, "link2", joints["B"][4], t2, "link1")
     s, c = np.sin((t1 + drive[0]) / 2), np.cos((t1 + drive[0]) / 2)
     D = s**2 + (K * c) ** 2

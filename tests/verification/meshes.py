@@ -52,6 +52,12 @@ def mapped_link(
     return solid_link("test", mapped_mesh(counts, mapping, nodes, closed), material, np.eye(3))
 
 
+def between_ellipses(r: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A quarter of the plate between two ellipses of NAFEMS tests LE1 and LE10 [m]."""
+    c, d = np.cos(np.pi / 2 * s), np.sin(np.pi / 2 * s)
+    return (2 + 1.25 * r) * c, (1 + 1.75 * r) * d
+
+
 def mapped_plane(
     counts: tuple[int, int], mapping: PlaneMapping, thickness: float, material: Material
 ) -> Link:

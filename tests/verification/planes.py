@@ -15,7 +15,7 @@ from kedfem.scene import Material, scene_from
 from .cases import Row, case
 from .linear import deflection, free_map, frequencies, held
 from .mechanisms import difference, histories
-from .meshes import mapped_plane, model
+from .meshes import between_ellipses, mapped_plane, model
 from .vibrations import NAFEMS, STEEL, rows
 
 LE1 = "The Standard NAFEMS Benchmarks, TNSB rev. 3 (1990), test LE1"
@@ -36,12 +36,7 @@ def tapered_membrane() -> list[Row]:
 
 def elliptic_membrane(counts: tuple[int, int]) -> Row:
     """σ_yy at D of LE1's quarter of a plate between two ellipses, pulled outwards with 10 MPa on the outer one."""
-
-    def mapping(r: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        c, d = np.cos(np.pi / 2 * s), np.sin(np.pi / 2 * s)
-        return (2 + 1.25 * r) * c, (1 + 1.75 * r) * d
-
-    link = mapped_plane(counts, mapping, 0.1, FLEXIBLE)
+    link = mapped_plane(counts, between_ellipses, 0.1, FLEXIBLE)
     x, y, _ = link.X.T
     T = free_map(link, held((np.abs(y) < 1e-9, "y"), (np.abs(x) < 1e-9, "x"), d=2))
     u = deflection(link, T, 1e7 * pressure(link, np.array([3.25, 2.75, 0]) * np.sqrt(0.5)))

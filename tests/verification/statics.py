@@ -12,7 +12,7 @@ from kedfem.scene import Material
 
 from .cases import Row, case
 from .linear import deflection, free_map, held, mean_support
-from .meshes import Mapping, box, mapped_link, model
+from .meshes import Mapping, between_ellipses, box, mapped_link, model
 
 MACNEAL = (
     "MacNeal, Harder: A proposed standard set of problems to test finite element accuracy, FEAD 1 (1985) 3–20"
@@ -28,11 +28,7 @@ def thick_plate(counts: tuple[int, int, int]) -> tuple[Link, np.ndarray]:
     counts : elements from ellipse to ellipse, around, through the thickness
     """
 
-    def mapping(r: np.ndarray, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, ...]:
-        c, d = np.cos(np.pi / 2 * s), np.sin(np.pi / 2 * s)
-        return (2 + 1.25 * r) * c, (1 + 1.75 * r) * d, 0.6 * t
-
-    link = mapped_link(counts, mapping, PLATE)
+    link = mapped_link(counts, lambda r, s, t: (*between_ellipses(r, s), 0.6 * t), PLATE)
     x, y, z = link.X.T
     outer = np.abs((x / 3.25) ** 2 + (y / 2.75) ** 2 - 1) < 1e-9
     middle = outer & (np.abs(z - 0.3) < 1e-9)
