@@ -41,12 +41,11 @@ def open_meshes(scene: Scene) -> list[str]:
 def with_fillets(scene: Scene, asked: float) -> Scene:
     """The scene with fillets and free bores of CAD parts and outlines as fine as stress needs, where meshes are open."""
     angle = np.radians(next((angle for least, angle in FILLETS if asked >= least), FINEST_FILLET))
-    drawn = {
-        name: link for name, link in scene.links.items() if isinstance(link.shape, Cad | Extrusion | Part)
-    }
+    links = scene.links.items()
+    drawn = {name: link for name, link in links if isinstance(link.shape, Cad | Extrusion | Part)}
     free = {n: x for n, x in drawn.items() if x.model != "rigid" and "mesh" not in x.model_fields_set}
-    links = {name: filleted(link, float(angle)) for name, link in free.items()}
-    return with_links(scene, links) if links else scene
+    finer = {name: filleted(link, float(angle)) for name, link in free.items()}
+    return with_links(scene, finer) if finer else scene
 
 
 def open_modes(scene: Scene) -> list[str]:

@@ -91,9 +91,8 @@ class _Bars:
         )
 
         columns = SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()
-        self._bars = Progress(
-            *columns, TimeElapsedColumn(), TimeRemainingColumn(), console=err, transient=True
-        )
+        times = TimeElapsedColumn(), TimeRemainingColumn()
+        self._bars = Progress(*columns, *times, console=err, transient=True)
         self._bars.start()
         self._stage, self._task, self._once = "", None, None
 

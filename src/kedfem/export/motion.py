@@ -25,7 +25,6 @@ def export_motion(scene: Scene, path: Path) -> tuple[int, tuple[str, ...]]:
     linked, along = moving(scene)
     require_counted(scene, linked, along)
     count = write_motion(path, scene, linked, (motion for _, motion in all_motions(scene, linked, along)))
-    free = (
-        (f"free motions ({linked.mobility}) are held in the reference position",) if linked.mobility else ()
-    )
+    held = f"free motions ({linked.mobility}) are held in the reference position"
+    free = (held,) if linked.mobility else ()
     return count, (*assembly_warning(assembly), *free)

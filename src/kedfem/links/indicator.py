@@ -53,9 +53,8 @@ def indicator(link: Link, g: Float[np.ndarray, "n d"]) -> Indicator:
     for i in range(d):
         for j in range(d):
             recovered[i, j] = np.asarray(basis.interpolate(np.ascontiguousarray(H[:, i, j])))
-    error, energy = (
-        (_density(link, x) * basis.dx).sum(axis=1) * link.thickness for x in (recovered - own, own)
-    )
+    both = recovered - own, own
+    error, energy = ((_density(link, x) * basis.dx).sum(axis=1) * link.thickness for x in both)
     volume = basis.dx.sum(axis=1) * link.thickness
     mean = (error.sum() + energy.sum()) / volume.sum()
     density = error / volume

@@ -150,9 +150,8 @@ def _plate(where: str, link: LinkScene, mesh: Meshing, folder: Path, kept_whole:
             return part_plate(where, shape, mesh, folder, kept_whole)
         case other:
             kind = "no shape" if other is None else other.kind
-            raise MeshError(
-                f"{where}.shape: must be bar, plate_link, extrusion, part, mesh or cad, got {kind}"
-            )
+            wanted = "must be bar, plate_link, extrusion, part, mesh or cad"
+            raise MeshError(f"{where}.shape: {wanted}, got {kind}")
 
 
 def bar_plate(where: str, shape: Bar, mesh: Meshing) -> Plate:

@@ -180,9 +180,8 @@ def _misfits(scene: Scene, rows: list[ConstraintEquation]) -> dict[str, float]:
     for row in rows:
         if row.joint in square and row.kind == GAP and not row.plus:
             joint = scene.joints[row.joint]
-            square[row.joint] += (
-                float(np.subtract(joint.on(bodies[row.i]), joint.on(bodies[row.j])) @ row.b) ** 2
-            )
+            gap = np.subtract(joint.on(bodies[row.i]), joint.on(bodies[row.j]))
+            square[row.joint] += float(gap @ row.b) ** 2
     return {name: float(np.sqrt(each)) for name, each in square.items()}
 
 

@@ -144,9 +144,8 @@ def _joint(joint: Joint, shifts: Mapping[str, Shift]) -> Joint:
     if joint.axes is not None:
         change["axes"] = tuple(shifts[x].turned(a) for x, a in zip(joint.links, joint.axes, strict=True))
     if joint.faces:
-        change["faces"] = {
-            name: tuple(_face(each, shifts[name]) for each in named) for name, named in joint.faces.items()
-        }
+        every = joint.faces.items()
+        change["faces"] = {name: tuple(_face(x, shifts[name]) for x in named) for name, named in every}
     return joint.model_copy(update=change)
 
 

@@ -139,6 +139,5 @@ def _check_reached(asked: list[Wanted], got: Float[np.ndarray, " w"]) -> None:
         if each.value or abs(x) > REACHED:
             closest = f"(closest possible {round(x, 9) + 0.0:.6g})"
             lines.append(f"{each.where} = {each.value:.6g} {each.unit} {closest}")
-    raise MotionError(
-        f"analysis: the joints must allow the speeds at the start together, got {', '.join(lines)}"
-    )
+    wanted = "the joints must allow the speeds at the start together"
+    raise MotionError(f"analysis: {wanted}, got {', '.join(lines)}")

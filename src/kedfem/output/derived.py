@@ -60,9 +60,8 @@ def fatigue_warning(found: Fatigue | None) -> tuple[str, ...]:
     if found.without:
         out.append(f"fatigue: no data of {', '.join(found.without)}, which were left out")
     if left := found.left_out_words:
-        out.append(
-            f"fatigue: points of the surface near {AWAY} were left out, {left}: fatigue.near_joints takes them in"
-        )
+        points = f"points of the surface near {AWAY} were left out, {left}"
+        out.append(f"fatigue: {points}: fatigue.near_joints takes them in")
     worst = found.worst
     if worst is not None and worst.utilisation > 1:
         life = f"{found.hours(worst):.3g} h at a safety factor of 1"

@@ -81,10 +81,8 @@ def link_fields(
     for prescribed, recovery in zip(model.prescribed, recoveries[len(model.links) :], strict=True):
         X = recovery.at_points((prescribed.link.full or prescribed.link).X)
         points = motion.p[k, prescribed.body] + X @ motion.R[k, prescribed.body].T
-        name, section = prescribed.link.name, _section(prescribed.link)
-        fields.append(
-            unstressed(name, recovery.cell_type, recovery.cells, points, np.zeros_like(X), section=section)
-        )
+        drawn_as = prescribed.link.name, recovery.cell_type, recovery.cells
+        fields.append(unstressed(*drawn_as, points, np.zeros_like(X), section=_section(prescribed.link)))
     out = _joined(fields) + _blocks(model, snapshot, deformation_scale)
     if scene is None or not (scene.bodies or scene.springs):
         return out

@@ -123,6 +123,5 @@ def _field_data(now: Mapping[str, float], fields: Sequence[Block], first: int) -
 
 
 def _number(name: str, x: float, kind: str = "Int32") -> str:
-    return (
-        f'<DataArray type="{kind}" Name="{escape(name)}" NumberOfTuples="1" format="ascii">{x!r}</DataArray>'
-    )
+    what = f'type="{kind}" Name="{escape(name)}" NumberOfTuples="1" format="ascii"'
+    return f"<DataArray {what}>{x!r}</DataArray>"

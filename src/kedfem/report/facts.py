@@ -187,9 +187,8 @@ def steady_table(notes: Mapping[str, str | float]) -> list[Table]:
     """A motion that repeats itself: its period, and what a period leaves of vibrations about it."""
     if f"{STEADY}period [s]" not in notes:
         return []
-    period, turns, marches, residual = (
-        float(notes[STEADY + key]) for key in ("period [s]", "revolutions", "marches", "residual")
-    )
+    keys = "period [s]", "revolutions", "marches", "residual"
+    period, turns, marches, residual = (float(notes[STEADY + key]) for key in keys)
     growth = notes.get(f"{STEADY}growth in a period")
     left = "not found out" if growth is None else f"{100 * float(growth):.4g} %"
     rows: Rows = [

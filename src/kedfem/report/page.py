@@ -93,9 +93,8 @@ def _content(results: Results, folder: Path, missing: list[str]) -> dict[str, An
     if not len(results.time):
         missing.append("no time step was written: there are no curves")
     elif results.status in {"interrupted", "abandoned", "running"}:
-        missing.append(
-            "highest stresses, estimated errors and timing are found at the end of a run, which this is not"
-        )
+        late = "highest stresses, estimated errors and timing are found at the end of a run"
+        missing.append(f"{late}, which this is not")
 
     moment = partial(_moment, scene, results)
     loads, polars = _loads(scene, results, folder, missing)

@@ -143,9 +143,8 @@ class CrossChecks:
             meaning = "a part of its effort is missing"
             if self.unworked <= MISSING:
                 left += ", no more"
-                meaning = (
-                    "so far efforts and energies are uncertain; a shorter step shows whether it is the steps'"
-                )
+                uncertain = "so far efforts and energies are uncertain"
+                meaning = f"{uncertain}; a shorter step shows whether it is the steps'"
             off = f"is off the change of energy and the other work by {left}"
             out.append(f"{names}: the work of the drive {off}: {meaning}")
         return tuple(out)

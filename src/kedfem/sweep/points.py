@@ -141,9 +141,8 @@ def chosen_by_plan(scene: Scene, stage: Stage) -> Chosen:
     plan = plan_for(before, stage)
     if plan is None:
         return Chosen()
-    links = {
-        name: _different(dict(before.links[name]), dict(link)) for name, link in plan.scene.links.items()
-    }
+    every = plan.scene.links.items()
+    links = {name: _different(dict(before.links[name]), dict(link)) for name, link in every}
     return Chosen(_different(dict(before.analysis), dict(plan.scene.analysis)), links)
 
 

@@ -114,9 +114,8 @@ def _round(points: Float[np.ndarray, "n d"], slack: float) -> tuple[Float[np.nda
     from_middle = points - middle
     scale = np.abs(from_middle).max()
     p = from_middle / scale
-    (*half, rest), _, rank, _ = np.linalg.lstsq(
-        np.column_stack([2 * p, np.ones(len(p))]), (p**2).sum(axis=1), rcond=1e-9
-    )
+    rows = np.column_stack([2 * p, np.ones(len(p))])
+    (*half, rest), _, rank, _ = np.linalg.lstsq(rows, (p**2).sum(axis=1), rcond=1e-9)
     if rank <= points.shape[1]:
         return None
     radius = np.sqrt(rest + np.dot(half, half))

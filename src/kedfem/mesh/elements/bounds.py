@@ -64,9 +64,8 @@ def _nearly_affine(corners: Float[np.ndarray, "e k d"]) -> Bool[np.ndarray, " e"
 
     Each column of J is a polynomial too: it is within the hull of its Bernstein coefficients.
     """
-    columns = [
-        np.tensordot(corners, matrix, axes=(1, 1)) for matrix in _column_coefficients(corners.shape[1])
-    ]
+    matrices = _column_coefficients(corners.shape[1])
+    columns = [np.tensordot(corners, matrix, axes=(1, 1)) for matrix in matrices]
     mean = np.stack([column.mean(axis=2) for column in columns], axis=2)
     upright = np.linalg.det(mean) > 0
     inverse = np.linalg.inv(np.where(upright[:, None, None], mean, np.eye(mean.shape[1])))

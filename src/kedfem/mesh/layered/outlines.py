@@ -59,9 +59,8 @@ def turned_outline(outline: Outline, origin: Float[np.ndarray, "2"], axis: Float
     """The outline in a frame at `origin` [m] whose x runs along `axis`."""
     x = axis / np.linalg.norm(axis)
     to_frame = np.array([[x[0], -x[1]], [x[1], x[0]]])
-    corners, via, centres = (
-        (points - origin) @ to_frame for points in (outline.corners, outline.via, outline.centres)
-    )
+    every = outline.corners, outline.via, outline.centres
+    corners, via, centres = ((points - origin) @ to_frame for points in every)
     return Outline(corners, via, centres, outline.radii)
 
 

@@ -219,8 +219,7 @@ def _energies(results: Results) -> Curves:
 
 def _of_joints(results: Results, ending: str) -> Curves:
     """Joint → the only column of its channel of that kind."""
-    found = {
-        name: x for name, (_, x) in results.channels.items() if x.shape[1] == 1 and name.endswith(ending)
-    }
+    every = results.channels.items()
+    found = {name: x for name, (_, x) in every if x.shape[1] == 1 and name.endswith(ending)}
     joints = {name: x[:, 0] for name, x in found.items() if name.startswith("joints/")}
     return {name.removeprefix("joints/").removesuffix(ending): x for name, x in joints.items()}

@@ -109,9 +109,7 @@ class RigidRates:
 
     def every(self, which: slice) -> "RigidRates":
         """At some of the time points."""
-        return RigidRates(
-            self.R[..., which], self.rates[..., which], self.omega[..., which], self.alpha[..., which]
-        )
+        return RigidRates(*(x[..., which] for x in (self.R, self.rates, self.omega, self.alpha)))
 
 
 def rates_of_bodies(motion: RigidMotion) -> RigidRates:

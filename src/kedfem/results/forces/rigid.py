@@ -223,6 +223,5 @@ def _on_grid(linkage: Linkage, along: Path) -> RigidMotion:
     R, c, T = along.R[which], linkage.centre, len(which)
     p = along.p[which] + c - R @ c
     zero, still = np.zeros_like(p), np.zeros_like(R)
-    return RigidMotion(
-        np.zeros(T), along.phi[which], R, p, zero, zero, zero, still, zero, np.zeros((T, 0)), zero, zero
-    )
+    t, none = np.zeros(T), np.zeros((T, 0))
+    return RigidMotion(t, along.phi[which], R, p, zero, zero, zero, still, zero, none, zero, zero)
