@@ -50,16 +50,15 @@ class Bordered:
     """
 
     def __init__(self, H: Any, C: sp.csr_array, compliance: Flat) -> None:
-        self.kept = independent_rows(C, compliance)
-        self.count = len(compliance)
-        rows = C[self.kept]
-        usual = np.abs(H.diagonal()).mean() if rows.shape[1] else 1.0
-        size = row_sizes(rows)
+        self.kept, self.count, k = independent_rows(C, compliance), len(compliance), C.shape[1]
+        size, soft = row_sizes(C)[self.kept], compliance[self.kept]
+        usual = np.abs(H.diagonal()).mean() if k else 1.0
         self.scale = usual / np.where(size > 0, size, 1.0)  # so that both parts are about as large
-        rows = sp.diags_array(self.scale) @ rows
-        self.matrix = sp.csc_array(
-            sp.block_array([[H, -rows.T], [rows, sp.diags_array(self.scale**2 * compliance[self.kept])]])
-        )
+        H, rows, own = sp.coo_array(H), sp.coo_array(C[self.kept]), k + np.flatnonzero(soft)
+        (i, j), (row, column), value = H.coords, rows.coords, self.scale[rows.coords[0]] * rows.data
+        entries = np.concatenate([H.data, -value, value, (self.scale**2 * soft)[own - k]])
+        places = np.concatenate([i, column, k + row, own]), np.concatenate([j, k + row, column, own])
+        self.matrix = sp.csc_array(sp.coo_array((entries, places), (k + len(soft),) * 2))
         if not self.matrix.shape[0]:
             return
         try:
@@ -92,7 +91,9 @@ def independent_rows(C: sp.csr_array, compliance: Flat) -> Int[np.ndarray, " q"]
     size = row_sizes(C)
     hard = np.flatnonzero((compliance == 0.0) & (size > DEPENDENT))
     soft = np.flatnonzero(compliance != 0.0)
-    unit = sp.csr_array(sp.diags_array(1 / size[hard]) @ C[hard])
+    unit = sp.csr_array((C.data / np.where(size > 0, size, 1.0)[_row_of(C)], C.indices, C.indptr), C.shape)[
+        hard
+    ]
     if len(hard) and not _independent(unit):
         _, upper, order = scipy.linalg.qr(unit.T.toarray(), mode="economic", pivoting=True)
         hard = hard[order[: int((np.abs(np.diag(upper)) > DEPENDENT).sum())]]
@@ -101,7 +102,12 @@ def independent_rows(C: sp.csr_array, compliance: Flat) -> Int[np.ndarray, " q"]
 
 def row_sizes(C: sp.csr_array) -> Flat:
     """Length of each row."""
-    return np.asarray(np.sqrt((C * C).sum(axis=1)))
+    return np.asarray(np.sqrt(np.bincount(_row_of(C), C.data**2, C.shape[0])))
+
+
+def _row_of(C: sp.csr_array) -> Int[np.ndarray, " e"]:
+    """The row of each entry."""
+    return np.repeat(np.arange(C.shape[0]), np.diff(C.indptr))
 
 
 def _independent(unit: sp.csr_array) -> bool:

@@ -31,8 +31,11 @@ def still_forces(c, bodies, R, amounts, state, trial, work):  # type: ignore[no-
 def still_gradients(ends, of, rigid_motion, p, stations, z, trial, work):  # type: ignore[no-untyped-def]
     """trial.C becomes the gradients of all coordinates on z: of those that are linear, and do not change, at z = 0.
 
+    trial.e becomes their values there, trial.m their rates in the rigid-body motion.
+
     Parameters
     ----------
+    trial : whose `turned` has angles of all terms to within half a turn
     rigid_motion, p : R (M, 3, 3), v and ω (M, 3), and origins (M, 3) of all bodies of the linkage
     stations : weights of ends on lines
     """
@@ -40,4 +43,4 @@ def still_gradients(ends, of, rigid_motion, p, stations, z, trial, work):  # typ
     placed(ends, rigid_motion[0], p, trial.row, trial.fixed, work.end, work.vectors)
     placed(ends, rigid_motion[0], p, z, trial.moving, work.end, work.vectors)
     for a in range(len(of.law)):
-        differentiated(ends, of, a, rigid_motion, trial, work)
+        trial.e[a], trial.m[a] = differentiated(ends, of, a, rigid_motion, trial, work)

@@ -72,17 +72,17 @@ def accelerated_in_a_step(now: Instant, r: Flat, u: Flat, v: Flat, asked: Asked)
 
 def in_a_step(now: Instant, pushed: Flat, asked: Asked) -> Solved:
     """Accelerations under forces on bodies, and those that constraints know, with a step's matrix; see above."""
-    of, K = now.of, now.always.still.K
+    of, still = now.of, now.always.still
     share = of.c.c_K / of.c.c_M
     held = [
         stepped_body(part, of.c.c_M) if isinstance(part, SparsePart)
-        else held_body(np.eye(K[k].shape[0]) + share * K[k], part.W)
+        else held_body(np.eye(len(still.K[k])) + share * still.K[k], part.W)
         for k, part in enumerate(of.parts)
     ]  # fmt: skip
     balance = LinearEquations(of, held, now.R, asked)
     more = balance.solved(pushed)
-    x = [balance.turned(k, more.x[own(of, k)], back=True) for k in range(len(K))]
-    f = np.concatenate([balance.turned(k, share * (K[k] @ x[k])) for k in range(len(K))])
+    x = [balance.turned(k, more.x[own(of, k)], back=True) for k in range(len(held))]
+    f = np.concatenate([balance.turned(k, share * still.times(k, each)) for k, each in enumerate(x)])
     return replace(more, f=f)
 
 

@@ -17,10 +17,9 @@ from kedfem.arrays import Float
 from kedfem.dynamics.matrices.bordered import Asked
 from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.system.march import Ready
-from kedfem.dynamics.system.record import RATE, Spring, Stop, curve_of
 from kedfem.dynamics.system.starts.accelerations import accelerations, own_spin
 from kedfem.dynamics.system.starts.initial_states import as_coordinates, begun
-from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
+from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, feels_rates, turned
 from kedfem.dynamics.system.starts.internal_forces import own, rows, turned_rate
 from kedfem.dynamics.system.starts.modified_newton import FREE, NoBalanceError, equilibrium
 from kedfem.dynamics.system.starts.turning_bodies import CONVERGED, Spins
@@ -242,10 +241,7 @@ def _scatter(u: Float[np.ndarray, "5 N"]) -> float:
 
 def _feels_rates(of: Ready) -> bool:
     """Whether a law's force depends on a rate."""
-    laws = [each.law for each in of.system.constraints]
-    curves = [curve for law in laws if (curve := curve_of(law)) is not None]
-    damped = any(isinstance(law, Spring | Stop) and law.damping != 0 for law in laws)
-    return damped or any(curve.over == RATE for curve in curves)
+    return any(feels_rates(each.law) for each in of.system.constraints)
 
 
 def _spins(now: Instant) -> Spins:

@@ -28,6 +28,7 @@ from kedfem.dynamics.system.record import (
     Law,
     Spring,
     Stop,
+    curve_of,
     law_at,
 )
 from kedfem.dynamics.system.sparse import SparsePart, softening
@@ -51,6 +52,8 @@ class Always:
     """What does not depend on time.
 
     number : (k,) where each interface unknown of the system stands in a state
+    columns : (e,) interface unknowns that coordinates have entries of their gradients on
+    rated : which coordinates are linear in these, with a force that depends on their rate
     closed : z from displacements at all interface points, w = B z as nearly as can be
     still : internal forces of bodies
     least : what the stiffness of body k gets of its mass, so that it is definite where nothing holds it [1/s²]
@@ -58,6 +61,8 @@ class Always:
     """
 
     number: Int[np.ndarray, " k"]
+    columns: Int[np.ndarray, " e"]
+    rated: Bool[np.ndarray, " r"]
     closed: Callable[[Flat], Flat]
     still: Still
     least: Callable[[int], float]
@@ -134,10 +139,14 @@ class Instant:
         e = coordinates(self.of.system, self.at, z)
         if self.near is not None:
             e[0] += self._whole_turns(z[0])
+        return self._less_drives(e)
+
+    def _less_drives(self, e: Float[np.ndarray, "n r"]) -> Float[np.ndarray, "n r"]:
+        """Coordinates, with rates of theirs, less what drives ask."""
         for n, each in enumerate(self.of.system.constraints):
             drive = getattr(each.law, "drive", -1)
             if drive >= 0 and not each.linear:
-                e[:, n] -= [self.motion.drives[0, drive], *self.travels[1:, n]]
+                e[:, n] -= [self.motion.drives[0, drive], *self.travels[1 : len(e), n]]
                 if each.terms[0].kind == ANGLE:
                     e[0, n] -= TURN * np.round(e[0, n] / TURN)
         return e
@@ -166,13 +175,25 @@ class Instant:
             if not line_of(system.ends[end]).stations.reach(s):
                 raise SolveError(left_line(system, end, self.time))
 
+    def measured(self, z: Flat, z1: Flat | None = None) -> tuple[sp.csr_array, Float[np.ndarray, "2 r"]]:
+        """Gradients of all coordinates by z, and these with their rates as in `coordinates`, as steps have them."""
+        of, always, known = self.of, self.always, np.zeros(self.of.system.unknowns)
+        known[always.number] = z
+        near = np.zeros(len(of.constraints.kind)) if self.near is None else _nearby(self)
+        data, e, rate = always.still.measured(self.motion, self._stations, near, known)
+        C = sp.csr_array((data, always.columns, of.constraints.column_at), (len(e), len(z)))
+        e = np.where(of.constraints.linear, C @ z, e)
+        out = self._less_drives(np.stack([e, rate if z1 is None else rate + C @ z1]))
+        if always.rated.any():
+            full = self.coordinates(np.stack([z, 0 * z if z1 is None else z1, 0 * z]))
+            out[1, always.rated] = full[1, always.rated]
+        return C, out
+
     def gradients(self, z: Flat) -> sp.csr_array:
         """Of all coordinates by z."""
-        always, known = self.always, np.zeros(self.of.system.unknowns)
-        known[always.number] = z
-        return always.still.gradients(self.motion, self._stations, known)[:, always.number]
+        return self.measured(z)[0]
 
-    def forces(self, e: Float[np.ndarray, "3 r"]) -> Float[np.ndarray, "r 3"]:
+    def forces(self, e: Float[np.ndarray, "_ r"]) -> Float[np.ndarray, "r 3"]:
         """Of all laws: force along the coordinate, and how it falls with it and its rate; zero of constraints."""
         laws = [law_at(each.law, self.motion.t, self.motion.phi) for each in self.of.system.constraints]
         return np.array([push(law, self.time, e[0, n], e[1, n]) for n, law in enumerate(laws)]).reshape(-1, 3)
@@ -185,7 +206,9 @@ class Instant:
 
 def sizes(C: sp.csr_array) -> Float[np.ndarray, " r"]:
     """Largest entry of each row."""
-    return np.asarray(abs(C).max(axis=1).toarray()) if C.shape[1] else np.zeros(C.shape[0])
+    out = np.zeros(C.shape[0])
+    np.maximum.at(out, np.repeat(np.arange(len(out)), np.diff(C.indptr)), np.abs(C.data))
+    return out
 
 
 def push(law: Law, t: float, e: float, rate: float) -> tuple[float, float, float]:
@@ -218,8 +241,17 @@ def always(of: Ready) -> Always:
     def held(k: int) -> HeldBody:
         return sparse_body(links[k], joints[k], factored(links[k], joints[k], least(k), 1.0))
 
+    number = renumbered(of)
+    rated = np.array([each.linear and feels_rates(each.law) for each in of.system.constraints], bool)
     return Always(
-        renumbered(of), closure(of), still, cache(least), cache(held), cache(partial(mass_body, of))
+        number,
+        np.argsort(number)[of.constraints.columns],
+        rated,
+        closure(of),
+        still,
+        cache(least),
+        cache(held),
+        cache(partial(mass_body, of)),
     )
 
 
@@ -254,10 +286,22 @@ def turned(now: Instant, z: Flat) -> Flat:
 
 def _counted(now: Instant, found: Flat) -> Flat:
     """The same of angles to within whole turns."""
-    near, place = np.zeros(len(found)) if now.near is None else now.near.copy(), 0
+    near = _nearby(now)
+    of_angles = np.array([x.kind == ANGLE for each in now.of.system.constraints for x in each.terms], bool)
+    return np.asarray(np.where(of_angles, found + TURN * np.round((near - found) / TURN), 0.0))
+
+
+def _nearby(now: Instant) -> Flat:
+    """Angles of all terms to within half a turn."""
+    near, place = np.zeros(len(now.of.constraints.kind)) if now.near is None else now.near.copy(), 0
     for each in now.of.system.constraints:
         drive = getattr(each.law, "drive", -1)
         near[place] = now.motion.drives[0, drive] if drive >= 0 else near[place]
         place += len(each.terms)
-    of_angles = np.array([x.kind == ANGLE for each in now.of.system.constraints for x in each.terms], bool)
-    return np.asarray(np.where(of_angles, found + TURN * np.round((near - found) / TURN), 0.0))
+    return near
+
+
+def feels_rates(law: Law) -> bool:
+    """Whether a law's force depends on a rate."""
+    curve = curve_of(law)
+    return (isinstance(law, Spring | Stop) and law.damping != 0) or (curve is not None and curve.over == RATE)

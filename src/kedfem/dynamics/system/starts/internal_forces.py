@@ -5,7 +5,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
 from kedfem.arrays import Float
 from kedfem.dynamics.frames import Deformed, frame_force, frames_of, mean_orientation, position, seen_from
@@ -14,7 +13,7 @@ from kedfem.dynamics.stepping.state import Nodal
 from kedfem.dynamics.system.layout import points_of
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.record import RIGID_BODY
-from kedfem.dynamics.system.sparse import SparsePart, component_order, momentum
+from kedfem.dynamics.system.sparse import SparsePart, momentum
 from kedfem.dynamics.system.state import State, empty_state, empty_trial, room
 from kedfem.links.record import Link, mass_times
 from kedfem.links.reduced import rigid_modes
@@ -28,17 +27,16 @@ Frames = tuple[Float[np.ndarray, "L 3 3"], Float[np.ndarray, " L"]]
 class Still:
     """Internal forces of all bodies where they do not move in their frames: what balances of deflections ask for.
 
-    K : per body its stiffness on coordinates, in its frame
+    K : per body its stiffness on coordinates, in its frame; of sparse ones K0, on nodal rows
     rigid : per body its rigid motions on coordinates, orthonormal
     """
 
     def __init__(self, of: Ready) -> None:
         self.of = of
         self.K: list[Any] = [
-            sp.csr_array(link.K0)[order := component_order(link)][:, order] if isinstance(part, SparsePart)
-            else component_first(part.T, link.K0)
+            link.K0 if isinstance(part, SparsePart) else component_first(part.T, link.K0)
             for part, link in zip(of.parts, of.system.model.links, strict=True)
-        ]  # fmt: skip
+        ]
         self.rigid = [_rigid(link, part) for link, part in zip(of.system.model.links, of.parts, strict=True)]
         none = (
             np.zeros_like(of.c.acceleration) if isinstance(of.c.acceleration, np.ndarray) else (0.0, 0.0, 0.0)
@@ -95,25 +93,30 @@ class Still:
         """Have frames sought from these; from far off a rotation that is none of the bodies' may be found."""
         self._trial.Q[:], self._trial.angle[:] = frames
 
-    def gradients(
-        self, motion: RigidMotion, stations: Float[np.ndarray, " w"], z: Float[np.ndarray, " k"]
-    ) -> sp.csr_array:
-        """Of all coordinates by the interface unknowns z, these in the order of a state.
+    def measured(
+        self, motion: RigidMotion, stations: Float[np.ndarray, " w"], near: Float[np.ndarray, " t"],
+        z: Float[np.ndarray, " k"],
+    ) -> tuple[Float[np.ndarray, " e"], Float[np.ndarray, " r"], Float[np.ndarray, " r"]]:  # fmt: skip
+        """Of all coordinates gradients on the columns of each, values, and rates in the rigid-body motion.
+
+        Of those that are linear in the interface unknowns z they are at z = 0.
 
         Parameters
         ----------
         motion : rigid-body motion at one time; stations : weights of ends on lines there
+        near : angles of all terms to within half a turn
+        z : in the order of a state
         """
-        of = self.of.constraints
-        if not len(of.law):
-            return sp.csr_array((0, len(z)))
-        from kedfem.dynamics.system.still_kernel import still_gradients
+        trial = self._trial
+        if len(trial.e):
+            from kedfem.dynamics.system.still_kernel import still_gradients
 
-        omega = np.ascontiguousarray(motion.omega[0])  # laid out as in steps: compiled once for both
-        turning = motion.R[0], motion.v[0], omega
-        ends, constraints, trial, work = self._of_gradients
-        still_gradients(ends, constraints, turning, motion.p[0], stations, z, trial, work)
-        return sp.csr_array((self._trial.C.copy(), of.columns, of.column_at), (len(of.law), len(z)))
+            omega = np.ascontiguousarray(motion.omega[0])  # laid out as in steps: compiled once for both
+            turning = motion.R[0], motion.v[0], omega
+            ends, constraints, handed_trial, work = self._of_gradients
+            trial.turned[:] = near
+            still_gradients(ends, constraints, turning, motion.p[0], stations, z, handed_trial, work)
+        return trial.C.copy(), trial.e.copy(), trial.m.copy()
 
     def sprung(self, k: int, R: Float[np.ndarray, "3 3"], u: Flat) -> Flat:
         """R K0 Rᵀ u of the displacement u (N,) of body k, world components.
@@ -122,9 +125,16 @@ class Still:
         """
         d, B = int(self.of.bodies.components[k]), self.rigid[k]
         turn = R[:d, :d]
-        f = self.K[k] @ (turn.T @ u.reshape(d, -1)).ravel()
+        f = self.times(k, (turn.T @ u.reshape(d, -1)).ravel())
         f -= B @ (B.T @ f)
         return np.asarray(turn @ f.reshape(d, -1)).ravel()
+
+    def times(self, k: int, x: Flat) -> Flat:
+        """K0 x of coordinates of body k, in its frame."""
+        if not isinstance(self.of.parts[k], SparsePart):
+            return np.asarray(self.K[k] @ x)
+        d = int(self.of.bodies.components[k])
+        return np.asarray((self.K[k] @ x.reshape(d, -1).T.ravel()).reshape(-1, d).T.ravel())
 
 
 def _rigid(link: Link, part: Any) -> Float[np.ndarray, "N m"]:

@@ -104,8 +104,7 @@ class Equilibrium:
         now, of = self.now, self.now.of
         f, r, R = self.forces(u)
         z = now.interface(u)
-        C = now.gradients(z)
-        e = now.coordinates(np.stack([z, 0 * z if self.z1 is None else self.z1, 0 * z]))
+        C, e = now.measured(z, self.z1)
         laws = now.forces(e)
         moved = np.zeros_like(u)
         for k, open_ in enumerate(gaps(now, u, z)):
@@ -146,13 +145,13 @@ class Equilibrium:
         """A x of all bodies."""
         out, of, always = np.zeros_like(x), self.now.of, self.now.always
         links = of.system.model.links
-        for k, K in enumerate(always.still.K):
+        for k in range(len(links)):
             here = own(of, k)
             d = int(of.bodies.components[k])
             R = at.R[k][:d, :d]
             local = (R.T @ x[here].reshape(d, -1)).ravel()
             mass = momentum(links[k], local) if self.bodies.sparse[k] else local
-            f = K @ local + always.least(k) * mass
+            f = always.still.times(k, local) + always.least(k) * mass
             out[here] = (R @ f.reshape(d, -1)).ravel()
         return out
 
@@ -245,11 +244,10 @@ def stands_off(now: Instant, u: Flat, z1: Flat | None) -> str:
     size = OPEN * max(map(reach, links))
     if max(off) > size:
         return f"link '{links[int(np.argmax(off))].name}' would stand {max(off):.3g} m off its joints"
-    e = np.abs(now.coordinates(np.stack([z, 0 * z if z1 is None else z1, 0 * z]))[0]) * now.hard(
-        now.gradients(z)
-    )
-    if e.max(initial=0.0) > size:
-        return f"{system.constraints[int(e.argmax())].name} would be open by {e.max():.3g} (m or rad)"
+    C, e = now.measured(z, z1)
+    open_ = np.abs(e[0]) * now.hard(C)
+    if open_.max(initial=0.0) > size:
+        return f"{system.constraints[int(open_.argmax())].name} would be open by {open_.max():.3g} (m or rad)"
     return ""
 
 
