@@ -17,6 +17,7 @@ from kedfem.dynamics.system.starts.internal_forces import own, rows
 from kedfem.dynamics.system.starts.modified_newton import NoBalanceError
 from kedfem.dynamics.system.steps import Steps
 from kedfem.scene import scene_from
+from tests.moving import channels, ran
 
 Raw = dict[str, Any]
 ASKEW = Rotation.from_rotvec([0.5, -0.8, 0.3]).as_matrix()
@@ -173,3 +174,58 @@ def test_a_start_that_is_not_found_is_refused_in_words_and_soon(monkeypatch: pyt
     ):
         solver.start(motion, [])
     assert counted[0] < 60 + 120 * 50
+
+
+STEADY = {"kind": "constant_speed", "speed": 9.0}
+SETTING_OUT = {"kind": "harmonic", "angle": 0.6, "frequency": 1.5, "phase": -np.pi / 2}
+RIM, ARM, MASS = 0.2, 0.15, 0.2
+
+
+def turntable(Q: np.ndarray, arm: Raw, motion: Raw) -> Raw:
+    """An arm on a hinge at the rim of a table that turns about Q's z; a spring that pulls it aside."""
+    hinge = {"kind": "revolute", "axis": Q[:, 2].tolist()}
+    return {
+        "links": {"table": {"model": "rigid"}, "arm": arm},
+        "joints": {
+            "O": {**hinge, "links": ["table", "ground"], "at": [0, 0, 0]},
+            "P": {**hinge, "links": ["arm", "table"], "at": (RIM * Q[:, 0]).tolist()},
+        },
+        "springs": {"s": {"kind": "torsion", "joint": "P", "stiffness": 20.0, "free_angle": 0.12}},
+        "drive": {"joint": "O", "motion": motion},
+        "analysis": {
+            "end_time": 2e-3, "step": 1e-3, "accuracy": "quick", "frames": "co-rotational", "initial": "quasi-static",
+        },
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("kind", "Q", "motion"),
+    [
+        ("bar", np.eye(3), STEADY), ("bar", ASKEW, SETTING_OUT), ("polyline", np.eye(3), SETTING_OUT),
+        ("polyline", np.eye(3)[:, [1, 2, 0]], STEADY), ("numbers", ASKEW, STEADY), ("numbers", np.eye(3), SETTING_OUT),
+    ],
+    ids=["bar", "bar, oblique", "planar line", "line about x", "numbers, oblique", "numbers"],
+)  # fmt: skip
+def test_a_rigid_link_that_a_spring_has_turned_begins_with_what_its_hinge_bears(
+    kind: str, Q: np.ndarray, motion: Raw
+) -> None:
+    """F = m a of its centre where the spring has turned it to, by (α× + ω²) of the table, at the start and a step later:
+    what moves by 4e-4 m in the step changes a force by 3e-3 of it."""
+    ends = [(RIM * Q[:, 0]).tolist(), ((RIM + 2 * ARM) * Q[:, 0]).tolist()]
+    shape: Raw = {"kind": kind, "width": 0.02, "thickness": 0.02}
+    shape |= {"between": ends} if kind == "bar" else {"points": ends}
+    arm: Raw = {"model": "rigid", "material": "steel", "shape": shape}
+    mass = 7850 * 0.02**2 * 2 * ARM
+    if kind == "numbers":
+        centre, mass = ((RIM + ARM) * Q[:, 0]).tolist(), MASS
+        arm = {"model": "rigid", "mass": MASS, "centre": centre, "inertia": [0.003] * 3 + [0.0] * 3}
+    found = channels(*ran(turntable(Q, arm, motion)))
+    q = float(found["springs/s/angle"].ravel()[0])
+    assert abs(q) > 0.03
+    omega, alpha = (9.0, 0.0) if motion is STEADY else (0.0, 0.6 * (3 * np.pi) ** 2)
+    e = RIM * Q[:, 0] + ARM * (np.cos(q) * Q[:, 0] + np.sin(q) * Q[:, 1])
+    force = mass * (alpha * np.cross(Q[:, 2], e) - omega**2 * e)
+    size = float(np.linalg.norm(force))
+    assert_allclose(found["joints/P/force"][0], force, atol=3e-4 * size)
+    turned = Rotation.from_rotvec(omega * 1e-3 * Q[:, 2]).apply(force)
+    assert_allclose(found["joints/P/force"][1], turned, atol=3e-3 * size)

@@ -111,27 +111,32 @@ def _position(now: Instant, k: int, u: Flat) -> Float[np.ndarray, "n d"]:
 
 
 def centripetal(now: Instant, u: Flat, v: Flat, which: Sequence[bool]) -> Flat:
-    """([ω]² − [ω₀]²) X of some bodies, that turn at ω in all, ω₀ of it rigid-body; world components."""
-    out = np.zeros_like(v)
+    """([ω]² − [ω₀]²) x + ([α₀]× + [ω₀]²) u of some bodies where they are, at x = X + u; world components.
+
+    They turn at ω in all, ω₀ of it rigid-body, whose rate is α₀.
+    """
+    out, alpha = np.zeros_like(v), now.motion.alpha[0][now.of.bodies.motion]
     for k, link in enumerate(now.of.system.model.links):
         if not which[k]:
             continue
+        here = own(now.of, k)
+        moved, x = rows(now.of, k, u[here]), _position(now, k, u)
         omega = cross_matrix(now.omega[k])
-        spin = omega + own_spin(link, rows(now.of, k, v[own(now.of, k)]), now.R[k])
-        moved = turned_rate(spin @ spin - omega @ omega, _position(now, k, u))
-        out[own(now.of, k)] = coordinates(link, now.of.parts[k], moved).ravel()
+        spin = omega + own_spin(link, rows(now.of, k, v[here]) - turned_rate(omega, moved), x)
+        rate = turned_rate(spin @ spin - omega @ omega, x)
+        rate += turned_rate(cross_matrix(alpha[k]) + omega @ omega, moved)
+        out[here] = coordinates(link, now.of.parts[k], rate).ravel()
     return out
 
 
 def own_spin(
-    link: Link, v: Float[np.ndarray, "n d"], R: Float[np.ndarray, "3 3"]
+    link: Link, v: Float[np.ndarray, "n d"], x: Float[np.ndarray, "n d"]
 ) -> Float[np.ndarray, "3 3"]:
-    """[ω]× of the rigid motion nearest to rates of a body: the skew part of their gradient."""
+    """[ω]× of the rigid motion nearest to rates of a body at places x: the skew part of their gradient."""
     k = 2 if link.planar else 3
     if link.kind == "beam":  # its axis alone does not determine it
         return cross_matrix(np.array([0.0, 0.0, link.one @ v[:, 2] / (link.one @ link.one)]))
-    X = (link.X @ R.T)[:, :k]
-    basis = np.column_stack([link.one, X])
+    basis = np.column_stack([link.one, x[:, :k]])
     gradient = np.linalg.lstsq(basis, v[:, :k], rcond=1e-10)[0][1:].T
     out = np.zeros((3, 3))
     out[:k, :k] = gradient

@@ -20,7 +20,7 @@ from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.starts.accelerations import accelerations, own_spin
 from kedfem.dynamics.system.starts.initial_states import as_coordinates, begun
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, feels_rates, turned
-from kedfem.dynamics.system.starts.internal_forces import own, rows, turned_rate
+from kedfem.dynamics.system.starts.internal_forces import drawn, own, rows, turned_rate
 from kedfem.dynamics.system.starts.modified_newton import FREE, NoBalanceError, equilibrium
 from kedfem.dynamics.system.starts.turning_bodies import CONVERGED, Spins
 from kedfem.dynamics.system.state import State
@@ -254,7 +254,10 @@ def _spins(now: Instant) -> Spins:
 def _relieved(now: Instant, v: Flat) -> tuple[Flat, Flat]:
     """Deflection of a system that nothing drives, and its rates: it turns with its links."""
     of, links = now.of, now.of.system.model.links
-    spins = [own_spin(link, rows(of, k, v[own(of, k)]), now.R[k]) for k, link in enumerate(links)]
+    spins = [
+        own_spin(link, rows(of, k, v[own(of, k)]), drawn(link) @ now.R[k][: link.d, : link.d].T)
+        for k, link in enumerate(links)
+    ]
 
     def rate(u: Flat) -> Flat:
         turning = [turned_rate(S, rows(of, k, u[own(of, k)])) for k, S in enumerate(spins)]
