@@ -262,5 +262,3 @@ compiled = _kept(_FAST)
 _INNER: dict[str, Any] = {**_FAST, "no_cpython_wrapper": True, "_nrt": False}
 inner = _kept(_INNER)
 """Called by compiled loops only, and allocates nothing, so that no references are counted: compiled in less time."""
-inlined = _kept({**_INNER, "inline": "always"})
-"""Called at one place: a part of its caller, as each function is optimised once more with every one that calls it."""

@@ -213,14 +213,3 @@ def test_a_file_of_compiled_code_with_a_flipped_bit_is_made_again_without_a_word
         file.write_bytes(content)
         os.utime(file, ns=(stat.st_atime_ns, stat.st_mtime_ns))
     assert (ran(), ran()) == ("compiled", "read")
-
-
-def test_what_is_inlined_is_called_at_one_place() -> None:
-    """Twice in a caller it would be compiled twice: `inner` is for that."""
-    code = {file: file.read_text(encoding="utf-8") for file in compiled.ROOT.rglob("*kernel.py")}
-    names = [name for text in code.values() for name in re.findall(r"@inlined\ndef (\w+)\(", text)]
-    assert len(names) > 20
-    calls = {
-        name: sum(len(re.findall(rf"(?<!def )\b{name}\(", text)) for text in code.values()) for name in names
-    }
-    assert {name for name, count in calls.items() if count != 1} == set()

@@ -11,7 +11,7 @@ updates (n, 3) : block that two blocks of one column change; of_column (b + 1,) 
 
 import numpy as np
 
-from kedfem.compiled import compiled, inlined, inner
+from kedfem.compiled import compiled, inner
 
 REFINEMENTS = 2  # of refinement: each takes off what the squared condition number costs
 TRIES, SETTLED = 60, 1e-5  # of the iterations for extreme singular values: relative change at which they end
@@ -114,7 +114,7 @@ def onto_bodies(value, starts, body, rows, out):  # type: ignore[no-untyped-def]
                     z[i] += v[i] * y
 
 
-@inlined
+@inner
 def refined(value, right, starts, body, columns, below, L, x, left, change):  # type: ignore[no-untyped-def]
     """x (b, 6) that leaves least of J x = right, and left (m,), what it leaves."""
     x[:] = 0.0

@@ -1,6 +1,6 @@
 """Products and turns of a body's coordinates and of its interface points, compiled by numba."""
 
-from kedfem.compiled import inlined, inner
+from kedfem.compiled import inner
 
 
 @inner
@@ -48,7 +48,7 @@ def turned_back(R, d, x, out):  # type: ignore[no-untyped-def]
                 to[j] = p * first[j] + q * second[j]
 
 
-@inlined
+@inner
 def ports_turned(bodies, i, R, x, out):  # type: ignore[no-untyped-def]
     """out becomes R x for held components of interface points; the same columns of both."""
     first, last = bodies.port_at[i], bodies.port_at[i + 1]
@@ -61,7 +61,7 @@ def ports_turned(bodies, i, R, x, out):  # type: ignore[no-untyped-def]
             out[q - first] += R[bodies.component[q], bodies.component[m]] * x[m - first]
 
 
-@inlined
+@inner
 def interface_columns(bodies, i, R, RB):  # type: ignore[no-untyped-def]
     """RB (q × c, flat) becomes Rᵀ B of a body."""
     first, last = bodies.port_at[i], bodies.port_at[i + 1]

@@ -5,7 +5,7 @@ Of body i: coordinates `at[i]:at[i + 1]`, component first; mass one. Rotations a
 
 import numpy as np
 
-from kedfem.compiled import inlined, inner
+from kedfem.compiled import inner
 from kedfem.dynamics.beams_kernel import bent
 from kedfem.dynamics.frames_kernel import entry
 from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, turned, turned_back
@@ -37,7 +37,7 @@ def right_hand_side(c, bodies, i, R, F, state, out, room):  # type: ignore[no-un
                 out[first + x] += c_f * c.rate[m] * state.damped[of + x]
 
 
-@inlined
+@inner
 def rigid_frame_end(c, bodies, i, R, F, g, Ag, state, history, t, work):  # type: ignore[no-untyped-def]
     """End of the step of a body with the rigid-body frame, from g and its balance A g = r + Wᵀ λ."""
     first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
@@ -125,7 +125,7 @@ def internal_forces(c, bodies, R, amounts, state, trial, work, first):  # type: 
     turned_loads(bodies.turning, bodies, R, amounts, trial.u, f, work.frame)
 
 
-@inlined
+@inner
 def mass_damped(c, bodies, i, R, u, state, trial, work):  # type: ignore[no-untyped-def]
     """Add to trial.f the rate of α M δ in the rigid-body frame."""
     first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
@@ -159,7 +159,7 @@ def orientation(bodies, i, R, u, trial, out):  # type: ignore[no-untyped-def]
             out[b, m] = x
 
 
-@inlined
+@inner
 def beam_rotation(bodies, i, R, u, Q):  # type: ignore[no-untyped-def]
     """Q becomes the mean rotation of a planar beam in the rigid-body frame, that of Σ y_a ⊗ fit_a."""
     first, n, c, s = bodies.at[i], bodies.functions[i], 0.0, 0.0
@@ -174,7 +174,7 @@ def beam_rotation(bodies, i, R, u, Q):  # type: ignore[no-untyped-def]
     Q[0, 0], Q[0, 1], Q[1, 0], Q[1, 1] = c, -s, s, c
 
 
-@inlined
+@inner
 def residual(c, bodies, i, R, F, u, state, trial, out, work):  # type: ignore[no-untyped-def]
     """out becomes what is missing to balance at the end of the step, without interface forces, in the frame R."""
     first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
@@ -197,7 +197,7 @@ def residual(c, bodies, i, R, F, u, state, trial, out, work):  # type: ignore[no
     turned_back(R, d, room[: last - first], out[first:last])
 
 
-@inlined
+@inner
 def own_end(c, bodies, i, R, F, u, state, trial, history, t, work):  # type: ignore[no-untyped-def]
     """End of the step of a body with frames of its own: what passes found becomes the state."""
     first, last = bodies.at[i], bodies.at[i + 1]

@@ -5,7 +5,7 @@ A coordinate is a sum of terms, each a function of the positions x and orientati
 
 import numpy as np
 
-from kedfem.compiled import inlined, inner
+from kedfem.compiled import inner
 from kedfem.dynamics.system.ends_kernel import borne, cross, dot, times
 from kedfem.dynamics.system.measures_kernel import borne_by_line, off_line, rotation_along, tilt_along
 from kedfem.dynamics.system.record import (
@@ -68,7 +68,7 @@ def coordinate(ends, of, r, rigid_motion, place, turned, row, y, w):  # type: ig
     return total, rate
 
 
-@inlined
+@inner
 def between(kind, ends, of, t, x, Q, w):  # type: ignore[no-untyped-def]
     """Gap along a direction fixed in j, or distance; w[6:10] becomes force and moment of unit size on i and on j."""
     i, j = of.i[t], of.j[t]
@@ -94,7 +94,7 @@ def between(kind, ends, of, t, x, Q, w):  # type: ignore[no-untyped-def]
     return value
 
 
-@inlined
+@inner
 def angle(of, t, Q, near, w):  # type: ignore[no-untyped-def]
     """Twist of i against j about an axis, to within half a turn of an earlier one; w[7] becomes its gradient."""
     i, j = of.i[t], of.j[t]
@@ -122,7 +122,7 @@ def directions(Q, a, axis, one, other, room):  # type: ignore[no-untyped-def]
     times(Q, room, other)
 
 
-@inlined
+@inner
 def law(of, r, t, factor, e, rate, before, force, out):  # type: ignore[no-untyped-def]
     """Force against the coordinate e with its rate, and how it grows with both: out (3,); a constraint has its misfit.
 
@@ -154,7 +154,7 @@ def law(of, r, t, factor, e, rate, before, force, out):  # type: ignore[no-untyp
     return False
 
 
-@inlined
+@inner
 def stop(numbers, e, rate, apart, force, out):  # type: ignore[no-untyped-def]
     """The law of a stop within a step: one that pushed goes on as long as it does not pull, wherever e is; see `law`.
 
@@ -176,7 +176,7 @@ def stop(numbers, e, rate, apart, force, out):  # type: ignore[no-untyped-def]
         out[0], out[1], out[2] = k * (e - limit) + c * rate, k, c
 
 
-@inlined
+@inner
 def interpolated(of, r, x):  # type: ignore[no-untyped-def]
     """Value and slope of a curve of cubics, held outside or repeated."""
     first, last, period = of.curve_at[r], of.curve_at[r + 1] - 1, of.period[r]

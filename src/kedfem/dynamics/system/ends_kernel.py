@@ -13,7 +13,7 @@ Without any line, `ends.knots` may be None: nothing of lines is compiled then.
 
 import numpy as np
 
-from kedfem.compiled import inlined, inner
+from kedfem.compiled import inner
 from kedfem.dynamics.frames_kernel import rodrigues, turn_of
 from kedfem.dynamics.system.algebra_kernel import frame_copied
 from kedfem.dynamics.system.record import FACE, PLANAR, PLANAR_BEAM, POINT, RIGID
@@ -33,7 +33,7 @@ def dot(a, b):  # type: ignore[no-untyped-def]
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@inlined
+@inner
 def triple(a, b, c):  # type: ignore[no-untyped-def]
     """a · (b × c)."""
     return (
@@ -98,7 +98,7 @@ def stationed(knots, ends, R, p, z, X, w):  # type: ignore[no-untyped-def]
             on_line(ends, n, R[body], p[body], z, X, w)
 
 
-@inlined
+@inner
 def on_line(ends, n, R, p, z, X, w):  # type: ignore[no-untyped-def]
     """The same of line n."""
     e, first, at = ends.line[n], ends.line_at[n], ends.full_at[n]
@@ -141,7 +141,7 @@ def unmoved(ends, of, driving, t, trial, work):  # type: ignore[no-untyped-def]
         placed(ends, driving.R[t], driving.p[t], trial.row, trial.fixed, work.end, work.vectors)
 
 
-@inlined
+@inner
 def moved(ends, e, z, y):  # type: ignore[no-untyped-def]
     """y becomes the displacements of an end's interface points, one after the other."""
     first, last = ends.column_at[e], ends.column_at[e + 1]
@@ -152,7 +152,7 @@ def moved(ends, e, z, y):  # type: ignore[no-untyped-def]
             y[r] += ends.onto[at + r * c + m - first] * z[ends.columns[m]]
 
 
-@inlined
+@inner
 def directed(ends, e, R, y, D, w):  # type: ignore[no-untyped-def]
     """D becomes the directions of a surface: the known ones from its points, the others completed."""
     form, d, known = ends.form[e], ends.components[e], ends.known[e]
@@ -171,7 +171,7 @@ def directed(ends, e, R, y, D, w):  # type: ignore[no-untyped-def]
             D[2, m] = w[m] / size
 
 
-@inlined
+@inner
 def oriented(e, D, Q, U, w):  # type: ignore[no-untyped-def]
     """Q becomes the rotation of A = Σ D_k ⊗ e_k, U = Qᵀ A: by Newton from one as near as A is to a rotation."""
     squared(D, w[4:7])
@@ -259,7 +259,7 @@ def borne(ends, e, force, moment, factor, rigid_motion, place, row, y, w):  # ty
     return factor * power
 
 
-@inlined
+@inner
 def turning(ends, e, moment, R, omega, Q, D, U, y, w):  # type: ignore[no-untyped-def]
     """Add to forces y at an end's points those that a moment on its orientation is; its power in the rigid-body
     motion."""

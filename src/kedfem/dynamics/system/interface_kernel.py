@@ -10,7 +10,7 @@ is put into the matrix, as in `dynamics.interface`. Both are solved for at once,
 Constraints that repeat others get no force.
 """
 
-from kedfem.compiled import inlined, inner
+from kedfem.compiled import inner
 from kedfem.dynamics.matrices.profile_kernel import profile_factored, profile_solved
 from kedfem.dynamics.system.algebra_kernel import copied, interface_columns
 from kedfem.dynamics.system.constraints_kernel import coordinate, law
@@ -158,7 +158,7 @@ def newmark_rate(c, x, x0, x1, x2):  # type: ignore[no-untyped-def]
     return c.rate[0] * (x - x0) - c.rate[1] * x1 - c.rate[2] * x2
 
 
-@inlined
+@inner
 def acts(row):  # type: ignore[no-untyped-def]
     """Whether a constraint says something that the interface unknowns do not satisfy by themselves."""
     most = 0.0
@@ -167,7 +167,7 @@ def acts(row):  # type: ignore[no-untyped-def]
     return most > REPEATED
 
 
-@inlined
+@inner
 def bordered(bodies, of, trial):  # type: ignore[no-untyped-def]
     """trial.K becomes H with a part of each constraint and law, and with what is left of them; so do compliances."""
     K, place, first, at = trial.K, bodies.place, bodies.first, bodies.row_at

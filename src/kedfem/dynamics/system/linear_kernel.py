@@ -3,7 +3,7 @@
 Apart from `step_kernel`, whose passes a linear scene has no use for and need not wait to be compiled.
 """
 
-from kedfem.compiled import compiled, inlined
+from kedfem.compiled import compiled, inner
 from kedfem.dynamics.system.algebra_kernel import copied
 from kedfem.dynamics.system.ends_kernel import unmoved
 from kedfem.dynamics.system.interface_kernel import evaluated, gathered, interface_solved, offset, pushed
@@ -38,7 +38,7 @@ def marched_linear(c, bodies, ends, of, driving, state, trial, work, history, so
     return len(driving.t), -1
 
 
-@inlined
+@inner
 def solved_at_once(c, bodies, ends, of, driving, t, state, trial, work):  # type: ignore[no-untyped-def]
     """Interface unknowns, and displacements and forces of all bodies at their interface points."""
     trial.right[:] = 0.0

@@ -20,14 +20,14 @@ On the line d, q and κ are zero: as the pin slides, and as n turns, no force do
 
 import numpy as np
 
-from kedfem.compiled import inlined, inner
+from kedfem.compiled import inner
 from kedfem.dynamics.system.ends_kernel import cross, dot, times
 from kedfem.dynamics.system.record import CLOSE, FEET, TURNED
 
 SMALL = 1e-2  # squares of angles below which series are exact to rounding
 
 
-@inlined
+@inner
 def rotation_along(Qi, Qj, b, w):  # type: ignore[no-untyped-def]
     """Component along b of the rotation vector, less than half a turn; w[7] becomes its gradient by the rotation of i."""
     trace = 0.0
@@ -58,7 +58,7 @@ def rotation_along(Qi, Qj, b, w):  # type: ignore[no-untyped-def]
     return dot(w[4], b)
 
 
-@inlined
+@inner
 def tilt_along(Qi, Qj, axis, b, w):  # type: ignore[no-untyped-def]
     """Component along b, across an axis, of the rotation vector of the axis' tilt; w[7] as in `rotation_along`."""
     times(Qi, axis, w[4])
@@ -126,7 +126,7 @@ def off_line(knots, ends, of, t, rigid_motion, place, w):  # type: ignore[no-unt
     return value, turning
 
 
-@inlined
+@inner
 def foot(ends, n, X, w):  # type: ignore[no-untyped-def]
     """Place on line n at which a point w[11] stands square to it, sought from its nearest station on; see `spline_at`."""
     first, last = ends.line_at[n], ends.line_at[n + 1]
@@ -146,7 +146,7 @@ def foot(ends, n, X, w):  # type: ignore[no-untyped-def]
     return s
 
 
-@inlined
+@inner
 def spline_at(ends, n, s, X, w):  # type: ignore[no-untyped-def]
     """w[5] and w[8] become c' and c'' of line n at s, beyond its ends those of its tangents there, w[9] the way from c to
     w[11], and ends.weights and ends.slopes N and N'."""

@@ -4,7 +4,7 @@ Arrays of the latter are found by their addresses: each body has its own, as fac
 Where no body is sparse, `mass` and `arrays` may be None, and nothing of this is compiled.
 """
 
-from kedfem.compiled import compiled, inlined, inner
+from kedfem.compiled import compiled, inner
 from kedfem.dynamics.matrices.triangle_kernel import solved
 from kedfem.dynamics.system.algebra_kernel import add_transposed, copied, product
 from kedfem.dynamics.system.reference import integers_at, reals_at
@@ -38,7 +38,7 @@ def mass_times(of, bodies, i, x, out):  # type: ignore[no-untyped-def]
             to[j] = total
 
 
-@inlined
+@inner
 def shared_mass_times(ends, column, value, x, out):  # type: ignore[no-untyped-def]
     """Of all three components (n,), from those of x."""
     first, second, third = x

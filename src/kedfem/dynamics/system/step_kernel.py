@@ -8,7 +8,7 @@ again. A linear system is done after one: `linear_kernel`.
 
 import numpy as np
 
-from kedfem.compiled import compiled, inlined, inner
+from kedfem.compiled import compiled, inner
 from kedfem.dynamics.anderson_kernel import mixed
 from kedfem.dynamics.beams_kernel import begun, ended
 from kedfem.dynamics.system.algebra_kernel import (
@@ -110,7 +110,7 @@ def beyond(knots, ends):  # type: ignore[no-untyped-def]
     return -1
 
 
-@inlined
+@inner
 def begin(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type: ignore[no-untyped-def]
     """The predictor, right-hand sides of bodies with rigid-body frames, the common matrix of z."""
     R, h = driving.R[t], c.h
@@ -140,7 +140,7 @@ def begin(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type:
     unmoved(ends, of, driving, t, trial, work)
 
 
-@inlined
+@inner
 def passes(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type: ignore[no-untyped-def]
     """Pass after pass, until none asks for a change; whether that came, and the body that moved most."""
     memory = (state.pairs, state.products, state.last, trial.mixing)
@@ -173,7 +173,7 @@ def passes(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type
     return False, worst
 
 
-@inlined
+@inner
 def asked(c, bodies, ends, of, driving, t, iteration, state, trial, work, solved):  # type: ignore[no-untyped-def]
     """The change of bodies with frames of their own, and of z, that a pass asks for."""
     trial.right[:] = 0.0
@@ -215,7 +215,7 @@ def asked(c, bodies, ends, of, driving, t, iteration, state, trial, work, solved
         trial.change[len(trial.change) - k + m] = c.weight * trial.dz[m]
 
 
-@inlined
+@inner
 def sizes(c, bodies, state, trial):  # type: ignore[no-untyped-def]
     """Squares of the change asked for, and of what a step has moved; the body that changes most."""
     size, reached, most, worst, k = 0.0, 0.0, -1.0, -1, len(trial.z)
@@ -237,7 +237,7 @@ def sizes(c, bodies, state, trial):  # type: ignore[no-untyped-def]
     return size, reached, worst
 
 
-@inlined
+@inner
 def deflected(bodies, trial):  # type: ignore[no-untyped-def]
     """Square of the deflection of all bodies, as changes are measured."""
     total = 0.0
@@ -247,7 +247,7 @@ def deflected(bodies, trial):  # type: ignore[no-untyped-def]
     return total
 
 
-@inlined
+@inner
 def taken(c, bodies, trial):  # type: ignore[no-untyped-def]
     """The change becomes part of the end of the step."""
     u, change = trial.u, trial.change
@@ -260,7 +260,7 @@ def taken(c, bodies, trial):  # type: ignore[no-untyped-def]
         trial.z[m] += trial.change[len(trial.change) - k + m] / c.weight
 
 
-@inlined
+@inner
 def finish(c, bodies, ends, of, driving, t, state, trial, work, history):  # type: ignore[no-untyped-def]
     """What the passes found becomes the state, and row t of the history."""
     R, F = driving.R[t], driving.F[t]

@@ -3,7 +3,7 @@
 Without any, `of` may be None: nothing of this is compiled then.
 """
 
-from kedfem.compiled import inlined, inner
+from kedfem.compiled import inner
 from kedfem.dynamics.system.algebra_kernel import frame_copied, turned, turned_back
 from kedfem.dynamics.system.bodies_kernel import right_hand_side
 
@@ -79,7 +79,7 @@ def add_stress(of, bodies, i, entries, g, room, out):  # type: ignore[no-untyped
             scalar_times(of, i, bodies.dense[i], k, row, out[b * n : (b + 1) * n])
 
 
-@inlined
+@inner
 def scalar_times(of, i, dense, k, x, out):  # type: ignore[no-untyped-def]
     """out + k x, k (n, n) full or of the body's sparsity pattern."""
     n = len(x)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from kedfem.compiled import inlined, inner
+from kedfem.compiled import inner
 
 
 @inner
@@ -41,7 +41,7 @@ def turned_loads(loads, bodies, R, amounts, u, f, frame):  # type: ignore[no-unt
                     f[first + b * n + x] -= p * loads.force[at + m * n + x]
 
 
-@inlined
+@inner
 def shown_frame(loads, bodies, w, R, u, frame):  # type: ignore[no-untyped-def]
     """frame becomes the axes of the directions that show how load w has turned, in columns, world components."""
     i, at = loads.body[w], loads.shown_at[w]

@@ -11,10 +11,10 @@ is one cycle, to the other extreme. pyLife's `FourPointDetector` counts the same
 
 import numpy as np
 
-from kedfem.compiled import compiled, inlined, inner
+from kedfem.compiled import compiled, inner
 
 
-@inlined
+@inner
 def turning_points(h, q, out):  # type: ignore[no-untyped-def]
     """Fill in the turning points of a closed history, from its largest value in size; returns how many there are."""
     T, k = h.shape[1], 0
@@ -34,7 +34,7 @@ def turning_points(h, q, out):  # type: ignore[no-untyped-def]
     return n
 
 
-@inlined
+@inner
 def reversed_amplitude(a, m, M):  # type: ignore[no-untyped-def]
     """The amplitude with mean 0 that does the same as a with mean m: Haigh's diagram of the FKM guideline."""
     if m <= -a:
@@ -44,7 +44,7 @@ def reversed_amplitude(a, m, M):  # type: ignore[no-untyped-def]
     return (a + M / 3 * min(m, 3 * a)) / (1 + M / 3) * (1 + M)
 
 
-@inlined
+@inner
 def damage_of(a, S, N, floor):  # type: ignore[no-untyped-def]
     """Of one cycle with an amplitude a and mean 0."""
     if a <= floor or a <= 0.0:

@@ -15,7 +15,7 @@ Cauchy and Schwarz, a bound of the rest mostly show that there is no extreme; al
 
 import numpy as np
 
-from kedfem.compiled import compiled, inlined, inner
+from kedfem.compiled import compiled, inner
 
 LEVELS = 5  # windows of at most 2^5 steps
 
@@ -44,7 +44,7 @@ def residuals_of(C, m, out):  # type: ignore[no-untyped-def]
             out[level, k, m] = np.sqrt(rest)
 
 
-@inlined
+@inner
 def head_at(heads, i, C, t, seen, k):  # type: ignore[no-untyped-def]
     """The six components seen[k] of a point at one time by the leading modes; returns their von Mises stress."""
     a, b, d, e, f, g = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -60,7 +60,7 @@ def head_at(heads, i, C, t, seen, k):  # type: ignore[no-untyped-def]
     return np.sqrt(a * a + b * b + d * d + e * e + f * f)
 
 
-@inlined
+@inner
 def stress_at(parts, i, C, t, seen, k):  # type: ignore[no-untyped-def]
     """The same by all modes."""
     for q in range(6):
@@ -80,7 +80,7 @@ def tensor(seen, k):  # type: ignore[no-untyped-def]
     return a - b, -a - b, 2 * b, root * seen[k, 2], root * seen[k, 3], root * seen[k, 4]
 
 
-@inlined
+@inner
 def principal(seen, k):  # type: ignore[no-untyped-def]
     """Largest and smallest principal stress, by the angle of Lode."""
     mean, vm = seen[k, 5], seen[k, 6]
@@ -137,7 +137,7 @@ def looked_at(heads, parts, size, C, rest, i, t, first, seen, k, highest, at):  
     return 1
 
 
-@inlined
+@inner
 def skipped(seen, a, b, more, spread, highest, i):  # type: ignore[no-untyped-def] # noqa: PLR0913, PLR0917
     """Whether no time between two ends can hold an extreme."""
     if max(seen[a, 6] + seen[a, 7], seen[b, 6] + seen[b, 7]) + more > highest[0, i]:
@@ -149,7 +149,7 @@ def skipped(seen, a, b, more, spread, highest, i):  # type: ignore[no-untyped-de
     return True
 
 
-@inlined
+@inner
 def sizes_of(heads, parts, i, size):  # type: ignore[no-untyped-def]
     """Of each leading mode, and of all others together, what one unit changes: von Mises, principal stresses."""
     m, r = heads.shape[1], parts.shape[2]
