@@ -57,9 +57,7 @@ def _deflections(link: Link, joint: Attachment, fixed: bool) -> list[Float[np.nd
     return [column.reshape(link.n, link.d) for column in found.T]
 
 
-def _normal_modes(
-    link: Link, M: sp.csr_array, solve: Callable[[np.ndarray], np.ndarray], fixed: bool
-) -> Columns:
+def _normal_modes(link: Link, M: sp.csr_array, solve: Callable[[np.ndarray], np.ndarray], fixed: bool) -> Columns:
     """The lowest, without the six rigid ones of a free link."""
     rigid = 0 if fixed else 6
     inverse = LinearOperator(M.shape, matvec=solve, dtype=float)

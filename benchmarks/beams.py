@@ -54,8 +54,7 @@ def _run(nodes: int, elements: int, frames: str, steps: int) -> tuple[Histories,
 def _scene(nodes: int, elements: int, frames: str, steps: int) -> Scene:
     raw = mechanisms()["beam four-bar"]
     links = {
-        name: {**link, "element": f"beam{nodes}", "mesh": {"elements": elements}}
-        for name, link in raw["links"].items()
+        name: {**link, "element": f"beam{nodes}", "mesh": {"elements": elements}} for name, link in raw["links"].items()
     }
     analysis = {"revolutions": TURNS, "steps_per_revolution": steps, "initial": "rest", "frames": frames}
     return scene_from({**raw, "links": links, "analysis": analysis})

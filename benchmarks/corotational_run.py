@@ -118,9 +118,7 @@ def first_state(ready: Prepared, solver: Any) -> Any:
     return started(ready.scene, ready.linkage, ready.path, ready.model, solver)
 
 
-def advanced(
-    ready: Prepared, solver: Any, state: Any, forcing: Sequence[Forcing], motion: RigidMotion
-) -> Any:
+def advanced(ready: Prepared, solver: Any, state: Any, forcing: Sequence[Forcing], motion: RigidMotion) -> Any:
     """What a solver hands on of some steps: links first, its state last."""
     return solver.advance(state, forcing, motion, _motion_at(ready))
 

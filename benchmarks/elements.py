@@ -78,9 +78,7 @@ def cost(work: Sequence[float], errors: Sequence[float], target: float) -> float
     if least[0] <= target:
         return float(work[0])
     k = int(np.argmax(least <= target))
-    return float(
-        np.exp(np.interp(-np.log(target), -np.log(least[k - 1 : k + 1]), np.log(work[k - 1 : k + 1])))
-    )
+    return float(np.exp(np.interp(-np.log(target), -np.log(least[k - 1 : k + 1]), np.log(work[k - 1 : k + 1]))))
 
 
 WORKS: dict[str, Callable[[Answer], float]] = {
@@ -98,10 +96,7 @@ def _costs(
     for part, elements in found.items():
         for name, target in TARGETS.items():
             for q in QUANTITIES:
-                ms = {
-                    e: cost([of(a) for _, a, _ in m], [x[q] for *_, x in m], target)
-                    for e, m in elements.items()
-                }
+                ms = {e: cost([of(a) for _, a, _ in m], [x[q] for *_, x in m], target) for e, m in elements.items()}
                 out[part, name, q] = {e: c for e, c in ms.items() if c is not None}
     return out
 
@@ -112,10 +107,7 @@ def _after(found: dict[str, Found]) -> tuple[list[str], list[str]]:
     works = {name: _costs(found, of) for name, of in WORKS.items()}
     rows = []
     for (part, target, q), ms in costs.items():
-        shown = (
-            " / ".join(_short(w[part, target, q][e]) for w in works.values()) if e in ms else "—"
-            for e in FORMS
-        )
+        shown = (" / ".join(_short(w[part, target, q][e]) for w in works.values()) if e in ms else "—" for e in FORMS)
         rows.append((part, target, q, *shown, _cheapest(ms)))
     return table(("part", "error", "of", *FORMS, "cheapest"), rows), _compared(costs)
 

@@ -65,11 +65,7 @@ def bench_levels(folder: Path, quick: bool) -> None:
 
 
 def _ready(case: Case, steps: int, levels: int) -> Prepared:
-    shape = (
-        {"kind": "bar", "width": 0.0254, "thickness": 0.0254}
-        if case.link is BEAMS
-        else {"kind": "plate_link", **EYE}
-    )
+    shape = {"kind": "bar", "width": 0.0254, "thickness": 0.0254} if case.link is BEAMS else {"kind": "plate_link", **EYE}
     raw = four_bar_of(shape, dict(case.link))
     raw["points"]["B"]["angle"] = 0 if case.link is BEAMS else "60 deg"
     if case.damped:
@@ -136,8 +132,7 @@ def _numerical_damping() -> list[str]:
         cells = [f"{rho:g}"]
         for levels in (2, 3):
             far, near = (
-                _error(_marched(_ready(of, n, levels)).values[SHOWN["stress"]], truth, 2000 / n)
-                for n in (500, 1000)
+                _error(_marched(_ready(of, n, levels)).values[SHOWN["stress"]], truth, 2000 / n) for n in (500, 1000)
             )
             cells += [f"{100 * far:.2g} %", f"{100 * near:.2g} %", f"{np.log2(far / near):.1f}"]
         out.append(tuple(cells))

@@ -174,9 +174,7 @@ def one(topology: str, n: int, limit: float, checkout: Path | None) -> Raw | Non
     environment = {**os.environ, "PYTHONPATH": f"{(checkout or here.parents[1]) / 'src'}"}
     command = [sys.executable, str(here), "--one", topology, str(n)]
     try:
-        done = subprocess.run(
-            command, capture_output=True, text=True, check=False, timeout=limit, env=environment
-        )
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=limit, env=environment)
     except subprocess.TimeoutExpired:
         return None
     if done.returncode:
@@ -190,9 +188,7 @@ def row(name: str, found: Raw | None, limit: float) -> str:
     if found is None:
         return f"| {name} | > {limit:.0f} |  |  |  |"
     spent = found["seconds"]
-    stages = sorted(
-        (k for k in spent if k != "whole" and spent[k] >= 0.03 * spent["whole"]), key=lambda k: -spent[k]
-    )
+    stages = sorted((k for k in spent if k != "whole" and spent[k] >= 0.03 * spent["whole"]), key=lambda k: -spent[k])
     most = ", ".join(f"{k} {spent[k]:.2f}" for k in stages[:5])
     return f"| {name} | {spent['whole']:.2f} | {found['memory'] / 1e6:.0f} | {found['peak'] / 1e6:.0f} | {most} |"
 

@@ -72,9 +72,7 @@ def recorded_rate(ready: Prepared) -> float:
 def least_time(ready: Prepared, bandwidth: float, rate: float) -> tuple[float, float]:
     """Seconds that a step's products need at a machine's speed: by memory (all from RAM), by arithmetic."""
     solver: Any = steps_of(ready.scene, ready.model)
-    numbers = sum(
-        x.G.size + 2 * x.Y.size + x.S.size + x.W.size for x in solver.ready.parts
-    )  # Y is used twice
+    numbers = sum(x.G.size + 2 * x.Y.size + x.S.size + x.W.size for x in solver.ready.parts)  # Y is used twice
     read = sum(x.G.size + x.Y.size + x.S.size + x.W.size for x in solver.ready.parts)
     return 8 * read / bandwidth, 2 * numbers / rate
 

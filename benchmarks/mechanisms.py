@@ -18,18 +18,14 @@ def plates(accuracy: float) -> Scene:
     }
     raw = four_bar_of(shape, {})
     raw["drive"]["motion"]["speed"] = "150 rpm"
-    return _asking(
-        raw, accuracy, {"revolutions": 0.5, "initial": "quasi-static"}, {"stress": "M", "middle": "N"}
-    )
+    return _asking(raw, accuracy, {"revolutions": 0.5, "initial": "quasi-static"}, {"stress": "M", "middle": "N"})
 
 
 def bars(accuracy: float) -> Scene:
     """The same of bars, from a quasi-static start at 300 rpm."""
     raw = four_bar_of({"kind": "bar", "width": 0.0254, "thickness": 0.0254}, {})
     raw["drive"]["motion"]["speed"] = "300 rpm"
-    return _asking(
-        raw, accuracy, {"revolutions": 0.5, "initial": "quasi-static"}, {"stress": "M", "middle": "N"}
-    )
+    return _asking(raw, accuracy, {"revolutions": 0.5, "initial": "quasi-static"}, {"stress": "M", "middle": "N"})
 
 
 def slider_crank(accuracy: float) -> Scene:
@@ -108,10 +104,7 @@ def _asking(raw: dict[str, Any], accuracy: float, analysis: dict[str, Any], on: 
     usual = {"stress": ("rocker", "M", "stress"), "middle": ("coupler", "N", "displacement")}
     probes = {name: usual[name] if isinstance(place, str) else place for name, place in on.items()}
     raw["output"] = {
-        "probes": {
-            name: {"link": link, "at": at, "quantity": quantity}
-            for name, (link, at, quantity) in probes.items()
-        }
+        "probes": {name: {"link": link, "at": at, "quantity": quantity} for name, (link, at, quantity) in probes.items()}
     }
     raw["analysis"] = {**analysis, "accuracy": accuracy, "frames": "rigid-body"}  # as the reference has them
     raw.setdefault("damping", {"ratio": 0.02, "frequencies": [20, 200]})

@@ -70,7 +70,5 @@ def marched(model: Model, scheme: Scheme, motion: RigidMotion) -> tuple[Float[np
 
 
 def _solved(A: sp.csr_array, right: Column) -> Column:
-    lu = splu(
-        sp.csc_array(A), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-    )
+    lu = splu(sp.csc_array(A), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     return np.asarray(lu.solve(right))

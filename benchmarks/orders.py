@@ -59,9 +59,7 @@ def bench_orders(folder: Path, quick: bool) -> None:
         tables += [_table(found, asked) for asked in ASKED]
         costs.append((f"{TIMED[name]}, µs", *(f"{1e6 * x.second:.1f}" for x in found.values())))
         if any(x.coupled for x in found.values()):
-            costs.append(
-                ("pass of two coupled stages, of a pass", *(f"{x.coupled:.2f}" for x in found.values()))
-            )
+            costs.append(("pass of two coupled stages, of a pass", *(f"{x.coupled:.2f}" for x in found.values())))
         drawn = {scene: {k: ([1e3 * x.second * w for w in work], e) for k, (work, e) in x.curves.items()}
                  for scene, x in found.items()}  # fmt: skip
         write_grid(folder / f"{name}.png", drawn, "processor time a turn [ms]")

@@ -67,9 +67,7 @@ class Corotational(Mechanism):
         """Levels of so many steps; and those without the coarsest, which show how far off the truth is."""
         runs = [self.alpha(steps * 2**k) for k in range(count)]
         fine = runs[-1]
-        return Run(extrapolated([x.u for x in runs]), 0, 0.0, fine.energy), extrapolated(
-            [x.u for x in runs[1:]]
-        )
+        return Run(extrapolated([x.u for x in runs]), 0, 0.0, fine.energy), extrapolated([x.u for x in runs[1:]])
 
     @property
     def large(self) -> bool:
@@ -143,9 +141,7 @@ def stage_numbers(of: Corotational, h: float, share: float) -> tuple[Ready, Coef
     """The system made ready for stages of a factor, their numbers, and these with zeros for those of the history."""
     g, zero = share * h, np.zeros(3)
     made = ready(of.of.system, Newmark(h, 0.0, 0.0, share**2, share), of.of.c.tolerance)
-    own = made.c._replace(
-        acceleration=np.array([1 / g**2, 0, 0]), rate=np.array([1 / g, 0, 0]), late=g, early=0.0
-    )
+    own = made.c._replace(acceleration=np.array([1 / g**2, 0, 0]), rate=np.array([1 / g, 0, 0]), late=g, early=0.0)
     return made, own, own._replace(acceleration=zero, rate=zero, late=0.0)
 
 

@@ -129,9 +129,7 @@ class Equation:
         found[:, :, found.shape[2] - k :] = [each.gradients(np.zeros(k)).toarray() for each in instants]
         waves = np.asarray(np.fft.rfft(found, axis=0)) / WAVES
         waves[1:] *= 2
-        return waves[
-            : 1 + int(np.flatnonzero(np.abs(waves).max(axis=(1, 2), initial=0.0) > 1e-14).max(initial=0))
-        ]
+        return waves[: 1 + int(np.flatnonzero(np.abs(waves).max(axis=(1, 2), initial=0.0) > 1e-14).max(initial=0))]
 
 
 def _waves(
@@ -146,9 +144,7 @@ def _waves(
         dR[:2, :2] = [[-np.sin(a), -np.cos(a)], [np.cos(a), -np.sin(a)]]
         whole, other = (scipy.linalg.block_diag(*[x] * (len(K0) // d)) for x in (R, dR if turning else R))
         found.append(T.T @ whole @ K0 @ other.T @ T)
-    basis = np.stack(
-        [np.ones(5), np.cos(angles), np.sin(angles), np.cos(2 * angles), np.sin(2 * angles)], axis=1
-    )
+    basis = np.stack([np.ones(5), np.cos(angles), np.sin(angles), np.cos(2 * angles), np.sin(2 * angles)], axis=1)
     return list(np.tensordot(np.linalg.inv(basis), np.array(found), 1))
 
 

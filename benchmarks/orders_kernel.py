@@ -144,9 +144,7 @@ def inside(c, c_inside, bodies, driving, t, size, state, trial, work):  # type: 
                         state.strain[1, beam, m, e] += scale * trial.strained[beam, m, e]
         for i in range(len(bodies.motion)):
             first, own = bodies.at[i], bodies.at[i + 1] - bodies.at[i]
-            turned_back(
-                R[bodies.motion[i]], bodies.components[i], trial.r[first : first + own], work.room[:own]
-            )
+            turned_back(R[bodies.motion[i]], bodies.components[i], trial.r[first : first + own], work.room[:own])
             for x in range(own):
                 state.damped[3 * first + own + x] = c.alpha * work.room[x]
     seen(c_inside, bodies, driving, t, state, trial, work)

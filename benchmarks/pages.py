@@ -72,9 +72,7 @@ def write_page(folder: Path, name: str, tables: Sequence[list[str]]) -> None:
         lines += left.pop(0) if tabular and left else former
     if left:
         raise ValueError(f"{page.name}: must have {len(tables)} tables, got {len(tables) - len(left)}")
-    named = [
-        f"{a}{MEASURED}{machine()}." if b else a for a, b, _ in (line.partition(MEASURED) for line in lines)
-    ]
+    named = [f"{a}{MEASURED}{machine()}." if b else a for a, b, _ in (line.partition(MEASURED) for line in lines)]
     folder.mkdir(parents=True, exist_ok=True)
     (folder / page.name).write_text("\n".join([*named, ""]), encoding="utf-8")
 

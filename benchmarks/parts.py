@@ -73,9 +73,7 @@ class Answer:
 
     def errors(self, exact: "Answer") -> dict[str, float]:
         """Greatest relative error of each quantity."""
-        return {
-            name: float(np.abs(found / exact.values[name] - 1).max()) for name, found in self.values.items()
-        }
+        return {name: float(np.abs(found / exact.values[name] - 1).max()) for name, found in self.values.items()}
 
 
 def answer(part: BenchPart, element: str, size: Size, repeats: int) -> Answer:
@@ -230,15 +228,11 @@ PARTS = (
         BAR,
         name="slender bar, distorted mesh",
         moved=0.25,
-        sizes={
-            element: sizes for element, sizes in BAR.sizes.items() if element != "tet10"
-        },  # they would fold
+        sizes={element: sizes for element, sizes in BAR.sizes.items() if element != "tet10"},  # they would fold
     ),
     BenchPart(
         "plate with bores",
-        PlateLink(
-            between=((0.0, 0.0, 0.0), (0.1, 0.0, 0.0)), width=0.03, thickness=0.005, bore_diameter=0.015
-        ),
+        PlateLink(between=((0.0, 0.0, 0.0), (0.1, 0.0, 0.0)), width=0.03, thickness=0.005, bore_diameter=0.015),
         force=(1.0, 0.0, 0.0),
         stressed=(-0.015, 0.0, 0.0),
         near=2000.0,

@@ -46,11 +46,7 @@ def bench_ports(folder: Path, quick: bool) -> None:
     for size in sizes:
         link = part_link(PLATE, "hex20", size)
         averaged, stiff = _found(link), _found(_stiffened(link, STIFF))
-        pairs = [
-            (1e6 * a.deflection[load], 1e6 * b.deflection[load])
-            for a, b in [(averaged, stiff)]
-            for load in LOADS
-        ]
+        pairs = [(1e6 * a.deflection[load], 1e6 * b.deflection[load]) for a, b in [(averaged, stiff)] for load in LOADS]
         pairs += [(averaged.frequency, stiff.frequency)]
         pairs += [(1e-6 * averaged.stress[load], 1e-6 * stiff.stress[load]) for load in LOADS]
         rows.append(("×".join(map(str, size)), f"{link.unknowns:,}", *(_change(*pair) for pair in pairs)))

@@ -89,9 +89,7 @@ def _ways(folder: Path, counts: Sequence[int]) -> list[str]:
     return table(header, rows)
 
 
-def _estimates(
-    scenes: dict[str, dict[str, object]], tolerances: Sequence[float]
-) -> tuple[list[str], list[str]]:
+def _estimates(scenes: dict[str, dict[str, object]], tolerances: Sequence[float]) -> tuple[list[str], list[str]]:
     """The estimated error against the true one, scene by scene."""
     rows, ratios = [], []
     for name, raw in scenes.items():
@@ -141,9 +139,7 @@ def _loop(folder: Path, counts: Sequence[int]) -> tuple[list[str], list[str]]:
     write_loglog(folder, "reduction_loop", curves, ("modes per link", "seconds per step"))
     header = ("modes per link", "a step [µs]", "matrices from memory [µs]",
               "flops at BLAS speed [µs]", "step / limit", "steps a second, recorded")  # fmt: skip
-    machine = table(
-        ("memory [GB/s]", "products [Gflop/s]"), [(f"{speed[0] / 1e9:.1f}", f"{speed[1] / 1e9:.1f}")]
-    )
+    machine = table(("memory [GB/s]", "products [Gflop/s]"), [(f"{speed[0] / 1e9:.1f}", f"{speed[1] / 1e9:.1f}")])
     return table(header, rows), machine
 
 

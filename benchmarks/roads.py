@@ -36,9 +36,7 @@ def plate(length: float, width: float, thickness: float, bore: float) -> PlateLi
     return PlateLink(between=ends, width=width, thickness=thickness, bore_diameter=bore)
 
 
-def extrusion(
-    corners: tuple[tuple[float, float], ...], thickness: float, holes: tuple[HOLE, ...]
-) -> Extrusion:
+def extrusion(corners: tuple[tuple[float, float], ...], thickness: float, holes: tuple[HOLE, ...]) -> Extrusion:
     """A polygon with holes (x, y, diameter)."""
     raw = {
         "kind": "extrusion", "outline": [[x, y, 0.0] for x, y in corners], "thickness": thickness,

@@ -77,8 +77,7 @@ def plate_four_bar(model: str, across: int, thickness: float, steps_per_revoluti
 def four_bar_of(shape: dict[str, Any], link: dict[str, Any]) -> dict[str, Any]:
     """The tables of a four-bar whose links have one shape."""
     links = {
-        name: {"material": "alloy", "shape": {**shape, "between": list(ends)}, **link}
-        for name, ends in LENGTHS.items()
+        name: {"material": "alloy", "shape": {**shape, "between": list(ends)}, **link} for name, ends in LENGTHS.items()
     }
     joined = {
         "A": ("ground", "crank"),

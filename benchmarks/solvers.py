@@ -58,9 +58,7 @@ def _solvers() -> dict[str, Factored]:
 
 def _superlu(A: sp.csr_array) -> Callable[[np.ndarray], np.ndarray]:
     options = {"SymmetricMode": True}
-    lu = scipy.sparse.linalg.splu(
-        sp.csc_array(A), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options
-    )
+    lu = scipy.sparse.linalg.splu(sp.csc_array(A), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
     return lu.solve  # type: ignore[no-any-return]
 
 

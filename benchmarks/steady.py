@@ -57,9 +57,7 @@ def scene_of(name: str, damping: float, reduced: bool = False) -> Scene:
 
 def map_of(ready: Prepared) -> PeriodMap:
     """The map of its period, from rest."""
-    scene = ready.scene.model_copy(
-        update={"analysis": ready.scene.analysis.model_copy(update={"kind": "transient"})}
-    )
+    scene = ready.scene.model_copy(update={"analysis": ready.scene.analysis.model_copy(update={"kind": "transient"})})
     solver = level_steps(scene, ready.model)[0]
     start = started(scene, ready.linkage, ready.path, ready.model, solver)
 

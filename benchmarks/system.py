@@ -188,9 +188,7 @@ def main() -> None:
     for (name, elements), count in zip(SOLIDS.items(), PAIRS, strict=True):
         step, solves = beside_solves(solid(elements), *count)
         print(f"| {name} | {step:.0f} | {solves:.0f} | {step / solves:.2f} |", flush=True)
-    print(
-        "\n| scene | start, s | steps, s | recorded too, s | solves, s | ratio | recorded | with the start |"
-    )
+    print("\n| scene | start, s | steps, s | recorded too, s | solves, s | ratio | recorded | with the start |")
     print("|---|---:|---:|---:|---:|---:|---:|---:|")
     start, steps, recorded, solves = example_beside_solves(STAGE / "scene.toml", 8)
     seconds = " | ".join(f"{x:.3f}" for x in (start, steps, recorded, solves))

@@ -33,9 +33,7 @@ nb_execution_raise_on_error = True
 
 # names of other packages are no targets here: nothing is fetched while building
 nitpicky = True
-inner = (
-    r"kedfem\.(scene\.base|accuracy|results\.(differences|kinematic|forces\.load_cases)|links|dynamics)\..*"
-)
+inner = r"kedfem\.(scene\.base|accuracy|results\.(differences|kinematic|forces\.load_cases)|links|dynamics)\..*"
 nitpick_ignore_regex = [("py:.*", r"(?!kedfem\.).*"), ("py:class", inner)]
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
@@ -87,9 +85,7 @@ def _fields(_app: Sphinx, what: str, _name: str, _obj: object, _options: object,
     lines[:] = out
 
 
-def _parameters(
-    _app: Sphinx, what: str, _name: str, _obj: object, _options: object, lines: list[str]
-) -> None:
+def _parameters(_app: Sphinx, what: str, _name: str, _obj: object, _options: object, lines: list[str]) -> None:
     """Lines `name : meaning` below a heading such as Parameters: what follows the colon is no type."""
     if what == "class":
         return

@@ -83,8 +83,7 @@ def swept(occ: Occ, radius: float, bends: list[Point], inner: float = 0.0) -> in
             continue
         points = [occ.addPoint(*at) for at in bends]
         arcs = [
-            occ.addCircleArc(points[k], points[k + 1], points[k + 2], center=False)
-            for k in range(0, len(points) - 2, 2)
+            occ.addCircleArc(points[k], points[k + 1], points[k + 2], center=False) for k in range(0, len(points) - 2, 2)
         ]
         wire = occ.addWire(arcs)
         face = occ.addDisk(*bends[0], r, r, zAxis=[0, 1, 0])
@@ -101,9 +100,7 @@ def anywhere(_: Point, __: Point) -> bool:
 
 @part
 def plate_with_chamfered_bores(occ: Occ) -> int:
-    body = without(
-        occ, box(occ, (0, 100), (0, 30), (0, 10)), [disc(occ, (x, 15, 6), (-1, 11)) for x in (20, 80)]
-    )
+    body = without(occ, box(occ, (0, 100), (0, 30), (0, 10)), [disc(occ, (x, 15, 6), (-1, 11)) for x in (20, 80)])
     return chamfered(occ, body, 1.0, lambda at, _: min(hypot(at[0] - x, at[1] - 15) for x in (20, 80)) < 7)
 
 
@@ -125,16 +122,12 @@ def casting(occ: Occ) -> int:
     boss = occ.addCone(25, 25, 4, 0, 0, 36, 14, 10)
     rib = occ.addWedge(25, 22, 6, 45, 6, 30, ltx=5)
     body = joined(occ, [base, boss, rib])
-    return without(
-        occ, body, [disc(occ, (25, 25, 6), (-1, 50)), *(disc(occ, (70, y, 3), (-1, 9)) for y in (10, 40))]
-    )
+    return without(occ, body, [disc(occ, (25, 25, 6), (-1, 50)), *(disc(occ, (70, y, 3), (-1, 9)) for y in (10, 40))])
 
 
 @part
 def ribbed_bell_crank(occ: Occ) -> int:
-    web = joined(
-        occ, [strap(occ, (0, 0, 14), (70, 0, 10), (-3, 3)), strap(occ, (0, 0, 14), (0, 55, 9), (-3, 3))]
-    )
+    web = joined(occ, [strap(occ, (0, 0, 14), (70, 0, 10), (-3, 3)), strap(occ, (0, 0, 14), (0, 55, 9), (-3, 3))])
     ribs = [occ.addWedge(0, -3, 3, 70, 6, 8, ltx=62), occ.addWedge(-3, 0, 3, 6, 55, 8, ltx=3)]
     hubs = [occ.addCone(*at, -8, 0, 0, 16, r, r - 1) for at, r in (((0, 0), 14), ((70, 0), 10), ((0, 55), 9))]
     body = joined(occ, [web, *ribs, *hubs])
@@ -149,9 +142,7 @@ def ribbed_bell_crank(occ: Occ) -> int:
 def i_section_rod(occ: Occ) -> int:
     eyes = [disc(occ, (0, 0, 26), (-9, 9)), disc(occ, (120, 0, 15), (-9, 9))]
     shank = plate(occ, [(15, -12, 0), (112, -8, 0), (112, 8, 0), (15, 12, 0)], (-7, 7))
-    pockets = [
-        plate(occ, [(32, -7, 3), (100, -4.5, 3), (100, 4.5, 3), (32, 7, 3)], z) for z in ((2, 8), (-8, -2))
-    ]
+    pockets = [plate(occ, [(32, -7, 3), (100, -4.5, 3), (100, 4.5, 3), (32, 7, 3)], z) for z in ((2, 8), (-8, -2))]
     bosses = [box(occ, (-18, 14), (y - 7, y + 7), (-8, 8)) for y in (-26, 26)]
     body = joined(occ, [without(occ, shank, pockets), *eyes, *bosses])
     bolts = [rod(occ, (-20, y, 0), (36, 0, 0), 3.5) for y in (-27.5, 27.5)]
@@ -231,9 +222,7 @@ def stepped_shaft(occ: Occ) -> int:
         occ,
         body,
         2.0,
-        lambda at, _: (
-            (abs(at[0] - 40) < 0.1 and hypot(*at[1:]) < 11) or (abs(at[0] - 90) < 0.1 and hypot(*at[1:]) < 9)
-        ),
+        lambda at, _: (abs(at[0] - 40) < 0.1 and hypot(*at[1:]) < 11) or (abs(at[0] - 90) < 0.1 and hypot(*at[1:]) < 9),
     )
 
 
@@ -268,9 +257,7 @@ def crank_with_counterweight(occ: Occ) -> int:
     sector = without(occ, disc(occ, (0, 0, 45), (0, 14)), [box(occ, (-60, 60), (-10, 60), (-1, 15))])
     web = strap(occ, (0, 0, 18), (32, 20, 15), (0, 14))
     body = joined(occ, [sector, web, disc(occ, (32, 20, 9), (14, 40)), disc(occ, (0, 0, 14), (-25, 0))])
-    return rounded(
-        occ, body, 1.0, lambda at, _: abs(at[2] - 14) < 0.1 and hypot(at[0] - 32, at[1] - 20) < 9.5
-    )
+    return rounded(occ, body, 1.0, lambda at, _: abs(at[2] - 14) < 0.1 and hypot(at[0] - 32, at[1] - 20) < 9.5)
 
 
 @part
@@ -377,9 +364,7 @@ def spoked_wheel(occ: Occ) -> int:
     spokes = [plate(occ, [(14 * cos(a) - 5 * sin(a), 14 * sin(a) + 5 * cos(a), 0), (14 * cos(a) + 5 * sin(a), 14 * sin(a) - 5 * cos(a), 0),
                           (54 * cos(a) + 3 * sin(a), 54 * sin(a) - 3 * cos(a), 0), (54 * cos(a) - 3 * sin(a), 54 * sin(a) + 3 * cos(a), 0)], (4, 12))
               for a in (2 * pi * k / 5 for k in range(5))]  # fmt: skip
-    return without(
-        occ, joined(occ, [rim, disc(occ, (0, 0, 18), (-4, 20)), *spokes]), [disc(occ, (0, 0, 9), (-5, 21))]
-    )
+    return without(occ, joined(occ, [rim, disc(occ, (0, 0, 18), (-4, 20)), *spokes]), [disc(occ, (0, 0, 9), (-5, 21))])
 
 
 @part
@@ -394,9 +379,7 @@ def flanged_pipe(occ: Occ) -> int:
     )
     bolts = [rod(occ, (-1, 31 * cos(k * pi / 3), 31 * sin(k * pi / 3)), (12, 0, 0), 4) for k in range(6)]
     body = without(occ, body, [rod(occ, (-1, 0, 0), (82, 0, 0), 16), *bolts])
-    return rounded(
-        occ, body, 3.0, lambda at, _: hypot(*at[1:]) < 21 and hypot(*at[1:]) > 19 and 9 < at[0] < 71
-    )
+    return rounded(occ, body, 3.0, lambda at, _: hypot(*at[1:]) < 21 and hypot(*at[1:]) > 19 and 9 < at[0] < 71)
 
 
 @part
@@ -560,9 +543,7 @@ def impeller(occ: Occ) -> int:
         occ.rotate([(3, blade)], 0, 0, 0, 0, 0, 1, k * pi / 3)
         blades.append(blade)
     hub = occ.addCone(0, 0, 0, 0, 0, 28, 14, 9)
-    return without(
-        occ, joined(occ, [disc(occ, (0, 0, 42), (0, 5)), hub, *blades]), [disc(occ, (0, 0, 5), (-1, 30))]
-    )
+    return without(occ, joined(occ, [disc(occ, (0, 0, 42), (0, 5)), hub, *blades]), [disc(occ, (0, 0, 5), (-1, 30))])
 
 
 @part
@@ -611,9 +592,7 @@ def plate_with_a_tiny_edge(occ: Occ) -> int:
 
 @part
 def wedge_with_a_sliver(occ: Occ) -> int:
-    body = prism(
-        occ, [((0, 0, 0), None), ((90, 0, 0), None), ((90, 18, 0), None), ((0, 0.4, 0), None)], (0, 30)
-    )
+    body = prism(occ, [((0, 0, 0), None), ((90, 0, 0), None), ((90, 18, 0), None), ((0, 0.4, 0), None)], (0, 30))
     return without(occ, body, [rod(occ, (70, -1, 15), (0, 30, 0), 6)])
 
 
@@ -635,19 +614,13 @@ def angled_arm(occ: Occ) -> int:
     arm = box(occ, (0, 70), (-6, 6), (-4, 4))
     occ.rotate([(3, arm)], 0, 0, 0, 0, 1, 0, -radians(25))
     top = (70 * cos(radians(25)), 0.0, 70 * sin(radians(25)))
-    body = joined(
-        occ, [arm, rod(occ, (0, 0, -10), (0, 0, 20), 12), rod(occ, (top[0], -9, top[2]), (0, 18, 0), 9)]
-    )
-    return without(
-        occ, body, [rod(occ, (0, 0, -11), (0, 0, 22), 7), rod(occ, (top[0], -10, top[2]), (0, 20, 0), 5)]
-    )
+    body = joined(occ, [arm, rod(occ, (0, 0, -10), (0, 0, 20), 12), rod(occ, (top[0], -9, top[2]), (0, 18, 0), 9)])
+    return without(occ, body, [rod(occ, (0, 0, -11), (0, 0, 22), 7), rod(occ, (top[0], -10, top[2]), (0, 20, 0), 5)])
 
 
 @part
 def bored_block_in_inches(occ: Occ) -> int:
-    body = without(
-        occ, box(occ, (0, 3), (0, 1.5), (0, 1)), [disc(occ, (x, 0.75, 0.25), (-1, 2)) for x in (0.75, 2.25)]
-    )
+    body = without(occ, box(occ, (0, 3), (0, 1.5), (0, 1)), [disc(occ, (x, 0.75, 0.25), (-1, 2)) for x in (0.75, 2.25)])
     return rounded(occ, body, 0.0625, lambda at, along: abs(along[0]) > 0.99)
 
 
@@ -743,17 +716,9 @@ def main() -> None:
         f"{len(sizes)} of {len(PARTS)} parts meshed, {swept} with hexahedra; median {sizes[len(sizes) // 2]:,} unknowns, "
         f"most {sizes[-1]:,}."
     )
-    titled = [
-        (f"{name}\n{found[0]}", mesh)
-        for name, mesh in meshes
-        if mesh and (found := TURNED.search(mesh.method))
-    ]
-    write_mesh_picture(
-        titled, DOCS / "pictures" / "swept.png", "Swept about an axis, or along lines and arcs"
-    )
-    (DOCS / "catalogue.md").write_text(
-        HEAD.format(summary=summary) + "\n".join(lines) + "\n", encoding="utf-8"
-    )
+    titled = [(f"{name}\n{found[0]}", mesh) for name, mesh in meshes if mesh and (found := TURNED.search(mesh.method))]
+    write_mesh_picture(titled, DOCS / "pictures" / "swept.png", "Swept about an axis, or along lines and arcs")
+    (DOCS / "catalogue.md").write_text(HEAD.format(summary=summary) + "\n".join(lines) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

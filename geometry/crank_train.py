@@ -79,13 +79,9 @@ def rod(occ: ModuleType) -> int:
     z = (-HALF_FLANGE, HALF_FLANGE)
     shank = plate(occ, [(RADIUS, -13, 0), (WRIST, -9.5, 0), (WRIST, 9.5, 0), (RADIUS, 13, 0)], z)
     small, big = (disc(occ, circle, z) for circle in ((WRIST, 0, SMALL_EYE / 2), (RADIUS, 0, BIG_EYE / 2)))
-    lugs = box(
-        occ, (RADIUS - 12, RADIUS + 12), (-BOLT_AT - 8, BOLT_AT + 8), z
-    )  # what the bolts hold together
+    lugs = box(occ, (RADIUS - 12, RADIUS + 12), (-BOLT_AT - 8, BOLT_AT + 8), z)  # what the bolts hold together
     body = joined(occ, [shank, small, big, lugs])
-    body = rounded(
-        occ, body, 6.0, lambda at, along: upright(at, along) and (at[0] > RADIUS + 13 or _at_lug(at))
-    )
+    body = rounded(occ, body, 6.0, lambda at, along: upright(at, along) and (at[0] > RADIUS + 13 or _at_lug(at)))
     bosses = [(WRIST, 0.0, SMALL_EYE / 2 - 2), (RADIUS, 0.0, BIG_EYE / 2 - 2)]
     body = joined(occ, [body, *(disc(occ, circle, (-HALF_EYE, HALF_EYE)) for circle in bosses)])
     pockets = [_pocket(occ, side) for side in ((HALF_WEB, HALF_FLANGE + 1), (-HALF_FLANGE - 1, -HALF_WEB))]
@@ -116,9 +112,7 @@ def _bolt(occ: ModuleType, y: float) -> int:
     head = occ.addCylinder(RADIUS - 17, y, 0, 5.5, 0, 0, BOLT_HEAD / 2)
     nut = occ.addCylinder(RADIUS + 11.5, y, 0, 4.5, 0, 0, BOLT_HEAD / 2)
     end = occ.addCylinder(RADIUS + 15.5, y, 0, 3.5, 0, 0, BOLT / 2)
-    return joined(
-        occ, [joined(occ, [nut, end]), occ.addCylinder(RADIUS - 12, y, 0, 24, 0, 0, BOLT / 2), head]
-    )
+    return joined(occ, [joined(occ, [nut, end]), occ.addCylinder(RADIUS - 12, y, 0, 24, 0, 0, BOLT / 2), head])
 
 
 def piston(occ: ModuleType) -> int:
@@ -130,17 +124,11 @@ def piston(occ: ModuleType) -> int:
         eye = joined(occ, [disc(occ, (WRIST, 0, BOSS / 2), z), rib])
         length = CEILING + 4 - SKIRT
         bosses.append(
-            common(
-                occ, eye, occ.addCylinder(WRIST + SKIRT, 0, 0, length, 0, 0, PISTON / 2 - GROOVE_DEPTH - 0.5)
-            )
+            common(occ, eye, occ.addCylinder(WRIST + SKIRT, 0, 0, length, 0, 0, PISTON / 2 - GROOVE_DEPTH - 0.5))
         )
     bowl = occ.addSphere(WRIST + CROWN + 87, 0, 0, 90)
-    whole = without(
-        occ, joined(occ, [body, *bosses]), [bowl, disc(occ, (WRIST, 0, SMALL_BORE / 2), (-PISTON, PISTON))]
-    )
-    return rounded(
-        occ, whole, 1.0, lambda at, _: abs(at[0] - WRIST - CROWN) < 0.1 and hypot(*at[1:]) > PISTON / 2 - 1
-    )
+    whole = without(occ, joined(occ, [body, *bosses]), [bowl, disc(occ, (WRIST, 0, SMALL_BORE / 2), (-PISTON, PISTON))])
+    return rounded(occ, whole, 1.0, lambda at, _: abs(at[0] - WRIST - CROWN) < 0.1 and hypot(*at[1:]) > PISTON / 2 - 1)
 
 
 def pin(occ: ModuleType) -> int:

@@ -13,9 +13,7 @@ from geometry.step_files import write_step
 NAME = "engine"
 ANGLE = radians(60)
 CRANK_PIN = (crank.RADIUS * cos(ANGLE), crank.RADIUS * sin(ANGLE))
-SWING = asin(
-    CRANK_PIN[1] / connecting_rod.LENGTH
-)  # of the rod, towards the crank pin, about the slider's pin
+SWING = asin(CRANK_PIN[1] / connecting_rod.LENGTH)  # of the rod, towards the crank pin, about the slider's pin
 SLIDER_PIN = (CRANK_PIN[0] + connecting_rod.LENGTH * cos(SWING), 0.0)
 SOLIDS = {"crank": "crank", "rod": "connecting_rod", "slider": "slider"}
 

@@ -26,9 +26,7 @@ def main() -> None:
     drawn: list[tuple[str, SolidMesh]] = []
     lines = []
     for name in PARTS:
-        mesh = part_mesh(
-            link_from({"shape": {"kind": "cad", "file": f"{name}.step"}, "material": "steel"}), HERE
-        )
+        mesh = part_mesh(link_from({"shape": {"kind": "cad", "file": f"{name}.step"}, "material": "steel"}), HERE)
         least = mesh_quality(mesh).least
         surfaces = sum(face_kind(mesh, face) in {"bore", "ball seat", "ball"} for face in mesh.faces)
         lines.append(

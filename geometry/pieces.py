@@ -26,9 +26,7 @@ from kedfem.mesh.swept.revolved import revolution
 from kedfem.scene import Cad
 
 LONGEST = 60  # [s] for a part
-FILLET = np.radians(
-    100
-)  # that a cylinder turns: what turns less is a fillet or a rounded edge, and no place to cut
+FILLET = np.radians(100)  # that a cylinder turns: what turns less is a fillet or a rounded edge, and no place to cut
 PLACE = CadKeys("part", "solid")
 
 
@@ -36,9 +34,7 @@ def cutting_faces(solid: Solid) -> list[CadFace]:
     """Plane faces, bores and journals, of those on one surface the first."""
     found: list[CadFace] = []
     for face in solid.faces:
-        if face.kind == "plane" or (
-            face.kind == "cylinder" and face.area > FILLET * face.radius * face.length
-        ):
+        if face.kind == "plane" or (face.kind == "cylinder" and face.area > FILLET * face.radius * face.length):
             found += [] if any(same_surface(face, other, solid.extent) for other in found) else [face]
     return found
 
@@ -65,9 +61,7 @@ def surface(gmsh: ModuleType, face: CadFace, extent: float) -> list[tuple[int, i
         return [(2, occ.addPlaneSurface([occ.addCurveLoop(lines)]))]
     tag = occ.addCylinder(*(at - face.direction), *(2 * face.direction), face.radius / extent)
     occ.synchronize()
-    sides = [
-        s for s in gmsh.model.getBoundary([(3, tag)], oriented=False) if gmsh.model.getType(*s) == "Cylinder"
-    ]
+    sides = [s for s in gmsh.model.getBoundary([(3, tag)], oriented=False) if gmsh.model.getType(*s) == "Cylinder"]
     occ.remove([(3, tag)])
     return sides
 

@@ -25,6 +25,4 @@ def shape(occ: ModuleType) -> int:
     body = rounded(occ, body, FILLET, upright)
     boss = disc(occ, (0, 0, BOSS / 2), (-HALF_BOSS, HALF_BOSS))
     body = joined(occ, [body, boss, long_hole(RIM_WIDTH, HALF_RIM)])
-    return without(
-        occ, body, [disc(occ, (0, 0, BORE / 2), (-HALF_BOSS, HALF_BOSS)), long_hole(SLOT_WIDTH, HALF_RIM)]
-    )
+    return without(occ, body, [disc(occ, (0, 0, BORE / 2), (-HALF_BOSS, HALF_BOSS)), long_hole(SLOT_WIDTH, HALF_RIM)])

@@ -25,8 +25,7 @@ def shape(occ: ModuleType) -> int:
     axes = [_axis(x) for x in EYES]
     legs = [occ.addCone(*start, *_between(start, end), *LEG) for start, end in axes]
     left, right = (
-        tuple(a + BRACE_AT * way for a, way in zip(start, _between(start, end), strict=True))
-        for start, end in axes
+        tuple(a + BRACE_AT * way for a, way in zip(start, _between(start, end), strict=True)) for start, end in axes
     )
     brace = occ.addCylinder(*left, *_between(left, right), BRACE_RADIUS)
     low, high = (SEAT[2] + height for height in SEAT_HEIGHTS)

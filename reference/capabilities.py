@@ -75,10 +75,7 @@ def table(head: list[str], rows: list[list[str]]) -> str:
 
 def capabilities_page() -> str:
     """The text of docs/capabilities.md."""
-    joints = [
-        [name, *(cell("joints", {**facts, **more}) for more in COLUMNS.values())]
-        for name, facts in JOINTS.items()
-    ]
+    joints = [[name, *(cell("joints", {**facts, **more}) for more in COLUMNS.values())] for name, facts in JOINTS.items()]
     elements = [
         [name, *(cell(of, {"element": element, "joint": kind}) for kind in KINDS)]
         for name, (of, element) in ON_JOINTS.items()

@@ -20,10 +20,6 @@ def meanings(record: type[BaseModel]) -> dict[str, str]:
         if not isinstance(found, ast.ClassDef):
             raise TypeError(f"{each.__name__}: must be a class, got {type(found).__name__}")
         for field, text in pairwise(found.body):
-            if (
-                isinstance(field, ast.AnnAssign)
-                and isinstance(field.target, ast.Name)
-                and isinstance(text, ast.Expr)
-            ):
+            if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and isinstance(text, ast.Expr):
                 out[field.target.id] = str(ast.literal_eval(text.value))
     return out

@@ -42,9 +42,7 @@ class Told:
         paths = [f"{kind}{slash}{rest}/{word}" for kind in kinds.split("|") for word, unit in self.words().items()
                  if unit == channel.unit]  # fmt: skip
         named = any(re.fullmatch(re.escape(path).replace("NAME", "[^/]+"), channel.name) for path in paths)
-        framed = channel.frame == self.frame or (
-            self.frame == "either" and channel.frame in {"link", "world"}
-        )
+        framed = channel.frame == self.frame or (self.frame == "either" and channel.frame in {"link", "world"})
         return named and framed and _among(channel.columns, self.columns)
 
 

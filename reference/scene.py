@@ -181,9 +181,7 @@ def scene_reference() -> str:
     """The text of docs/scene.md."""
     built_in = ", ".join(f"`{name}`" for name in materials.BUILT_IN)
     parts = [
-        INTRODUCTION.format(
-            materials=built_in, longest=expressions.LONGEST_EXPRESSION, power=expressions.MOST_POWER
-        )
+        INTRODUCTION.format(materials=built_in, longest=expressions.LONGEST_EXPRESSION, power=expressions.MOST_POWER)
     ]
     for heading, note, records in SECTIONS:
         example = f"\n```toml{EXAMPLES[heading]}```\n" if heading in EXAMPLES else ""
@@ -221,9 +219,7 @@ def described(hint: Any) -> tuple[str, str]:
     for known, words in NAMED.items():
         if hint == known:
             return words
-    quantity = next(
-        (extra for extra in getattr(hint, "__metadata__", ()) if isinstance(extra, Quantity)), None
-    )
+    quantity = next((extra for extra in getattr(hint, "__metadata__", ()) if isinstance(extra, Quantity)), None)
     if quantity is not None:
         return f"number{limits(quantity)}", unit_sign(quantity.unit)
     parts = [part for part in annotated_members(hint) if part is not type(None)]
@@ -234,9 +230,7 @@ def described(hint: Any) -> tuple[str, str]:
 
 def annotated_members(hint: Any) -> list[Any]:
     """The alternatives of a type with their annotations."""
-    while hasattr(hint, "__metadata__") and not any(
-        isinstance(extra, Quantity) for extra in hint.__metadata__
-    ):
+    while hasattr(hint, "__metadata__") and not any(isinstance(extra, Quantity) for extra in hint.__metadata__):
         if any(hint == known for known in NAMED):
             return [hint]
         hint = hint.__origin__
@@ -249,13 +243,9 @@ def plain_type(hint: Any) -> tuple[str, str]:
         return described(hint)
     inner = get_args(hint)
     if get_origin(hint) is Literal:
-        return ", ".join(
-            f'`"{word}"`' if isinstance(word, str) else f"`{word}`" for word in options(hint)
-        ), ""
+        return ", ".join(f'`"{word}"`' if isinstance(word, str) else f"`{word}`" for word in options(hint)), ""
     if get_origin(hint) is dict:
-        return "tables by name" if models(inner[1]) else f"{described(inner[1])[0]}s by name", described(
-            inner[1]
-        )[1]
+        return "tables by name" if models(inner[1]) else f"{described(inner[1])[0]}s by name", described(inner[1])[1]
     if get_origin(hint) is tuple:
         word, unit = described(inner[0])
         return (f"list: {word}" if inner[-1] is Ellipsis else f"{len(inner)} × {word}"), unit
@@ -271,9 +261,7 @@ def limits(quantity: Quantity) -> str:
 
 def unit_sign(unit: str) -> str:
     """A unit as it is printed."""
-    return (
-        "" if unit == "1" else unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴").replace("*", "·")
-    )
+    return "" if unit == "1" else unit.replace("^2", "²").replace("^3", "³").replace("^4", "⁴").replace("*", "·")
 
 
 def default(field: FieldInfo) -> str:

@@ -73,9 +73,7 @@ class Browser:
         number = self._calls
 
         async def answered() -> Any:
-            await self._socket.write_message(
-                json.dumps({"id": number, "method": method, "params": parameters})
-            )
+            await self._socket.write_message(json.dumps({"id": number, "method": method, "params": parameters}))
             while True:
                 message = json.loads(await asyncio.wait_for(self._socket.read_message(), 120))
                 if message.get("id") == number:

@@ -135,9 +135,7 @@ def cases() -> Iterator[Case]:
         word = "struck" if sudden else "swung"
         fine = arm(8000, FINE, sudden, "co-rotational")
         for frames, count in (("rigid-body", 1), ("co-rotational", 2)):
-            yield Case(
-                f"arm {word}, {count} beam3, {frames}", arm(1000, beams("beam3", count), sudden, frames), fine
-            )
+            yield Case(f"arm {word}, {count} beam3, {frames}", arm(1000, beams("beam3", count), sudden, frames), fine)
 
     yield from in_full()
 
@@ -145,9 +143,7 @@ def cases() -> Iterator[Case]:
 def in_full() -> Iterator[Case]:
     """Six with hexahedra that are not reduced, meshes small."""
     for speed in (60, 150):
-        fine = four_bar(
-            speed, 1440, solids(16, 2), 0.5, frames="co-rotational" if speed > 60 else "rigid-body"
-        )
+        fine = four_bar(speed, 1440, solids(16, 2), 0.5, frames="co-rotational" if speed > 60 else "rigid-body")
         for along in (4, 8):
             raw = four_bar(speed, 720, solids(along, 1), 0.5)
             yield Case(f"{speed} rpm, solid {along} × 1 a link, unreduced", raw, fine, full=True)
@@ -198,9 +194,7 @@ def page(found: list[Judged]) -> str:
 
 
 def _cell(each: Judged, kind: str) -> str:
-    return (
-        f"{100 * each.found.together[kind]:.2g} / {100 * each.true[kind]:.2g}" if kind in each.true else "-"
-    )
+    return f"{100 * each.found.together[kind]:.2g} / {100 * each.true[kind]:.2g}" if kind in each.true else "-"
 
 
 def main(say: Callable[[str], None] = print) -> None:

@@ -129,9 +129,7 @@ def scene_of(cell: Cell) -> Raw:
         if "mesh" in link:
             counts = link["mesh"]["elements"]
             along = 1 if cell.joint != "slot" else 3 if cell.frames == "co-rotational" else 2
-            link["mesh"] = {
-                "elements": along if isinstance(counts, int) else [along] + [1] * (len(counts) - 1)
-            }
+            link["mesh"] = {"elements": along if isinstance(counts, int) else [along] + [1] * (len(counts) - 1)}
         if link.get("reduction", "none") != "none":
             link["reduction"] = 6
     raw["analysis"] |= {"initial": "rest", "end_time": STEPS * 5e-4}
@@ -176,9 +174,7 @@ def sections(cell: Cell, crank: Any) -> Raw:
     spring = {"kind": "spring", "between": ends, "stiffness": 2e4, "damping": 20.0, "preload": 30.0}
     by_law: dict[str, Raw] = {
         "spring between points": {"springs": {"s": spring}},
-        "spring on the joint": {
-            "springs": {"s": {"kind": "spring" if along else "torsion", "joint": "J", **preloaded}}
-        },
+        "spring on the joint": {"springs": {"s": {"kind": "spring" if along else "torsion", "joint": "J", **preloaded}}},
         "motor on the joint": {"motors": {"m": {"joint": "J", "force" if slides else "torque": torque}}},
         "motor at the crank": {"motors": {"m": {"joint": "A", "torque": torque}}},
         "point mass": {"bodies": {"w": {"kind": "point_mass", "link": "crank", "at": crank, "mass": 0.4}}},

@@ -37,9 +37,7 @@ def stiffer(raw: Raw, factor: float) -> Raw:
     raw = copy.deepcopy(raw)
     for link in raw["links"].values():
         link["material"] = "steel" if link["model"] == "rigid" else "elastic"
-    raw["materials"] = {
-        "elastic": {"youngs_modulus": 2.1e11 * factor, "poisson_ratio": 0.3, "density": 7850.0}
-    }
+    raw["materials"] = {"elastic": {"youngs_modulus": 2.1e11 * factor, "poisson_ratio": 0.3, "density": 7850.0}}
     for each in raw["joints"].values():
         if "bushing" in each:
             each["bushing"] = {key: x * factor for key, x in each["bushing"].items()}
@@ -57,9 +55,7 @@ def off_rigid(raw: Raw) -> dict[str, float]:
             pairs[name] = elastic, rigid
     arm = 0.15  # m, the length of a link
     unit = {name: 1.0 if name.endswith("force") else arm for name in pairs}
-    largest = max(
-        (float(np.abs(rigid).max()) / unit[name] for name, (_, rigid) in pairs.items()), default=1.0
-    )
+    largest = max((float(np.abs(rigid).max()) / unit[name] for name, (_, rigid) in pairs.items()), default=1.0)
     return {name: float(np.abs(e - r).max()) / unit[name] / largest for name, (e, r) in pairs.items()}
 
 
@@ -139,14 +135,8 @@ def with_small_deflections(raw: Raw) -> dict[str, float]:
 
 def between_frames(raw: Raw) -> dict[str, float]:
     """How far displacements, forces and moments in quasi-static positions are apart with co-rotational frames."""
-    got, other = (
-        channels(*ran({**raw, "analysis": raw["analysis"] | {"frames": frames}})) for frames in FRAMES
-    )
-    return {
-        name: x
-        for name, x in differences(got, other).items()
-        if _kind(name) in {"displacement", "force", "moment"}
-    }
+    got, other = (channels(*ran({**raw, "analysis": raw["analysis"] | {"frames": frames}})) for frames in FRAMES)
+    return {name: x for name, x in differences(got, other).items() if _kind(name) in {"displacement", "force", "moment"}}
 
 
 LAWS: dict[str, Callable[[Raw], dict[str, float]]] = {

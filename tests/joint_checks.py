@@ -126,9 +126,7 @@ def twist(ready: Prepared, blocks: list[Block], name: str, on: str) -> np.ndarra
     return np.hstack([u0 + np.cross(turn, P - x), LENGTH * turn])
 
 
-def surface_motion(
-    ready: Prepared, blocks: list[Block], name: str, on: str
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def surface_motion(ready: Prepared, blocks: list[Block], name: str, on: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Middle of a joint's or gears' coupling surface, its displacement and turn, world components (T, 3), from its
     ports."""
     X, u = port_motion(ready, blocks, name, on)

@@ -10,9 +10,7 @@ from kedfem.motion.path import path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.scene import Scene, path_parameter, scene_from
 
-JointTable = Mapping[
-    str, tuple[Any, ...]
-]  # name: kind, link, link, at[, axis; of a universal joint both axes]
+JointTable = Mapping[str, tuple[Any, ...]]  # name: kind, link, link, at[, axis; of a universal joint both axes]
 UNIT_SPEED = {"kind": "constant_speed", "speed": 1.0}  # rad/s: time is the drive angle
 RISE = {"kind": "cycloidal", "rise": 1.0}  # with an angle: a drive that speeds up and slows down within 1 s
 Z = (0.0, 0.0, 1.0)

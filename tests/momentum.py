@@ -42,9 +42,7 @@ def momentum(model: Model, blocks: Sequence[Block]) -> Momentum:
             of, motion = block.links[k], block.motion
             last = _Before(of.g[-1], of.u[-1], motion.p[-1, body], motion.R[-1, body])
         found = [np.concatenate(x) for x in zip(*parts, strict=True)]
-        kept, forces, turning, taken = (
-            a + b for a, b in zip((kept, forces, turning, taken), found[:4], strict=True)
-        )
+        kept, forces, turning, taken = (a + b for a, b in zip((kept, forces, turning, taken), found[:4], strict=True))
         sizes += np.stack([_size(found[0][:, :3]), _size(found[0][:, 3:]), found[4]], axis=1)
     work, turned = (np.cumsum(0.5 * h * (x + np.vstack([x[:1], x[:-1]])), axis=0) for x in (forces, turning))
     left = kept - kept[0] - work + turned + np.cumsum(taken, axis=0)
@@ -123,9 +121,7 @@ def _of_link(model: Model, k: int, block: Block, last: _Before | None) -> tuple[
     velocity = fields.affine(motion.v[:, body], turning, omega) + of.v
     inertia = fields.mass_times(fields.affine(motion.p2[:, body], motion.R2[:, body], motion.alpha[:, body]))
     loads, ports = of.F + inertia, np.zeros_like(of.F)
-    ports[:, joint.nodes] = np.einsum(
-        "pn,tpd->tnd", joint.weights, turned_vectors(joint, of.R, of.port_forces)
-    )
+    ports[:, joint.nodes] = np.einsum("pn,tpd->tnd", joint.weights, turned_vectors(joint, of.R, of.port_forces))
     turned = np.zeros((len(p), 6))
     if link.fit is None:
         turned[:, 3:] = np.einsum("tij,tj->ti", R, fields.moment(of.g, fields.stiffness_times(of.g)))

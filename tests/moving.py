@@ -63,9 +63,7 @@ def channels(ready: Prepared, blocks: list[Block]) -> dict[str, np.ndarray]:
     return {each.channel.name: np.concatenate([each.rows(block) for block in blocks]) for each in every}
 
 
-def beam_in_space(
-    a: Sequence[float], b: Sequence[float], along: int = 4, up: Any = (0, 0, 1)
-) -> dict[str, Any]:
+def beam_in_space(a: Sequence[float], b: Sequence[float], along: int = 4, up: Any = (0, 0, 1)) -> dict[str, Any]:
     """A steel rod of round section."""
     section = {"kind": "round", "diameter": 0.02}
     shape = {"kind": "polyline", "points": [list(a), list(b)], "section": section, "up": list(up)}

@@ -90,9 +90,7 @@ def joint(kind: str, links: Sequence[str], at: Any, axis: Any) -> Raw:
             return {"kind": kind, "links": list(links), "at": list(at), "axis": list(axis)}
 
 
-def direction(
-    kind: str, at: int, places: Sequence[np.ndarray], plane: bool, random: np.random.Generator
-) -> np.ndarray:
+def direction(kind: str, at: int, places: Sequence[np.ndarray], plane: bool, random: np.random.Generator) -> np.ndarray:
     """An axis that suits solids too: of a hinge in the faces at the ends of both links, in the plane z."""
     any_, last = random.normal(size=3), len(places) - 1
     one = places[at] - places[at - 1]
@@ -134,14 +132,9 @@ def chain(
     here, last = kinds.index("J") + 1, len(kinds)
     solids = {"solid", "reduced", "rigid"}.issuperset(partners)
     if kind == "weld" and here < last and (plane or solids):
-        places[here + 1] = (
-            2 * places[here] - places[here - 1]
-        )  # two of a width are welded along one face or edge
+        places[here + 1] = 2 * places[here] - places[here - 1]  # two of a width are welded along one face or edge
     random = np.random.default_rng(SEEDS.get((kind, form), 0))
-    axes = [
-        direction(kind if k == here else each, k, places, plane, random)
-        for k, each in enumerate(kinds, start=1)
-    ]
+    axes = [direction(kind if k == here else each, k, places, plane, random) for k, each in enumerate(kinds, start=1)]
     R = turned(axes[here - 1])
 
     def vector(x: Any) -> list[float]:

@@ -43,9 +43,7 @@ class Planned:
     @property
     def work(self) -> float:
         """Steps of all levels in a turn."""
-        return (
-            (2 ** (self.scene.analysis.extrapolation_levels or 1) - 1) * time_grid(self.scene).steps / TURNS
-        )
+        return (2 ** (self.scene.analysis.extrapolation_levels or 1) - 1) * time_grid(self.scene).steps / TURNS
 
     @property
     def needed(self) -> float:
@@ -73,15 +71,9 @@ def judged(scene: Scene) -> Planned:
     found = histories(ready)
     running = process_time() - since
     steps = time_grid(chosen).steps
-    fine = histories(
-        replace(ready, scene=with_analysis(with_steps(chosen, 4 * steps), extrapolation_levels=3))
-    )
-    plain = histories(
-        replace(ready, scene=with_analysis(with_steps(chosen, 2000 * TURNS), extrapolation_levels=1))
-    )
-    return Planned(
-        chosen, expected, *(worst(relative_errors(x, fine)) for x in (found, plain)), (planning, running)
-    )
+    fine = histories(replace(ready, scene=with_analysis(with_steps(chosen, 4 * steps), extrapolation_levels=3)))
+    plain = histories(replace(ready, scene=with_analysis(with_steps(chosen, 2000 * TURNS), extrapolation_levels=1)))
+    return Planned(chosen, expected, *(worst(relative_errors(x, fine)) for x in (found, plain)), (planning, running))
 
 
 def cases() -> Iterator[tuple[str, Scene]]:

@@ -62,9 +62,7 @@ class Drawing:
         made = partner(kind, a.tolist(), b.tolist(), up)
         if "mesh" in made:
             counts = made["mesh"]["elements"]
-            made["mesh"] = {
-                "elements": along if isinstance(counts, int) else [along] + [1] * (len(counts) - 1)
-            }
+            made["mesh"] = {"elements": along if isinstance(counts, int) else [along] + [1] * (len(counts) - 1)}
         if made.get("reduction", "none") != "none":
             made["reduction"] = 6
         self.links[name], self.kinds[name] = made, kind
@@ -85,9 +83,7 @@ class Drawing:
     def join(self, kind: str, pair: tuple[str, str], at: Vector, axis: Vector) -> str:
         name = f"J{len(self.joints)}"
         made = joint(kind, pair, at, axis)
-        made = {
-            key: np.asarray(x).tolist() if key in {"at", "axis", "axes"} else x for key, x in made.items()
-        }
+        made = {key: np.asarray(x).tolist() if key in {"at", "axis", "axes"} else x for key, x in made.items()}
         if kind == "screw":
             made["lead"] = float(self.random.uniform(0.05, 0.5) * self.one((1, -1)))
         self.joints[name] = made

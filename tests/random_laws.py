@@ -60,9 +60,7 @@ def springs(d: Drawing, moved: set[str]) -> Raw:
                 "damping": 0.05,
                 "preload": 0.3,
             }
-        if made["kind"] in {"prismatic", "cylindrical"} and (
-            "ground" in made["links"] or d.frames != "rigid-body"
-        ):
+        if made["kind"] in {"prismatic", "cylindrical"} and ("ground" in made["links"] or d.frames != "rigid-body"):
             out[f"along{name}"] = {"kind": "spring", "joint": name, **law}
     return out
 

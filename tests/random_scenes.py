@@ -28,9 +28,7 @@ def welded_arm(d: Drawing) -> None:
     a = d.places[body][1]
     b = a + (a - d.places[body][0]) * d.random.uniform(0.6, 1.2)
     plane = {"plane"} & {d.kinds[body]}
-    name = d.link(
-        a, b, "plane" if plane else "planar beam" if d.plane else d.kinds[body] if d.chance(0.5) else "beam"
-    )
+    name = d.link(a, b, "plane" if plane else "planar beam" if d.plane else d.kinds[body] if d.chance(0.5) else "beam")
     d.join("weld", (body, name), a, d.vector())
 
 
@@ -68,11 +66,7 @@ def loop(d: Drawing) -> None:
             a, b = (b, b + 1.8 * (a - b)) if kind == "slot" else (a, b)
             after = d.link(a, b, along=3 if kind == "slot" else 1)
         one, two = d.along(before), d.along(after)
-        axis = (
-            (two if after != "ground" else one + 0.2 * d.vector())
-            if kind == "slot"
-            else d.axis(kind, one, two)
-        )
+        axis = (two if after != "ground" else one + 0.2 * d.vector()) if kind == "slot" else d.axis(kind, one, two)
         pair = (before, after) if kind == "slot" or d.chance(0.5) else (after, before)
         d.join(kind, pair, places[k], axis)
         before = after

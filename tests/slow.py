@@ -38,6 +38,4 @@ def slowest(log: str, most: float = MOST) -> list[str]:
 
 
 if __name__ == "__main__":
-    LIST.write_text(
-        HEAD + "\n".join(slowest(Path(sys.argv[1]).read_text(encoding="utf-8"))) + "\n", encoding="utf-8"
-    )
+    LIST.write_text(HEAD + "\n".join(slowest(Path(sys.argv[1]).read_text(encoding="utf-8"))) + "\n", encoding="utf-8")

@@ -77,9 +77,7 @@ def stiffened(of: Begun) -> Begun:
     scene, model = of.prepared.scene, of.prepared.model
     system = replace(of.ready.system, stiffening=steps_of(scene, model).stiffening)
     made = ready(system, of.ready.scheme)
-    return replace(
-        of, ready=made, state=rest(made, of.motion, initial_rates(scene, of.prepared.linkage, system.model))
-    )
+    return replace(of, ready=made, state=rest(made, of.motion, initial_rates(scene, of.prepared.linkage, system.model)))
 
 
 def rows(of: Ready, x: np.ndarray) -> np.ndarray:
@@ -120,10 +118,7 @@ def assembled_deflection(of: Ready, at: RigidMotion) -> np.ndarray:
     K u + M ([α]× + [ω]×²) u − Wᵀ λ = F, W u = B z, Bᵀ λ = Cᵀ m − Cᵀ k C z, C z = −e(0); dampers are left out.
     """
     solver, system, model = Monolithic(of.system, of.scheme), of.system, of.system.model
-    K = [
-        rotated_stiffness(x.K0, at.R[0, body, : x.d, : x.d])
-        for x, body in zip(model.links, model.bodies, strict=True)
-    ]
+    K = [rotated_stiffness(x.K0, at.R[0, body, : x.d, : x.d]) for x, body in zip(model.links, model.bodies, strict=True)]
     if system.stiffening is not None:
         found = system.stiffening.over(forcings(model, at), at)
         stressed = system.stiffening.stiffness([each.at(0) for each in found])

@@ -58,10 +58,7 @@ def numbers(text: str) -> set[int]:
 def cited() -> set[tuple[int, str]]:
     """Equation and function, from the docstrings."""
     return {
-        (number, name)
-        for name, text in docstrings()
-        for where in CITATION.findall(text)
-        for number in numbers(where)
+        (number, name) for name, text in docstrings() for where in CITATION.findall(text) for number in numbers(where)
     }
 
 
@@ -131,9 +128,7 @@ def test_other_lists_of_equations_are_refused(text: str) -> None:
 
 def members(node: ast.ClassDef) -> set[str]:
     """Fields, methods and attributes of `self` of a class."""
-    fields = {
-        x.target.id for x in node.body if isinstance(x, ast.AnnAssign) and isinstance(x.target, ast.Name)
-    }
+    fields = {x.target.id for x in node.body if isinstance(x, ast.AnnAssign) and isinstance(x.target, ast.Name)}
     methods = {x.name for x in node.body if isinstance(x, ast.FunctionDef)}
     own = {x.attr for x in ast.walk(node) if isinstance(x, ast.Attribute) and isinstance(x.ctx, ast.Store)}
     return fields | methods | own

@@ -85,9 +85,7 @@ def test_every_command_of_the_readme_is_there() -> None:
     assert install.startswith("apt-get install ")
     for script in ("scripts/setup", "scripts/kedfem", "scripts/test", ".ci/run"):
         assert (ROOT / script).stat().st_mode & stat.S_IXUSR, f"{script} is not executable"
-    assert (
-        read_scene(ROOT / run.split()[-1]).results_folder == ROOT / "examples/four_bar_solids/scene-results"
-    )
+    assert read_scene(ROOT / run.split()[-1]).results_folder == ROOT / "examples/four_bar_solids/scene-results"
     assert "`examples/four_bar_solids/scene-results/`" in README
 
 

@@ -31,11 +31,7 @@ def linked(page: Path) -> set[Path]:
         for line in options.splitlines():
             name = re.sub(r".*<(.*)>", r"\1", line)  # a title may stand before it
             if name and not name.startswith(":"):
-                out |= {
-                    file.resolve()
-                    for ending in (".md", ".ipynb")
-                    for file in page.parent.glob(f"{name}{ending}")
-                }
+                out |= {file.resolve() for ending in (".md", ".ipynb") for file in page.parent.glob(f"{name}{ending}")}
     return out
 
 
@@ -70,9 +66,7 @@ def same(shown: str, said: str) -> bool:
 def shows(output: str, line: str) -> bool:
     """Whether some line of an output begins as a line of a page."""
     wanted = words(line)
-    return any(
-        len(got) >= len(wanted) and all(map(same, wanted, got)) for got in map(words, output.splitlines())
-    )
+    return any(len(got) >= len(wanted) and all(map(same, wanted, got)) for got in map(words, output.splitlines()))
 
 
 def followed(page: str) -> int:
@@ -114,12 +108,8 @@ def test_shown_lines_are_looked_for_in_the_output() -> None:
 
 @pytest.mark.long
 @pytest.mark.usefixtures("wide")
-@pytest.mark.parametrize(
-    ("page", "lines"), [("tutorial/first-linkage.md", 11), ("tutorial/own-part.md", 7)], ids=str
-)
-def test_a_lesson_does_what_it_says(
-    page: str, lines: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize(("page", "lines"), [("tutorial/first-linkage.md", 11), ("tutorial/own-part.md", 7)], ids=str)
+def test_a_lesson_does_what_it_says(page: str, lines: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     shutil.copyfile(ROOT / "geometry" / "connecting_rod.step", "rod.step")
     assert followed(page) == lines
@@ -135,9 +125,7 @@ def test_a_lesson_does_what_it_says(
     ],
     ids=str,
 )
-def test_a_how_to_does_what_it_says(
-    page: str, lines: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_how_to_does_what_it_says(page: str, lines: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert followed(page) == lines
     for file in tmp_path.glob("*.toml"):
@@ -158,9 +146,7 @@ def test_the_notebook_runs_and_shows_its_bar(monkeypatch: pytest.MonkeyPatch) ->
     shown = [output for cell in book.cells for output in cell.get("outputs", [])]
     kinds = [kind for output in shown for kind in output.get("data", {})]
     assert "image/png" in kinds
-    assert any(
-        re.match(r"done after \d+\.\d s", output.get("data", {}).get("text/html", "")) for output in shown
-    )
+    assert any(re.match(r"done after \d+\.\d s", output.get("data", {}).get("text/html", "")) for output in shown)
     (table,) = (
         output.data["text/plain"]
         for output in shown

@@ -11,9 +11,7 @@ LINES, FILES = 300, 25
 
 
 def test_no_file_is_long() -> None:
-    lines = {
-        path: len(path.read_text(encoding="utf-8").splitlines()) for path in sorted(PACKAGE.rglob("*.py"))
-    }
+    lines = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in sorted(PACKAGE.rglob("*.py"))}
     assert len(lines) > 300
     assert {str(path.relative_to(PACKAGE)): count for path, count in lines.items() if count > LINES} == {}, (
         "split it by what its parts are about"

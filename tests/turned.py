@@ -15,9 +15,7 @@ from kedfem.mesh.elements.tetrahedra import tetrahedral
 FORMS = {8: linear, 10: tetrahedral, 20: serendipity, 27: quadratic}
 
 
-def turned(
-    parts: Sequence[tuple[float, float, float, float]], nodes: int = 20, around: int = 16
-) -> SolidMesh:
+def turned(parts: Sequence[tuple[float, float, float, float]], nodes: int = 20, around: int = 16) -> SolidMesh:
     """A part turned about z: hollow cylinders from low to high, from one radius (0: solid) to another [m]."""
     core = 0.5 * min(r for part in parts for r in part[2:] if r > 0)
     radii = sorted({r for part in parts for r in part[2:] if r > 0} | {core})
@@ -61,9 +59,7 @@ def turned(
     return curved(mesh, nodes, distance * (distance > 0.9 * core), lambda x: x * [1, 1, 0])
 
 
-def curved(
-    mesh: SolidMesh, nodes: int, radius: np.ndarray, arm: Callable[[np.ndarray], np.ndarray]
-) -> SolidMesh:
+def curved(mesh: SolidMesh, nodes: int, radius: np.ndarray, arm: Callable[[np.ndarray], np.ndarray]) -> SolidMesh:
     """The mesh with more nodes, put where the corners of their edge or side are that have one radius (0: straight)."""
     out = quadratic(mesh)
     points = out.points.copy()
@@ -82,9 +78,7 @@ def ball_on_neck(radius: float, nodes: int = 20) -> SolidMesh:
     s = np.linspace(-1, 1, 5)
     grid = np.stack(np.meshgrid(s, s, s, indexing="ij"), axis=-1).reshape(-1, 3)
     size = np.abs(grid).max(axis=1)
-    round_ = np.where(
-        size[:, None] > 0.9, grid / np.maximum(np.linalg.norm(grid, axis=1), 1e-9)[:, None], 0.6 * grid
-    )
+    round_ = np.where(size[:, None] > 0.9, grid / np.maximum(np.linalg.norm(grid, axis=1), 1e-9)[:, None], 0.6 * grid)
     number = np.arange(125).reshape(5, 5, 5)
     cells = [
         [number[tuple(np.add((i, j, k), c))] for c in (HEX8 + 1) // 2]

@@ -56,9 +56,7 @@ class Sheet:
         ):
             face = [c + normal + s * u + t * v for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
             rgb = np.asarray(mpl.colors.to_rgb(colour)) * shade + (1 - shade) * 0.25
-            self.ax.add_patch(
-                Polygon(flat(np.array(face)), facecolor=rgb, edgecolor="#333", lw=0.7, zorder=self._next())
-            )
+            self.ax.add_patch(Polygon(flat(np.array(face)), facecolor=rgb, edgecolor="#333", lw=0.7, zorder=self._next()))
 
     def rod(self, a: Vector, b: Vector, radius: float, colour: str) -> None:
         """A round bar from one point to another."""
@@ -92,14 +90,10 @@ class Sheet:
 
     def _arrow(self, p: np.ndarray, q: np.ndarray) -> None:
         """An arrow on paper, of a positive motion."""
-        arrow = FancyArrowPatch(
-            tuple(p), tuple(q), arrowstyle="-|>", mutation_scale=15, lw=2.2, color=MOTION, zorder=55
-        )
+        arrow = FancyArrowPatch(tuple(p), tuple(q), arrowstyle="-|>", mutation_scale=15, lw=2.2, color=MOTION, zorder=55)
         self.ax.add_patch(arrow)
 
-    def rotation(
-        self, centre: Vector, axis: Vector, radius: float, since: float = -150, to: float = 110
-    ) -> None:
+    def rotation(self, centre: Vector, axis: Vector, radius: float, since: float = -150, to: float = 110) -> None:
         """An arrow of positive rotation, by the right hand about an axis."""
         p = flat(circle(centre, axis, radius, np.linspace(since, to, 60)))
         self.ax.plot(p[:-2, 0], p[:-2, 1], color=MOTION, lw=2.2, zorder=55)

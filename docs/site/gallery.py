@@ -14,9 +14,7 @@ Writer = Callable[[Path, str], None]
 def heading(name: str) -> tuple[str, str, list[str]]:
     """Title of an example's scene, what the comment above it says, and the commands in that comment."""
     text = (ROOT / "examples" / name / "scene.toml").read_text("utf-8")
-    comment = [
-        line.removeprefix("#") for line in text.split("\n\n", 1)[0].splitlines() if line.startswith("#")
-    ]
+    comment = [line.removeprefix("#") for line in text.split("\n\n", 1)[0].splitlines() if line.startswith("#")]
     commands = [part.strip() for line in comment if line.startswith("   ") for part in re.split(r"   +(?=\w)", line.strip())
                 if part.strip().startswith("kedfem ")]  # fmt: skip
     said = " ".join(line.strip() for line in comment if not line.startswith("   "))
@@ -78,9 +76,7 @@ def page(name: str, site: Path) -> str:
 def index(titles: dict[str, str]) -> str:
     """The page with all pictures."""
     cards = "".join(
-        f"[![{title}]({picture(name)})\\\n{title}]({name}.md)\n\n"
-        if picture(name)
-        else f"[{title}]({name}.md)\n\n"
+        f"[![{title}]({picture(name)})\\\n{title}]({name}.md)\n\n" if picture(name) else f"[{title}]({name}.md)\n\n"
         for name, title in titles.items()
     )
     return (

@@ -64,10 +64,7 @@ def faults() -> list[tuple[str, str]]:
 
     cases = tomllib.loads((ROOT / "tests" / "rooms" / "bad_scenes.toml").read_text("utf-8"))
     lines = {
-        line.strip()
-        for base, wrong in cases.items()
-        for case in wrong
-        for line in said(BASES[base], case).splitlines()
+        line.strip() for base, wrong in cases.items() for case in wrong for line in said(BASES[base], case).splitlines()
     }
     rows = [(line.split(":")[0].split(".")[0].split("[")[0], line) for line in lines if ": " in line]
     return sorted(rows)

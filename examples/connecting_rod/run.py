@@ -26,9 +26,7 @@ def main() -> None:
     assert np.abs(guide[:, 0]).max() < 1e-6 * np.abs(guide[:, 1]).max()
     assert np.abs(pin[:, 1]).max() < 1.3 * np.abs(pin[:, 0]).max() * RADIUS / np.sqrt(ROD**2 - RADIUS**2)
     assert run.peak is not None
-    print(
-        f"highest von Mises stress {run.peak.stress / 1e6:.1f} MPa in the {run.peak.link}; see {run.folder}"
-    )
+    print(f"highest von Mises stress {run.peak.stress / 1e6:.1f} MPa in the {run.peak.link}; see {run.folder}")
 
 
 def rms(x: np.ndarray) -> float:

@@ -35,9 +35,7 @@ def main() -> None:
     print(f"drive torque: {100 * difference:.1f} % from that of the rigid linkage")
     assert difference < 0.1  # it rings after each firing
     assert run.peak is not None
-    print(
-        f"highest von Mises stress {run.peak.stress / 1e6:.0f} MPa in the {run.peak.link}; see {run.folder}"
-    )
+    print(f"highest von Mises stress {run.peak.stress / 1e6:.0f} MPa in the {run.peak.link}; see {run.folder}")
 
 
 def volumes_in_mm3() -> dict[str, float]:
@@ -46,9 +44,7 @@ def volumes_in_mm3() -> dict[str, float]:
         gmsh.model.occ.importShapes(str(STEP))
         gmsh.model.occ.synchronize()
         solids = [tag for _, tag in gmsh.model.getEntities(3)]
-        return {
-            gmsh.model.getEntityName(3, tag).split("/")[-1]: gmsh.model.occ.getMass(3, tag) for tag in solids
-        }
+        return {gmsh.model.getEntityName(3, tag).split("/")[-1]: gmsh.model.occ.getMass(3, tag) for tag in solids}
 
 
 if __name__ == "__main__":

@@ -32,9 +32,7 @@ def main() -> None:
     lost = channels["energy/dissipated"][after, 0]
     left = np.abs(energy - energy[0] + lost - lost[0]).max() / energy[0]
     ends = 1e6 * energy[[0, -1]]
-    print(
-        f"energy of the swing {ends[0]:.2f} uJ, at the end {ends[1]:.2f} uJ; {left:.1e} of it unaccounted for"
-    )
+    print(f"energy of the swing {ends[0]:.2f} uJ, at the end {ends[1]:.2f} uJ; {left:.1e} of it unaccounted for")
     assert energy[-1] < 0.5 * energy[0]
     assert left < 0.01
     assert run.balance is not None

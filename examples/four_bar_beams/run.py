@@ -18,27 +18,19 @@ def main() -> None:
 
     coarse, fine, finer = stress(720, 4), stress(720, 8), stress(1440, 8)
     peak = np.abs(fine).max()
-    print(
-        f"bending stress on the rocker's outer side, last turn: {fine.min() / 1e6:.1f} to {fine.max() / 1e6:.1f} MPa"
-    )
+    print(f"bending stress on the rocker's outer side, last turn: {fine.min() / 1e6:.1f} to {fine.max() / 1e6:.1f} MPa")
     space, time = np.abs(fine - coarse).max() / peak, np.abs(fine - finer[::2]).max() / peak
-    print(
-        f"changes with 4 → 8 elements a link by {100 * space:.1f} %, with the step halved by {100 * time:.1f} %"
-    )
+    print(f"changes with 4 → 8 elements a link by {100 * space:.1f} %, with the step halved by {100 * time:.1f} %")
     assert space < 0.06
     assert time < 0.03
 
     # far below resonance only inertia loads the links: the stress grows with the square of the speed
     slow, twice = (np.abs(stress(720, 2, f"{rpm} rpm", revolutions=3)).max() for rpm in (15, 30))
-    print(
-        f"peak stress at 15 and 30 rpm: {slow / 1e3:.1f} and {twice / 1e3:.1f} kPa, ratio {twice / slow:.3f}"
-    )
+    print(f"peak stress at 15 and 30 rpm: {slow / 1e3:.1f} and {twice / 1e3:.1f} kPa, ratio {twice / slow:.3f}")
     assert abs(twice / slow - 4) < 0.1
 
 
-def stress(
-    steps_per_revolution: int, elements: int, speed: str = "600 rpm", revolutions: int = 8
-) -> np.ndarray:
+def stress(steps_per_revolution: int, elements: int, speed: str = "600 rpm", revolutions: int = 8) -> np.ndarray:
     """Stress of the last turn [Pa]."""
     raw = tomllib.loads(SCENE.read_text(encoding="utf-8"))
     for link in raw["links"].values():

@@ -19,10 +19,7 @@ def main() -> None:
     corotational = run(pictures=True)
     y = stress(corotational)
     peak = np.abs(y).max()
-    off = {
-        name: np.abs(stress(each) - y).max() / peak
-        for name, each in (("linear", linear), ("stiffened", stiffened))
-    }
+    off = {name: np.abs(stress(each) - y).max() / peak for name, each in (("linear", linear), ("stiffened", stiffened))}
     print(f"peak stress {peak / 1e6:.1f} MPa, exact beams {PEAK / 1e6:.1f} MPa")
     print(
         *(f"the {name} equation is off by {100 * error:.0f} % of it at worst" for name, error in off.items()),

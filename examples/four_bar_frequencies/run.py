@@ -33,10 +33,7 @@ def main() -> None:
     where = np.degrees(whole.angle[first.argmin()])
     print(f"linkage: {first.min():.1f} Hz at {where:.0f}° of the crank to {first.max():.1f} Hz")
     assert whole.still == 0  # the drive holds the crank
-    assert (
-        frequencies(scene, Wanted(modes=1, positions=2, free=True), SCENE.with_name("free-frequencies")).still
-        == 1
-    )
+    assert frequencies(scene, Wanted(modes=1, positions=2, free=True), SCENE.with_name("free-frequencies")).still == 1
     for crossing in (x for x in whole.crossings if x.mode == 1):
         slowest, fastest = (30 / np.pi * speed for speed in (crossing.slowest, crossing.fastest))
         print(f"harmonic {crossing.harmonic} meets it at {slowest:.0f} to {fastest:.0f} rpm")

@@ -21,9 +21,7 @@ def main() -> None:
         force = channels[f"joints/{joint}/force"][1]
         assert np.abs(force[:, 2]).max() < 1e-6 * np.abs(force).max()
     assert run.peak is not None
-    print(
-        f"highest von Mises stress {run.peak.stress / 1e6:.1f} MPa in the {run.peak.link}; see {run.folder}"
-    )
+    print(f"highest von Mises stress {run.peak.stress / 1e6:.1f} MPa in the {run.peak.link}; see {run.folder}")
 
 
 def rms(x: np.ndarray) -> float:

@@ -20,9 +20,7 @@ def main() -> None:
     guide = channels["joints/guide/force"][1]
     assert np.abs(guide[:, 0]).max() < 1e-9 * np.abs(guide[:, 1]).max()
     assert run.peak is not None
-    print(
-        f"highest von Mises stress {run.peak.stress / 1e6:.1f} MPa in the {run.peak.link}; see {run.folder}"
-    )
+    print(f"highest von Mises stress {run.peak.stress / 1e6:.1f} MPa in the {run.peak.link}; see {run.folder}")
 
 
 def rms(x: np.ndarray) -> float:

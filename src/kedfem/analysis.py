@@ -162,9 +162,7 @@ def _analysed(
     notices = [*size_warnings(scene, plain), *assembly_warning(assembly), *stubby_warning(ready.model)]
     solvers = clock.timed("factor", lambda: _solvers(ready, beside), factor_words(ready.model))
     account = Account(ready.model, measured_elements(scene, ready.model), lambda: stresses_in(solvers))
-    recorded = clock.timed(
-        "probes", lambda: recording(scene, ready.model, account, ready.path, ready.linkage)
-    )
+    recorded = clock.timed("probes", lambda: recording(scene, ready.model, account, ready.path, ready.linkage))
     every = [*ready.model.links, *(each.link for each in ready.model.prescribed)]
     recoveries = clock.timed("recovery", lambda: [stress_recovery(link) for link in every])
     notices += _about_steps(ready)
@@ -172,12 +170,8 @@ def _analysed(
     channels = [each.channel for each in recorded]
     untold = undetermined(scene, ready.model, [each.name for each in channels])
     efforts = CrossChecks(scene, ready.linkage, channels, account)
-    watched = Watched(
-        recorded, untold, efforts, recoveries, SingularPasses(ready), since, kept_since(scene, period)
-    )
-    envelope, seen, step = clock.timed(
-        "steps", lambda: stepped(ready, solvers, watched, folder, watch, keeper)
-    )
+    watched = Watched(recorded, untold, efforts, recoveries, SingularPasses(ready), since, kept_since(scene, period))
+    envelope, seen, step = clock.timed("steps", lambda: stepped(ready, solvers, watched, folder, watch, keeper))
     balance = None if without_vibration(scene) else account.balance
     unbalanced = balance_warning(balance) if balance else ()
     notices += [
@@ -257,9 +251,7 @@ def _about_steps(ready: Prepared) -> list[str]:
     return [*stability_warning(ready.scene), *coarse_steps(ready.scene)]
 
 
-def _stress_files(
-    ready: Prepared, folder: FilePath, drive: Channel, envelope: Envelope, doubts: list[list[str]]
-) -> None:
+def _stress_files(ready: Prepared, folder: FilePath, drive: Channel, envelope: Envelope, doubts: list[list[str]]) -> None:
     """The envelope of stresses, the top ten of each link, and the frame of the highest of all."""
     scene, named = ready.scene, drive_heading(drive)
     extremes = Extremes(envelope.links(), envelope.when(), doubts, named)
@@ -269,9 +261,7 @@ def _stress_files(
         write_frame(folder / WORST, worst.t, fields(scene, ready.model, envelope.recoveries, worst))
 
 
-def _damaged(
-    ready: Prepared, folder: FilePath, envelope: Envelope, doubts: list[list[str]], period: float
-) -> Fatigue:
+def _damaged(ready: Prepared, folder: FilePath, envelope: Envelope, doubts: list[list[str]], period: float) -> Fatigue:
     """Damage over the last period, in its files and in that of the results."""
     found, fields = fatigue_of(ready.scene, ready.model, envelope, doubts, period)
     write_fatigue(folder, found, fields, ready.scene.output.csv)

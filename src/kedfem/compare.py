@@ -73,22 +73,15 @@ def compare(
     try:
         over, along = common_abscissa(runs, over)
     except ValueError as error:
-        raise OutputError(
-            f"kedfem compare: must have {error}, got none; take --over time or other runs"
-        ) from error
+        raise OutputError(f"kedfem compare: must have {error}, got none; take --over time or other runs") from error
     found = differences(runs, over, along)
     if not found:
-        raise OutputError(
-            "kedfem compare: must have channels that all runs record, got none: give them the same probes"
-        )
+        raise OutputError("kedfem compare: must have channels that all runs record, got none: give them the same probes")
     target = FilePath(folder) if folder else paths[0].parent / "compare"
     if pictures:
         write_comparison(found, names, over, along, runs[0].drive, target)
     links = dict.fromkeys(link for run in runs for link in run.peaks)
-    peaks = {
-        link: np.array([run.peaks[link].stress if link in run.peaks else np.nan for run in runs])
-        for link in links
-    }
+    peaks = {link: np.array([run.peaks[link].stress if link in run.peaks else np.nan for run in runs]) for link in links}
     ends = float(along[0]), float(along[-1])
     reported = (*_missing(names, runs), *_partial(names, runs))
     unit = "s" if over == "time" else runs[0].drive.unit
@@ -119,8 +112,7 @@ def _missing(names: Sequence[str], runs: Sequence[Results]) -> tuple[str, ...]:
 def _partial(names: Sequence[str], runs: Sequence[Results]) -> tuple[str, ...]:
     """Runs that are not whole."""
     return tuple(
-        f"{name}: the run is {run.status} after {len(run.time)} rows"
-        + (f" ({run.reason})" if run.reason else "")
+        f"{name}: the run is {run.status} after {len(run.time)} rows" + (f" ({run.reason})" if run.reason else "")
         for name, run in zip(names, runs, strict=True)
         if run.status != "complete"
     )

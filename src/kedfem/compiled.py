@@ -36,9 +36,7 @@ KNOWN = numba.version_info.short <= (0, 68)
 RECORDS = ("dynamics/system/arrays.py", "dynamics/system/state.py", "dynamics/metric.py")
 """Where the named tuples stand that kernels are given: numba's cache names them by their modules."""
 
-PATIENCE = (
-    120.0  # s, with a process that compiles a function; one that was stopped would be waited for for ever
-)
+PATIENCE = 120.0  # s, with a process that compiles a function; one that was stopped would be waited for for ever
 
 
 def kernel_folder(root: Path) -> Path:

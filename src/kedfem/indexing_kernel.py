@@ -61,9 +61,7 @@ def _located(
         strides.append(step)
         at.append(start)
     at += [size.type(0) for size in sizes[len(kinds) :]]
-    place = cgutils.get_item_pointer2(
-        context, builder, model.get(builder, array, "data"), sizes, steps, kind.layout, at
-    )
+    place = cgutils.get_item_pointer2(context, builder, model.get(builder, array, "data"), sizes, steps, kind.layout, at)
     return place, [*shape, *sizes[len(kinds) :]], [*strides, *steps[len(kinds) :]]
 
 
@@ -75,11 +73,7 @@ def _chosen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     (kind, index), out = signature.args, signature.return_type
     kinds = _plain(context, kind, index)
     if kinds is None:
-        numbas = (
-            arrayobj.getitem_array_tuple
-            if isinstance(index, types.BaseTuple)
-            else arrayobj.getitem_arraynd_intp
-        )
+        numbas = arrayobj.getitem_array_tuple if isinstance(index, types.BaseTuple) else arrayobj.getitem_arraynd_intp
         return numbas(context, builder, signature, arguments)
     array = arguments[0]
     place, shape, strides = _located(context, builder, signature, arguments, kinds)

@@ -52,9 +52,7 @@ def kinematics_folder(scene: Scene) -> FilePath:
     return beside(scene.results_folder, "kinematics")
 
 
-def kinematics(
-    scene: Scene, folder: FilePath | None = None, watch: Watch = lambda stage, done, total: None
-) -> Moved:
+def kinematics(scene: Scene, folder: FilePath | None = None, watch: Watch = lambda stage, done, total: None) -> Moved:
     """Move a scene's links as rigid bodies and write positions, velocities, accelerations, forces, an animation, plots.
 
     Parameters
@@ -151,8 +149,7 @@ def _stepped(
             for k in sorted(wanted & set(range(first, first + len(motion.t)))):
                 frames.add(
                     float(motion.t[k - first]),
-                    rigid_fields(seen, motion, k - first)
-                    + rigid_springs(scene, linked, motion, k - first, places),
+                    rigid_fields(seen, motion, k - first) + rigid_springs(scene, linked, motion, k - first, places),
                     float(motion.phi[k - first]),
                 )
 

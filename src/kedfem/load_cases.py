@@ -104,9 +104,7 @@ def _rows(path: FilePath, results: Results, link: str, at: Sequence[float]) -> l
         raise OutputError(f"{path}: must be results of `kedfem run` with rows, got none with elastic motion")
     if not at:
         if link not in results.peaks:
-            raise OutputError(
-                f"--at: is required [s], got nothing and no highest stress of '{link}' in {path}"
-            )
+            raise OutputError(f"--at: is required [s], got nothing and no highest stress of '{link}' in {path}")
         at = [results.peaks[link].time]
     first, last = float(results.time[0]), float(results.time[-1])
     step = (last - first) / max(len(results.time) - 1, 1)
@@ -124,9 +122,7 @@ def _refuse(scene: Scene, name: str) -> None:
     link, where = scene.links[name], f"links.{name}"
     if link.category != "solid":
         got = "a rigid one" if link.category == "rigid" else f"a {link.category}"
-        raise SceneError(
-            f'{where}: must be an elastic solid for load cases, got {got}: take `model = "solid"`'
-        )
+        raise SceneError(f'{where}: must be an elastic solid for load cases, got {got}: take `model = "solid"`')
     if corotational(scene):
         raise SceneError(
             "analysis.frames: must be rigid-body for load cases (a linear static analysis knows small deflections), got "
@@ -164,25 +160,19 @@ def _refuse_other(path: FilePath, scene: Scene, results: Results, block: Block, 
         )
 
 
-def _written(
-    target: FilePath, scene: Scene, link: Link, cases: list[LoadCase], results: Results
-) -> LoadCases:
+def _written(target: FilePath, scene: Scene, link: Link, cases: list[LoadCase], results: Results) -> LoadCases:
     element, drive = ELEMENTS.get(link.cell_type, ""), drive_heading(results.drive)
     about = {f"joint {name}": np.asarray(joint.at) for name, joint in scene.joints.items()}
     left = [_left(link, case) for case in cases]
     deck = target / f"{link.name}.inp"
     if element:
-        write_deck(
-            deck, link, scene.materials[str(scene.links[link.name].material)], cases, _head(scene, link)
-        )
+        write_deck(deck, link, scene.materials[str(scene.links[link.name].material)], cases, _head(scene, link))
     else:
         deck.unlink(missing_ok=True)  # of an earlier mesh
     files = [f"{link.name}_{number:04d}.vtu" for number in range(len(cases))]
     for name, case in zip(files, cases, strict=True):
         write_case(target / name, link, case)
-    write_collection(
-        target, link.name, [(x.time, link.name, name) for x, name in zip(cases, files, strict=True)]
-    )
+    write_collection(target, link.name, [(x.time, link.name, name) for x, name in zip(cases, files, strict=True)])
     write_resultants(target / f"{link.name}.csv", link.X, cases, about, drive)
     warnings = [*_elements(link), *_balance(link.name, cases, left), *_differing(scene, link, cases)]
     counts = link.n, len(link.cells)

@@ -75,11 +75,7 @@ class Packed:
             case "scalar":
                 made = self._file[NUMBERED.format(content)][()]
             case "list" | "tuple":
-                before = (
-                    onto
-                    if isinstance(onto, list | tuple) and len(onto) == len(content)
-                    else [None] * len(content)
-                )
+                before = onto if isinstance(onto, list | tuple) and len(onto) == len(content) else [None] * len(content)
                 every = [self._made(y, each) for y, each in zip(content, before, strict=True)]
                 made = every if kind == "list" else tuple(every)
             case "dict":

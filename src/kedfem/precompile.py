@@ -102,6 +102,4 @@ def _count_cycles() -> None:
 
     from kedfem.results.fatigue.counting_kernel import counted
 
-    counted(
-        np.zeros((1, 4)), 0.0, np.array([-1.0, 0.0, 1.0]), np.array([9.0, 0.0, -5.0]), 0.0, np.zeros((1, 4))
-    )
+    counted(np.zeros((1, 4)), 0.0, np.array([-1.0, 0.0, 1.0]), np.array([9.0, 0.0, -5.0]), 0.0, np.zeros((1, 4)))

@@ -178,9 +178,7 @@ def _read(path: Path) -> Packed:
     try:
         whole = path.read_bytes()
     except FileNotFoundError:
-        message = (
-            f"{path}: must be the stored state of a run, got nothing there: the run is complete, ended before"
-        )
+        message = f"{path}: must be the stored state of a run, got nothing there: the run is complete, ended before"
         raise OutputError(f"{message} it stored any, or cannot store them; run without --resume") from None
     except OSError as error:
         raise OutputError(f"{path}: must be a readable file, got {error.strerror}") from error

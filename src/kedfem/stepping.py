@@ -102,9 +102,7 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
     for each in solvers:
         each.watch = lambda marched: watch(f"steady motion: march {marched} over a period", 0, 0)
     notes, drive = _notes(ready, watched), drive_channel(scene)
-    written = ResultsWriter(
-        folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes, drive
-    )
+    written = ResultsWriter(folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes, drive)
     with written.of_run(keeper.run, keeper.rows) if keeper else written as writer, closing(shown):
         table = _Table(writer, channels, folder)
         if not (keeper and keeper.rows):

@@ -246,9 +246,7 @@ def sudden_stop(elements: int, nodes: int) -> Motion:
 
 
 def _four_bar(rpm: float, ratio: float, end: float, h: float, elements: int = 8) -> Case:
-    return Case(
-        partial(four_bar_motion, rpm, ratio), ("stress [Pa]",), end, 5e-4 if rpm == 600 else 1e-3, h, elements
-    )
+    return Case(partial(four_bar_motion, rpm, ratio), ("stress [Pa]",), end, 5e-4 if rpm == 600 else 1e-3, h, elements)
 
 
 TIP = ("x [m]", "y [m]")

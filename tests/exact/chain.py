@@ -76,9 +76,7 @@ def chain_forces(this: Chain, x: np.ndarray, root: float, flywheel: float) -> tu
     return total, at_D, float(E * (axial - SIDE / 2 * curvature))
 
 
-def chain_history(
-    rpm: float, bars: tuple[int, int, int], h: float, steps: int
-) -> tuple[np.ndarray, np.ndarray]:
+def chain_history(rpm: float, bars: tuple[int, int, int], h: float, steps: int) -> tuple[np.ndarray, np.ndarray]:
     """t [s] and the rocker's outer stress [Pa] of links that begin rigid; an even number of bars in the rocker."""
     speed = rpm * 2 * np.pi / 60
     at = pose(0.0, speed)

@@ -56,9 +56,7 @@ def rayleigh(ratio: float, low: float = 20.0, high: float = 200.0) -> tuple[floa
     return 2 * ratio * a * b / (a + b), 2 * ratio / (a + b)
 
 
-def four_bar(
-    rpm: float, ratio: float, elements: int, nodes: int = 3, slender: float = 1.0
-) -> tuple[Problem, State]:
+def four_bar(rpm: float, ratio: float, elements: int, nodes: int = 3, slender: float = 1.0) -> tuple[Problem, State]:
     """The problem and its state at t = 0: undeformed, with the rates of the rigid linkage.
 
     Parameters

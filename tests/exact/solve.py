@@ -146,9 +146,7 @@ def forces(problem: Problem, state: State, rate: float = 0.0) -> tuple[np.ndarra
     return (f if problem.load is None else f - problem.load(state.t)), Ke
 
 
-def equilibrium(
-    problem: Problem, steps: int = 10, q: np.ndarray | None = None, spin: float = 0.0
-) -> np.ndarray:
+def equilibrium(problem: Problem, steps: int = 10, q: np.ndarray | None = None, spin: float = 0.0) -> np.ndarray:
     """The state at 'time' 1 of load(t) and held(t), reached in equal steps of t [the state at rest at 0].
 
     Parameters
@@ -266,8 +264,7 @@ def spinning_frequencies(problem: Problem, q: np.ndarray, spin: float, coriolis:
     Ke = forces(problem, State(1.0, q, zero, zero))[1] - spin**2 * beams.Me * np.tile([1.0, 1.0, 0.0], k)
     J = np.kron(np.eye(k), np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 0]]))
     K, M, G = (
-        assembled(x, beams.edof, beams.size)[free][:, free].toarray()
-        for x in (Ke, beams.Me, 2 * spin * beams.Me @ J)
+        assembled(x, beams.edof, beams.size)[free][:, free].toarray() for x in (Ke, beams.Me, 2 * spin * beams.Me @ J)
     )
     M += np.diag(beams.lumps[free])
     n = len(free)

@@ -50,9 +50,7 @@ def change_points() -> list[Outcome]:
     found = motion_at(doubled, revolutions)
     off = turned(found, body(doubled, "rocker"), UP) - revolutions
     return [
-        refused(
-            "one coupler, through them", lambda: motion_at(scene, np.linspace(0, 2.2, 90)), "in two ways"
-        ),
+        refused("one coupler, through them", lambda: motion_at(scene, np.linspace(0, 2.2, 90)), "in two ways"),
         Right("one coupler, up to 1° before them: the coupler's turn", float(coupler), 1e-12),
         Right("two couplers, two turns: the wheels turn alike [rad]", float(np.abs(off).max()), 1e-12),
     ]
@@ -73,9 +71,7 @@ def near_dead_point() -> list[Outcome]:
     turns round within a degree of the crank, and rounding errors grow by the square.
     """
     b, c, d, bend = 0.6, 0.5, 0.8, np.radians(0.1)
-    a = float(
-        np.sqrt(b**2 + c**2 + 2 * b * c * np.cos(bend)) - d
-    )  # the diagonal at 180° leaves this triangle
+    a = float(np.sqrt(b**2 + c**2 + 2 * b * c * np.cos(bend)) - d)  # the diagonal at 180° leaves this triangle
     t = np.linspace(0, 2 * np.pi, 1441)
     scene = linkage_scene(four_bar(a, b, c, d, 0.6))
     got = turned(motion_at(scene, t), body(scene, "rocker"), UP)
@@ -118,9 +114,7 @@ def redundant() -> list[Outcome]:
         many[f"{name}2"] = (kind, one, other, at + 0.1 * UP, axis)
     t = np.linspace(0, 1.8, 91)
     scenes = [linkage_scene(joints) for joints in (many, plain)]
-    got, wanted = (
-        place(motion_at(scene, t), body(scene, "coupler"), np.array([0.5, 0.4, 0.0]))[2] for scene in scenes
-    )
+    got, wanted = (place(motion_at(scene, t), body(scene, "coupler"), np.array([0.5, 0.4, 0.0]))[2] for scene in scenes)
     count = len(linkage(scenes[0]).redundant)
     return [
         Right("accelerations of the coupler [m/s²]", float(np.abs(got - wanted).max()), 1e-10),
@@ -150,9 +144,7 @@ def mass_ratio() -> list[Outcome]:
 @case("Stiffness ratio of a million between neighbours")
 def stiffness_ratio() -> list[Outcome]:
     """[KED]'s four-bar with a coupler a million times as stiff as its neighbours: it moves as a rigid link does."""
-    raw = elastic_four_bar(
-        "beam", revolutions=1, steps_per_revolution=720, rho_inf=0.9, initial="quasi-static"
-    )
+    raw = elastic_four_bar("beam", revolutions=1, steps_per_revolution=720, rho_inf=0.9, initial="quasi-static")
     raw["damping"] = {"alpha": 0.5}
     raw["drive"]["motion"]["speed"] = "60 rpm"
     raw["materials"]["stiff"] = {"density": 2796, "youngs_modulus": 7.031e16, "shear_modulus": 2.712e16}
@@ -206,9 +198,7 @@ def many_turns() -> list[Outcome]:
     torque = run(raw).channels["drive/torque"][1][1:, 0].reshape(10_000, 60)
     change = float(np.abs(torque[-1] - torque[99]).max() / np.abs(torque[99]).max())
     return [
-        Right(
-            "rocker's angle in the last turn, from the closed form [rad]", float(np.abs(drift).max()), 2e-11
-        ),
+        Right("rocker's angle in the last turn, from the closed form [rad]", float(np.abs(drift).max()), 2e-11),
         Right("drive's torque in turn 10,000 against turn 100", change, 1e-9),
     ]
 

@@ -34,9 +34,7 @@ def bar(a: list[float], b: list[float], size: tuple[float, float], elements: int
     }
 
 
-def driven(
-    motion: dict[str, Any], arm: dict[str, Any], material: dict[str, Any], **analysis: Any
-) -> dict[str, Any]:
+def driven(motion: dict[str, Any], arm: dict[str, Any], material: dict[str, Any], **analysis: Any) -> dict[str, Any]:
     return {
         "materials": {"m": material},
         "links": {"arm": arm},

@@ -30,9 +30,7 @@ def _no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("KEDFEM_CACHE", "off")
 
 
-def arm(
-    model: str, elements: list[int], *, height: float = 0.01, nu: float = 0.3, **analysis: Any
-) -> dict[str, Any]:
+def arm(model: str, elements: list[int], *, height: float = 0.01, nu: float = 0.3, **analysis: Any) -> dict[str, Any]:
     """A cantilever with a drive that stands still but for a hair, under its weight, and a probe at its tip."""
     mesh = {"elements": elements[0] if model == "beam" else elements[: 2 if model == "plane" else 3]}
     return scenes.arm(
@@ -69,9 +67,7 @@ def test_a_link_500_times_as_long_as_high(model: str, elements: list[int]) -> No
     full, small = run(raw), run(reduced(raw))
     assert_allclose(tip(full), sag(L / 500), rtol=2e-3)
     assert_allclose(tip(small), tip(full), rtol=1e-3)  # as asked for
-    few = prepared(
-        scene_from(reduced(raw, modes=12))
-    )  # too few for a solid: shear locks, and the estimate shows
+    few = prepared(scene_from(reduced(raw, modes=12)))  # too few for a solid: shear locks, and the estimate shows
     error = worst(relative_errors(histories(few[0]), full))
     assert few[1] is not None
     assert error < 1e-3 or 0.5 < worst(few[1].estimate) / error < 2
@@ -92,9 +88,7 @@ def test_badly_shaped_elements(tmp_path: Any) -> None:
     link = bare_link(scene_from(raw), "arm")
     X, rng = link.X.copy(), np.random.default_rng(3)
     corners = np.unique(link.cells[:, :8])
-    inner = corners[
-        np.all((X[corners] > [1e-9, -0.0249, -0.0249]) & (X[corners] < [L - 1e-9, 0.0249, 0.0249]), axis=1)
-    ]
+    inner = corners[np.all((X[corners] > [1e-9, -0.0249, -0.0249]) & (X[corners] < [L - 1e-9, 0.0249, 0.0249]), axis=1)]
     X[inner] += rng.uniform(-1, 1, (len(inner), 3)) * [0.017, 0.013, 0.013]
     cells = link.cells[:, :8]
     quality = mesh_quality(SolidMesh(X, cells)).least
@@ -120,9 +114,7 @@ def test_a_load_put_on_at_once_swings_to_twice_its_static_deflection() -> None:
         raw = arm(model, elements)
         raw["gravity"] = [0, 0, 0]
         raw["bodies"] = {"tip": {"kind": "point_mass", "link": "arm", "at": [L, 0], "mass": 20.0}}
-        raw["loads"] = {
-            "F": {"kind": "force", "link": "arm", "at": [L, 0], "vector": [0, -1, 0], "frame": "world"}
-        }
+        raw["loads"] = {"F": {"kind": "force", "link": "arm", "at": [L, 0], "vector": [0, -1, 0], "frame": "world"}}
         raw["analysis"] = {"initial": "rest", "end_time": 0.4, "step": 5e-4, "rho_inf": 1.0}
         static = -(L**3) * 12 / (3 * E * 0.01**4)
         full, small = run(raw), run(reduced(raw))
@@ -189,9 +181,7 @@ def test_twenty_thousand_damped_steps_stay_bounded(rho_inf: float, per_turn: int
         (0.9, 60, "too long for rho_inf = 0.9"),
     ],
 )
-def test_vibration_grows_in_damped_links_that_turn_too_far_in_a_step(
-    rho_inf: float, per_turn: int, said: str
-) -> None:
+def test_vibration_grows_in_damped_links_that_turn_too_far_in_a_step(rho_inf: float, per_turn: int, said: str) -> None:
     """By 1 − ρ∞ and more: a limit of the scheme that a warning shows, not of the mechanism."""
     first, last = growth(rho_inf, 4000, per_turn, said)
     assert last > 100 * first

@@ -17,18 +17,14 @@ def rocker_angle(a: float, b: float, c: float, d: float, crank: np.ndarray) -> n
     return np.unwrap(np.arctan2(y, x) - np.arccos((c**2 + s2 - b**2) / (2 * c * np.sqrt(s2))))
 
 
-def rocker_error(
-    lengths: tuple[float, float, float, float], drawn: float, t: np.ndarray, scale: float = 1.0
-) -> float:
+def rocker_error(lengths: tuple[float, float, float, float], drawn: float, t: np.ndarray, scale: float = 1.0) -> float:
     scene = linkage_scene(four_bar(*(scale * x for x in lengths), drawn))
     got = turned(motion_at(scene, t), body(scene, "rocker"), Z)
     wanted = rocker_angle(*lengths, drawn + t)
     return float(np.abs((got - got[0]) - (wanted - wanted[0])).max())
 
 
-@pytest.mark.parametrize(
-    "beside", [5.0, 1.0, 0.1]
-)  # degrees between coupler and rocker where they are nearest to a line
+@pytest.mark.parametrize("beside", [5.0, 1.0, 0.1])  # degrees between coupler and rocker where they are nearest to a line
 def test_passing_close_to_a_dead_point_stays_on_the_branch(beside: float) -> None:
     """a + d < b + c by so little that the diagonal at crank angle 180° leaves a triangle of this angle.
 
@@ -76,9 +72,7 @@ def test_two_change_points_at_once_are_not_stepped_over() -> None:
     joints["E"] = ("revolute", "crank", "coupler2", B, Z)
     joints["F"] = ("revolute", "coupler2", "rocker2", B + beside, Z)
     joints["G"] = ("revolute", "rocker2", "ground", beside, Z)
-    with pytest.raises(
-        MotionError, match=r"at drive angle 120\.00 deg, where the linkage could go on in two ways"
-    ):
+    with pytest.raises(MotionError, match=r"at drive angle 120\.00 deg, where the linkage could go on in two ways"):
         motion_at(linkage_scene(joints), np.linspace(0, 2 * np.pi, 90))
 
 

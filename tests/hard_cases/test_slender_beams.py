@@ -39,9 +39,7 @@ def test_condensed_is_monolithic_on_a_slender_arm_in_space() -> None:
     for step in (1e-4, 1e-2):
         raw = {
             "links": {"arm": {"model": "beam", "material": "steel", "mesh": {"elements": 3}, "shape": shape}},
-            "joints": {
-                "A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0], "axis": [0.3, 1, 0.5]}
-            },
+            "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0], "axis": [0.3, 1, 0.5]}},
             "drive": {"joint": "A", "motion": {"kind": "cycloidal", "angle": 0.5, "rise": 100 * step}},
             "analysis": {"end_time": 100 * step, "step": step},
         }

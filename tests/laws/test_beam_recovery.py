@@ -21,9 +21,7 @@ SECTION = rectangle(HEIGHT, THICKNESS)
 TURN = np.array([[0.6, -0.8], [0.8, 0.6]])
 
 
-def beam(
-    elements: int, points: tuple[tuple[float, float], ...] = ((0, 0), (LENGTH, 0)), nodes: int = 3
-) -> Link:
+def beam(elements: int, points: tuple[tuple[float, float], ...] = ((0, 0), (LENGTH, 0)), nodes: int = 3) -> Link:
     """Its axis turned by an angle, so that no direction is special."""
     turned = np.array(points) @ TURN.T
     X = np.column_stack([turned, np.zeros(len(turned))])
@@ -117,9 +115,7 @@ def test_a_kink_of_the_moment_is_not_smoothed() -> None:
         largest = LENGTH / 2 * HEIGHT / 2 / SECTION.second_moment
         assert abs(stress - exact) < 1e-7 * largest  # linear on both sides: exact but for rounding
     smooth = (point_rows(link, "probe", place(0.99, HEIGHT / 2), np.zeros((0, 3))).stress @ g)[0]
-    assert (
-        abs(smooth + 0.01 * HEIGHT / 2 / SECTION.second_moment) > 1e-3 * largest
-    )  # what kinks are there for
+    assert abs(smooth + 0.01 * HEIGHT / 2 / SECTION.second_moment) > 1e-3 * largest  # what kinks are there for
 
 
 def test_two_node_elements_and_single_ones_keep_what_they_have() -> None:

@@ -69,9 +69,7 @@ def test_matrices_of_a_turned_beam_element_are_the_turned_matrices(x: np.ndarray
     """m does not change (12), K = T K0 Tᵀ (14), on curved elements too."""
     K, T = element_stiffness(x, RIGIDITY), np.kron(np.eye(len(x)), R)
     turned = x @ R[:2, :2].T + [0.3, -0.7]
-    np.testing.assert_allclose(
-        element_stiffness(turned, RIGIDITY), T @ K @ T.T, atol=ROUNDING * np.abs(K).max()
-    )
+    np.testing.assert_allclose(element_stiffness(turned, RIGIDITY), T @ K @ T.T, atol=ROUNDING * np.abs(K).max())
     m = element_mass(x)
     np.testing.assert_allclose(element_mass(turned), m, atol=ROUNDING * m.max())
     assert np.linalg.eigvalsh(m).min() > 0

@@ -88,16 +88,12 @@ def test_singular_values_and_least_squares_are_those_of_the_whole_matrix(name: s
     f = features(link.rows, (along.R, along.p), along.near)
     whole, by_entry = Factor(link, f), BlockFactor(link, f, link.blocks)
     assert_allclose(by_entry.extremes(), whole.extremes(), rtol=0.03)  # power iteration: close ones mix
-    rhs = np.random.default_rng(2).standard_normal(
-        (len(along.phi), link.rows.count, 2)
-    )  # not to be fulfilled
+    rhs = np.random.default_rng(2).standard_normal((len(along.phi), link.rows.count, 2))  # not to be fulfilled
     wanted = whole.solve(rhs)
     assert_allclose(by_entry.solve(rhs), wanted, atol=1e-9 * np.abs(wanted).max())
     for k in range(len(along.phi)):
         there = link.blocks.values(link.rows, f, link.size)[k]
-        assert link.blocks.agree(there, by_entry.values[0]) == (
-            np.linalg.slogdet(whole.J[k].T @ whole.J[0])[0] > 0
-        )
+        assert link.blocks.agree(there, by_entry.values[0]) == (np.linalg.slogdet(whole.J[k].T @ whole.J[0])[0] > 0)
 
 
 PARALLEL = four_bar(0.3, 0.9, 0.3, 0.9, np.radians(60))
@@ -145,11 +141,7 @@ def test_joints_of_rigid_links_bear_the_same(name: str, whole_up_to: Any) -> Non
 REFUSED: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "a drive too many": (
         dict(four_bar(0.3, 0.95, 0.35, 1.0, 1.2)),
-        {
-            "drives": {
-                x: {"joint": x, "motion": {"kind": "cycloidal", "angle": 0.1, "rise": 1.0}} for x in "AD"
-            }
-        },
+        {"drives": {x: {"joint": x, "motion": {"kind": "cycloidal", "angle": 0.1, "rise": 1.0}} for x in "AD"}},
     ),
     "a dead point in the reference position": (
         {

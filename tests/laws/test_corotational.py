@@ -49,9 +49,7 @@ def segments(kind: str, count: int = 2) -> tuple[Link, Segments]:
     return link, segmented(link, SOFT, count, ENDS, ())
 
 
-PARTS = {
-    kind: segments(kind)[1].parts[0] for kind in ("beam", "plane", "solid", "tetrahedra", "spatial_beam")
-}
+PARTS = {kind: segments(kind)[1].parts[0] for kind in ("beam", "plane", "solid", "tetrahedra", "spatial_beam")}
 KINDS = list(PARTS)
 
 
@@ -83,9 +81,7 @@ def moved(link: Link, y: np.ndarray, R: np.ndarray, angle: float, shift: np.ndar
     return np.asarray(out)
 
 
-def force(
-    link: Link, y: np.ndarray, R: np.ndarray | None = None, angle: float = 0.0
-) -> tuple[np.ndarray, float]:
+def force(link: Link, y: np.ndarray, R: np.ndarray | None = None, angle: float = 0.0) -> tuple[np.ndarray, float]:
     """Internal force of all frames, which are near R, and the strain energy."""
     total, energy, zero = np.zeros_like(y), 0.0, np.zeros_like(y)
     for frame in frames_of(link):
@@ -164,10 +160,7 @@ def tip_deflection(whole: Segments | Link, load: np.ndarray) -> np.ndarray:
             blocks[number] = sp.kron(sp.csr_array(sign * weights), sp.eye_array(parts[number].d))
         height = len(cut.points) * parts[a].d
         rows.append(
-            [
-                sp.csr_array((height, part.unknowns)) if x is None else x
-                for x, part in zip(blocks, parts, strict=True)
-            ]
+            [sp.csr_array((height, part.unknowns)) if x is None else x for x, part in zip(blocks, parts, strict=True)]
         )
     C = sp.block_array(rows).tocsr() if rows else sp.csr_array((0, first[-1]))
     ends = [end_weights(parts[0], 0.0), end_weights(parts[-1], 1.0)]
@@ -296,9 +289,7 @@ def slow_four_bar(factor: float, follow: bool) -> dict[str, Any]:
     return raw
 
 
-def test_stiff_links_leave_the_linear_answer_and_the_difference_falls_with_the_square_of_their_stiffness() -> (
-    None
-):
+def test_stiff_links_leave_the_linear_answer_and_the_difference_falls_with_the_square_of_their_stiffness() -> None:
     apart = []
     for factor in (0.25, 1, 4):
         rigid_body, free = (ran(slow_four_bar(factor, follow)) for follow in (False, True))
@@ -351,9 +342,7 @@ def test_free_flight_keeps_momentum_and_the_integrators_order_of_spin_and_energy
     for h in (4e-4, 2e-4):
         made = ran(flight(kind, h))
         p, energy = made.momentum, made.kinetic_energy + made.strain_energy
-        assert_allclose(
-            p[:, :3], p[[0]][:, :3].repeat(len(p), 0), rtol=0, atol=1e-11 * np.abs(p[0, :3]).max()
-        )
+        assert_allclose(p[:, :3], p[[0]][:, :3].repeat(len(p), 0), rtol=0, atol=1e-11 * np.abs(p[0, :3]).max())
         spin = np.linalg.norm(p[-1, 3:] - p[0, 3:]) / np.linalg.norm(p[0, 3:])
         lost.append((spin, abs(energy[-1] / energy[0] - 1)))
     assert max(lost[0]) < 1e-3

@@ -47,9 +47,7 @@ def bead_on_an_arm(model: str = "rigid", torque: float = 0.0, stiffness: float =
     }
 
 
-def falling(
-    t: np.ndarray, torque: float = 0.0, stiffness: float = 0.0
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def falling(t: np.ndarray, torque: float = 0.0, stiffness: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The bead's path (T, 2), the arm's angle and the force across it on the bead: Lagrange's equations of r and φ."""
     m, M, L = RHO * SECTION * 0.04, RHO * SECTION * (HIGH - LOW), HIGH - LOW
     d = (HIGH + LOW) / 2
@@ -111,9 +109,7 @@ def test_a_balance_beyond_the_end_of_a_line_is_told() -> None:
     ends = [{"link": "cart", "at": [HERE[0], 0.4]}, {"link": "ground", "at": [-1.0, 0.4]}]
     raw["springs"] = {"s": {"kind": "spring", "between": ends, "stiffness": 100.0}}
     raw["loads"]["G"] = {"kind": "force", "link": "cart", "at": [HERE[0], 0.4], "vector": [100.0, 0]}
-    with pytest.raises(
-        SolveError, match=r"joints\.S: the pin must stay on link 'beam'.* slides off it at t = 0 s"
-    ):
+    with pytest.raises(SolveError, match=r"joints\.S: the pin must stay on link 'beam'.* slides off it at t = 0 s"):
         ran(raw)
 
 
@@ -191,9 +187,7 @@ def test_beams_and_plane_links_that_bend_far_carry_pins_alike() -> None:
     assert np.abs(one).max() > 0.07
     assert_allclose(one, other, atol=5e-4 * np.abs(one).max())
     assert_allclose(force, same, atol=5e-4 * np.abs(force).max())
-    assert force[-1, 0] == pytest.approx(
-        0.1033 * force[-1, 1], rel=2e-2
-    )  # P s²/2EI (1 − …) of the deflected beam
+    assert force[-1, 0] == pytest.approx(0.1033 * force[-1, 1], rel=2e-2)  # P s²/2EI (1 − …) of the deflected beam
 
 
 def pinned(bushing: Raw | None = None, **analysis: Any) -> Raw:
@@ -214,9 +208,7 @@ TURNS = {
 }
 
 
-@pytest.mark.parametrize(
-    "turn", [pytest.param(x, marks=[] if x == "askew" else pytest.mark.long) for x in TURNS]
-)
+@pytest.mark.parametrize("turn", [pytest.param(x, marks=[] if x == "askew" else pytest.mark.long) for x in TURNS])
 @pytest.mark.parametrize("bushing", [pytest.param(None, id="hard"), pytest.param(SOFT, id="soft")])
 def test_the_same_whichever_way_the_scene_is_turned(bushing: Raw | None, turn: str) -> None:
     """Deflections to 1e-8 of the peak, forces to 1e-7, as passes converge."""

@@ -60,9 +60,7 @@ def test_a_curve_has_one_slope_from_both_sides_and_values_and_slopes_agree(curve
     """A smooth one has no corner, where it repeats itself neither; a straight one has its corners at its points only."""
     of, step = pieces(curve), 1e-6
     x = np.linspace(curve.at[0], curve.at[-1] + (curve.period or 0.0), 61)
-    x = x[
-        np.abs(np.subtract.outer(x, np.add.outer([0, curve.period or 0], curve.at))).min(axis=(1, 2)) > 0.01
-    ]
+    x = x[np.abs(np.subtract.outer(x, np.add.outer([0, curve.period or 0], curve.at))).min(axis=(1, 2)) > 0.01]
     for place in x:
         value, slope = of(np.array([place]))
         assert_allclose(value, load_factor(curve, np.array([place]))[0], atol=1e-12)
@@ -80,9 +78,7 @@ def test_a_smooth_curve_of_a_law_converges_by_the_third_power_of_its_spacing() -
     errors = []
     for count in (16, 32, 64):
         at = np.linspace(0.0, TURN, count, endpoint=False)
-        curve = Factor(
-            over="angle", at=tuple(at), value=tuple(np.sin(at)), interpolation="smooth", period=TURN
-        )
+        curve = Factor(over="angle", at=tuple(at), value=tuple(np.sin(at)), interpolation="smooth", period=TURN)
         errors.append(np.abs(load_factor(curve, x, x) - np.sin(x)).max())
     assert errors[2] < 2e-3
     slopes = np.log2(np.array(errors[:-1]) / errors[1:])
@@ -164,9 +160,7 @@ def test_a_factor_over_the_travel_of_a_drive_is_one_over_time_there() -> None:
 
 def test_motors_take_their_curve_from_a_file(tmp_path: Path) -> None:
     n = AXES["z"]
-    (tmp_path / "motor.csv").write_text(
-        "speed [rpm], torque [N*m]\n0, 12\n1500, 9\n3000, 0\n", encoding="utf-8"
-    )
+    (tmp_path / "motor.csv").write_text("speed [rpm], torque [N*m]\n0, 12\n1500, 9\n3000, 0\n", encoding="utf-8")
     from_file = rod(n, {"over": "speed", "file": "motor.csv", "interpolation": "smooth"}, 0.0, 0.1, 10)
     listed = {"over": "speed", "at": ["0 rpm", "1500 rpm", "3000 rpm"], "value": [12.0, 9.0, 0.0],
               "interpolation": "smooth"}  # fmt: skip

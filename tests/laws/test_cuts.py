@@ -37,18 +37,14 @@ def pulled(file: Path, along: np.ndarray, segments: int, at: np.ndarray, **link:
 
 @pytest.mark.parametrize("axis", AXES)
 @pytest.mark.parametrize("element", ["tet10", "hex20"])
-def test_a_uniform_tension_stays_uniform_through_cuts_of_any_facets(
-    axis: str, element: str, tmp_path: Path
-) -> None:
+def test_a_uniform_tension_stays_uniform_through_cuts_of_any_facets(axis: str, element: str, tmp_path: Path) -> None:
     """Cuts through tetrahedra zigzag: what they bear is spread by the area of their facets across the link."""
     n = AXES[axis]
     other = across(n)
     R = np.column_stack([n, other, np.cross(n, other)])
 
     def prism(occ: Any) -> None:
-        occ.affineTransform(
-            [(3, occ.addBox(0, -10, -6, 100, 20, 12))], [*np.column_stack([R, np.zeros(3)]).ravel()]
-        )
+        occ.affineTransform([(3, occ.addBox(0, -10, -6, 100, 20, 12))], [*np.column_stack([R, np.zeros(3)]).ravel()])
 
     written(tmp_path, "prism", prism, ("step",))
     _, got = pulled(tmp_path / "prism.step", n, 3, np.zeros(3), element=element, mesh={"size": "8 mm"})

@@ -58,13 +58,9 @@ def scene(kind: str, frames: str = "rigid-body", **output: Any) -> dict[str, Any
 def test_the_envelope_is_the_maximum_over_all_steps(kind: str, frames: str) -> None:
     """Against stresses of every step by the recovery that frames are drawn with, and eigenvalues by LAPACK."""
     ready, _ = prepared(scene_from(scene(kind, frames)))
-    recoveries = [
-        stress_recovery(link) for link in [*ready.model.links, *(x.link for x in ready.model.prescribed)]
-    ]
+    recoveries = [stress_recovery(link) for link in [*ready.model.links, *(x.link for x in ready.model.prescribed)]]
     envelope = Envelope(ready.model, recoveries)
-    blocks = list(
-        transient(ready.scene, ready.linkage, ready.path, ready.model, steps_of(ready.scene, ready.model))
-    )
+    blocks = list(transient(ready.scene, ready.linkage, ready.path, ready.model, steps_of(ready.scene, ready.model)))
     for block in blocks:
         envelope.add(block)
     found = envelope.links()
@@ -105,9 +101,7 @@ def test_leading_modes_tell_where_there_is_no_extreme() -> None:
     ready, _ = prepared(scene_from(scene("reduced")))
     recoveries = [stress_recovery(link) for link in ready.model.links]
     envelope = Envelope(ready.model, recoveries)
-    for block in transient(
-        ready.scene, ready.linkage, ready.path, ready.model, steps_of(ready.scene, ready.model)
-    ):
+    for block in transient(ready.scene, ready.linkage, ready.path, ready.model, steps_of(ready.scene, ready.model)):
         envelope.add(block)
     envelope.flush()
     assert envelope.evaluated < 0.6 * envelope.looked

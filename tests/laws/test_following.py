@@ -56,9 +56,7 @@ def amplitudes(speed: float) -> np.ndarray:
 def along(folder: Path, values: str, follow: bool) -> Swept:
     raw = duffing()
     axes = axes_of([f"drive.speed={values}"], raw)
-    return sweep(
-        Base(raw, folder, "d"), axes, Asked(quick=True, follow=follow), folder / "out", executor=Inline()
-    )
+    return sweep(Base(raw, folder, "d"), axes, Asked(quick=True, follow=follow), folder / "out", executor=Inline())
 
 
 def size(done: Swept, k: int) -> float:
@@ -68,9 +66,7 @@ def size(done: Swept, k: int) -> float:
 
 @pytest.mark.long
 def test_both_directions_keep_to_their_branch(tmp_path: Path) -> None:
-    up, down = (
-        along(tmp_path / name, values, True) for name, values in (("up", "40:46:4"), ("down", "50:48:3"))
-    )
+    up, down = (along(tmp_path / name, values, True) for name, values in (("up", "40:46:4"), ("down", "50:48:3")))
     assert_allclose(size(up, 0), amplitudes(40.0), rtol=0.02)
     small, _, large = amplitudes(48.0)
     assert_allclose(size(down, 2), small, rtol=0.03)

@@ -53,9 +53,7 @@ CELLS = [
 TURNS = [np.zeros(3), np.array([0, 0, np.pi / 2]), np.array([0, -np.pi / 2, 0]), np.array([0.7, -0.4, 1.1])]
 
 
-def frozen(
-    raw: dict[str, Any], count: int = 4, driven: bool = True
-) -> tuple[System, RigidMotion, Modes, int]:
+def frozen(raw: dict[str, Any], count: int = 4, driven: bool = True) -> tuple[System, RigidMotion, Modes, int]:
     """A scene's system, its motion at one time, its modes there, and how many motions the linkage has."""
     scene = scene_from(raw)
     linkage, path = moving(scene)
@@ -72,13 +70,8 @@ def monolithic_eigenvalues(system: System, motion: RigidMotion, s: float) -> np.
     """
     oracle = Monolithic(system, generalised_alpha(1e-3, 1.0))
     every = zip(system.model.links, system.model.bodies, strict=True)
-    K = [
-        rotated_stiffness(sp.csr_array(link.K0), motion.R[0, n][: link.d, : link.d]).toarray()
-        for link, n in every
-    ]
-    C = oracle.coordinates(
-        np.zeros(oracle.k), np.zeros(sum(len(x.terms) for x in system.constraints)), motion
-    )[1]
+    K = [rotated_stiffness(sp.csr_array(link.K0), motion.R[0, n][: link.d, : link.d]).toarray() for link, n in every]
+    C = oracle.coordinates(np.zeros(oracle.k), np.zeros(sum(len(x.terms) for x in system.constraints)), motion)[1]
     laws = [x.law for x in system.constraints]
     kappa = np.array([x.stiffness if isinstance(x, Spring) else 0.0 for x in laws])
     hard = C[[isinstance(x, Held | Driven) for x in laws]]
@@ -93,9 +86,7 @@ def monolithic_eigenvalues(system: System, motion: RigidMotion, s: float) -> np.
 
 
 def difference(system: System, motion: RigidMotion, found: Modes) -> float:
-    wanted = monolithic_eigenvalues(system, motion, found.omega[found.still] ** 2)[
-        found.still : len(found.omega)
-    ]
+    wanted = monolithic_eigenvalues(system, motion, found.omega[found.still] ** 2)[found.still : len(found.omega)]
     return float(np.abs(found.omega[found.still :] ** 2 / wanted - 1).max())
 
 

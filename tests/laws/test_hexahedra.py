@@ -230,9 +230,7 @@ def test_stiffness_of_the_turned_mesh_is_the_turned_stiffness(mesh: SolidMesh, m
 
 @LAW
 @given(hexahedra(), motions, seeds)
-def test_strain_energy_and_stresses_do_not_depend_on_the_frame(
-    mesh: SolidMesh, motion: Motion, seed: int
-) -> None:
+def test_strain_energy_and_stresses_do_not_depend_on_the_frame(mesh: SolidMesh, motion: Motion, seed: int) -> None:
     """½ δᵀ K δ = ½ gᵀ K0 g with δ = T g, [KED, eq. (13)]; stresses in link axes turn with the link."""
     here, there = solid(mesh), solid(rotated(mesh, motion), axes=motion.R)
     g = np.random.default_rng(seed).uniform(-1, 1, (here.n, 3))

@@ -31,9 +31,7 @@ def sampled(points: np.ndarray, cells: np.ndarray, count: int = 13) -> np.ndarra
 
 def grid(nodes: np.ndarray, line: np.ndarray) -> np.ndarray:
     """Places in an element, of a tetrahedron those of its cube that are in it too."""
-    places = np.stack(np.meshgrid(*[line] * nodes.shape[1], indexing="ij"), axis=-1).reshape(
-        -1, nodes.shape[1]
-    )
+    places = np.stack(np.meshgrid(*[line] * nodes.shape[1], indexing="ij"), axis=-1).reshape(-1, nodes.shape[1])
     if len(nodes) != len(TET10):
         return places
     return ((places + 1) / 2)[places.sum(axis=1) <= -1 + 1e-12]
@@ -61,9 +59,7 @@ def test_without_halving_the_bound_is_below_the_least_sample(nodes, size, seed):
     points, cells = elements(nodes, size, seed)
     lower, _ = determinant_bounds(points, cells, depth=0)
     values = sampled(points, cells)
-    if (
-        len(nodes) <= 10
-    ):  # the scale is the mean over the places that are sampled inside; of these only the sign
+    if len(nodes) <= 10:  # the scale is the mean over the places that are sampled inside; of these only the sign
         assert (values.min(axis=1)[lower > 0] > 0).all()
         return
     ends = -np.cos(np.pi * np.arange(6) / 5)
@@ -111,9 +107,7 @@ def test_an_element_folded_between_the_places_that_are_sampled_is_refused():
     mesh = folded_between()
     assert mesh_quality(mesh).least > 0.28
     assert sampled(mesh.points, mesh.cells, 41).min() < -0.08
-    with pytest.raises(
-        MeshError, match="must not be inverted or folded anywhere, got det J that is not positive"
-    ):
+    with pytest.raises(MeshError, match="must not be inverted or folded anywhere, got det J that is not positive"):
         checked_mesh("links.arm", mesh, 0.1)
 
 

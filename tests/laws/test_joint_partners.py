@@ -166,9 +166,7 @@ def test_a_planar_beam_and_a_rigid_bar_are_welded_either_way_round() -> None:
 @pytest.mark.parametrize("other", ["solid", "beam"])
 def test_a_plane_link_does_not_slide_on_one_in_space(other: str) -> None:
     raw = chain("prismatic", ("plane", "planar beam"), plane=True)
-    (link,) = (
-        raw["links"][name] for name in raw["joints"]["J"]["links"] if raw["links"][name]["model"] == "beam"
-    )
+    (link,) = (raw["links"][name] for name in raw["joints"]["J"]["links"] if raw["links"][name]["model"] == "beam")
     if other == "solid":
         link |= {"model": "solid", "mesh": {"elements": [4, 1, 1]}}
         link.pop("beam", None)
@@ -190,9 +188,7 @@ def test_dampers_of_bushings_are_felt_where_beams_in_space_start_as_where_planar
         link["beam"] = "spatial"
     spatial = channels(*ran(raw))["joints/J/force"]
     assert_allclose(spatial[:1, :2], planar[:1, :2], rtol=0, atol=1e-7 * np.abs(planar[0]).max())
-    assert_allclose(
-        spatial[:, :2], planar[:, :2], rtol=0, atol=1e-2 * np.abs(planar).max()
-    )  # sections lean a little
+    assert_allclose(spatial[:, :2], planar[:, :2], rtol=0, atol=1e-2 * np.abs(planar).max())  # sections lean a little
 
 
 ARM = {"width": 0.02, "thickness": 0.01}  # m
@@ -222,9 +218,7 @@ def arm(kinds: tuple[str, str], frames: str) -> dict[str, Any]:
 
 @pytest.mark.parametrize("frames", ["rigid-body", "co-rotational"])
 @pytest.mark.parametrize("kinds", [("plane", "beam"), ("beam", "plane")])
-def test_a_plane_link_and_a_planar_beam_are_welded_as_two_beams_are(
-    kinds: tuple[str, str], frames: str
-) -> None:
+def test_a_plane_link_and_a_planar_beam_are_welded_as_two_beams_are(kinds: tuple[str, str], frames: str) -> None:
     """Shear aside, which is 1e-4 of the deflection: the weld passes force, and moment, without any give of its own."""
     scene = arm(kinds, frames)
     assert not spatial_beams(scene_from(scene))
@@ -235,9 +229,7 @@ def test_a_plane_link_and_a_planar_beam_are_welded_as_two_beams_are(
 
 @pytest.mark.parametrize("frames", ["rigid-body", "co-rotational"])
 @pytest.mark.parametrize("kinds", [("plane", "solid"), ("solid", "plane")])
-def test_a_plane_link_and_a_solid_are_welded_as_two_plane_links_are(
-    kinds: tuple[str, str], frames: str
-) -> None:
+def test_a_plane_link_and_a_solid_are_welded_as_two_plane_links_are(kinds: tuple[str, str], frames: str) -> None:
     """Without contraction a plane link is the solid that moves in its plane."""
     assert_alike(without_contraction(kinds, frames), without_contraction(("plane", "plane"), frames), 1e-7)
 
@@ -253,9 +245,7 @@ def test_a_plane_link_and_a_rigid_one_are_welded_as_to_a_far_stiffer_plane_link(
 
 @pytest.mark.parametrize("frames", ["rigid-body", "stiffening", "co-rotational", "no drive"])
 @pytest.mark.parametrize("partners", [("plane", "rigid"), ("solid", "plane")])
-def test_a_weld_of_a_plane_link_and_one_in_space_moves_as_by_the_oracle(
-    partners: tuple[str, str], frames: str
-) -> None:
+def test_a_weld_of_a_plane_link_and_one_in_space_moves_as_by_the_oracle(partners: tuple[str, str], frames: str) -> None:
     raw = chain("weld", partners, plane=True)
     raw["analysis"] |= {
         "initial": "rest",
@@ -282,9 +272,7 @@ def assert_alike(one: dict[str, Any], other: dict[str, Any], digits: float) -> N
 def without_contraction(kinds: tuple[str, str], frames: str) -> dict[str, Any]:
     """`arm` of a material with ν = 0, solids of one layer across the plane; seen at the weld, far from the force."""
     raw = arm(("plane", "plane"), frames)
-    raw["output"]["probes"] = {
-        "tip": {"link": "one", "at": [0.2, 0.01, 0], "quantity": "displacement", "frame": "world"}
-    }
+    raw["output"]["probes"] = {"tip": {"link": "one", "at": [0.2, 0.01, 0], "quantity": "displacement", "frame": "world"}}
     raw["materials"] = {"own": {"youngs_modulus": 2.1e11, "poisson_ratio": 0.0, "density": 7850.0}}
     more = {
         "solid": {"mesh": {"elements": [16, 2, 1]}, "element": "hex27"},
@@ -298,7 +286,5 @@ def without_contraction(kinds: tuple[str, str], frames: str) -> dict[str, Any]:
 def test_a_weld_of_two_faces_at_an_angle_is_refused_with_the_reason() -> None:
     raw = chain("weld", ("solid", "solid"))
     raw["links"]["link 1"]["shape"]["between"][1] = [0.2, 0.15, 0.05]
-    with pytest.raises(
-        KedfemError, match=r"joints\.J: must weld faces that lie in one plane.* of link 'link 1'"
-    ):
+    with pytest.raises(KedfemError, match=r"joints\.J: must weld faces that lie in one plane.* of link 'link 1'"):
         ran(raw)

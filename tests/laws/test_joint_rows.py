@@ -56,9 +56,7 @@ def rounding(kind: str) -> float:
 def assert_the_same(kind: str, one: Any, other: Any, R: np.ndarray, digits: float) -> None:
     """Link-frame deflections of all links, forces, moments and torques of all joints, drives and gears, turned back."""
     (ready, blocks), (_, again) = one, other
-    links = [
-        k for k, link in enumerate(ready.model.links) if not link.rigid
-    ]  # whose functions lie as they do
+    links = [k for k, link in enumerate(ready.model.links) if not link.rigid]  # whose functions lie as they do
     size = max((np.abs(state(blocks, k, "g")).max() for k in links), default=0.0)  # all may be rigid
     for k in links:
         # of the functions of a beam in space some are slopes, whose values turn with their own directions
@@ -124,9 +122,7 @@ def test_the_force_on_a_slider_without_a_shape_is_the_same_in_all_directions_of_
         assert_allclose(other, force[0], atol=1e-8 * np.abs(force[0]).max())
 
 
-@pytest.mark.parametrize(
-    "kind", ["cylindrical, bores", pytest.param("prismatic, bores", marks=pytest.mark.long)]
-)
+@pytest.mark.parametrize("kind", ["cylindrical, bores", pytest.param("prismatic, bores", marks=pytest.mark.long)])
 def test_no_answer_of_solids_depends_on_how_the_scene_lies(kind: str, tmp_path: Path) -> None:
     """All solids in mesh files, which may lie as they like; bores are found there."""
     R, shift = moved(3)
@@ -225,9 +221,7 @@ def shortened(raw: dict[str, Any], end: float) -> dict[str, Any]:
     return {**raw, "analysis": {**raw["analysis"], "end_time": end}}
 
 
-@pytest.mark.parametrize(
-    "kind", [pytest.param(x, marks=pytest.mark.long if "bores" in x else ()) for x in EVERY]
-)
+@pytest.mark.parametrize("kind", [pytest.param(x, marks=pytest.mark.long if "bores" in x else ()) for x in EVERY])
 def test_the_monolithic_steps_agree(kind: str) -> None:
     """Assembled at every step, with bordered rows and no condensation: displacements, rates, joint forces and torques."""
     raw = shortened(EVERY[kind](), 0.01 if kind in BEAMS else 0.002)

@@ -58,9 +58,7 @@ class Bounce:
     def peak(self) -> float:
         """Its largest push: at once, or where k s' + c s'' = 0."""
         root, angle = np.sqrt(1 - self.zeta**2), np.arccos(self.zeta)
-        turned = max(
-            3 * angle - np.pi, 0.0
-        )  # s'' goes with sin(ω_d t − 2 acos ζ), its rate with sin(ω_d t − 3 acos ζ)
+        turned = max(3 * angle - np.pi, 0.0)  # s'' goes with sin(ω_d t − 2 acos ζ), its rate with sin(ω_d t − 3 acos ζ)
         falls = np.exp(-self.zeta / root * turned)
         return float(self.mass * self.speed * self.omega / root * falls * np.sin(2 * angle - turned))
 
@@ -194,9 +192,7 @@ KINDS: dict[str, Raw] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "kind", [x if x in QUICK else pytest.param(x, marks=pytest.mark.long) for x in KINDS]
-)
+@pytest.mark.parametrize("kind", [x if x in QUICK else pytest.param(x, marks=pytest.mark.long) for x in KINDS])
 def test_links_of_all_kinds_bounce_as_the_closed_form(kind: str) -> None:
     """On a slide at a side of theirs: they give way a little there."""
     bounce, side = Bounce(STEEL * 6e-4 * 0.04, 1.0, 1e5, 0.2), 0.0 if kind == "beam" else 0.015
@@ -261,9 +257,7 @@ def slider_crank(frames: str) -> Ran:
         return {"model": "beam", "material": "steel", "shape": shape(a, b), "mesh": {"elements": 3}}
 
     hinges = {"A": ("ground", "crank", 0.0), "B": ("crank", "rod", 0.1), "C": ("rod", "shoe", 0.4)}
-    joints: Raw = {
-        name: {"kind": "revolute", "links": [i, j], "at": [x, 0]} for name, (i, j, x) in hinges.items()
-    }
+    joints: Raw = {name: {"kind": "revolute", "links": [i, j], "at": [x, 0]} for name, (i, j, x) in hinges.items()}
     joints["S"] = {"kind": "prismatic", "links": ["ground", "shoe"], "at": [0.4, 0], "axis": "x"}
     return ran({
         "links": {"crank": beam(0, 0.1), "rod": beam(0.1, 0.4), "shoe": {"model": "rigid", "mass": 0.5}},
@@ -276,9 +270,7 @@ def slider_crank(frames: str) -> Ran:
 
 
 @pytest.mark.parametrize("frames", ["rigid-body", "co-rotational"])
-def test_a_driven_slider_is_pushed_as_the_drive_moves_it(
-    frames: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_driven_slider_is_pushed_as_the_drive_moves_it(frames: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """k s + c s' of the rigid slider-crank: links give way by 2e-4 of s; it is met half way, at once with c s' = 60 N."""
     divided, times = impacts.divided, []
     monkeypatch.setattr(impacts, "divided", lambda *x: (times.append(x[2]), divided(*x))[1])
@@ -297,9 +289,7 @@ def test_a_march_that_stops_divide_goes_on_from_a_stored_state_bit_for_bit() -> 
     raw = {
         "links": {"block": bar("beam", (0, 0), (0.04, 0), 1)},
         "joints": {"J": {"kind": "prismatic", "links": ["block", "ground"], "at": [0.02, 0], "axis": "x"}},
-        "limits": {
-            "stop": {"kind": "travel", "joint": "J", "upper": 1e-5, "stiffness": 1e5, "damping": 100.0}
-        },
+        "limits": {"stop": {"kind": "travel", "joint": "J", "upper": 1e-5, "stiffness": 1e5, "damping": 100.0}},
         "analysis": {"end_time": 0.01, "step": 1e-4, "rho_inf": 0.8, "initial_speeds": {"J": 1.0}},
     }
     of = begun(raw)

@@ -55,9 +55,7 @@ def at_one_instant(motion: Motion, alpha: np.ndarray, p2: np.ndarray) -> RigidMo
     R, p, omega = both(motion.R), both(motion.p), both(motion.omega)
     none = np.zeros((len(zero), 0))
     still = np.zeros_like(omega)
-    return RigidMotion(
-        zero, zero, R, p, omega, both(alpha), both(motion.v), both(R2), both(p2), none, still, still
-    )
+    return RigidMotion(zero, zero, R, p, omega, both(alpha), both(motion.v), both(R2), both(p2), none, still, still)
 
 
 def point_acceleration(motion: Motion, alpha: np.ndarray, p2: np.ndarray, X: np.ndarray) -> np.ndarray:
@@ -194,9 +192,7 @@ def test_kinetic_energy_of_a_beam_with_a_body_on_its_node(beam: Beam, motion: Mo
 
 @LAW
 @given(rings(), motions, seeds)
-def test_kinetic_energy_with_a_slider_is_that_of_link_and_point_mass(
-    mesh: SolidMesh, motion: Motion, seed: int
-) -> None:
+def test_kinetic_energy_with_a_slider_is_that_of_link_and_point_mass(mesh: SolidMesh, motion: Motion, seed: int) -> None:
     rest = Motion(np.eye(3), np.zeros(3), np.zeros(3), np.zeros(3))
     link = solid(mesh)
     random = np.random.default_rng(seed)

@@ -90,9 +90,7 @@ CHEAP = (
 DEAR = ((1, "rigid-body"), (1006, "co-rotational"))  # gears on a rigid hub; gears, a spring and a rigid link
 
 
-@pytest.mark.parametrize(
-    ("seed", "frames"), [*CHEAP, *(pytest.param(*each, marks=pytest.mark.long) for each in DEAR)]
-)
+@pytest.mark.parametrize(("seed", "frames"), [*CHEAP, *(pytest.param(*each, marks=pytest.mark.long) for each in DEAR)])
 def test_forces_of_a_driven_mechanism_tend_to_those_of_rigid_links(seed: int, frames: str) -> None:
     """Two ways: elastic links three times as stiff as steel, in quasi-static positions, and rigid inverse dynamics."""
     what, found = tried("rigid", seed, frames)

@@ -95,9 +95,7 @@ def test_strains_within_sections_leave_the_beam_alone(x: np.ndarray, seed: int) 
         e = element.drawn[element.node == a]
         stretch = random.uniform(-0.1, 0.1, (len(mine), len(mine)))
         y[mine] += (stretch + stretch.T) @ e
-    assert_allclose(
-        node_rotations(element, element.gradients @ y), np.tile(np.eye(3), (len(x), 1, 1)), atol=1e-12
-    )
+    assert_allclose(node_rotations(element, element.gradients @ y), np.tile(np.eye(3), (len(x), 1, 1)), atol=1e-12)
     count = 6 * len(element.tangents)
     assert_allclose(strains_of(element, y)[:count], 0, atol=1e-12)
     assert np.abs(strains_of(element, y)[count:]).max() > 1e-3

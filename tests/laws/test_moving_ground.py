@@ -26,18 +26,13 @@ ALONG = np.array([0.05, 0, 0])
 QUIET = {"plots": False, "picture": False, "animation": False}
 EVERY = pytest.mark.parametrize(
     "axis",
-    [
-        pytest.param(axis, id=name, marks=[pytest.mark.long] if name in "yz" else [])
-        for name, axis in AXES.items()
-    ],
+    [pytest.param(axis, id=name, marks=[pytest.mark.long] if name in "yz" else []) for name, axis in AXES.items()],
 )
 
 
 def run(raw: Raw, folder: Path, **probes: Raw) -> Results:
     quick = {"accuracy": "quick", **raw["analysis"]}
-    return analyse(
-        scene_from({**raw, "analysis": quick, "output": {**QUIET, "probes": probes}}, folder)
-    ).results
+    return analyse(scene_from({**raw, "analysis": quick, "output": {**QUIET, "probes": probes}}, folder)).results
 
 
 def sprung(axis: Vector, motion: Raw, **analysis: Any) -> Raw:
@@ -85,9 +80,7 @@ def test_a_swinging_ground_moves_a_block_by_its_transmissibility(axis: Vector, t
         step=1 / (400 * f),
         kind="steady",
     )
-    found = run(
-        {**raw, "gravity": -G * axis}, tmp_path, block=travel("block", 0.3 * axis), road=travel("road")
-    )
+    found = run({**raw, "gravity": -G * axis}, tmp_path, block=travel("block", 0.3 * axis), road=travel("road"))
     w, y = 2 * np.pi * f, Y * np.exp(0.4j)
     x = y * (K + 1j * C * w) / (K - M * w**2 + 1j * C * w)
     force = M * -(w**2) * x + GROUND_MASS * -(w**2) * y
@@ -131,12 +124,9 @@ def test_damping_by_mass_of_what_moves_freely_is_told_with_what_it_takes(tmp_pat
     t = done.results.time
     v = CubicSpline(t, along(done.results, axis))(t, 1)
     taken = alpha * M * trapezoid(v**2, t)
-    change = (
-        rows["energy/kinetic"] - rows["energy/kinetic"][0] + rows["energy/strain"] - rows["energy/strain"][0]
-    )
+    change = rows["energy/kinetic"] - rows["energy/kinetic"][0] + rows["energy/strain"] - rows["energy/strain"][0]
     exchanged = max(
-        np.abs(x).max()
-        for x in (change, rows["energy/strain"], rows["energy/work"], rows["energy/dissipated"])
+        np.abs(x).max() for x in (change, rows["energy/strain"], rows["energy/work"], rows["energy/dissipated"])
     )
     assert done.balance.resisted == pytest.approx(taken / exchanged, rel=1e-3)
     (said,) = warnings
@@ -159,9 +149,7 @@ def test_a_static_analysis_lifts_a_block_with_its_ground(axis: Vector, tmp_path:
     """x = y − m g/k, and the drive bears both weights."""
     rise = {"kind": "cycloidal", "travel": 0.2, "rise": 1.0}
     raw = sprung(axis, rise, kind="static", end_time=1.0, step=0.25)
-    found = run(
-        {**raw, "gravity": -G * axis}, tmp_path, block=travel("block", 0.3 * axis), road=travel("road")
-    )
+    found = run({**raw, "gravity": -G * axis}, tmp_path, block=travel("block", 0.3 * axis), road=travel("road"))
     assert_allclose(along(found, axis), along(found, axis, "road") - M * G / K, atol=1e-9)
     assert_allclose(found.channels["drive/force"][1][:, 0], (M + GROUND_MASS) * G, rtol=1e-8)
 
@@ -189,10 +177,7 @@ def pushed(raw: Raw, axis: Vector, height: float) -> Raw:
     t = np.linspace(0, END, STEPS + 1)
     a = drive_angle(Polynomial(**RISE, travel=height), t)[2]
     factor = {"time": t, "value": a}
-    loads = {
-        name: {"kind": "body", "link": name, "vector": -7850.0 * axis, "factor": factor}
-        for name in raw["links"]
-    }
+    loads = {name: {"kind": "body", "link": name, "vector": -7850.0 * axis, "factor": factor} for name in raw["links"]}
     return {**(raw if "drive" in raw else shaken(raw, axis, 1e-12)), "loads": loads}
 
 
@@ -292,12 +277,8 @@ def test_grounds_on_grounds_bear_centrifugal_and_coriolis_forces(tmp_path: Path)
     force = m * (r2 - r * omega**2)
     torque = m * r**2 * alpha + 2 * m * r * r1 * omega
     for kind in ("", "rigid_"):
-        assert_allclose(
-            found.channels[f"drive/way/{kind}force"][1][:, 0], force, atol=1e-9 * np.abs(force).max()
-        )
-        assert_allclose(
-            found.channels[f"drive/turn/{kind}torque"][1][:, 0], torque, atol=1e-9 * np.abs(torque).max()
-        )
+        assert_allclose(found.channels[f"drive/way/{kind}force"][1][:, 0], force, atol=1e-9 * np.abs(force).max())
+        assert_allclose(found.channels[f"drive/turn/{kind}torque"][1][:, 0], torque, atol=1e-9 * np.abs(torque).max())
 
 
 def test_what_no_drive_moves_alone_is_no_ground(tmp_path: Path) -> None:

@@ -25,9 +25,7 @@ def test_stages_satisfy_the_conditions_of_their_order(scheme: Scheme) -> None:
             assert found == pytest.approx(asked, abs=1e-9)  # published fractions of up to twelve digits
 
 
-@pytest.mark.parametrize(
-    "scheme", [s for s in STAGED if "L-stable" in s.name], ids=lambda scheme: scheme.name
-)
+@pytest.mark.parametrize("scheme", [s for s in STAGED if "L-stable" in s.name], ids=lambda scheme: scheme.name)
 def test_l_stable_stages_damp_what_a_step_cannot_resolve(scheme: Scheme) -> None:
     """R(z) = 1 + z bᵀ (1 − z A)⁻¹ 1 goes to zero (Hairer and Wanner, Solving ODEs II, IV.3)."""
     assert scheme.tableau is not None

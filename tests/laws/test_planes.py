@@ -137,12 +137,8 @@ def test_linear_fields_pass_the_patch_test_in_plane_stress(mesh: QuadMesh, seed:
     c = E / (1 - nu**2)
     exact = np.array([c * (xx + nu * yy), c * (yy + nu * xx), 0, E / (2 * (1 + nu)) * xy, 0, 0])
     size = np.abs(exact).max()
-    np.testing.assert_allclose(
-        point_rows(link, "here", inside(link)).stress @ g.ravel(), exact, atol=1e-10 * size
-    )
-    np.testing.assert_allclose(
-        nodal_stress(stress_recovery(link), g), np.tile(exact, (link.n, 1)), atol=1e-10 * size
-    )
+    np.testing.assert_allclose(point_rows(link, "here", inside(link)).stress @ g.ravel(), exact, atol=1e-10 * size)
+    np.testing.assert_allclose(nodal_stress(stress_recovery(link), g), np.tile(exact, (link.n, 1)), atol=1e-10 * size)
     energy = exact @ [xx, yy, 0, xy, 0, 0] / 2 * link.volume.sum()
     assert g.ravel() @ link.K0 @ g.ravel() / 2 == pytest.approx(energy, rel=1e-11)
     force = (link.K0 @ g.ravel()).reshape(-1, 2)
@@ -212,9 +208,7 @@ def test_a_bore_reads_value_and_gradient_of_affine_fields_exactly(seed: int) -> 
     surface = joint_surface(link, "joints.A", np.zeros(3), Z)
     u = a + link.X[:, :2] @ H.T
     point = random.uniform(-1, 1, 3)  # its z plays no part
-    np.testing.assert_allclose(
-        port_weights(surface, point[None, :]) @ u, (a + H @ point[:2])[None, :], atol=1e-13
-    )
+    np.testing.assert_allclose(port_weights(surface, point[None, :]) @ u, (a + H @ point[:2])[None, :], atol=1e-13)
     np.testing.assert_allclose(surface.fit[1:] @ u, [*H.T, [0, 0]], atol=1e-12)
     np.testing.assert_allclose(port_weights(surface, point[None, :]).sum(), 1, atol=1e-13)
     # the circle of radius 0.1 is chords of parabolas: its spread is r/√2 to their fourth order
@@ -244,9 +238,7 @@ def test_edges_have_the_area_of_length_times_thickness() -> None:
 
 @LAW
 @given(quadrilaterals(), planar_motions, vectors, vectors)
-def test_inertia_load_is_literally_minus_M_R0(
-    mesh: QuadMesh, motion: Motion, alpha: np.ndarray, p2: np.ndarray
-) -> None:
+def test_inertia_load_is_literally_minus_M_R0(mesh: QuadMesh, motion: Motion, alpha: np.ndarray, p2: np.ndarray) -> None:
     """m·1 and m·X serve in place of M R0'' at the nodes, [KED, eq. (17)]."""
     link, alpha, p2 = plane(mesh), alpha * [0, 0, 1], p2 * [1, 1, 0]
     got = applied(link, (), at_one_instant(motion, alpha, p2), 1)[0]
@@ -256,9 +248,7 @@ def test_inertia_load_is_literally_minus_M_R0(
 
 @LAW
 @given(planar_motions, vectors, seeds)
-def test_kinetic_energy_with_a_body_is_that_of_link_and_rigid_body(
-    motion: Motion, centre: np.ndarray, seed: int
-) -> None:
+def test_kinetic_energy_with_a_body_is_that_of_link_and_rigid_body(motion: Motion, centre: np.ndarray, seed: int) -> None:
     """In the plane: T = T_link + ½ m v² + ½ I_zz ω², the centre anywhere, its z of no account."""
     link, random = disc(), np.random.default_rng(seed)
     surface = joint_surface(link, "joints.A", np.zeros(3), Z)

@@ -116,16 +116,12 @@ def test_a_stiff_reduced_link_is_the_stiff_link_reduced(nodes: int) -> None:
     other = reduced(with_rigid_coupling(link, bore(link)), Q)
     for K in (one, other):  # functions may differ by a turn among them, the eigenvalues may not
         assert K.full is not None
-    assert_allclose(
-        np.linalg.eigvalsh(one.K0), np.linalg.eigvalsh(other.K0), rtol=0, atol=1e-9 * np.abs(other.K0).max()
-    )
+    assert_allclose(np.linalg.eigvalsh(one.K0), np.linalg.eigvalsh(other.K0), rtol=0, atol=1e-9 * np.abs(other.K0).max())
 
 
 def test_a_rigid_coupling_of_a_plane_link_leaves_three_motions_free() -> None:
     angle = np.arange(16) * np.pi / 8
-    points = np.concatenate(
-        [r * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]) for r in (0.1, 0.2, 0.3)]
-    )
+    points = np.concatenate([r * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]) for r in (0.1, 0.2, 0.3)])
     quads = [
         [(2 * k + i) % 16 + 16 * j for j, i in ((0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1), (1, 1))]
         for k in range(8)
@@ -183,9 +179,7 @@ def drawn(R: np.ndarray, folder: Path, port: str, **analysis: Any) -> dict[str, 
 
 
 @pytest.mark.parametrize("port", ["distributing", "rigid"])
-def test_a_scene_in_another_direction_bends_alike(
-    port: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_scene_in_another_direction_bends_alike(port: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     R = Rotation.from_rotvec([0.7, -1.1, 0.4]).as_matrix()
     analysis = {"revolutions": 5 / 240, "steps_per_revolution": 240}
@@ -201,9 +195,7 @@ def test_a_scene_in_another_direction_bends_alike(
     for upright, turned in zip(*found, strict=True):
         peak = max(np.abs(x).max() for x in upright)
         for a, b in zip(turned, upright, strict=True):
-            assert_allclose(
-                a, b, rtol=0, atol=1e-6 * peak
-            )  # rounding, docs/ports.md: plates are soft sideways
+            assert_allclose(a, b, rtol=0, atol=1e-6 * peak)  # rounding, docs/ports.md: plates are soft sideways
 
 
 @pytest.mark.parametrize("port", ["distributing", "rigid"])
@@ -214,9 +206,7 @@ def test_joints_are_closed_and_hand_on_force_and_moment_in_full(kind: str, port:
     raw["damping"], raw["gravity"] = {"beta": 1e-5}, [0, -9.81, 0]  # inner damping carries no resultant
     model, _, snapshots = run(raw)
     for snapshot in snapshots[1::4]:
-        held = np.concatenate(
-            [port_values(j, s.u) for j, s in zip(model.joints, snapshot.states, strict=True)]
-        )
+        held = np.concatenate([port_values(j, s.u) for j, s in zip(model.joints, snapshot.states, strict=True)])
         B = interface_matrix(model.joints).toarray()
         gap = held - B @ np.linalg.lstsq(B, held, rcond=None)[0]
         assert np.abs(gap).max() < 1e-12 * min(link.size for link in model.links)
@@ -239,9 +229,7 @@ def moment(x: np.ndarray, force: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("kind", ["plate", "plane"])
 def test_condensed_is_monolithic_with_stiff_ports(kind: str) -> None:
     fast = run(ported(four_bar(kind, revolutions=1 / 24, steps_per_revolution=240), "rigid"))
-    slow = run(
-        ported(four_bar(kind, revolutions=1 / 24, steps_per_revolution=240, solver="monolithic"), "rigid")
-    )
+    slow = run(ported(four_bar(kind, revolutions=1 / 24, steps_per_revolution=240, solver="monolithic"), "rigid"))
     peak = max(np.abs(s.u).max() for snapshot in slow[2] for s in snapshot.states)
     for a, b in zip(fast[2], slow[2], strict=True):
         for s, r in zip(a.states, b.states, strict=True):
@@ -286,9 +274,7 @@ def test_segments_and_reduced_links_take_stiff_ports(reduce: bool) -> None:
         for link in raw["links"].values():
             link["segments"] = 3
         models.append(model_of(ported(raw, port)))
-    changed = [
-        np.abs(dense(a.K0) - dense(b.K0)).max() > 0 for a, b in zip(*(m.links for m in models), strict=True)
-    ]
+    changed = [np.abs(dense(a.K0) - dense(b.K0)).max() > 0 for a, b in zip(*(m.links for m in models), strict=True)]
     assert changed == [True, False, True] * 3
     if reduce:
         part = models[1].links[0]
@@ -300,9 +286,7 @@ def test_frames_that_follow_converge_with_stiff_ports_too() -> None:
     """Stiff coupling surfaces stretch the rounding of positions; it may take more iterations, joints stay closed."""
     runs = []
     for port in ("distributing", "rigid"):
-        raw = four_bar(
-            "plane", revolutions=1 / 60, steps_per_revolution=600, frames="co-rotational", rho_inf=0.95
-        )
+        raw = four_bar("plane", revolutions=1 / 60, steps_per_revolution=600, frames="co-rotational", rho_inf=0.95)
         for link in raw["links"].values():
             link["segments"] = 2
         runs.append(run(ported(raw, port)))
@@ -337,9 +321,7 @@ def test_both_ports_are_the_same_from_afar() -> None:
         raw = ported(four_bar("plane"), "distributing")
         shape = {"kind": "plate_link", "between": [[0, 0], [length, 0]], "width": 0.03, "thickness": 0.01,
                  "bore_diameter": 0.015}  # fmt: skip
-        raw["links"] = {
-            "arm": {"material": "alloy", "model": "plane", "shape": shape, "mesh": {"elements_across": 2}}
-        }
+        raw["links"] = {"arm": {"material": "alloy", "model": "plane", "shape": shape, "mesh": {"elements_across": 2}}}
         raw["joints"] = {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}}
         raw["bodies"] = {}
         (link,) = model_of(raw).links

@@ -185,9 +185,7 @@ KINDS = [
 
 
 @pytest.mark.parametrize(("model", "kind", "frames"), KINDS)
-def test_a_quasi_static_motion_so_slow_that_it_has_no_inertia_is_static(
-    model: str, kind: str, frames: str
-) -> None:
+def test_a_quasi_static_motion_so_slow_that_it_has_no_inertia_is_static(model: str, kind: str, frames: str) -> None:
     """And static positions do not depend on the drive's speed."""
     raw = inverted(model, kind, initial=None, revolutions=1, steps_per_revolution=4, frames=frames)
     raw |= {"gravity": [0, -G]}
@@ -307,7 +305,5 @@ def test_what_nothing_holds_is_told_in_words() -> None:
         "joints": {"A": {"kind": "revolute", "links": ["rod", "ground"], "at": [0, 0]}},
         "analysis": {"kind": "static"},
     }  # fmt: skip
-    with pytest.raises(
-        SolveError, match="must balance at each position of a static analysis, got no balance at t = 0 s"
-    ):
+    with pytest.raises(SolveError, match="must balance at each position of a static analysis, got no balance at t = 0 s"):
         values(hanging)

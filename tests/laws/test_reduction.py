@@ -105,10 +105,7 @@ def test_all_functions_give_the_full_answer(kind: str) -> None:
 def test_a_reduced_link_is_too_stiff_and_less_so_with_more_functions(kind: str) -> None:
     """Galerkin: the work of the loads on their static deflection, uᵀ F, rises with the space up to the full."""
     full = meshed(scene_from(arm(kind)))
-    work = [
-        static_work(reduced_model(full.model, [b.first(n) for b in found_bases(full)]), full)
-        for n in (5, 8, 11, 20)
-    ]
+    work = [static_work(reduced_model(full.model, [b.first(n) for b in found_bases(full)]), full) for n in (5, 8, 11, 20)]
     exact = static_work(full.model, full)
     assert np.all(np.diff(work) >= -1e-9 * exact)
     assert work[-1] <= exact * (1 + 1e-9)
@@ -148,9 +145,7 @@ def test_the_full_models_own_state_leaves_no_residual(kind: str) -> None:
     del raw["damping"]
     full = meshed(scene_from(raw))
     parts = static_parts(full.model)
-    states = list(
-        snapshots(full.scene, full.linkage, full.path, full.model, steps_of(full.scene, full.model))
-    )
+    states = list(snapshots(full.scene, full.linkage, full.path, full.model, steps_of(full.scene, full.model)))
     size = max(np.abs(s.states[0].g).max() for s in states)
     for left in residual_deflections(full.model, parts, full.model, states[1::30]):
         assert np.abs(left[0]).max() < 1e-7 * size

@@ -37,9 +37,7 @@ def sliders(joints: JointTable) -> tuple[str, ...]:
 
 @settings(LAW, max_examples=examples(5))  # each follows two linkages over a turn
 @given(joint_tables, rotations, vectors)
-def test_the_motion_does_not_depend_on_where_the_scene_lies(
-    joints: JointTable, Q: np.ndarray, s: np.ndarray
-) -> None:
+def test_the_motion_does_not_depend_on_where_the_scene_lies(joints: JointTable, Q: np.ndarray, s: np.ndarray) -> None:
     """Drawn at Q X + s, a link turns by Q R Qᵀ; vectors turn with Q; p' = Q p + s − (Q R Qᵀ) s."""
     here = motion_at(linkage_scene(joints, sliders=sliders(joints)), T)
     there = motion_at(linkage_scene(moved_scene(joints, Q, s), sliders=sliders(joints)), T)
@@ -87,9 +85,7 @@ def test_orthonormal_mends_small_errors_to_second_order(R: np.ndarray, a: np.nda
 
 @LAW
 @given(rotations, vectors, vectors)
-def test_orthonormal_mends_errors_of_some_percent_to_rounding(
-    R: np.ndarray, a: np.ndarray, b: np.ndarray
-) -> None:
+def test_orthonormal_mends_errors_of_some_percent_to_rounding(R: np.ndarray, a: np.ndarray, b: np.ndarray) -> None:
     """As of poses that are predicted a few grid points ahead: 2 · 3 % → 3e-3 → 6e-6 → 3e-11 → rounding."""
     size = max(float(np.linalg.norm(a) * np.linalg.norm(b)), 1.0)
     mended = orthonormal(R + 0.03 / size * np.outer(a, b))

@@ -169,9 +169,7 @@ def test_a_start_that_is_not_found_is_refused_in_words_and_soon(monkeypatch: pyt
 
     monkeypatch.setattr(Instant, "gradients", counting)
     solver, motion = made(corner(np.eye(3), strut=-5e4, initial="quasi-static"))
-    with pytest.raises(
-        NoBalanceError, match=r"link '\w+' moves most from iteration to iteration.*take initial"
-    ):
+    with pytest.raises(NoBalanceError, match=r"link '\w+' moves most from iteration to iteration.*take initial"):
         solver.start(motion, [])
     assert counted[0] < 60 + 120 * 50
 

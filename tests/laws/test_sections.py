@@ -123,9 +123,7 @@ def test_area_and_second_moments_are_integrals(name: str) -> None:
     basis = skfem.Basis(of.mesh, skfem.ElementQuad1(), elements=np.flatnonzero(of.inside), intorder=4)
     dA, (y, z) = basis.dx, np.asarray(basis.global_coordinates())
     found = [float(np.sum(f * dA)) for f in (np.ones_like(y), y**2, z**2)]
-    np.testing.assert_allclose(
-        [section.area, section.second_moment, section.second_moment_z], found, rtol=1e-12
-    )
+    np.testing.assert_allclose([section.area, section.second_moment, section.second_moment_z], found, rtol=1e-12)
 
 
 def membrane(of: Grid, hollow: bool) -> tuple[skfem.Basis, np.ndarray, float]:
@@ -162,9 +160,7 @@ def test_torsion_is_that_of_the_membrane_over_the_section(name: str) -> None:
         amid = (along < 0.1) | (across < 0.1)
     else:
         amid = (along < 0.2) | ((across > 0.25) & (across < 0.35))
-    known = np.array(
-        [torsion_stress(section, *at) for at in zip(y[amid].ravel(), z[amid].ravel(), strict=True)]
-    )
+    known = np.array([torsion_stress(section, *at) for at in zip(y[amid].ravel(), z[amid].ravel(), strict=True)])
     found = np.stack([slopes[1][amid].ravel(), -slopes[0][amid].ravel()], axis=1)
     assert np.abs(known).max(axis=0).min() > 0  # both walls
     np.testing.assert_allclose(known, found, atol=0.03 * np.abs(found).max())
@@ -226,9 +222,7 @@ def test_constants_of_profiles_are_those_of_tables() -> None:
     assert ipe.second_moment + fillets * arm**2 == pytest.approx(1943e-8, rel=2e-3)
     assert ipe.second_moment_z == pytest.approx(142.4e-8, rel=5e-3)
     assert cowper_box(0.3, 1.0, 1.0) == pytest.approx(0.4355, rel=1e-2)  # of a thin square tube
-    assert cowper_i(0.3, 1.0, 0.0, 1.0, 1.0) == pytest.approx(
-        10 * 1.3 / (12 + 11 * 0.3)
-    )  # no flanges: a rectangle
+    assert cowper_i(0.3, 1.0, 0.0, 1.0, 1.0) == pytest.approx(10 * 1.3 / (12 + 11 * 0.3))  # no flanges: a rectangle
 
 
 def test_drawn_sections_have_the_area_and_corners_of_the_section() -> None:

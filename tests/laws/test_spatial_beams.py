@@ -94,9 +94,7 @@ def test_matrices_of_a_turned_element_are_the_turned_matrices(x: np.ndarray, R: 
     K, T = space_stiffness(x, RIGIDITY), np.kron(np.eye(3 * len(x)), R)
     turned = x @ R.T
     turned[:, 0] += [0.3, -0.7, 0.2]
-    np.testing.assert_allclose(
-        space_stiffness(turned, RIGIDITY), T @ K @ T.T, atol=ROUNDING * np.abs(K).max()
-    )
+    np.testing.assert_allclose(space_stiffness(turned, RIGIDITY), T @ K @ T.T, atol=ROUNDING * np.abs(K).max())
     m = space_mass(x, SECTION)
     np.testing.assert_allclose(space_mass(turned, SECTION), m, atol=ROUNDING * m.max())
     assert np.linalg.eigvalsh(m).min() > 0
@@ -137,9 +135,7 @@ def axis_of(seed: int, curve: str, nodes: int, R: np.ndarray) -> Axis:
 
 
 def beam_in_space(seed: int, curve: str, nodes: int, R: np.ndarray | None = None) -> Link:
-    return spatial_beam_link(
-        "any", axis_of(seed, curve, nodes, np.eye(3) if R is None else R), SECTION, MATERIAL
-    )
+    return spatial_beam_link("any", axis_of(seed, curve, nodes, np.eye(3) if R is None else R), SECTION, MATERIAL)
 
 
 curves, counts = st.sampled_from(["straight", "smooth"]), st.sampled_from([2, 3])
@@ -147,9 +143,7 @@ curves, counts = st.sampled_from(["straight", "smooth"]), st.sampled_from([2, 3]
 
 @LAW
 @given(seeds, curves, counts)
-def test_stiffness_of_a_beam_in_space_has_exactly_the_six_rigid_modes(
-    seed: int, curve: str, nodes: int
-) -> None:
+def test_stiffness_of_a_beam_in_space_has_exactly_the_six_rigid_modes(seed: int, curve: str, nodes: int) -> None:
     link = beam_in_space(seed, curve, nodes)
     K0 = link.K0.toarray()
     modes = rigid_modes(link.X, link.one)
@@ -174,9 +168,7 @@ def test_matrices_of_a_turned_beam_in_space(seed: int, curve: str, nodes: int, R
 
 @LAW
 @given(motions, vectors, seeds)
-def test_kinetic_energy_of_a_rigid_beam_with_a_body_on_its_end(
-    motion: Motion, centre: np.ndarray, seed: int
-) -> None:
+def test_kinetic_energy_of_a_rigid_beam_with_a_body_on_its_end(motion: Motion, centre: np.ndarray, seed: int) -> None:
     """½ m v² + ½ ω · I ω of the box, of the body, and of two hubs with Euler tensor h t tᵀ."""
     random = np.random.default_rng(seed)
     L, h, b = random.uniform(0.3, 1.0), 0.05, 0.03
@@ -191,11 +183,7 @@ def test_kinetic_energy_of_a_rigid_beam_with_a_body_on_its_end(
     box = own / 12 * np.diag([h**2 + b**2, L**2 + b**2, L**2 + h**2])
     hub = HUB_INERTIA * MATERIAL.density * np.sqrt(h * b) * h * b**3 / 12
     v = motion.velocity(np.array([[L / 2, 0, 0], centre]))
-    wanted = (
-        own * v[0] @ v[0]
-        + mass * v[1] @ v[1]
-        + omega @ (box + inertia + 2 * hub * np.diag([0, 1, 1])) @ omega
-    ) / 2
+    wanted = (own * v[0] @ v[0] + mass * v[1] @ v[1] + omega @ (box + inertia + 2 * hub * np.diag([0, 1, 1])) @ omega) / 2
     velocity = np.cross(motion.omega, link.X @ motion.R.T) + np.outer(link.one, motion.v)
     assert kinetic_energy(loaded, velocity) == pytest.approx(wanted, rel=1e-11)
     np.testing.assert_allclose(link.one @ loaded.m1, own + mass, rtol=1e-11)

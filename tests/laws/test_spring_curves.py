@@ -95,9 +95,7 @@ STRAIGHT = [
 
 
 @pytest.mark.parametrize("frames", ["rigid-body", "co-rotational"])
-@pytest.mark.parametrize(
-    ("constants", "curve"), STRAIGHT, ids=["length", "speed of ends", "angle", "speed of turn"]
-)
+@pytest.mark.parametrize(("constants", "curve"), STRAIGHT, ids=["length", "speed of ends", "angle", "speed of turn"])
 def test_a_straight_curve_is_a_spring_or_a_damper(constants: Raw, curve: Raw, frames: str) -> None:
     """In a driven four-bar whose links bend: joint forces, the drive's torque and probes are the same."""
     ends = [
@@ -161,9 +159,7 @@ def test_a_pull_over_time_does_the_work_that_the_account_of_energy_has() -> None
 
 
 def test_a_curve_of_a_spring_comes_from_a_file(tmp_path: Path) -> None:
-    (tmp_path / "damper.csv").write_text(
-        "speed [mm/s], force [kN]\n-500, -2\n0, 0\n500, 1.2\n", encoding="utf-8"
-    )
+    (tmp_path / "damper.csv").write_text("speed [mm/s], force [kN]\n-500, -2\n0, 0\n500, 1.2\n", encoding="utf-8")
     n = AXES["z"]
     read = scene_from(pulled_rod(n, 10, force={"over": "speed", "file": "damper.csv"}), tmp_path)
     listed = {"over": "speed", "at": [-0.5, 0.0, 0.5], "value": ["-2 kN", 0.0, "1.2 kN"]}

@@ -31,9 +31,7 @@ def damped(guided: str, way: str, **analysis: Any) -> tuple[Raw, np.ndarray]:
 def assert_starts(guided: str, way: str, frames: str) -> None:
     """k x + c x' = F (1 + t/T): x' = F/(k T), x = F/k − c x'/k."""
     raw, along = damped(guided, way, frames=frames)
-    turns = (
-        frames == "co-rotational" and guided in HINGED
-    )  # by 6e-4 rad, which three angles see to first order
+    turns = frames == "co-rotational" and guided in HINGED  # by 6e-4 rad, which three angles see to first order
     found = channels(*ran(raw))
     rate = PUSH / MOUNT * GROWS
     for name, wanted in (("v/velocity", rate), ("b/displacement", PUSH / MOUNT - FADES * rate)):

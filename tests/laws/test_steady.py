@@ -168,9 +168,7 @@ CASES: dict[str, tuple[Raw, dict[str, Any], int]] = {
 QUICK = ("planar beams", "co-rotational, bent far", "a screw")
 
 
-@pytest.mark.parametrize(
-    "name", [x if x in QUICK else pytest.param(x, marks=pytest.mark.long) for x in CASES]
-)
+@pytest.mark.parametrize("name", [x if x in QUICK else pytest.param(x, marks=pytest.mark.long) for x in CASES])
 def test_a_steady_motion_is_what_a_march_settles_to(name: str) -> None:
     raw, analysis, turns = CASES[name]
     ready, found, of = steady(raw, **analysis)
@@ -225,9 +223,7 @@ def spun(axis: Any, ratio: float, section: tuple[float, float], **more: Any) -> 
 def clamped(raw: Raw, axis: Any, modes: int = 14) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Frequencies [rad/s] of a clamped link, and M J and M J² in its modes."""
     ready = meshed(
-        over_one_period(
-            scene_from({**raw, "analysis": {**raw["analysis"], "kind": "steady", "accuracy": "quick"}})
-        )
+        over_one_period(scene_from({**raw, "analysis": {**raw["analysis"], "kind": "steady", "accuracy": "quick"}}))
     )
     at = rigid_motion(ready.linkage, ready.path, np.zeros(1), path_parameter(ready.scene, np.zeros(1)))
     found = Frozen(system_of(ready.scene, ready.linkage, ready.path), modes, 0).at(at)
@@ -237,9 +233,7 @@ def clamped(raw: Raw, axis: Any, modes: int = 14) -> tuple[np.ndarray, np.ndarra
     return found.omega, heavy @ once.T, heavy @ twice.T
 
 
-def largest_multiplier(
-    omega: np.ndarray, speed: float, MJ: np.ndarray, MJJ: np.ndarray, beta: float
-) -> float:
+def largest_multiplier(omega: np.ndarray, speed: float, MJ: np.ndarray, MJJ: np.ndarray, beta: float) -> float:
     """In a turn at a speed [rad/s]."""
     n, K = len(omega), np.diag(omega**2)
     A = np.block([[np.zeros((n, n)), np.eye(n)], [-K - speed**2 * MJJ, -beta * K - 2 * speed * MJ]])
@@ -415,9 +409,7 @@ def test_what_has_no_period_is_refused() -> None:
     once = {"over": "time", "at": [0, 1], "value": [0, 1]}
     assert "over time without one" in refused({**raw, "loads": {"gas": {**FOUR_STROKE, "factor": once}}})
     odd = {**FOUR_STROKE["factor"], "period": 1.0, "at": [0, 0.5, 0.9]}
-    assert "a part of the motion's period" in refused(
-        {**raw, "loads": {"gas": {**FOUR_STROKE, "factor": odd}}}
-    )
+    assert "a part of the motion's period" in refused({**raw, "loads": {"gas": {**FOUR_STROKE, "factor": odd}}})
     assert "the 1 of the period" in refused(raw, revolutions=3)
     rise = {**raw, "drive": {**raw["drive"], "motion": {"kind": "cycloidal", "angle": 1.0, "rise": 0.1}}}
     assert "must have a period" in refused({**rise, "analysis": {"step": 1e-3}}, end_time=0.2)

@@ -57,9 +57,7 @@ def arm(kind: str, mu: float, turn: Any = "z", **more: Any) -> Raw:
     }  # fmt: skip
 
 
-def stiffened(
-    raw: Raw, count: int = 2, driven: bool = True, share: float = 0.3
-) -> tuple[System, RigidMotion, Stiffened]:
+def stiffened(raw: Raw, count: int = 2, driven: bool = True, share: float = 0.3) -> tuple[System, RigidMotion, Stiffened]:
     """A scene, its motion after a share of a revolution, and its solver."""
     scene = scene_from(raw)
     ready = meshed(scene)

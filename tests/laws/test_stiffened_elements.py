@@ -35,10 +35,7 @@ ARMS = [
     ("plane", "z"),
     *((kind, turn) for kind in ("spatial beam", "solid") for turn in AXES),
 ]
-DEAR = [
-    x if x[1] == "oblique" or x[0] == "planar beam" else pytest.param(*x, marks=pytest.mark.long)
-    for x in ARMS
-]
+DEAR = [x if x[1] == "oblique" or x[0] == "planar beam" else pytest.param(*x, marks=pytest.mark.long) for x in ARMS]
 PULLS = (1.5, -1.2)  # N L²/EI; a column on its foot buckles at −2.47
 
 
@@ -48,9 +45,7 @@ def pulled(kind: str, turn: str, pull: float, apart: float, **analysis: Any) -> 
     along = Rotation.from_rotvec(AXES[turn]).as_matrix()[:, 0][: 2 if kind in ("planar beam", "plane") else 3]
     ends = [{"link": "arm", "at": (LENGTH * along).tolist()},
             {"link": "ground", "at": ((1 + apart) * LENGTH * along).tolist()}]  # fmt: skip
-    raw["springs"] = {
-        "s": {"kind": "spring", "between": ends, "stiffness": 1e-9, "preload": pull * EI / LENGTH**2}
-    }
+    raw["springs"] = {"s": {"kind": "spring", "between": ends, "stiffness": 1e-9, "preload": pull * EI / LENGTH**2}}
     raw["output"] = {"probes": {"tip": {"quantity": "displacement", "link": "arm", "at": ends[0]["at"]}}}
     raw["analysis"] |= analysis
     return raw
@@ -96,9 +91,7 @@ HOW = ("start", "static", "quasi-static", "plucked")
     [(*x, how) if x in (("planar beam", "z"), ("solid", "oblique")) else pytest.param(*x, how, marks=pytest.mark.long)
      for x in ARMS for how in HOW],
 )  # fmt: skip
-def test_a_pulled_cantilever_has_the_deflection_of_a_beam_column(
-    kind: str, turn: str, how: str, pull: float
-) -> None:
+def test_a_pulled_cantilever_has_the_deflection_of_a_beam_column(kind: str, turn: str, how: str, pull: float) -> None:
     """Under a load: where a march begins, which stays there, and in static and quasi-static positions; and where forces
     let it go."""
     step = 0.01 / UNIT
@@ -158,9 +151,7 @@ def swung(size: float, **analysis: Any) -> Raw:
         "C": ("coupler", "rocker"),
         "D": ("rocker", "ground"),
     }
-    joints = {
-        name: {"kind": "revolute", "links": list(held[name]), "at": list(at)} for name, at in places.items()
-    }
+    joints = {name: {"kind": "revolute", "links": list(held[name]), "at": list(at)} for name, at in places.items()}
     ends = [{"link": "rocker", "at": [0.4, 0.3]}, {"link": "ground", "at": [0.45, 0.9]}]
     springs = {"s": {"kind": "spring", "between": ends, "stiffness": 400.0 * size, "preload": 600.0 * size}}
     return {

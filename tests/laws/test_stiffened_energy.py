@@ -36,9 +36,7 @@ def four_bar(step: float, sprung: bool = False) -> Raw:
         link["shape"]["width"] = 0.008
     ends = ["ground", *places, "ground"]
     at = [[0, 0], [0.1, 0], [0.3, 0.2], [0.3, -0.05]]
-    joints = {
-        name: {"kind": "revolute", "links": ends[k : k + 2], "at": at[k]} for k, name in enumerate("ABCD")
-    }
+    joints = {name: {"kind": "revolute", "links": ends[k : k + 2], "at": at[k]} for k, name in enumerate("ABCD")}
     pulled = [{"link": "rocker", "at": at[2]}, {"link": "ground", "at": [0.3, 0.6]}]
     spring = {"kind": "spring", "between": pulled, "stiffness": 2e3, "preload": 500.0}
     analysis = {"end_time": 0.1, "step": step, "rho_inf": 1.0, "initial": "quasi-static", "stiffening": True}

@@ -117,9 +117,7 @@ def stress_factors(raw: Raw) -> list[np.ndarray]:
     [("revolute", "planar beam", 1e-9), ("weld", "planar beam", 1e-9), ("spherical", "beam", 1e-6),
      ("spherical", "solid", 1e-8), ("revolute", "beam", 1e-5), ("weld", "beam", 2e-5)],
 )  # fmt: skip
-def test_stresses_through_a_bushing_are_those_of_the_joint(
-    kind: str, link: str, off: float, stiffness: float
-) -> None:
+def test_stresses_through_a_bushing_are_those_of_the_joint(kind: str, link: str, off: float, stiffness: float) -> None:
     """What is statically determinate does not depend on how much a joint gives; nor on whether its points are shared or
     constrained, but for how moments spread over a section."""
     plane = link == "planar beam"

@@ -23,9 +23,7 @@ BENT = np.array([[0.0, 0, 0], [0.5, 0.1, 0], [0.5, 0.6, 0]])
 
 def links() -> dict[str, Link]:
     out = {
-        f"hex{n}": mapped_link(
-            (2, 2, 1), lambda r, s, t: (r + 0.1 * s * t, s / 2 + 0.1 * r * r, t / 5), SOFT, n
-        )
+        f"hex{n}": mapped_link((2, 2, 1), lambda r, s, t: (r + 0.1 * s * t, s / 2 + 0.1 * r * r, t / 5), SOFT, n)
         for n in (8, 10, 20, 27)
     }
     out["plane"] = mapped_plane((3, 2), lambda r, s: (r + 0.1 * s * s, s / 2 + 0.1 * r), 0.01, SOFT)

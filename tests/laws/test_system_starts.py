@@ -61,9 +61,7 @@ def test_rates_of_coordinates_are_those_of_their_values(kind: str, frames: str) 
     C, measured = now.measured(z[0], z[1])
     assert_allclose(C @ x, moved, atol=1e-5 * np.abs(moved).max())
     exact, shown = now.coordinates(z)[:2], ~of.ready.constraints.linear | now.always.rated
-    assert_allclose(
-        measured[0], exact[0], atol=1e-13 * np.abs(exact[0]).max()
-    )  # what balances take, by compiled code
+    assert_allclose(measured[0], exact[0], atol=1e-13 * np.abs(exact[0]).max())  # what balances take, by compiled code
     assert_allclose(measured[1, shown], exact[1, shown], atol=1e-12 * np.abs(exact[1]).max())
 
 
@@ -203,9 +201,7 @@ def test_a_rigid_link_that_spins_begins_with_what_holds_it() -> None:
 
 def held_up() -> Begun:
     """The arm on a spring about its hinge, under gravity."""
-    return at(
-        arm(gravity=[0, -9.81, 0], springs={"s": {"kind": "torsion", "joint": "A", "stiffness": 200.0}})
-    )
+    return at(arm(gravity=[0, -9.81, 0], springs={"s": {"kind": "torsion", "joint": "A", "stiffness": 200.0}}))
 
 
 def test_static_balance_stays() -> None:

@@ -134,9 +134,7 @@ def follower_tip(load: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("drawn", "elements"), [("reference", 4), ("askew", 8)])
-def test_a_rod_in_space_bends_as_elastica_under_a_force_that_stays_across_its_tip(
-    drawn: str, elements: int
-) -> None:
+def test_a_rod_in_space_bends_as_elastica_under_a_force_that_stays_across_its_tip(drawn: str, elements: int) -> None:
     """Loaded slowly, much damped; shear leaves 1e-3 of the length."""
     R, load = DRAWN[drawn], 2.0
     raw = moving("spatial beam", R, driven=True) | {"damping": {"beta": 0.01}}

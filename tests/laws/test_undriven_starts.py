@@ -73,8 +73,6 @@ def test_damping_in_proportion_to_mass_slows_what_nothing_drives(kind: str, R: A
 def test_an_arm_that_spins_freely_begins_stretched() -> None:
     """Tension m ω² (L² − x²)/2 has the energy m² ω⁴ L⁵/(15 E A); from rest it rings."""
     omega, area, E = 30.0, 0.02**2, 2.1e11
-    raw = released("beam", np.eye(3), initial="quasi-static", initial_speeds={"A": omega}) | {
-        "gravity": [0, 0]
-    }
+    raw = released("beam", np.eye(3), initial="quasi-static", initial_speeds={"A": omega}) | {"gravity": [0, 0]}
     found = strain(raw)
     assert_allclose(found, MASS["beam"] ** 2 * omega**4 * LENGTH**5 / (15 * E * area), rtol=0.01)

@@ -94,15 +94,11 @@ def test_edges_are_refused_where_nothing_tells_of_stability(tmp_path: Path) -> N
             )
         return str(found.value)
 
-    assert "--edges: must be a relative width from 1e-09 to below 1, such as 0.001, got 2" in said(
-        2.0, kind="steady"
-    )
+    assert "--edges: must be a relative width from 1e-09 to below 1, such as 0.001, got 2" in said(2.0, kind="steady")
     assert "must be combined with analysis.kind = 'steady' and its stability" in said(revolutions=1)
     assert said(kind="steady", stability=False).endswith("got stability = false")
     words = axes_of(["analysis.initial=rest,quasi-static"], raw)
-    assert "must be combined with numbers of the first key, analysis.initial" in said(
-        kind="steady", axes=words
-    )
+    assert "must be combined with numbers of the first key, analysis.initial" in said(kind="steady", axes=words)
 
 
 def test_an_edge_is_not_looked_for_where_points_between_tell_nothing() -> None:
@@ -155,9 +151,7 @@ def test_growth_of_what_steps_do_not_resolve_is_not_told(tmp_path: Path) -> None
     assert long.steady is not None
     assert long.steady.growth is None
     assert long.steady.levels[0] > 1.5
-    assert any(
-        "cannot be determined with steps as long as these: a vibration at about" in x for x in long.warnings
-    )
+    assert any("cannot be determined with steps as long as these: a vibration at about" in x for x in long.warnings)
     assert not (tmp_path / "growing.pvd").exists()
     short = found(180)
     assert short.steady is not None

@@ -162,9 +162,7 @@ def swung(square: float, free: float, t: np.ndarray) -> np.ndarray:
     def rates(time: float, x: np.ndarray) -> list[float]:
         return [x[1], -square * np.interp(time, RISES["at"], RISES["value"]) * (x[0] - free)]
 
-    found = solve_ivp(
-        rates, (0, t[-1]), (0, 0), t_eval=t, rtol=1e-10, atol=1e-12, method="DOP853", max_step=1e-3
-    )
+    found = solve_ivp(rates, (0, t[-1]), (0, 0), t_eval=t, rtol=1e-10, atol=1e-12, method="DOP853", max_step=1e-3)
     return np.asarray(found.y[0])
 
 
@@ -184,9 +182,7 @@ def test_a_constant_factor_is_another_stiffness(frames: str) -> None:
     once = {"s": {**LINE, "stiffness": 2e3}}
     one, other = (ran(four_bar(frames, springs=each, steps=60)) for each in (twice, once))
     for name, rows in channels(*one).items():  # those of rigid links too, which are worked out apart
-        assert_allclose(
-            rows, channels(*other)[name], atol=1e-9 * max(1.0, float(np.abs(rows).max())), err_msg=name
-        )
+        assert_allclose(rows, channels(*other)[name], atol=1e-9 * max(1.0, float(np.abs(rows).max())), err_msg=name)
 
 
 def refused(**spring: Any) -> str:

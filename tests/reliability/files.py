@@ -92,10 +92,7 @@ def cache_entries(tally: Tally, count: int, seed: int, folder: Path) -> None:
     scene = scene_from(raw)
 
     def made() -> list[np.ndarray]:
-        return [
-            link.K0.toarray() if hasattr(link.K0, "toarray") else link.K0
-            for link in prepared(scene)[0].model.links
-        ]
+        return [link.K0.toarray() if hasattr(link.K0, "toarray") else link.K0 for link in prepared(scene)[0].model.links]
 
     with cached_in(folder / "cache"):
         good = made()

@@ -163,8 +163,7 @@ def unequal(ground: Ground, folder: Path, whole: bool = True) -> str:
     if whole and (found.status != ground.rows.status or n != len(ground.rows.time)):
         return f"{found.status}, {n} rows"
     same = np.array_equal(found.time, ground.rows.time[:n]) and all(
-        np.array_equal(found.channels[name][1], values[:n])
-        for name, (_, values) in ground.rows.channels.items()
+        np.array_equal(found.channels[name][1], values[:n]) for name, (_, values) in ground.rows.channels.items()
     )
     return "" if same else "other rows"
 
@@ -177,9 +176,7 @@ def torn(folder: Path) -> str:
     return ""
 
 
-def come(
-    ground: Ground, running: "subprocess.Popen[str]", folder: Path, phase: str, rng: random.Random
-) -> None:
+def come(ground: Ground, running: "subprocess.Popen[str]", folder: Path, phase: str, rng: random.Random) -> None:
     """Wait for a random moment of one of the times that a run is in a phase; of the whole run, where it is "any"."""
     if phase == "any":
         time.sleep(rng.uniform(0.1, 1.0) * ground.takes)

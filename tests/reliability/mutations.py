@@ -100,9 +100,7 @@ def nudged(raw: dict[str, Any], rng: random.Random) -> dict[str, Any]:
     numbers = [p for p in places(raw) if type(value_at(raw, p)) in {int, float} and p[0] != "analysis"]
     for place in rng.sample(numbers, min(len(numbers), rng.randint(1, 3))):
         table, value = value_at(raw, place[:-1]), value_at(raw, place)
-        factor = rng.choice(
-            [0.0, -1.0, 1.01, 0.5, 2.0, 10.0 ** rng.randint(-9, 9), 10.0 ** rng.randint(-3, 3)]
-        )
+        factor = rng.choice([0.0, -1.0, 1.01, 0.5, 2.0, 10.0 ** rng.randint(-9, 9), 10.0 ** rng.randint(-3, 3)])
         table[place[-1]] = value * factor
     if rng.random() < 0.3:
         raw = mutated(raw, rng, 1)

@@ -29,10 +29,7 @@ class Tally:
         except KedfemError as error:
             said = "refused" if str(error).strip() and "Traceback" not in str(error) else "without words"
         except Exception as error:  # noqa: BLE001 - that is what is looked for
-            said = (
-                f"{type(error).__name__}: {error}"[:200]
-                + f" at {traceback.extract_tb(error.__traceback__)[-1]}"
-            )
+            said = f"{type(error).__name__}: {error}"[:200] + f" at {traceback.extract_tb(error.__traceback__)[-1]}"
         took = time.process_time() - began
         self.slowest[kind] = max(self.slowest.get(kind, 0.0), took)
         if took > most:

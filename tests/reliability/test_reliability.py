@@ -99,9 +99,7 @@ def test_killed_runs_go_on_to_equal_rows(tmp_path: Path) -> None:
 def test_phases_are_told_with_their_lengths(tmp_path: Path) -> None:
     """Two frames, and a third that never ended."""
     file = tmp_path / "phases"
-    file.write_text(
-        "".join(f"writing frames\t{x}\t{t}\n" for x, t in zip("+-+-+", (1, 3, 5, 6, 9), strict=True))
-    )
+    file.write_text("".join(f"writing frames\t{x}\t{t}\n" for x, t in zip("+-+-+", (1, 3, 5, 6, 9), strict=True)))
     assert phases.spans(file, "writing frames") == [(1.0, 2.0), (5.0, 1.0)]
     assert phases.begun(file, "writing frames") == 3
     assert phases.at_work(file, "writing frames")

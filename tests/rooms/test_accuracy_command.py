@@ -133,9 +133,7 @@ def slowed(seconds: Seconds, by: float) -> Seconds:
 @pytest.mark.parametrize("slower", [0.01, 1.0, 300.0])
 def test_no_figure_of_the_table_is_cut_off_at_80_columns(study: Study, slower: float) -> None:
     """Of runs of any length: the first in a fresh checkout compile for a minute."""
-    rows = [
-        replace(row, unknowns=12345, seconds=slowed(row.seconds, slower)) for row in study.rows if row.seconds
-    ]
+    rows = [replace(row, unknowns=12345, seconds=slowed(row.seconds, slower)) for row in study.rows if row.seconds]
     console = Console(width=80, file=StringIO(), record=True)
     console.print(study_tables(replace(study, rows=rows), "a machine")[0])
     said = console.export_text()
@@ -146,9 +144,7 @@ def test_no_figure_of_the_table_is_cut_off_at_80_columns(study: Study, slower: f
 
 def test_what_does_not_fit_the_budget_is_named(whip: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     looks = itertools.count()
-    monkeypatch.setattr(
-        "kedfem.accuracy.study.measuring.perf_counter", lambda: float(next(looks))
-    )  # a second a look
+    monkeypatch.setattr("kedfem.accuracy.study.measuring.perf_counter", lambda: float(next(looks)))  # a second a look
     bound = studied(read_scene(whip), most=25.0, repeats=1)
     left = [row.note for row in bound.rows if row.seconds is None]
     assert left
@@ -189,9 +185,7 @@ def test_a_fidelity_that_cannot_be_built_is_one_row_that_says_why(whip: Path) ->
         (("--repeats", "0"), "error: --repeats: must be at least 1, got 0\n"),
     ],
 )
-def test_options_that_mean_nothing(
-    run_kedfem: Command, whip: Path, option: tuple[str, str], message: str
-) -> None:
+def test_options_that_mean_nothing(run_kedfem: Command, whip: Path, option: tuple[str, str], message: str) -> None:
     said = run_kedfem("accuracy", whip, *option)
     assert (said.code, said.err) == (USER_ERROR, message)
     assert run_kedfem("accuracy", whip, "--fast").code == USER_ERROR

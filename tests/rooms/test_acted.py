@@ -98,9 +98,7 @@ def test_the_monolithic_solver_finds_the_same(initial: str, rho_inf: float) -> N
     """It assembles and factors all of it at every step."""
     analysis = {"initial": initial, "rho_inf": rho_inf}
     condensed = four_bar("rigid-body", springs=line(200.0), analysis=analysis, steps=40)
-    monolithic = four_bar(
-        "rigid-body", springs=line(200.0), analysis={**analysis, "solver": "monolithic"}, steps=40
-    )
+    monolithic = four_bar("rigid-body", springs=line(200.0), analysis={**analysis, "solver": "monolithic"}, steps=40)
     ready, _ = prepared(scene_from(monolithic))
     solver = steps_of(ready.scene, ready.model)
     assert solver.oracle is not None
@@ -145,8 +143,7 @@ def test_the_same_law_drives_a_motor() -> None:
 @pytest.mark.parametrize("model", ["plane", pytest.param("solid", marks=pytest.mark.long)])
 def test_meshed_links_bear_springs_too(model: str) -> None:
     corotational, rigid_body = (
-        places(four_bar(frames, model, springs=line(50.0), steps=72))
-        for frames in ("co-rotational", "rigid-body")
+        places(four_bar(frames, model, springs=line(50.0), steps=72)) for frames in ("co-rotational", "rigid-body")
     )
     assert apart(corotational, rigid_body) < 1e-3 * largest(rigid_body)
 
@@ -167,9 +164,7 @@ def balance(raw: dict[str, Any]) -> tuple[float, float]:
 
 
 def test_the_energy_left_over_falls_with_the_square_of_the_step() -> None:
-    (long, work), (short, same) = (
-        balance(four_bar("rigid-body", springs=line(200.0), steps=n)) for n in (360, 720)
-    )
+    (long, work), (short, same) = (balance(four_bar("rigid-body", springs=line(200.0), steps=n)) for n in (360, 720))
     assert long / short == pytest.approx(4.0, rel=0.3)
     assert work == pytest.approx(same, rel=1e-3)
 
@@ -207,9 +202,7 @@ def test_forces_that_tear_the_links_apart_are_solved() -> None:
 
 def test_forces_that_tear_the_links_apart_are_solved_by_the_oracle_too() -> None:
     """But for the last of five steps, in which both find a deflection as large as the links, one of two."""
-    one, other = (
-        {key: u[:5] for key, u in places(torn(**solver)).items()} for solver in ({}, {"solver": "monolithic"})
-    )
+    one, other = ({key: u[:5] for key, u in places(torn(**solver)).items()} for solver in ({}, {"solver": "monolithic"}))
     assert apart(one, other) < 1e-8 * largest(one)
 
 

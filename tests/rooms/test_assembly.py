@@ -187,9 +187,7 @@ def test_a_four_bar_with_too_long_a_coupler_is_closed_in_its_plane() -> None:
     for name, pair in ends.items():
         before, after = points_of(scene, name), points_of(closed, name)
         assert_allclose(after, [closed.joints[key].at for key in pair], rtol=0, atol=1e-12 * size)
-        assert_allclose(
-            np.linalg.norm(after[1] - after[0]), np.linalg.norm(before[1] - before[0]), rtol=1e-14
-        )
+        assert_allclose(np.linalg.norm(after[1] - after[0]), np.linalg.norm(before[1] - before[0]), rtol=1e-14)
         assert (after[:, 2] == 0.0).all()
     assert all(not each.points and each.axis == Z for each in closed.joints.values())
     for key in "AD":
@@ -266,9 +264,7 @@ def test_a_flywheel_sits_at_the_point_of_its_own_link() -> None:
     closed, _ = assembled(scene_from(raw))
     assert_allclose(closed.bodies["disc"].at, closed.joints["C"].at, rtol=0, atol=1e-12)
     raw["bodies"]["disc"]["link"] = "rocker"
-    with pytest.raises(
-        SceneError, match=r"bodies\.disc\.at: must be the point of a revolute joint of links\.rocker"
-    ):
+    with pytest.raises(SceneError, match=r"bodies\.disc\.at: must be the point of a revolute joint of links\.rocker"):
         scene_from(raw)
 
 
@@ -360,9 +356,7 @@ def test_plates_go_with_their_outline_and_holes() -> None:
     after = closed_scene(before, {"arm": SHIFT})
     one, other = (link_mesh("arm", scene.links["arm"], Path()) for scene in (before, after))
     lowest, highest = moved(SHIFT, one.points).min(axis=0), moved(SHIFT, one.points).max(axis=0)
-    assert_allclose(
-        [other.points.min(axis=0), other.points.max(axis=0)], [lowest, highest], rtol=0, atol=1e-8
-    )
+    assert_allclose([other.points.min(axis=0), other.points.max(axis=0)], [lowest, highest], rtol=0, atol=1e-8)
     hole = after.links["arm"].shape.holes[0]  # type: ignore[union-attr]
     assert_allclose(hole.at, moved(SHIFT, [0, 0, 0]), rtol=0, atol=1e-15)
 
@@ -377,9 +371,7 @@ def test_plates_go_with_their_outline_and_holes() -> None:
     ],
 )
 @pytest.mark.parametrize("shift", [SHIFT, TILT])
-def test_parts_from_cad_are_placed_where_their_link_goes(
-    shift: Shift, keys: dict[str, Any], tmp_path: Path
-) -> None:
+def test_parts_from_cad_are_placed_where_their_link_goes(shift: Shift, keys: dict[str, Any], tmp_path: Path) -> None:
     (tmp_path / "arm.step").write_text("", "utf-8")
     raw = arm()
     raw["links"]["arm"] = {"material": "steel", "shape": {"kind": "cad", "file": "arm.step", **keys}}
@@ -403,8 +395,7 @@ def test_meshes_from_files_are_placed_where_their_link_goes(tmp_path: Path) -> N
     }
     before = scene_from(raw, tmp_path)
     one, other = (
-        link_mesh("arm", scene.links["arm"], tmp_path)
-        for scene in (before, closed_scene(before, {"arm": TILT}))
+        link_mesh("arm", scene.links["arm"], tmp_path) for scene in (before, closed_scene(before, {"arm": TILT}))
     )
     assert_allclose(one.points, 0.1 * cube, rtol=0, atol=0)
     assert_allclose(other.points, moved(TILT, one.points), rtol=0, atol=1e-14)
@@ -469,9 +460,7 @@ def test_what_no_motion_closes_is_refused() -> None:
     }  # fmt: skip
     raw = raw_scene(joints, {"one": line((0, 0), (0.3, 0))})
     raw["joints"]["B"]["at"] = {"ground": [0.3, 0], "one": [0.301, 0]}
-    with pytest.raises(
-        MotionError, match=r"joints\.B\.at: must be a point to which small motions .* 0\.001 apart"
-    ):
+    with pytest.raises(MotionError, match=r"joints\.B\.at: must be a point to which small motions .* 0\.001 apart"):
         assembled(scene_from(raw))
 
 

@@ -87,9 +87,7 @@ KINDS: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
 DAILY = {"beams", "from rest", "spatial beams", "beams that are followed", "planes", "solids"}
 
 
-@pytest.mark.parametrize(
-    "kind", [pytest.param(x, marks=() if x in DAILY else pytest.mark.long) for x in KINDS]
-)
+@pytest.mark.parametrize("kind", [pytest.param(x, marks=() if x in DAILY else pytest.mark.long) for x in KINDS])
 def test_what_the_steps_leave_over_falls_with_the_square_of_the_step(kind: str) -> None:
     name, links, analysis = KINDS[kind]
     found = [audited_too(example(name, steps, links, **analysis)) for steps in (360, 720)]
@@ -125,9 +123,7 @@ def test_a_link_that_the_drive_carries_is_counted_too() -> None:
     for energies in found.values():
         assert_allclose(energies["work"][-1, 0], weights, rtol=2e-3)  # links sag a little
     for name in ("kinetic", "work"):
-        assert_allclose(
-            found["rigid"][name], found["beam"][name], atol=5e-3 * np.abs(found["beam"][name]).max()
-        )
+        assert_allclose(found["rigid"][name], found["beam"][name], atol=5e-3 * np.abs(found["beam"][name]).max())
 
 
 def test_sliders_and_gravity_balance() -> None:

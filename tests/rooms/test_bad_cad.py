@@ -49,10 +49,7 @@ class TestBadFile:
     def test_that_is_something_else(self, tmp_path, ending, form):
         path = tmp_path / f"rod.{ending}"
         path.write_text("Dear Sir or Madam\n")
-        assert (
-            refused(path)
-            == f"links.rod.shape.file: must hold {form}, as its ending says, got another text in FILE"
-        )
+        assert refused(path) == f"links.rod.shape.file: must hold {form}, as its ending says, got another text in FILE"
 
     @pytest.mark.parametrize("share", [0.5, 0.8, 0.95])
     @pytest.mark.parametrize(("ending", "form"), [("step", "STEP"), ("igs", "IGES"), ("brep", "BREP")])
@@ -60,19 +57,14 @@ class TestBadFile:
         text = (parts / f"lever.{ending}").read_text()
         path = parts / f"broken.{ending}"
         path.write_text(text[: int(share * len(text))])
-        assert (
-            refused(path)
-            == f"links.rod.shape.file: must be a whole file of {form}, got one that breaks off: FILE"
-        )
+        assert refused(path) == f"links.rod.shape.file: must be a whole file of {form}, got one that breaks off: FILE"
 
     def test_with_a_gap_inside(self, parts):
         text = (parts / "lever.step").read_text()
         path = parts / "gap.step"
         path.write_text(text[: len(text) // 2] + "\nENDSEC;\nEND-ISO-10303-21;\n")
         message = refused(path)
-        assert message.startswith(
-            "links.rod.shape.file: must be a file that OpenCASCADE can read as STEP, got FILE: "
-        )
+        assert message.startswith("links.rod.shape.file: must be a file that OpenCASCADE can read as STEP, got FILE: ")
 
     @pytest.mark.parametrize("ending", FORMATS)
     def test_with_open_faces(self, tmp_path, ending):
@@ -84,9 +76,7 @@ class TestBadFile:
 
     def test_with_curves_alone(self, tmp_path):
         written(tmp_path, "ring", lambda occ: occ.addCircle(0, 0, 0, 10), ("step",))
-        assert refused(tmp_path / "ring.step").endswith(
-            "must hold a solid, got 1 curves and no faces in FILE"
-        )
+        assert refused(tmp_path / "ring.step").endswith("must hold a solid, got 1 curves and no faces in FILE")
 
 
 def prism(*corners: tuple[float, float]) -> Callable[[Any], None]:
@@ -122,9 +112,7 @@ class TestMended:
     def test_faces_with_a_gap_are_sewn(self, tmp_path, width, said):
         solid = read(bad_cad.gap(tmp_path, width))
         # sewing may leave the top or take the sides to it
-        assert (
-            60 * 20 * 10 * MM**3 * (1 - 1e-9) <= solid.volume <= 60 * 20 * (10 + width) * MM**3 * (1 + 1e-9)
-        )
+        assert 60 * 20 * 10 * MM**3 * (1 - 1e-9) <= solid.volume <= 60 * 20 * (10 + width) * MM**3 * (1 + 1e-9)
         assert solid.mended == (said and f"faces up to {said} mm apart sewn")
         assert len(solid.faces) == 6
 

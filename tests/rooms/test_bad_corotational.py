@@ -35,10 +35,7 @@ def test_a_rigid_slider_has_no_frames_of_its_own() -> None:
     raw["links"]["shoe"] = {"model": "rigid", "mass": 0.3, "frames": "co-rotational"}
     raw["joints"]["B"] = {"kind": "revolute", "links": ["arm", "shoe"], "at": [0.5, 0]}
     raw["joints"]["S"] = {"kind": "prismatic", "links": ["shoe", "ground"], "at": [0.5, 0], "axis": "x"}
-    assert (
-        "links.shoe.frames: must be left out for a rigid link without a shape, got 'co-rotational'"
-        in fault(raw)
-    )
+    assert "links.shoe.frames: must be left out for a rigid link without a shape, got 'co-rotational'" in fault(raw)
 
 
 def test_segments_finer_than_the_mesh() -> None:

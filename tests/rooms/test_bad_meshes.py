@@ -56,12 +56,8 @@ class TestMeshFile:
         message = refused({"kind": "mesh", "file": "."}, tmp_path)
         assert message.endswith(f", got a folder at {tmp_path}")
 
-    @pytest.mark.parametrize(
-        "name", ["arm.vtu", "arm.msh", "arm.vtk", "arm.inp", "arm.xdmf", "arm.med", "arm.stl"]
-    )
-    @pytest.mark.parametrize(
-        "content", [b"", b"\x00\xff\x13 no mesh at all \xfe" * 9, b"<VTKFile type='PolyData'>"]
-    )
+    @pytest.mark.parametrize("name", ["arm.vtu", "arm.msh", "arm.vtk", "arm.inp", "arm.xdmf", "arm.med", "arm.stl"])
+    @pytest.mark.parametrize("content", [b"", b"\x00\xff\x13 no mesh at all \xfe" * 9, b"<VTKFile type='PolyData'>"])
     def test_corrupt(self, tmp_path, name, content, capfd):
         (tmp_path / name).write_bytes(content)
         message = refused({"kind": "mesh", "file": name}, tmp_path)
@@ -98,9 +94,7 @@ class TestMeshFile:
             gmsh.model.mesh.generate(3)
             gmsh.model.mesh.setOrder(3)
             gmsh.write(str(tmp_path / "arm.msh"))
-        assert re.search(
-            r"of order 1 or 2, got \d+ tetra20 in", refused({"kind": "mesh", "file": "arm.msh"}, tmp_path)
-        )
+        assert re.search(r"of order 1 or 2, got \d+ tetra20 in", refused({"kind": "mesh", "file": "arm.msh"}, tmp_path))
 
     @pytest.mark.parametrize("number", [np.nan, np.inf])
     def test_coordinates_that_are_no_numbers(self, tmp_path, number):
@@ -132,9 +126,7 @@ class TestMeshFile:
     def test_inverted_element(self, tmp_path):
         points = np.concatenate([CUBE, CUBE[[1, 2, 5, 6]] + [1, 0, 0]])
         good, bad = np.arange(8), np.array([1, 8, 9, 2, 5, 10, 11, 6])
-        message = mesh_file(
-            tmp_path, points, [("hexahedron", np.stack([good, bad[[4, 5, 6, 7, 0, 1, 2, 3]]]))]
-        )
+        message = mesh_file(tmp_path, points, [("hexahedron", np.stack([good, bad[[4, 5, 6, 7, 0, 1, 2, 3]]]))])
         assert message == (
             "links.arm: elements must not be inverted or folded, got scaled Jacobian -1 in element 1 "
             "at (1500, 500, 500) mm; refine the mesh or mend the mesh file"
@@ -174,8 +166,7 @@ class TestSizes:
 
     def test_too_fine(self):
         assert refused(SQUARE, mesh={"size": 1e-4}) == (
-            "links.arm.mesh.size: must give at most 2,000,000 elements, got about 100,000,000; "
-            "take a coarser mesh"
+            "links.arm.mesh.size: must give at most 2,000,000 elements, got about 100,000,000; take a coarser mesh"
         )
 
     def test_too_many_across_and_layers(self):
@@ -185,8 +176,7 @@ class TestSizes:
     def test_too_many_elements_of_a_bar(self):
         message = refused(BAR, mesh={"elements": [1000, 300, 10]})
         assert message == (
-            "links.arm.mesh.elements: must give at most 2,000,000 elements, got about 3,000,000; "
-            "take a coarser mesh"
+            "links.arm.mesh.elements: must give at most 2,000,000 elements, got about 3,000,000; take a coarser mesh"
         )
 
     def test_eyes_too_close_for_a_waist(self):
@@ -230,17 +220,14 @@ class TestPart:
 
     def test_between_points_that_are_not_as_far_apart(self, tmp_path):
         assert part(tmp_path, OUTLINE, ((0, 0), (1.001, 0))) == (
-            "links.arm.shape.between: must be as far apart as origin and x_point of plate.toml, "
-            "1 [m], got 1.001"
+            "links.arm.shape.between: must be as far apart as origin and x_point of plate.toml, 1 [m], got 1.001"
         )
 
 
 class TestShape:
     def test_none(self):
         message = refused(None, model="rigid")
-        assert (
-            message == "links.arm.shape: must be bar, plate_link, extrusion, part, mesh or cad, got no shape"
-        )
+        assert message == "links.arm.shape: must be bar, plate_link, extrusion, part, mesh or cad, got no shape"
 
     def test_for_beams_only(self):
         line = {"kind": "polyline", "points": [[0, 0], [1, 0]], "width": 0.1, "thickness": 0.1}

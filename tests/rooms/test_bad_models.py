@@ -38,9 +38,7 @@ def test_joint_that_does_not_touch_its_link(model: str) -> None:
     raw = arm(model)
     raw["joints"]["A"]["at"] = [-0.1, 0]
     what = "a bore or a flat face of" if model == "solid" else "a node of"
-    nearest = (
-        "(0, 0, -0.01), 0.1005 m" if model == "solid" else "(0, 0, 0), 0.1 m"
-    )  # hex20: none within the end
+    nearest = "(0, 0, -0.01), 0.1005 m" if model == "solid" else "(0, 0, 0), 0.1 m"  # hex20: none within the end
     first, *offered, advice = fault(raw).split("; ")
     assert first == (
         f"joints.A: must sit on {what} link 'arm' at (-0.1, 0, 0), got none there (nearest node {nearest} away)"
@@ -58,9 +56,7 @@ def test_joint_beside_the_bore_of_a_plate() -> None:
     raw["points"]["D"] = [0.9144, 0, 0]
     raw["joints"]["D"]["at"] = [0.9144, 0.004]
     raw["bodies"] = {}
-    assert fault(raw).startswith(
-        "joints.D: must sit on a bore or a flat face of link 'rocker' at (0.9144, 0.004, 0)"
-    )
+    assert fault(raw).startswith("joints.D: must sit on a bore or a flat face of link 'rocker' at (0.9144, 0.004, 0)")
 
 
 def test_hinge_across_a_flat_face() -> None:
@@ -106,9 +102,7 @@ def test_displacement_beside_a_beams_axis() -> None:
 def test_surface_force_on_no_face() -> None:
     raw = arm()
     raw["loads"] = {"push": {"kind": "surface", "link": "arm", "at": [0.25, 0], "vector": [0, 1]}}
-    assert fault(raw).startswith(
-        "loads.push.at: must sit on a bore or a flat face of link 'arm' at (0.25, 0, 0)"
-    )
+    assert fault(raw).startswith("loads.push.at: must sit on a bore or a flat face of link 'arm' at (0.25, 0, 0)")
 
 
 def test_body_on_no_coupling_surface() -> None:
@@ -133,9 +127,7 @@ def body() -> dict[str, Any]:
 def test_full_inertia_on_a_flat_face() -> None:
     raw = arm()
     raw["bodies"] = {"tool": body()}
-    assert fault(raw) == (
-        "bodies.tool.at: a rigid body with full inertia must sit on a bore, got a flat face of 'arm'"
-    )
+    assert fault(raw) == ("bodies.tool.at: a rigid body with full inertia must sit on a bore, got a flat face of 'arm'")
 
 
 def test_body_beside_a_beams_node() -> None:
@@ -148,9 +140,7 @@ def test_body_beside_a_beams_node() -> None:
 
 
 def test_matrix_that_is_not_positive_definite() -> None:
-    with pytest.raises(
-        SolveError, match=r"^links.arm: effective matrix must be positive definite, got a pivot ≤ 0"
-    ):
+    with pytest.raises(SolveError, match=r"^links.arm: effective matrix must be positive definite, got a pivot ≤ 0"):
         Cholesky(sp.csr_array(np.diag([1.0, -1.0])), "links.arm")
 
 

@@ -272,15 +272,13 @@ def test_faults_of_all_rooms_of_a_scene_come_at_once():
         "joints.B.links[1]: must name a link, got 'couple', did you mean 'coupler'?",
         "joints.D.kind: must be one of revolute, spherical, weld, prismatic, cylindrical, screw, universal, planar, "
         "slot, got 'hinge'",
-        "links.coupler.shape.bore_diameter: must be a length [m], got '600 rpm': the unit 'rpm' "
-        "is of another kind",
+        "links.coupler.shape.bore_diameter: must be a length [m], got '600 rpm': the unit 'rpm' is of another kind",
         "links.crank.material: must name a material, got 'stel', did you mean 'steel'?",
         "links.crank.shape.width: must be positive [m], got -0.04",
         "links.rocker.colour: unknown key, known: model, reduction, material, shape, file, mass, centre, inertia, "
         "mesh, element, min_quality, shear_coefficient, beam, frames, segments",
         "output.probes.middle.link: must name a link, got 'roker', did you mean 'rocker'?",
-        "points.C: circles of radius 0.05 and 0.05 must meet [m], got centres 0.264575 apart: a gap "
-        "of 0.164575",
+        "points.C: circles of radius 0.05 and 0.05 must meet [m], got centres 0.264575 apart: a gap of 0.164575",
     ]
 
 
@@ -297,9 +295,7 @@ def test_a_scene_must_be_a_table():
 
 
 def test_a_name_cannot_be_looked_up_outside_a_scene():
-    with pytest.raises(
-        ValueError, match="must be coordinates in a record that is made outside a scene, got 'A'"
-    ):
+    with pytest.raises(ValueError, match="must be coordinates in a record that is made outside a scene, got 'A'"):
         Bar(between=("A", (1, 0)), width=1, thickness=1)
 
 
@@ -374,10 +370,7 @@ def test_a_part_that_does_not_fit(tmp_path, plate, message):
 
 def test_a_part_that_fits_is_no_fault(tmp_path):
     (tmp_path / "part.toml").write_text(PLATE)
-    assert (
-        scene_from(changed(GOOD, PART, ["links/rocker/mesh"]), tmp_path).links["rocker"].shape.file
-        == "part.toml"
-    )
+    assert scene_from(changed(GOOD, PART, ["links/rocker/mesh"]), tmp_path).links["rocker"].shape.file == "part.toml"
 
 
 @pytest.mark.parametrize(
@@ -454,9 +447,7 @@ def paths(table, above=""):
             yield from paths(value, f"{above}{key}/")
 
 
-@pytest.mark.parametrize(
-    "base", [pytest.param(x, marks=() if x == "beam" else pytest.mark.long) for x in BASES]
-)
+@pytest.mark.parametrize("base", [pytest.param(x, marks=() if x == "beam" else pytest.mark.long) for x in BASES])
 def test_no_odd_value_anywhere_gives_more_than_lines_of_faults(base):
     """Every odd value at every third place of the long scenes, and another third for the next one."""
     every = 1 if base == "beam" else 3

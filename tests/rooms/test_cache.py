@@ -145,9 +145,7 @@ def test_what_cannot_be_packed_is_made_each_time() -> None:
     assert len(calls) == 2
 
 
-def test_a_folder_that_cannot_be_written_does_not_stop_a_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_that_cannot_be_written_does_not_stop_a_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("in the way", "utf-8")
     monkeypatch.setenv("KEDFEM_CACHE", str(blocked / "cache"))
@@ -239,9 +237,7 @@ kept("number", "key", lambda: 17, itself, itself)
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")
 @pytest.mark.parametrize("before", [False, True])
-def test_a_run_that_is_killed_while_it_writes_an_entry_leaves_none_or_the_one_before(
-    folder: Path, before: bool
-) -> None:
+def test_a_run_that_is_killed_while_it_writes_an_entry_leaves_none_or_the_one_before(folder: Path, before: bool) -> None:
     if before:
         assert kept("number", "key", lambda: 17, itself, itself) == 17
         (entry,) = entries(folder)

@@ -41,9 +41,7 @@ class TestFormats:
 
     @pytest.mark.parametrize("ending", FORMATS[1:])
     def test_same_faces(self, parts, ending):
-        for mine, wanted in zip(
-            told(read(parts / f"lever.{ending}")), told(read(parts / "lever.step")), strict=True
-        ):
+        for mine, wanted in zip(told(read(parts / f"lever.{ending}")), told(read(parts / "lever.step")), strict=True):
             assert mine[:2] == wanted[:2]
             assert_allclose(mine[2:], wanted[2:], atol=2e-9)
 
@@ -66,9 +64,7 @@ class TestFormats:
     def test_settings_of_gmsh_are_as_before(self, parts):
         with gmsh_model() as gmsh:
             read(parts / "lever.igs")
-            kept = [
-                gmsh.option.getNumber(f"Geometry.{key}") for key in ("OCCScaling", "OCCSewFaces", "Tolerance")
-            ]
+            kept = [gmsh.option.getNumber(f"Geometry.{key}") for key in ("OCCScaling", "OCCSewFaces", "Tolerance")]
             assert kept == [1, 0, 1e-8]
             assert gmsh.model.getEntities() == []
 
@@ -203,9 +199,7 @@ class TestUnits:
     )
     def test_that_no_part_can_have(self, parts, ending, scale, got):
         message = refused(parts / f"lever.{ending}", scale=scale)
-        assert message.startswith(
-            "links.rod.shape.file: must hold a part between 1e-05 and 1000 [m] across, got "
-        )
+        assert message.startswith("links.rod.shape.file: must hold a part between 1e-05 and 1000 [m] across, got ")
         assert message.endswith("in FILE; set `scale`, the metres per unit of the file")
         assert got in message
 

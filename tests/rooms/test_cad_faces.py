@@ -135,9 +135,7 @@ class TestGroups:
             assert_allclose(np.abs(mine.direction), np.abs(face.direction), atol=1e-6)
 
     def test_of_another_format(self, tmp_path):
-        points = np.array(
-            [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))], dtype=float
-        )
+        points = np.array([(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))], dtype=float)
         cells = [("hexahedron", [list(range(8))]), ("quad", [[4, 5, 6, 7], [0, 1, 2, 3]])]
         sets = {"above": [np.array([], dtype=int), np.array([0])], "both": [np.array([0]), np.array([0, 1])]}
         path = tmp_path / "cube.vtk"

@@ -56,9 +56,7 @@ class TestSolids:
         text = (parts / "boxes.step").read_text()
         names = iter(("web", "rod", "boss"))
         path = parts / "bodies.step"
-        path.write_text(
-            re.sub(r"MANIFOLD_SOLID_BREP\(''", lambda _: f"MANIFOLD_SOLID_BREP('{next(names)}'", text)
-        )
+        path.write_text(re.sub(r"MANIFOLD_SOLID_BREP\(''", lambda _: f"MANIFOLD_SOLID_BREP('{next(names)}'", text))
         assert_allclose(read(path).volume, 2000 * MM**3, rtol=1e-9)
 
     def test_none_meant(self, parts):
@@ -89,9 +87,7 @@ class TestSolids:
 def with_face_names(source: Path, *names: str) -> Path:
     each = iter(names)
     path = source.parent / "faces.step"
-    path.write_text(
-        re.sub(r"ADVANCED_FACE\(''", lambda _: f"ADVANCED_FACE('{next(each, '')}'", source.read_text())
-    )
+    path.write_text(re.sub(r"ADVANCED_FACE\(''", lambda _: f"ADVANCED_FACE('{next(each, '')}'", source.read_text()))
     return path
 
 

@@ -26,9 +26,7 @@ def over(what: str, link: str = "arm") -> Raw:
     between = [end, {"link": "ground", "at": [1, 1]}]
     return {
         "loads": {"p": {"kind": "force", **end, "vector": [0, 1], "factor": factor}},
-        "springs": {
-            "s": {"kind": "spring", "between": between, "stiffness": 1.0, "stiffness_factor": factor}
-        },
+        "springs": {"s": {"kind": "spring", "between": between, "stiffness": 1.0, "stiffness_factor": factor}},
     }
 
 

@@ -115,9 +115,7 @@ def test_segments_and_reduced_links_know_the_choice_that_was_made_on_the_whole(t
     assert_allclose(face.face.radius, 0.004, rtol=1e-6)
 
 
-@pytest.mark.parametrize(
-    "mesh", [turned(SLEEVE), turned(SLEEVE, 10), ball_on_neck(0.01), ball_seat(0.01)], ids=str
-)
+@pytest.mark.parametrize("mesh", [turned(SLEEVE), turned(SLEEVE, 10), ball_on_neck(0.01), ball_seat(0.01)], ids=str)
 def test_what_is_offered_chooses_itself_when_it_is_copied_back(mesh: SolidMesh) -> None:
     link = made(mesh)
     offered = surfaces(link)
@@ -152,9 +150,7 @@ def test_a_part_from_cad_has_all_its_faces_to_choose_from(tmp_path: Path) -> Non
 
 def test_the_distance_to_a_face_is_that_to_its_nearest_place() -> None:
     link = made(turned([(0.0, 0.002, 0.0, 0.02)]))  # a disc, 2 mm thick, elements of many times that
-    top, bottom = (
-        next(x for x in surfaces(link) if x.form == "plane" and x.direction[2] * z > 0.9) for z in (1, -1)
-    )
+    top, bottom = (next(x for x in surfaces(link) if x.form == "plane" and x.direction[2] * z > 0.9) for z in (1, -1))
     for r, a in ((0.0, 0.0), (0.003, 1.0), (0.013, 2.0), (0.019, 4.0)):
         point = np.array([r * math.cos(a), r * math.sin(a), 0.0025])
         assert_allclose([distance(link, x, point) for x in (top, bottom)], [0.0005, 0.0025], rtol=1e-9)
@@ -174,9 +170,7 @@ def refusal(link: Link, **choice: Any) -> str:
 def test_what_is_ambiguous_is_refused_with_those_that_are_meant_nearest_first() -> None:
     link = made(turned([(0.0, 0.01, 0.005, 0.01), (0.01, 0.02, 0.005, 0.015)]))
     text = refusal(link, plane="z")
-    assert text.startswith(
-        "joints.A.faces.part: must mean one face of link 'part', got 3 such faces; nearest first: "
-    )
+    assert text.startswith("joints.A.faces.part: must mean one face of link 'part', got 3 such faces; nearest first: ")
     away = [float(x) for x in re.findall(r"([\d.]+) mm away", text)]
     assert len(away) == 3
     assert away == sorted(away)
@@ -191,9 +185,7 @@ def test_what_is_ambiguous_is_refused_with_those_that_are_meant_nearest_first() 
 def test_what_is_missing_is_refused_with_what_there_is_of_that_form() -> None:
     link = made(turned(SLEEVE))
     text = refusal(link, cylinder="12 mm", near=(0.0, 0.0, 0.02))
-    assert (
-        'got { cylinder = "12 mm", near = [0, 0, 0.02] }, of which it has none; nearest first: bore' in text
-    )
+    assert 'got { cylinder = "12 mm", near = [0, 0, 0.02] }, of which it has none; nearest first: bore' in text
     found = re.findall(r'(bore|journal) \{ cylinder = "([\d.]+) mm"', text)
     assert found == [("bore", "8"), ("bore", "10"), ("journal", "20"), ("journal", "30")]
     assert "axis" in refusal(link, cylinder="8 mm", axis="x")

@@ -80,9 +80,7 @@ Command = Callable[..., Said]
 
 
 @pytest.fixture
-def run_kedfem(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> Command:
+def run_kedfem(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Command:
     """kedfem in this process, in a folder of its own, on a terminal of 80 columns; it never shows a traceback."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
@@ -123,9 +121,7 @@ def test_help_names_every_command_and_each_explains_itself(run_kedfem: Command) 
     said = run_kedfem("--help")
     assert said.code == 0
     for name in ("run", "check", "kinematics", "frequencies", "mesh", "accuracy", "new", "cache"):
-        assert re.search(rf"^ +{name} +[A-Z]\w+ .*\.$", said.out, re.MULTILINE), (
-            f"{name} is cut off or missing"
-        )
+        assert re.search(rf"^ +{name} +[A-Z]\w+ .*\.$", said.out, re.MULTILINE), f"{name} is cut off or missing"
         assert run_kedfem(name, "--help").code == 0
 
 
@@ -136,9 +132,7 @@ def test_version(run_kedfem: Command) -> None:
 @pytest.mark.parametrize(
     "arguments", [(), ("runn",), ("run",), ("run", "a", "b"), ("bench", "nothing"), ("check", "--fast")]
 )
-def test_a_command_that_cannot_be_understood_is_the_users_error(
-    run_kedfem: Command, arguments: tuple[str, ...]
-) -> None:
+def test_a_command_that_cannot_be_understood_is_the_users_error(run_kedfem: Command, arguments: tuple[str, ...]) -> None:
     assert run_kedfem(*arguments).code == USER_ERROR
 
 
@@ -158,8 +152,7 @@ def test_help_loads_no_heavy_library(tmp_path: Path) -> None:
         "vtkmodules",
     ]
     code = (
-        "import sys, atexit\n"
-        f"atexit.register(lambda: print('loaded', [m for m in {heavy} if m in sys.modules]))\n" + MAIN
+        f"import sys, atexit\natexit.register(lambda: print('loaded', [m for m in {heavy} if m in sys.modules]))\n" + MAIN
     )
     out, err = process(code, "--help", folder=tmp_path).communicate(timeout=60)
     assert "loaded []" in out, err
@@ -185,9 +178,7 @@ def test_importing_the_analysis_leaves_libraries_alone_that_few_runs_need(tmp_pa
     assert "loaded []" in out, err
 
 
-def test_run_says_the_largest_values_in_80_columns_and_where_everything_is(
-    run_kedfem: Command, arm: Path
-) -> None:
+def test_run_says_the_largest_values_in_80_columns_and_where_everything_is(run_kedfem: Command, arm: Path) -> None:
     said = run_kedfem("run", arm)
     assert said.code == 0
     assert all(
@@ -353,9 +344,7 @@ def test_broken_toml_is_named_with_its_line(run_kedfem: Command, command: str) -
 
 def test_all_faults_come_at_once_and_nothing_is_written(run_kedfem: Command, arm: Path) -> None:
     text = (
-        arm.read_text(encoding="utf-8")
-        .replace("width = 0.01", "width = -0.01")
-        .replace("revolutions =", "revolution =")
+        arm.read_text(encoding="utf-8").replace("width = 0.01", "width = -0.01").replace("revolutions =", "revolution =")
     )
     arm.write_text(text, encoding="utf-8")
     said = run_kedfem("run", arm)
@@ -373,9 +362,7 @@ def test_a_file_in_the_way_of_the_output_folder(run_kedfem: Command, arm: Path) 
     assert arm.with_name("arm-results").read_text() == "precious"
 
 
-def test_a_defect_of_kedfem_is_called_one(
-    run_kedfem: Command, arm: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_defect_of_kedfem_is_called_one(run_kedfem: Command, arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def failing(*_: object) -> None:
         raise RuntimeError("[/broken] inside")
 
@@ -408,9 +395,7 @@ def test_ctrl_c_before_the_first_step_leaves_an_earlier_run_alone(
 
     monkeypatch.setattr("kedfem.analysis.ready_to_step", interrupted)
     said = run_kedfem("run", arm)
-    nothing = (
-        "interrupted; nothing was computed yet, as the first step had not begun, and nothing was written"
-    )
+    nothing = "interrupted; nothing was computed yet, as the first step had not begun, and nothing was written"
     assert (said.code, said.err.splitlines()[-1]) == (INTERRUPTED, nothing)
     assert file.read_bytes() == before
 
@@ -439,9 +424,7 @@ def test_an_interrupted_run_leaves_what_was_computed(arm: Path, number: signal.S
     expect_whole_animation(folder, results)
 
 
-def test_frames_and_rows_of_two_runs_never_stand_side_by_side(
-    arm: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_frames_and_rows_of_two_runs_never_stand_side_by_side(arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever moment a run is killed at, once its first rows are in place."""
     folder = analyse(read_scene(arm)).folder
     real, seen, begun = AnimationWriter.add, [], time.time_ns()
@@ -450,16 +433,13 @@ def test_frames_and_rows_of_two_runs_never_stand_side_by_side(
     def added(writer: AnimationWriter, *given: Any) -> list[Path]:
         rows = (folder / "results.h5").stat().st_mtime_ns >= begun
         frames = [
-            path.stat().st_mtime_ns >= begun
-            for path in [*folder.glob("animation.pvd"), *folder.glob("animation/*")]
+            path.stat().st_mtime_ns >= begun for path in [*folder.glob("animation.pvd"), *folder.glob("animation/*")]
         ]
         seen.append((rows, all(frames)))
         return real(writer, *given)
 
     monkeypatch.setattr(AnimationWriter, "add", added)
-    arm.write_text(
-        arm.read_text("utf-8").replace("frames_per_revolution = 36", "frames_per_revolution = 1"), "utf-8"
-    )
+    arm.write_text(arm.read_text("utf-8").replace("frames_per_revolution = 36", "frames_per_revolution = 1"), "utf-8")
     analyse(read_scene(arm))
     assert set(seen) == {(True, True)}
 
@@ -500,9 +480,7 @@ def test_a_run_that_means_nothing_is_not_called_complete(run_kedfem: Command, ar
     assert results.reason in last
 
 
-def test_an_arm_that_rings_from_a_sudden_start_is_warned_of_and_no_more(
-    run_kedfem: Command, arm: Path
-) -> None:
+def test_an_arm_that_rings_from_a_sudden_start_is_warned_of_and_no_more(run_kedfem: Command, arm: Path) -> None:
     """Energy exchanged, and torque, are next to nothing beside the kinetic energy and the force in its joint."""
     text = arm.read_text("utf-8").replace('initial = "quasi-static"', "").replace("gravity = [0, -9.81]", "")
     arm.write_text(text, encoding="utf-8")
@@ -529,18 +507,14 @@ def test_a_killed_run_is_named_by_the_next_one(run_kedfem: Command, arm: Path) -
     assert read_results(file).status == "complete"
 
 
-def test_tables_and_plots_of_an_earlier_run_do_not_stay_beside_the_new_results(
-    run_kedfem: Command, arm: Path
-) -> None:
+def test_tables_and_plots_of_an_earlier_run_do_not_stay_beside_the_new_results(run_kedfem: Command, arm: Path) -> None:
     text = arm.read_text(encoding="utf-8")
     arm.write_text(text.replace("plots = false", "plots = true\ncsv = true"), encoding="utf-8")
     folder = arm.with_name(f"{arm.stem}-results")
     assert run_kedfem("run", arm).code == 0
     assert (folder / "results.csv").exists()
     assert list((folder / "plots").glob("*.png"))
-    arm.write_text(
-        text.replace("animation = { frames_per_revolution = 36 }", "animation = false"), encoding="utf-8"
-    )
+    arm.write_text(text.replace("animation = { frames_per_revolution = 36 }", "animation = false"), encoding="utf-8")
     assert run_kedfem("run", arm).code == 0
     assert sorted(path.name for path in folder.rglob("*") if path.is_file()) == [
         "envelope.vtu",
@@ -550,9 +524,7 @@ def test_tables_and_plots_of_an_earlier_run_do_not_stay_beside_the_new_results(
     ]
 
 
-@pytest.mark.parametrize(
-    "name", ["results.csv", "worst.png", "animation.pvd", "envelope.vtu", "peaks.csv", "results.h5"]
-)
+@pytest.mark.parametrize("name", ["results.csv", "worst.png", "animation.pvd", "envelope.vtu", "peaks.csv", "results.h5"])
 def test_files_that_are_not_kedfems_are_left_alone(run_kedfem: Command, arm: Path, name: str) -> None:
     """A scene may name any folder for its results: what others keep there under such names stays."""
     arm.write_text(arm.read_text("utf-8").replace("[output]", '[output]\nfolder = "mine"'), encoding="utf-8")

@@ -36,18 +36,14 @@ def left(row: Row) -> str:
     return replace(row, seconds=0.0).text()
 
 
-def test_workers_of_a_cluster_find_the_same_rows_and_go_on_with_those_of_a_pool(
-    address: str, tmp_path: Path
-) -> None:
+def test_workers_of_a_cluster_find_the_same_rows_and_go_on_with_those_of_a_pool(address: str, tmp_path: Path) -> None:
     (tmp_path / "one").mkdir()
     wanted, _ = swept(tmp_path / "one", OVER)
     raw = arm()
 
     def run(over: str) -> list[object]:
         executor = cluster.cluster(address, tmp_path)
-        done = sweep(
-            Base(raw, tmp_path, "arm"), axes_of([over], raw), QUICK, tmp_path / "out", executor=executor
-        )
+        done = sweep(Base(raw, tmp_path, "arm"), axes_of([over], raw), QUICK, tmp_path / "out", executor=executor)
         assert [row.status for row in done.rows] == ["complete"] * len(done.rows)
         return [done.before, *map(left, done.rows)]
 
@@ -56,12 +52,8 @@ def test_workers_of_a_cluster_find_the_same_rows_and_go_on_with_those_of_a_pool(
     assert run(OVER) == [2, *every]
 
 
-def test_what_cannot_run_points_is_refused(
-    address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with pytest.raises(
-        OutputError, match=r"--cluster: its workers must see the scene's folder .*nowhere, got one that"
-    ):
+def test_what_cannot_run_points_is_refused(address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(OutputError, match=r"--cluster: its workers must see the scene's folder .*nowhere, got one that"):
         cluster.cluster(address, tmp_path / "nowhere")
     monkeypatch.setattr(cluster, "installed_version", lambda: "9.9")
     with pytest.raises(OutputError, match=r"--cluster: its workers must have kedfem 9\.9, got "):
@@ -69,9 +61,7 @@ def test_what_cannot_run_points_is_refused(
     monkeypatch.setattr(cluster, "PATIENCE", 1)
     before = loops()
     for wrong in ("tcp://127.0.0.1:1", "nonsense://x"):
-        with pytest.raises(
-            OutputError, match=r"--cluster: must be the address of a Dask scheduler, .* got " + wrong
-        ):
+        with pytest.raises(OutputError, match=r"--cluster: must be the address of a Dask scheduler, .* got " + wrong):
             cluster.cluster(wrong, tmp_path)
     assert loops() == before
     with (
@@ -82,9 +72,7 @@ def test_what_cannot_run_points_is_refused(
 
 
 def test_workers_are_those_of_one_or_the_other(run_kedfem: Command, tmp_path: Path) -> None:
-    (tmp_path / "scene.toml").write_text(
-        'title = "x"\n[drive]\nmotion = { kind = "constant_speed", speed = 1 }\n'
-    )
+    (tmp_path / "scene.toml").write_text('title = "x"\n[drive]\nmotion = { kind = "constant_speed", speed = 1 }\n')
     both = "--cluster", "tcp://127.0.0.1:1", "--workers", "2"
     said = run_kedfem("sweep", "scene.toml", "--over", "drive.speed=1,2", *both)
     assert said.code == 2

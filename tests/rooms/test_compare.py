@@ -139,18 +139,14 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 def test_a_user_compares_two_runs(folders: list[Path], tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["compare", *map(str, folders), "--folder", str(tmp_path / "here")])
     assert done.exit_code == 0, done.output
-    assert (
-        "links.rocker.shape.width" in done.output.replace("\n", "").replace(" ", "") or "0.02" in done.output
-    )
+    assert "links.rocker.shape.width" in done.output.replace("\n", "").replace(" ", "") or "0.02" in done.output
     with (tmp_path / "here" / "differences.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     by = {(row["channel"], row["run"]): row for row in rows}
     channels = {name for name, _ in by}
     assert {"drive/torque", "joints/A/force"} <= channels
     assert all(float(row["largest difference [%]"]) == 0.0 for row in rows[::2])
-    assert all(
-        float(row["largest difference [%]"]) > 1e-3 for row in rows[1::2] if row["channel"] == "drive/torque"
-    )
+    assert all(float(row["largest difference [%]"]) > 1e-3 for row in rows[1::2] if row["channel"] == "drive/torque")
     for name in channels:
         with Image.open(tmp_path / "here" / f"{name.replace('/', '-')}.png") as image:
             assert image.size == (1320, 744)

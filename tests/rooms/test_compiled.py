@@ -75,9 +75,7 @@ def test_all_records_that_kernels_are_given_are_in_it() -> None:
     """A class that moved was an AttributeError on every cache that had been made before."""
     files = compiled.ROOT.rglob("*.py")
     records = {
-        file
-        for file in files
-        if re.search(r"^class \w+\((NamedTuple|namedtuple)\b", file.read_text(), re.MULTILINE)
+        file for file in files if re.search(r"^class \w+\((NamedTuple|namedtuple)\b", file.read_text(), re.MULTILINE)
     }
     assert records == {compiled.ROOT / name for name in compiled.RECORDS}
 
@@ -98,9 +96,7 @@ def test_what_is_compiled_goes_there() -> None:
     assert Path(marched_linear.stats.cache_path).is_relative_to(compiled.kernel_folder(compiled.ROOT))
 
 
-def test_it_is_kept_for_the_user_even_where_the_cache_is_off(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_it_is_kept_for_the_user_even_where_the_cache_is_off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setenv("KEDFEM_CACHE", "off")
     assert compiled.kernel_folder(compiled.ROOT).is_relative_to(tmp_path)
@@ -190,18 +186,12 @@ print("compiled" if told else "read")
 
 
 @pytest.mark.parametrize("end", ["nbi", "nbc"])
-def test_a_file_of_compiled_code_with_a_flipped_bit_is_made_again_without_a_word(
-    end: str, tmp_path: Path
-) -> None:
-    environment = {k: x for k, x in os.environ.items() if k != "NUMBA_CACHE_DIR"} | {
-        "KEDFEM_CACHE": str(tmp_path)
-    }
+def test_a_file_of_compiled_code_with_a_flipped_bit_is_made_again_without_a_word(end: str, tmp_path: Path) -> None:
+    environment = {k: x for k, x in os.environ.items() if k != "NUMBA_CACHE_DIR"} | {"KEDFEM_CACHE": str(tmp_path)}
 
     def ran() -> str:
         command = [sys.executable, "-W", "error", "-c", RESIDUALS]
-        done = subprocess.run(
-            command, env=environment, capture_output=True, text=True, timeout=120, check=False
-        )
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
         assert not done.stderr
         return done.stdout.strip()
 

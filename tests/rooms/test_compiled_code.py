@@ -41,13 +41,9 @@ def test_parts_are_those_of_python(of: np.ndarray) -> None:
 
 
 @pytest.mark.usefixtures("indices")
-@pytest.mark.parametrize(
-    "of", [np.arange(60.0).reshape(3, 4, 5), np.arange(120.0).reshape(3, 4, 10)[:, :, ::2]]
-)
+@pytest.mark.parametrize("of", [np.arange(60.0).reshape(3, 4, 5), np.arange(120.0).reshape(3, 4, 10)[:, :, ::2]])
 def test_elements_and_parts_in_several_directions_are_those_of_python(of: np.ndarray) -> None:
-    every = numba.njit(
-        lambda x, i, j, k: (x[i], x[i, j], x[i, j, k], x[i:, j], x[i, j:, k], x[1:j, :, i:k], x[-1, j])
-    )
+    every = numba.njit(lambda x, i, j, k: (x[i], x[i, j], x[i, j, k], x[i:, j], x[i, j:, k], x[1:j, :, i:k], x[-1, j]))
     plain = every.py_func
     for i in range(-3, 3):
         for j in range(-4, 4):
@@ -109,9 +105,7 @@ def test_a_part_that_was_kept_becomes_one_of_another_loop_and_takes_its_constant
     said = []
     for name in ("one", "one", "other"):
         command = [sys.executable, "-c", CALLED, str(tmp_path), name]
-        done = subprocess.run(
-            command, env=environment, capture_output=True, text=True, timeout=120, check=True
-        )
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=True)
         said.append(done.stdout.split("\n")[:2])
     message = "('must not be negative',)"
     assert said == [["4.0", f"{message} 0"], ["4.0", f"{message} 0"], ["15.0", f"{message} 1"]]
@@ -132,9 +126,7 @@ def test_another_numba_compiles_in_its_own_way(tmp_path: Path) -> None:
     environment.pop("NUMBA_CACHE_DIR", None)
     command = [sys.executable, "-c", LATER + CALLED, str(tmp_path), "other"]
     for _ in ("compiled", "kept"):
-        done = subprocess.run(
-            command, env=environment, capture_output=True, text=True, timeout=120, check=True
-        )
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=True)
         assert done.stdout.split("\n")[:2] == ["15.0", "('must not be negative',) 0"]
 
 

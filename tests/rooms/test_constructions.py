@@ -166,9 +166,7 @@ WEIGHT = 7850 * 0.4 * 0.02 * 0.01 * 10.0  # of the arm [N]
 
 
 @pytest.mark.parametrize("body", [POINT, HEAVY], ids=["point mass", "rigid body"])
-@pytest.mark.parametrize(
-    "keys", [{}, {"beam": "spatial"}, {"element": "beam5", "mesh": {"elements": 2}}], ids=str
-)
+@pytest.mark.parametrize("keys", [{}, {"beam": "spatial"}, {"element": "beam5", "mesh": {"elements": 2}}], ids=str)
 def test_a_body_anywhere_along_a_beam_weighs_where_it_is(body: dict[str, Any], keys: dict[str, Any]) -> None:
     torque = ran(arm(body, **keys)).channel("drive/torque")[0, 0]
     x = body.get("centre", [0.13])[0]
@@ -178,9 +176,7 @@ def test_a_body_anywhere_along_a_beam_weighs_where_it_is(body: dict[str, Any], k
 def test_a_planar_beam_whose_body_is_off_its_point_moves_in_space() -> None:
     assert meshed(scene_from(arm(POINT))).model.links[0].kind == "beam"
     assert meshed(scene_from(arm(HEAVY))).model.links[0].kind == "spatial_beam"
-    with pytest.raises(
-        SceneError, match=r"bodies\.b\.centre: must be its point .* for the planar beam 'arm'"
-    ):
+    with pytest.raises(SceneError, match=r"bodies\.b\.centre: must be its point .* for the planar beam 'arm'"):
         scene_from(arm(HEAVY, beam="planar"))
 
 

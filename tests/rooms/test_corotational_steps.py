@@ -46,9 +46,7 @@ def channels(raw: Raw, solver_of: Any = steps_of) -> tuple[Steps, Channels, floa
 def alike(got: Channels, wanted: Channels, within: float) -> None:
     """Of the largest value of all channels of the same kind."""
     assert got.keys() == wanted.keys()
-    kinds = {
-        name: (name.partition("/")[0], name.rpartition("/")[2] * ("energy" not in name)) for name in wanted
-    }
+    kinds = {name: (name.partition("/")[0], name.rpartition("/")[2] * ("energy" not in name)) for name in wanted}
     for name, x in wanted.items():
         size = max(np.abs(y).max() for like, y in wanted.items() if kinds[like] == kinds[name])
         assert np.abs(got[name] - x).max() <= within * size, name
@@ -96,9 +94,7 @@ def stiffer(raw: Raw, times: float) -> Raw:
 
 def shorter(raw: Raw) -> Raw:
     """Half of the time."""
-    return with_analysis(
-        raw, **{k: x / 2 for k, x in raw["analysis"].items() if k in {"revolutions", "end_time"}}
-    )
+    return with_analysis(raw, **{k: x / 2 for k, x in raw["analysis"].items() if k in {"revolutions", "end_time"}})
 
 
 def off_its_surface(raw: Raw) -> Raw:
@@ -110,9 +106,7 @@ def off_its_surface(raw: Raw) -> Raw:
 DRIVEN = {
     **{kind: make for kind, make in BEAMS.items() if kind != "bushings"},
     "sliding block": inverted,
-    "sliding block of plane links": lambda: off_its_surface(
-        with_analysis(inverted("plane"), revolutions=0.02)
-    ),
+    "sliding block of plane links": lambda: off_its_surface(with_analysis(inverted("plane"), revolutions=0.02)),
     "shaft of universal joints": cardan,
     "gears": geared,
     "two drives": two_drives,
@@ -120,9 +114,7 @@ DRIVEN = {
 SOON = {"screw", "sliding block of plane links", "gears"}
 
 
-@pytest.mark.parametrize(
-    "kind", [pytest.param(x, marks=[] if x in SOON else pytest.mark.long) for x in DRIVEN]
-)
+@pytest.mark.parametrize("kind", [pytest.param(x, marks=[] if x in SOON else pytest.mark.long) for x in DRIVEN])
 def test_joints_by_constraint_equations_bear_in_stiff_links_what_they_do_in_rigid_body_frames(
     kind: str,
 ) -> None:
@@ -140,9 +132,7 @@ def test_joints_by_constraint_equations_bear_in_stiff_links_what_they_do_in_rigi
 
 def test_the_effort_of_a_drive_is_its_work_where_links_bend() -> None:
     """A crank and an arm on which a block slides, half a turn: ∫ T dφ is the work of supports, bent arm and all."""
-    raw = with_analysis(
-        inverted(), frames="co-rotational", revolutions=0.5, steps_per_revolution=480, rho_inf=0.8
-    )
+    raw = with_analysis(inverted(), frames="co-rotational", revolutions=0.5, steps_per_revolution=480, rho_inf=0.8)
     _, got, unworked = channels(raw)
     assert np.abs(got["energy/work"][:, 1]).max() > 5.0  # J
     assert unworked < 1e-5
@@ -190,9 +180,7 @@ ON_SLIDE: dict[str, Raw] = {
         "motors": {"m": {"joint": "S", "force": {"over": "travel", "at": [-1, 1], "value": [1e3, -1e3]}}}
     },
     "spring and damper": {
-        "springs": {
-            "s": {"kind": "spring", "joint": "S", "stiffness": 2e4, "damping": 50.0, "preload": 300.0}
-        }
+        "springs": {"s": {"kind": "spring", "joint": "S", "stiffness": 2e4, "damping": 50.0, "preload": 300.0}}
     },
 }
 
@@ -229,7 +217,5 @@ def test_a_torque_about_a_cylindrical_joint_is_between_its_links() -> None:
 def test_loads_that_turn_stand_beside_joints_by_constraint_equations() -> None:
     """As by the oracle, with a block that slides on the loaded arm."""
     load = {"kind": "force", "link": "arm", "at": [0.5, 0], "vector": [0, 100.0], "frame": "link"}
-    raw = with_analysis(inverted(), frames="co-rotational", initial="rest", rho_inf=0.8) | {
-        "loads": {"P": load}
-    }
+    raw = with_analysis(inverted(), frames="co-rotational", initial="rest", rho_inf=0.8) | {"loads": {"P": load}}
     assert against_oracle(as_a_run(begun(raw))) < 1e-7

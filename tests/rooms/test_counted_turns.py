@@ -43,9 +43,7 @@ CASES = [("x", "static", "rigid-body"), ("y", "quasi-static", "co-rotational"), 
 
 
 @pytest.mark.parametrize(("axis", "kind", "frames"), CASES)
-def test_gears_of_a_rigid_crank_and_a_spring_that_is_wound_up_for_turns(
-    axis: str, kind: str, frames: str
-) -> None:
+def test_gears_of_a_rigid_crank_and_a_spring_that_is_wound_up_for_turns(axis: str, kind: str, frames: str) -> None:
     """T = i² k φ at the drive, of which gears bear all, and a moment of the hub that is the drive's torque alone."""
     values = channels(*ran(geared(AXES[axis], 8, frames, kind)))
     phi = 2 * np.pi * np.arange(5) / 8

@@ -60,17 +60,13 @@ def test_a_bore_is_found_whole_with_or_without_an_axis(layers: int) -> None:
     with_axis = joint_surface(link, "joints.A", np.zeros(3), np.array([0.0, 0, 1]))
     without = joint_surface(link, "joints.A", np.zeros(3), None)
     assert set(without.facets) == set(with_axis.facets)
-    assert_allclose(
-        with_axis.origin, 0, atol=1e-7
-    )  # the middle of the bore; a quadratic circle is off by 1e-5
+    assert_allclose(with_axis.origin, 0, atol=1e-7)  # the middle of the bore; a quadratic circle is off by 1e-5
     assert_allclose(with_axis.spread.max(), 0.02 / np.sqrt(12), rtol=1e-6)  # uniform over its length
 
 
 def test_a_bore_far_along_its_axis_is_not_the_joints() -> None:
     link = link_of(PLATE | {"offset": 0.5}, elements_across=1)
-    with pytest.raises(
-        KedfemError, match=r"^joints.A: must sit on a bore or a flat face of link 'part' at \(0, 0, 0\)"
-    ):
+    with pytest.raises(KedfemError, match=r"^joints.A: must sit on a bore or a flat face of link 'part' at \(0, 0, 0\)"):
         joint_surface(link, "joints.A", np.zeros(3), np.array([0.0, 0, 1]))
 
 
@@ -257,9 +253,7 @@ def test_faces_that_are_named_make_the_coupling_surface_wherever_the_joint_is(no
     assert len(both.facets) == (64 if nodes == 10 else 32)
     Q = np.column_stack([rigid_functions(link), np.sin(90 * link.X[:, 0])])
     small = reduced(link, Q)
-    assert_allclose(
-        surface_at(small, 0.5, ["narrow"]).fit, narrow.fit @ small.Q, atol=1e-9 * np.abs(narrow.fit).max()
-    )
+    assert_allclose(surface_at(small, 0.5, ["narrow"]).fit, narrow.fit @ small.Q, atol=1e-9 * np.abs(narrow.fit).max())
 
 
 def test_segments_keep_the_names_of_their_faces() -> None:
@@ -390,9 +384,7 @@ def test_a_bore_with_rounded_mouths_is_told_by_its_cylinder(nodes: int) -> None:
     assert_allclose(bore.radius, 0.005, rtol=1e-6)
     assert_allclose(np.abs(bore.direction), Z, atol=1e-9)
     assert_allclose(bore.length, 0.01, rtol=1e-6)
-    assert_allclose(
-        joint_surface(link, "joints.A", np.array([0, 0, 0.007]), None).origin, [0, 0, 0.007], atol=1e-7
-    )
+    assert_allclose(joint_surface(link, "joints.A", np.array([0, 0, 0.007]), None).origin, [0, 0, 0.007], atol=1e-7)
 
 
 @pytest.mark.parametrize("nodes", [8, 10, 20, 27])

@@ -33,9 +33,7 @@ def check(sound: Path, folder: Path, ending: str, number: int, capfd: pytest.Cap
     path = folder / f"part.{ending}"
     path.write_bytes(DAMAGES[number % len(DAMAGES)](content, rng))
     shape = {"kind": "cad" if ending in FORMATS else "mesh", "file": path.name}
-    link = link_from(
-        {"material": "steel", "shape": shape, "mesh": {"size": 0.02} if ending in FORMATS else {}}
-    )
+    link = link_from({"material": "steel", "shape": shape, "mesh": {"size": 0.02} if ending in FORMATS else {}})
     capfd.readouterr()
     try:
         mesh = link_mesh("arm", link, folder)
@@ -114,9 +112,7 @@ def facets(path: Path, n: int) -> None:
     with gmsh_model() as gmsh:
         occ = gmsh.model.occ
         height = 10 + 30 / n * np.pad(rng.random((n - 1, n - 1)), 1)
-        P = [
-            [occ.addPoint(100 * i / n, 100 * j / n, height[i, j]) for j in range(n + 1)] for i in range(n + 1)
-        ]
+        P = [[occ.addPoint(100 * i / n, 100 * j / n, height[i, j]) for j in range(n + 1)] for i in range(n + 1)]
         lines: dict[tuple[int, int], int] = {}
 
         def face(*corners: int) -> int:

@@ -18,14 +18,12 @@ ON_CRANK: dict[str, dict[str, Any]] = {
     },
     "spring to the ground": {
         "springs": {
-            "k": SPRING
-            | {"between": [{"link": "crank", "at": [0.05, 0.0866]}, {"link": "ground", "at": [0.5, 0]}]}
+            "k": SPRING | {"between": [{"link": "crank", "at": [0.05, 0.0866]}, {"link": "ground", "at": [0.5, 0]}]}
         }
     },
     "spring to the rocker": {
         "springs": {
-            "k": SPRING
-            | {"between": [{"link": "crank", "at": [0.05, 0.0866]}, {"link": "rocker", "at": [0.3, 0]}]}
+            "k": SPRING | {"between": [{"link": "crank", "at": [0.05, 0.0866]}, {"link": "rocker", "at": [0.3, 0]}]}
         }
     },
     "torsion spring": {"springs": {"k": {"kind": "torsion", "joint": "B", "stiffness": 20.0}}},
@@ -71,9 +69,7 @@ def four_bar(crank: str, more: dict[str, Any], **analysis: Any) -> dict[str, Any
     [("beam", "rigid-body"), ("rigid", "rigid-body"), ("rigid", "co-rotational"), ("beam", "co-rotational")],
 )
 @pytest.mark.parametrize("acting", list(ON_CRANK))
-def test_drive_and_hub_bear_springs_and_motors_on_the_driven_link(
-    acting: str, crank: str, frames: str
-) -> None:
+def test_drive_and_hub_bear_springs_and_motors_on_the_driven_link(acting: str, crank: str, frames: str) -> None:
     """As the inverse dynamics of rigid links says; a beam bends by some 1e-3 of its length under 1.4 kN."""
     got = channels(*ran(four_bar(crank, ON_CRANK[acting], frames=frames)))
     most = np.abs(got["drive/rigid_torque"]).max()
@@ -81,9 +77,7 @@ def test_drive_and_hub_bear_springs_and_motors_on_the_driven_link(
     assert_allclose(got["drive/torque"], got["drive/rigid_torque"], atol=0.01 * most)
     for joint in "ABD":
         rigid = got[f"joints/{joint}/rigid_force"]
-        assert_allclose(
-            got[f"joints/{joint}/force"][:, :2], rigid[:, :2], atol=0.01 * np.abs(rigid).max() + 1e-3
-        )
+        assert_allclose(got[f"joints/{joint}/force"][:, :2], rigid[:, :2], atol=0.01 * np.abs(rigid).max() + 1e-3)
 
 
 @pytest.mark.long
@@ -202,9 +196,7 @@ def test_the_pin_of_a_slider_bears_springs_and_motors_on_the_slider(on: dict[str
     got = channels(*ran(raw))
     for name in ("joints/P", "joints/G", "joints/A"):
         rigid, elastic = got[f"{name}/rigid_force"], got[f"{name}/force"][:, :2]
-        assert_allclose(
-            elastic, rigid[:, :2], atol=0.01 * np.abs(got["joints/P/rigid_force"]).max(), err_msg=name
-        )
+        assert_allclose(elastic, rigid[:, :2], atol=0.01 * np.abs(got["joints/P/rigid_force"]).max(), err_msg=name)
     assert np.abs(got["joints/P/rigid_force"]).max() > 100.0  # N
 
 

@@ -69,13 +69,9 @@ def run(raw: Mapping[str, Any]) -> tuple[Model, Steps, list[Snapshot]]:
     [("beam", 720, 1e-8), ("bar", 120, 1e-8), ("plate", 24, 1e-7), ("plane", 120, 1e-7)],
 )
 @pytest.mark.parametrize("rho_inf", [1.0, pytest.param(0.8, marks=pytest.mark.long)])
-def test_condensed_is_monolithic_over_a_whole_turn(
-    kind: str, steps: int, bound: float, rho_inf: float
-) -> None:
+def test_condensed_is_monolithic_over_a_whole_turn(kind: str, steps: int, bound: float, rho_inf: float) -> None:
     model, solver, fast = run(four_bar(kind, rho_inf=rho_inf, steps_per_revolution=steps))
-    _, monolithic, slow = run(
-        four_bar(kind, rho_inf=rho_inf, steps_per_revolution=steps, solver="monolithic")
-    )
+    _, monolithic, slow = run(four_bar(kind, rho_inf=rho_inf, steps_per_revolution=steps, solver="monolithic"))
     assert monolithic.oracle is not None
     assert solver.factorisations == len(model.links) == 3  # one per link, for the whole turn
     peak = max(np.abs(s.u).max() for snapshot in slow for s in snapshot.states)
@@ -101,17 +97,13 @@ def test_mass_is_solved_exactly_under_a_heavy_flywheel(element: str) -> None:
     b = np.random.default_rng(0).uniform(-1, 1, (link.n, 3))
     x = mass_substructure(link, model.joints[rocker]).solve(b)
     # backward stable: of the sizes that are added, not of b
-    assert_allclose(
-        mass_times(link.mass, x), b, rtol=0, atol=1e-10 * np.abs(link.mass[0]).max() * np.abs(x).max()
-    )
+    assert_allclose(mass_times(link.mass, x), b, rtol=0, atol=1e-10 * np.abs(link.mass[0]).max() * np.abs(x).max())
 
 
 @pytest.mark.parametrize("kind", ["beam", "bar"])
 def test_condensed_is_monolithic_however_long_the_step(kind: str) -> None:
     raw = four_bar(kind, steps_per_revolution=36)
-    raw["drive"]["motion"]["speed"] = (
-        "6 rpm"  # a step of 0.28 s: the free links hang on their inertia by a thread
-    )
+    raw["drive"]["motion"]["speed"] = "6 rpm"  # a step of 0.28 s: the free links hang on their inertia by a thread
     _, _, fast = run(raw)
     raw["analysis"]["solver"] = "monolithic"
     _, _, slow = run(raw)
@@ -129,9 +121,7 @@ def test_joints_are_closed_in_displacement_velocity_and_acceleration(kind: str) 
             values = [getattr(s, field) for s in snapshot.states]
             size = max(np.abs(x).max() for x in values)
             B = interface_matrix(model.joints).toarray()
-            held = np.concatenate(
-                [port_values(joint, x) for joint, x in zip(model.joints, values, strict=True)]
-            )
+            held = np.concatenate([port_values(joint, x) for joint, x in zip(model.joints, values, strict=True)])
             z = np.linalg.lstsq(B, held, rcond=None)[0]
             # W u = B z: the residual is rounding, of differences divided by the step for rates
             assert_allclose(held, B @ z, rtol=0, atol={"u": 1e-12, "v": 1e-9, "a": 1e-6}[field] * size)
@@ -146,9 +136,7 @@ def test_joint_forces_balance_inertia_and_loads_of_every_link(kind: str) -> None
     for snapshot in snapshots[1::17]:
         for link, joint, s in zip(model.links, model.joints, snapshot.states, strict=True):
             # Newton's second law of the whole link: Σ λ + Σ (P − M R0'') = Σ M δ''
-            force = s.R @ (
-                port_vectors(joint, s.port_forces) * ([1, 1, 0] if link.kind == "beam" else 1)
-            ).sum(axis=0)
+            force = s.R @ (port_vectors(joint, s.port_forces) * ([1, 1, 0] if link.kind == "beam" else 1)).sum(axis=0)
             left = (mass_times(link.mass, s.a) - s.F).sum(axis=0)
             if link.kind == "beam":
                 left = left * [1, 1, 0]
@@ -260,9 +248,7 @@ def test_a_force_on_a_slider_never_turns() -> None:
     forces = []
     for frame in ("world", "link"):
         raw = slider_crank("rigid")
-        raw["loads"] = {
-            "push": {"kind": "force", "link": "piston", "at": "C", "vector": [-100, 0], "frame": frame}
-        }
+        raw["loads"] = {"push": {"kind": "force", "link": "piston", "at": "C", "vector": [-100, 0], "frame": frame}}
         _, _, snapshots = run(raw)
         forces.append(np.array([x.states[1].port_forces for x in snapshots]))
     assert_allclose(forces[1], forces[0], rtol=0, atol=1e-12 * np.abs(forces[0]).max())
@@ -284,9 +270,7 @@ def worst_difference(a: list[Snapshot], b: list[Snapshot]) -> float:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("example", "steps", "bound"), [("four_bar_beams", 720, 1e-8), ("four_bar_solids", 90, 1e-7)]
-)
+@pytest.mark.parametrize(("example", "steps", "bound"), [("four_bar_beams", 720, 1e-8), ("four_bar_solids", 90, 1e-7)])
 def test_condensed_is_monolithic_over_a_turn_of_the_examples(
     example: str, steps: int, bound: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -101,9 +101,7 @@ def test_a_newcomers_four_bar_says_how_wrong_it_is() -> None:
     raw = example("four_bar_beams", 720, revolutions=1.0)
     raw["drive"]["motion"]["speed"] = "60 rpm"
     found, ready = estimated(raw)
-    fine: Any = example(
-        "four_bar_beams", 2880, {"element": "beam5", "mesh": {"elements": 3}}, revolutions=1.0
-    )
+    fine: Any = example("four_bar_beams", 2880, {"element": "beam5", "mesh": {"elements": 3}}, revolutions=1.0)
     fine["drive"]["motion"]["speed"] = "60 rpm"
     true = by_kind(relative_errors(histories(ready), histories(meshed(scene_from(fine)))))
     assert true["displacement"] > 0.1
@@ -266,9 +264,7 @@ def test_kinds_sums_and_warnings_of_a_budget() -> None:
     assert "stress 4 %" in budget_warning(found, asked=0.01)[0]
     assert "drive" not in budget_warning(found, asked=0.01)[0]
     worse = Budget((Share("frames", {"drive": 0.2}, remedy="stiffer links"),))
-    assert budget_warning(worse) == (
-        "estimated error: drive 20 %; most of it from the frames: stiffer links",
-    )
+    assert budget_warning(worse) == ("estimated error: drive 20 %; most of it from the frames: stiffer links",)
     empty = Histories(np.zeros(1), {})
     assert relative_errors(empty, empty) == {}
 

@@ -20,9 +20,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], Exp
 
 
 @pytest.mark.parametrize(("kind", "axis"), CASES)
-def test_rigid_motions_are_what_they_are_called(
-    kind: str, axis: str, found: dict[tuple[str, str], ExportedLink]
-) -> None:
+def test_rigid_motions_are_what_they_are_called(kind: str, axis: str, found: dict[tuple[str, str], ExportedLink]) -> None:
     """No strain; ports move by e and ω × x and rotate by ω; the mass they carry is that of the bar, its inertia too."""
     link = found[kind, axis]
     flat = kind in FLAT
@@ -32,9 +30,7 @@ def test_rigid_motions_are_what_they_are_called(
     for p, at in enumerate(link.places):
         T, Theta = link.translation[p] @ link.rigid, link.rotation[p] @ link.rigid
         assert_allclose(T[:, : len(moves)], np.eye(3)[:, moves], atol=1e-9)
-        assert_allclose(
-            T[:, len(moves) :], np.array([np.cross(np.eye(3)[k], at) for k in turns]).T, atol=1e-9
-        )
+        assert_allclose(T[:, len(moves) :], np.array([np.cross(np.eye(3)[k], at) for k in turns]).T, atol=1e-9)
         assert link.turns[p].tolist() == [not flat, not flat, True]
         assert_allclose(Theta[:, : len(moves)], 0, atol=1e-7)
         assert_allclose(Theta[:, len(moves) :], np.eye(3)[:, turns], atol=1e-7)
@@ -130,15 +126,11 @@ def test_what_cannot_be_exported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         exported_link(scene, "leg")
     with pytest.raises(SceneError, match="must be an elastic link, got a rigid one"):
         exported_link(scene, "tip")
-    bent = scene.model_copy(
-        update={"analysis": scene.analysis.model_copy(update={"frames": "co-rotational"})}
-    )
+    bent = scene.model_copy(update={"analysis": scene.analysis.model_copy(update={"frames": "co-rotational"})})
     with pytest.raises(SceneError, match=r"analysis\.frames: must be rigid-body"):
         exported_link(bent, "arm")
     monkeypatch.setattr("kedfem.export.link.MOST", 100)
-    with pytest.raises(
-        SceneError, match=r"links.arm: must have 100 unknowns at most, .* take `reduction = \"modal\"`"
-    ):
+    with pytest.raises(SceneError, match=r"links.arm: must have 100 unknowns at most, .* take `reduction = \"modal\"`"):
         exported_link(scene, "arm")
     with pytest.raises(OutputError, match=r"must end in .npz or .mat, got '.txt'"):
         write_link(None, tmp_path / "arm.txt")  # type: ignore[arg-type]

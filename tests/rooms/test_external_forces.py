@@ -69,11 +69,7 @@ def wrench(link: Link, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def at_start(raw: dict[str, Any]) -> tuple[Link, np.ndarray]:
     """The link and its deflection at the start."""
     ready, _ = prepared(scene_from(raw))
-    block = next(
-        iter(
-            transient(ready.scene, ready.linkage, ready.path, ready.model, steps_of(ready.scene, ready.model))
-        )
-    )
+    block = next(iter(transient(ready.scene, ready.linkage, ready.path, ready.model, steps_of(ready.scene, ready.model))))
     return ready.model.links[0], block.links[0].u[0]
 
 
@@ -108,17 +104,13 @@ def test_a_torque_turns_the_end_of_a_cantilever_by_ml_over_ei(kind: str) -> None
     link, u = at_start(arm(kind, {"t": {"kind": "torque", "link": "arm", "at": [L, 0], "vector": [0, 0, M]}}))
     inertia = T * W**3 / 12
     end = np.isclose(link.X[:, 0], L) & np.isclose(link.one, 1) & np.isclose(link.X[:, 1], 0)
-    assert_allclose(
-        u[end, 1].mean(), M * L**2 / (2 * E * inertia), rtol=0.02 if kind.startswith("bar") else 1e-6
-    )
+    assert_allclose(u[end, 1].mean(), M * L**2 / (2 * E * inertia), rtol=0.02 if kind.startswith("bar") else 1e-6)
     if kind == "beam":
         assert_allclose(u[end, 2], M * L / (E * inertia), rtol=1e-6)
 
 
 def test_a_torque_about_its_axis_twists_a_beam() -> None:
-    link, u = at_start(
-        arm("spatial", {"t": {"kind": "torque", "link": "arm", "at": [L, 0], "vector": [2.0, 0, 0]}})
-    )
+    link, u = at_start(arm("spatial", {"t": {"kind": "torque", "link": "arm", "at": [L, 0], "vector": [2.0, 0, 0]}}))
     ends = np.flatnonzero(np.isclose(link.X[:, 0], L) & (link.one != 0))
     slopes = u[ends[0] + 1 :]
     across = link.X[ends[0] + 1 :]
@@ -130,9 +122,7 @@ def test_a_torque_about_its_axis_twists_a_beam() -> None:
 @pytest.mark.parametrize("kind", ["solid", "tetrahedra", "plane"])
 def test_a_torque_at_a_joint_is_that_on_its_bore(kind: str) -> None:
     here, there = (
-        at_start(arm(kind, {"t": {"kind": "torque", "link": "arm", **place, "vector": [0, 0, 2.0]}, **push}))[
-            1
-        ]
+        at_start(arm(kind, {"t": {"kind": "torque", "link": "arm", **place, "vector": [0, 0, 2.0]}, **push}))[1]
         for place in ({"at": [0, 0]}, {"joint": "A"})
         for push in [{"f": {"kind": "force", "link": "arm", "at": [L, 0.02], "vector": [0, 5]}}]
     )
@@ -191,9 +181,7 @@ def test_a_ring_under_pressure_is_that_of_lame(what: str, inner: bool) -> None:
     K = link.K0.toarray()
     rows = [np.eye(link.d)[k] * np.ones((link.n, 1)) for k in range(link.d)]
     rows += [
-        link.X[:, [i]] * np.eye(link.d)[j] - link.X[:, [j]] * np.eye(link.d)[i]
-        for i in range(link.d)
-        for j in range(i)
+        link.X[:, [i]] * np.eye(link.d)[j] - link.X[:, [j]] * np.eye(link.d)[i] for i in range(link.d) for j in range(i)
     ]
     B = np.linalg.qr(np.stack([x.ravel() for x in rows], axis=1))[0]
     u = np.linalg.solve(K + np.trace(K) / len(K) * B @ B.T, forces.ravel()).reshape(forces.shape)
@@ -282,9 +270,7 @@ def test_a_factor_comes_from_a_file(tmp_path: Path) -> None:
     factor = scene_from(arm("beam", {"f": load}), tmp_path).loads["f"].factor
     assert_allclose(load_factor(factor, np.zeros(2), np.array([np.pi / 4, 1.25 * np.pi])), [1.0, 1.0])
     (tmp_path / "cut.csv").write_text("0, 0\n90, two\n")
-    with pytest.raises(
-        SceneError, match=r"loads.f.factor.file: cut.csv, line 2: must be two numbers, angle and factor"
-    ):
+    with pytest.raises(SceneError, match=r"loads.f.factor.file: cut.csv, line 2: must be two numbers, angle and factor"):
         scene_from(arm("beam", {"f": load}), tmp_path)
 
 
@@ -304,9 +290,7 @@ SPUN: dict[str, tuple[str, dict[str, Any], float]] = {
 
 def spun(kind: str, load: dict[str, Any]) -> dict[str, np.ndarray]:
     """Channels of a link on a hinge that a load turns from rest, by about half a turn."""
-    raw = arm(
-        kind, {"load": {"link": "arm", **load}}, end_time=0.05, step=2.5e-4, initial="rest", rho_inf=0.8
-    )
+    raw = arm(kind, {"load": {"link": "arm", **load}}, end_time=0.05, step=2.5e-4, initial="rest", rho_inf=0.8)
     del raw["drive"]
     raw["joints"]["A"]["links"] = ["arm", "ground"]
     ready, _ = prepared(scene_from(raw))

@@ -85,9 +85,7 @@ def test_turning_under_a_fixed_force_is_the_guidelines_life_by_hand(along: Any, 
 
 def test_without_the_force_along_the_mean_is_none_and_a_required_life_counts(tmp_path: Path) -> None:
     raw = shaft(AXES["x"], required_life="100 h", safety_factor=1.0)
-    raw["loads"]["F"]["vector"] = (
-        4 * FORCE * np.array(raw["loads"]["F"]["vector"]) / FORCE * [0, 1, 1]
-    ).tolist()
+    raw["loads"]["F"]["vector"] = (4 * FORCE * np.array(raw["loads"]["F"]["vector"]) / FORCE * [0, 1, 1]).tolist()
     spot = worst(run(raw, tmp_path))
     assert abs(spot.mean) < 1e-6 * spot.amplitude
     assert_allclose(spot.damage, (spot.amplitude / STRENGTH) ** 5 / 1e6, rtol=1e-9)
@@ -209,9 +207,7 @@ def refused(raw: Mapping[str, Any], folder: Path, *said: str) -> None:
 def test_what_has_no_period_is_refused_before_the_run(tmp_path: Path) -> None:
     once = arm(bar(), cycloidal(1.0, 0.1), analysis={"end_time": 0.1, "step": 1e-3}, fatigue=DATA)
     refused(once, tmp_path, "fatigue.period: is required [s]", "does not go on turning or return")
-    refused(
-        swung(revolutions=0.5), tmp_path, "fatigue: needs a whole period, 0.2 s, got an analysis of 0.1 s"
-    )
+    refused(swung(revolutions=0.5), tmp_path, "fatigue: needs a whole period, 0.2 s, got an analysis of 0.1 s")
     load = {"kind": "force", "link": "arm", "at": [0.5, 0], "vector": [0, 1]}
     pulse = swung() | {"loads": {"p": load | {"factor": {"at": [0, 1], "value": [0, 1]}}}}
     refused(pulse, tmp_path, "loads.p.factor: must have a period with [fatigue]")
@@ -242,9 +238,7 @@ def test_data_that_make_no_sense_are_refused(data: dict[str, Any], said: str) ->
 
 def test_links_without_stress_or_data_are_refused_or_told(tmp_path: Path) -> None:
     raw = swung() | {"fatigue": {"materials": {"brass": STEEL}}}
-    with pytest.raises(
-        SceneError, match="fatigue: must have data of an elastic link or of its material, got data of no"
-    ):
+    with pytest.raises(SceneError, match="fatigue: must have data of an elastic link or of its material, got data of no"):
         scene_from(raw)
     raw["links"]["arm"]["model"] = "rigid"
     with pytest.raises(SceneError, match=r"got rigid links only"):

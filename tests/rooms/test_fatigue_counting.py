@@ -194,9 +194,7 @@ def test_strain_life_data_are_neubers_rule() -> None:
 
 def test_the_steps_of_the_guideline_by_hand() -> None:
     """Steel and aluminium: strength, roughness, design factor, mean stress, Stieler's support [FKM 2012, chapter 4]."""
-    steel = material_factors(
-        FatigueData(group="steel", tensile_strength=6e8), 2000.0, (1e8, 2e8)
-    )  # 2 per millimetre
+    steel = material_factors(FatigueData(group="steel", tensile_strength=6e8), 2000.0, (1e8, 2e8))  # 2 per millimetre
     K_R = 1 - 0.22 * np.log10(25) * np.log10(2 * 600 / 400)
     n = 1 + 2**0.25 * 10 ** -(0.5 + 600 / 2700)
     M = 0.35 * 0.6 - 0.1

@@ -204,9 +204,7 @@ def test_a_torsion_spring_turns_back() -> None:
 
 
 def test_a_spring_between_points_pulls_along_its_line() -> None:
-    element = ForceElement(
-        "s", DISTANCE, (end(POINT, [0, 0, 0]), end(POINT, [3, 4, 0])), Spring(10.0, 2.0, 4.0)
-    )
+    element = ForceElement("s", DISTANCE, (end(POINT, [0, 0, 0]), end(POINT, [3, 4, 0])), Spring(10.0, 2.0, 4.0))
     x, v = drawn(element), np.zeros((2, 2, 3))
     v[1, 0] = [1, 0, 0]  # lengthens it by 3/5
     f, values = found(element, x, v)
@@ -297,9 +295,7 @@ def built(raw: dict[str, Any]) -> tuple[Scene, Model]:
     return scene, elastic_model(scene, linkage(scene))
 
 
-def state_of(
-    element: ForceElement, model: Model, motion: Callable[[int, np.ndarray], np.ndarray]
-) -> np.ndarray:
+def state_of(element: ForceElement, model: Model, motion: Callable[[int, np.ndarray], np.ndarray]) -> np.ndarray:
     """Vectors (2, 2, 3) of an element's ends where the functions of link k, at X (n, 3), are moved by motion(k, X)."""
     x = drawn(element)
     for e, at in enumerate(element.ends):
@@ -335,9 +331,7 @@ def test_every_kind_of_link_shows_its_turn_and_takes_the_torque(kind: str, angle
     assert values[0] == pytest.approx(-angle, abs=1e-9)
     assert found(looked, x)[1][0] == pytest.approx(-angle, abs=1e-9)
     mask = np.array(element.ends[0].mask)[: link.d]
-    forces = np.einsum(
-        "mn,mc->nc", element.ends[0].weights, (f[0, : len(element.ends[0].X), : link.d] * mask)
-    )
+    forces = np.einsum("mn,mc->nc", element.ends[0].weights, (f[0, : len(element.ends[0].X), : link.d] * mask))
     spin = 1e-6
     u = turning(model, (angle + spin) * Z)(0, link.X) - turning(model, (angle - spin) * Z)(0, link.X)
     assert np.vdot(forces, u) / (2 * spin) == pytest.approx(-2.5, rel=1e-6)  # about z
@@ -408,9 +402,7 @@ def test_ends_are_on_the_segments_that_hold_them(kind: str) -> None:
 
 def test_ends_must_be_on_their_links() -> None:
     scene, model = built(arm("beam", springs={"tip": spring("arm", [1, 0.01], [1, 2])}))
-    with pytest.raises(
-        SceneError, match=r"springs\.tip\.between\[0\]\.at: must lie on the axis of beam 'arm'"
-    ):
+    with pytest.raises(SceneError, match=r"springs\.tip\.between\[0\]\.at: must lie on the axis of beam 'arm'"):
         force_elements(scene, model)
     scene, model = built(arm("solid", springs={"tip": spring("arm", [7, 0], [1, 2])}))
     with pytest.raises((SceneError, MeshError), match=r"springs\.tip\.between\[0\]\.at"):
@@ -468,9 +460,7 @@ def test_channels_and_forces_are_those_of_laws_where_links_are(kind: str) -> Non
         raw["analysis"] |= {"solver": "monolithic"} if kind == "monolithic" else {"frames": kind}
         raw["motors"] = {"m": {"joint": "D", "torque": {"over": "angle", "at": [0, 2], "value": [5, 1]}}}
     else:
-        raw = arm(
-            kind, motors={"m": motor}, springs={"t": torsion, "s": spring("arm", tip, [0, 2], damping=3)}
-        )
+        raw = arm(kind, motors={"m": motor}, springs={"t": torsion, "s": spring("arm", tip, [0, 2], damping=3)})
         raw["analysis"] = {"end_time": 0.5, "step": 5e-3, "rho_inf": 0.8}
     ready, every = ran(raw)
     elements = force_elements(ready.scene, ready.model)
@@ -486,9 +476,7 @@ def test_channels_and_forces_are_those_of_laws_where_links_are(kind: str) -> Non
             rate = (unit * v).sum(axis=(1, 2, 3))
             Q = effort(element.law, block.motion, q, rate)
             values = {"angle": q, "length": q, "speed": rate, "torque": Q, "force": -Q}
-            for what in values.keys() & {
-                x.rpartition("/")[2] for x in got if x.startswith(f"{element.name}/")
-            }:
+            for what in values.keys() & {x.rpartition("/")[2] for x in got if x.startswith(f"{element.name}/")}:
                 assert_near(got.pop(f"{element.name}/{what}"), values[what])
             for e, on in enumerate(at_ends(supports(block), element.name.replace("/", "."))):
                 f = Q[:, None, None] * unit[:, e]

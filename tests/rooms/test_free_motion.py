@@ -72,9 +72,7 @@ def test_an_undriven_linkage_rests_in_its_rigid_body_motion() -> None:
     t = np.linspace(0, 1, 5)
     motion = motion_at(scene, t)
     np.testing.assert_array_equal(motion.R, np.broadcast_to(np.eye(3), motion.R.shape))
-    assert not any(
-        getattr(motion, name).any() for name in ("p", "v", "omega", "alpha", "R2", "p2", "v_phi", "phi")
-    )
+    assert not any(getattr(motion, name).any() for name in ("p", "v", "omega", "alpha", "R2", "p2", "v_phi", "phi"))
     assert motion.R.shape == (5, 3, 3, 3)
     assert (motion.part(1, 3).t == t[1:3]).all()
 
@@ -165,9 +163,7 @@ def test_a_slider_set_going_turns_the_crank() -> None:
         ("cylindrical", 0.0, 3.0),
     ],
 )
-def test_a_speed_is_that_of_its_joint(
-    kind: str, turns: float, travels: float, swapped: bool, axis: np.ndarray
-) -> None:
+def test_a_speed_is_that_of_its_joint(kind: str, turns: float, travels: float, swapped: bool, axis: np.ndarray) -> None:
     """Of the first link against the other, about its axis or along it; a cylindrical joint does not turn then."""
     at = np.array([0.7, 0.1, 0.3])
     pair = ("one", "two") if swapped else ("two", "one")
@@ -186,9 +182,7 @@ def test_a_speed_is_that_of_its_joint(
 @pytest.mark.parametrize("kind", ["universal", "planar", "slot", "spherical", "weld"])
 def test_a_joint_without_one_speed_is_asked_for_none(kind: str) -> None:
     axis = {"universal": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))}.get(kind, (1.0, 0.0, 0.0))
-    with pytest.raises(
-        SceneError, match=r"initial_speeds\.J: must be of a revolute, prismatic, cylindrical or screw"
-    ):
+    with pytest.raises(SceneError, match=r"initial_speeds\.J: must be of a revolute, prismatic, cylindrical or screw"):
         twists({"J": (kind, "ground", "one", (0, 0, 0), axis)}, initial_speeds={"J": 1.0})
 
 
@@ -213,9 +207,7 @@ def test_speeds_that_contradict_each_other_are_refused() -> None:
 
 def test_a_structure_cannot_start_to_move() -> None:
     post = {"A": ("weld", "ground", "post", (0, 0, 0))}
-    scene = linkage_scene(
-        post, drive=None, initial_motions={"post": {"at": [1, 0, 0], "velocity": [0, 2, 0]}}
-    )
+    scene = linkage_scene(post, drive=None, initial_motions={"post": {"at": [1, 0, 0], "velocity": [0, 2, 0]}})
     with pytest.raises(MotionError, match=r"post\.velocity along y = 2 m/s \(closest possible 0\)"):
         moving(scene)
 

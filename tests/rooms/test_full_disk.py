@@ -25,25 +25,19 @@ def allowed(folder: Path) -> bool:
     """Whether this user may have a small disk of their own."""
     if shutil.which("unshare") is None:
         return False
-    tried = subprocess.run(
-        [*SMALL_DISK, 'mount -t tmpfs none "$1"', "-", folder], capture_output=True, check=False
-    )
+    tried = subprocess.run([*SMALL_DISK, 'mount -t tmpfs none "$1"', "-", folder], capture_output=True, check=False)
     return tried.returncode == 0
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(("size", "begun"), [("200k", False), ("1500k", True), ("3m", True)])
-def test_a_full_disk_ends_a_run_in_words_and_its_rows_are_kept(
-    tmp_path: Path, size: str, begun: bool
-) -> None:
+def test_a_full_disk_ends_a_run_in_words_and_its_rows_are_kept(tmp_path: Path, size: str, begun: bool) -> None:
     disk, kept = tmp_path / "disk", tmp_path / "kept"
     disk.mkdir()
     if not allowed(disk):
         pytest.skip("needs a name space with a disk of its own (unshare)")
     command = [*SMALL_DISK, RUN, "-", size, disk, EXAMPLE, sys.executable, kept]
-    done = subprocess.run(
-        command, capture_output=True, text=True, check=False, env={**os.environ, "COLUMNS": "200"}
-    )
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env={**os.environ, "COLUMNS": "200"})
     said = done.stdout + done.stderr
     assert "exit 2" in said, said
     assert "must be a file that can be written, got No space left on device" in said

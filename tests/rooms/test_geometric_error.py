@@ -72,13 +72,9 @@ def tip(*force: float) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("rpm", "true"), [(60, 0.006), (150, 0.038), (300, 0.143), (400, 0.248), (600, 0.396)]
 )  # against geometrically exact beams, converged: tests/verification/rigid_body_frames.py
-def test_the_four_bar_of_the_source_is_judged_as_a_geometrically_exact_solution_does(
-    rpm: float, true: float
-) -> None:
+def test_the_four_bar_of_the_source_is_judged_as_a_geometrically_exact_solution_does(rpm: float, true: float) -> None:
     found = estimated(four_bar(rpm))
-    assert (
-        0.5 < found.estimate / true < 1.3 or true < 0.01
-    )  # where it is small, more is due to time than to stiffness
+    assert 0.5 < found.estimate / true < 1.3 or true < 0.01  # where it is small, more is due to time than to stiffness
     warning = geometric_warning(found)
     assert bool(warning) == (true > 0.02)
     if warning:
@@ -298,9 +294,7 @@ def test_a_slider_crank_is_judged_as_frames_that_follow_do(rpm: float, initial: 
             found[frames].add(block)
             every.append(np.stack([probe.rows(block)[:, 0] for probe in probes]))
         stress[frames] = np.concatenate(every, axis=1)
-    true = (
-        np.abs(stress["rigid-body"] - stress["co-rotational"]).max() / np.abs(stress["co-rotational"]).max()
-    )
+    true = np.abs(stress["rigid-body"] - stress["co-rotational"]).max() / np.abs(stress["co-rotational"]).max()
     assert true / 3 < found["rigid-body"].estimate < 3 * true
 
 
@@ -315,9 +309,7 @@ def against_following(rpm: float, initial: str) -> tuple[float, float, float]:
             "frames": frames,
         }
         ready = meshed(scene_from(raw))
-        (probe,) = (
-            x for x in recording(ready.scene, ready.model) if x.channel.name == "probes/rocker_outer/stress"
-        )
+        (probe,) = (x for x in recording(ready.scene, ready.model) if x.channel.name == "probes/rocker_outer/stress")
         found, every = GeometricError(ready.model), []
         for block in blocks(ready):
             found.add(block)
@@ -412,7 +404,5 @@ def test_stiffening_does_not_know_how_hard_stops_are_met_and_its_estimate_says_s
     found = watcher(ready).geometric
     for block in blocks:
         found.add(block)
-    error = float(
-        np.abs(channels(ready, blocks)["probes/m/deflection"] - wanted).max() / np.abs(wanted).max()
-    )
+    error = float(np.abs(channels(ready, blocks)["probes/m/deflection"] - wanted).max() / np.abs(wanted).max())
     assert 0.8 < found.estimate / error < 3.5

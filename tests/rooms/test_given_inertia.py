@@ -126,9 +126,7 @@ def test_a_point_mass_on_next_to_no_mass_is_refused(kind: str) -> None:
     middle = (np.array([*joints["B"]["at"], 0.0][:3]) + np.array([*joints["C"]["at"], 0.0][:3])) / 2
     raw["bodies"] = {"b": {"kind": "point_mass", "link": "coupler", "at": middle.tolist(), "mass": 0.5}}
     raw["materials"] = LIGHT
-    with pytest.raises(
-        SceneError, match=r"^links\.coupler: a rigid link must have mass in more than one place"
-    ):
+    with pytest.raises(SceneError, match=r"^links\.coupler: a rigid link must have mass in more than one place"):
         meshed(scene_from(raw))
 
     def with_density(share: float) -> dict[str, np.ndarray]:
@@ -245,9 +243,7 @@ def test_rigid_motion_knows_their_masses() -> None:
 def test_a_pattern_turns_their_inertia() -> None:
     raw = pendulum(np.eye(3))
     link, hinge = raw["links"].pop("p"), raw["joints"].pop("H")
-    raw["patterns"] = {
-        "four": {"count": 4, "about": "x", "turn": "90 deg", "links": {"p": link}, "joints": {"H": hinge}}
-    }
+    raw["patterns"] = {"four": {"count": 4, "about": "x", "turn": "90 deg", "links": {"p": link}, "joints": {"H": hinge}}}
     scene = scene_from(raw)
     R = Rotation.from_rotvec([np.pi / 2, 0, 0]).as_matrix()
     bodies = list(scene.bodies.values())

@@ -35,9 +35,7 @@ def scene(gravity: list[float], **output: Any) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module", params=DOWN)
-def written(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[str, Path, Path]:
+def written(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path, Path]:
     """A direction of gravity, the results of a run, and the file."""
     folder = analyse(scene_from(scene(DOWN[request.param]), tmp_path_factory.mktemp("shown"))).folder
     path = folder / "arm.glb"

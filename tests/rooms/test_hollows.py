@@ -61,9 +61,7 @@ def test_a_bore_with_a_joint_is_as_usual(tmp_path: Path) -> None:
     assert len(held.points) == len(usual.points)
 
 
-def test_where_finer_ones_are_too_many_the_mesh_is_the_usual_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_where_finer_ones_are_too_many_the_mesh_is_the_usual_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(filling, "_MOST", 1000)
     usual, mesh = (meshed(bored_shaft, tmp_path, Sizing(hollow=x)) for x in (np.pi / 4, ASKED))
     assert len(mesh.points) == len(usual.points)
@@ -89,9 +87,7 @@ def rounded(occ: ModuleType) -> None:
 
 
 @pytest.mark.parametrize(("draw", "hollow"), [(shaft, True), (rounded, False)])
-def test_a_fillet_around_a_shaft_is_hollow_and_a_round_is_not(
-    draw: Draw, hollow: bool, tmp_path: Path
-) -> None:
+def test_a_fillet_around_a_shaft_is_hollow_and_a_round_is_not(draw: Draw, hollow: bool, tmp_path: Path) -> None:
     with read(draw, tmp_path) as (_, solid):
         found = {face.kind: face.hollow for face in solid.faces}
     assert found == {"plane": False, "cylinder": False, "other": hollow}

@@ -63,9 +63,7 @@ def test_deep_tables_and_long_chains_of_points_are_refused_in_words(tmp_path: Pa
         file.write_text(text)
         with pytest.raises(SceneError, match="must be nested less than 100 deep"):
             read_scene(file)
-    points = {f"p{k}": {"from": f"p{k + 1}", "distance": 1, "angle": 0} for k in range(5000)} | {
-        "p5000": [0, 0]
-    }
+    points = {f"p{k}": {"from": f"p{k + 1}", "distance": 1, "angle": 0} for k in range(5000)} | {"p5000": [0, 0]}
     assert "hundreds deep" in refusal({"points": points})[0]
     nested: Any = "A"
     for _ in range(3000):
@@ -74,9 +72,7 @@ def test_deep_tables_and_long_chains_of_points_are_refused_in_words(tmp_path: Pa
     raw["loads"]["push"]["at"] = nested
     with pytest.raises(SceneError, match="hundreds deep"):
         scene_from(raw)
-    chained = {f"q{k}": {"from": f"q{k + 1}", "distance": 1e-3, "angle": 0} for k in range(40)} | {
-        "q40": [0, 0]
-    }
+    chained = {f"q{k}": {"from": f"q{k + 1}", "distance": 1e-3, "angle": 0} for k in range(40)} | {"q40": [0, 0]}
     raw = changed(BEAMS, {"points": chained})
     assert scene_from(raw).points["q0"][0] == pytest.approx(0.04)  # a chain as long as a user's is no fault
 
@@ -103,9 +99,7 @@ def test_scenes_from_others_stay_in_their_folder(tmp_path: Path, name: str, plac
     table, _, key = place.rpartition(".")
     scene = inner / "scene.toml"
     scene.write_text(f"[{table}]\n{key} = {json.dumps(name)}\n", encoding="utf-8")
-    with pytest.raises(
-        SceneError, match=rf"^{place}: must be within the scene's folder \(--within\), got "
-    ) as refused:
+    with pytest.raises(SceneError, match=rf"^{place}: must be within the scene's folder \(--within\), got ") as refused:
         read_scene(scene, within=True)
     assert len(refused.value.faults) == 1
     scene.write_text(f'[{table}]\n{key} = "deeper/motion.csv"\n', encoding="utf-8")

@@ -48,9 +48,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("kind", "R", "held", "frames"), CASES)
-def test_a_plucked_cantilever_swings_with_its_first_frequency(
-    kind: str, R: Any, held: str, frames: str
-) -> None:
+def test_a_plucked_cantilever_swings_with_its_first_frequency(kind: str, R: Any, held: str, frames: str) -> None:
     """From F L³/(3 E I), at rest, through zero after a quarter of the first period; 97 % of it is the first mode."""
     ready, blocks = ran(plucked(kind, R, held, frames))
     links = ready.model.links

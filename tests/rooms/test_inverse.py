@@ -56,9 +56,7 @@ def bar(length: float) -> tuple[float, float]:
     return m, m * (length**2 + WIDTH**2) / 12
 
 
-def balance(
-    parts: list[tuple[float, float, Array, float, dict[int, Array], Array, float]], unknowns: int
-) -> Array:
+def balance(parts: list[tuple[float, float, Array, float, dict[int, Array], Array, float]], unknowns: int) -> Array:
     """Newton and Euler of links in a plane, three equations each.
 
     parts : mass, inertia, centre's acceleration, angular acceleration, unknown → (force's direction, arm from the centre,
@@ -120,9 +118,7 @@ def loaded_four_bar(kind: str, frame: str = "world") -> dict[str, Any]:
     raw["drive"]["motion"]["speed"] = "60 rpm"
     raw["gravity"] = [0, -9.81, 0]
     raw["points"]["P"] = {"between": ["A", "B"], "fraction": 0.6}
-    raw["loads"] = {
-        "pull": {"kind": "force", "link": "crank", "at": "P", "vector": [3, 20, 0], "frame": frame}
-    }
+    raw["loads"] = {"pull": {"kind": "force", "link": "crank", "at": "P", "vector": [3, 20, 0], "frame": frame}}
     return raw
 
 
@@ -139,9 +135,7 @@ def test_a_four_bar_bears_what_newton_and_euler_say(kind: str, frame: str) -> No
         # said of the first link: crank from ground, crank from coupler, coupler from rocker, rocker from ground
         assert_allclose(np.concatenate(got), wanted[:8], rtol=0, atol=1e-10 * np.abs(wanted).max())
         assert_allclose(found["drive/rigid_torque"][k], wanted[8:], rtol=0, atol=1e-10 * np.abs(wanted).max())
-        assert_allclose(
-            found["joints/A/rigid_moment"][k, -1], wanted[8], rtol=0, atol=1e-10 * np.abs(wanted).max()
-        )
+        assert_allclose(found["joints/A/rigid_moment"][k, -1], wanted[8], rtol=0, atol=1e-10 * np.abs(wanted).max())
 
 
 def slider_crank_by_hand(t: float) -> Array:
@@ -336,9 +330,7 @@ def test_in_a_plane_askew_what_is_open_is_said_and_left_out() -> None:
         assert_allclose(found[key], flat @ R.T, atol=1e-8 * np.abs(flat).max())
     said = next(x.channel.description for x in forces.every if x.channel.name == "joints/B/rigid_force")
     n = R[:, 2] if f"{R[0, 2]:.3g}" in said else -R[:, 2]
-    assert said.endswith(
-        f"without what is along ({n[0]:.3g}, {n[1]:.3g}, {n[2]:.3g}), which statics leave open"
-    )
+    assert said.endswith(f"without what is along ({n[0]:.3g}, {n[1]:.3g}, {n[2]:.3g}), which statics leave open")
 
 
 def test_two_hinges_on_one_shaft_share_what_they_bear_in_an_unknown_way() -> None:
@@ -398,9 +390,7 @@ def test_rigid_channels_of_many_turns_are_those_of_the_first_again_where_loads_a
     ready = meshed(scene_from(raw))
     recorded = {x.channel.name: x for x in recording(ready.scene, ready.model, None, ready.path)}
     blocks = []
-    for block in transient(
-        ready.scene, ready.linkage, ready.path, ready.model, steps_of(ready.scene, ready.model)
-    ):
+    for block in transient(ready.scene, ready.linkage, ready.path, ready.model, steps_of(ready.scene, ready.model)):
         blocks += [block.part(k, min(k + 23, len(block))) for k in range(0, len(block), 23)]
     key = "joints/B/rigid_force"
     found = np.concatenate([recorded[key].rows(block) for block in blocks])

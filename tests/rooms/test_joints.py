@@ -46,8 +46,7 @@ def arm(kind: str, pieces: int) -> dict[str, Any]:
         for name, a, b in zip(names, x, x[1:], strict=False)
     }
     welds = {
-        f"weld{k}": {"kind": "weld", "links": [names[k], names[k + 1]], "at": [x[k + 1], 0]}
-        for k in range(pieces - 1)
+        f"weld{k}": {"kind": "weld", "links": [names[k], names[k + 1]], "at": [x[k + 1], 0]} for k in range(pieces - 1)
     }
     return {
         "links": links,

@@ -104,9 +104,7 @@ def test_transmission_angle_of_a_four_bar_is_that_between_coupler_and_rocker() -
     a, b, c, d, drawn = 0.1, 0.3, 0.25, 0.35, 0.4
     got, *names = transmission_of(four_bar(a, b, c, d, drawn))
     # law of cosines in the triangle B C D
-    wanted = np.degrees(
-        np.arccos((b**2 + c**2 - a**2 - d**2 + 2 * a * d * np.cos(drawn + TURN)) / (2 * b * c))
-    )
+    wanted = np.degrees(np.arccos((b**2 + c**2 - a**2 - d**2 + 2 * a * d * np.cos(drawn + TURN)) / (2 * b * c)))
     assert_allclose(got, wanted, atol=1e-9)
     assert names == ["coupler", "rocker"]
     assert got.min() < 60
@@ -192,9 +190,7 @@ def test_a_universal_joint_turns_about_both_its_axes() -> None:
     beta = 0.5
     joints = cardan(beta)
     axes = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    shafts = linkage_scene(
-        {key: joints[key] for key in "AD"}, drive=None, frames="co-rotational"
-    ).model_dump()
+    shafts = linkage_scene({key: joints[key] for key in "AD"}, drive=None, frames="co-rotational").model_dump()
     cross = {"kind": "universal", "links": ("shaft1", "shaft2"), "at": (0.0, 0.0, 0.0), "axes": axes}
     raw = {
         **{key: shafts[key] for key in ("links", "analysis", "materials")},
@@ -299,9 +295,7 @@ def test_a_sketch_of_joints_alone_is_enough(run_kedfem: Command, tmp_path: Path)
     assert run_kedfem("run", path).code == USER_ERROR  # which needs shapes
 
 
-def test_the_angle_of_a_drive_between_links_says_of_which_against_which(
-    run_kedfem: Command, tmp_path: Path
-) -> None:
+def test_the_angle_of_a_drive_between_links_says_of_which_against_which(run_kedfem: Command, tmp_path: Path) -> None:
     """An elbow: that of the link named first, which is easily taken the other way round."""
     path = tmp_path / "robot.toml"
     path.write_text(ROBOT, encoding="utf-8")
@@ -360,9 +354,7 @@ plots = false
 """
 
 
-def test_rigid_links_of_a_sketch_need_no_shape_and_a_block_may_have_mass(
-    run_kedfem: Command, tmp_path: Path
-) -> None:
+def test_rigid_links_of_a_sketch_need_no_shape_and_a_block_may_have_mass(run_kedfem: Command, tmp_path: Path) -> None:
     """The rocker bears nothing, so the crank's pin holds the block on its circle."""
     path = tmp_path / "block.toml"
     path.write_text(BLOCK.format(mass=", mass = 0.2", other=""), encoding="utf-8")
@@ -373,9 +365,7 @@ def test_rigid_links_of_a_sketch_need_no_shape_and_a_block_may_have_mass(
     assert_allclose(force, 0.2 * 0.1 * (2 * np.pi) ** 2, rtol=1e-9)
     pin = 0.1 * np.exp(1j * (np.pi / 2 + channels["joints/A/angle"][1][:, 0])) + 0.3
     assert_allclose(channels["joints/D/angle"][1][:, 0], np.angle(pin) - np.arctan2(1, 3), atol=1e-10)
-    path.write_text(
-        BLOCK.format(mass="", other="").replace("crank = {}", 'crank = { model = "rigid", mass = 1 }')
-    )
+    path.write_text(BLOCK.format(mass="", other="").replace("crank = {}", 'crank = { model = "rigid", mass = 1 }'))
     said = run_kedfem("kinematics", path)
     assert said.code == USER_ERROR
     assert "links.crank.mass: must be that of what slides [kg], got 1 without a prismatic joint" in " ".join(
@@ -385,20 +375,13 @@ def test_rigid_links_of_a_sketch_need_no_shape_and_a_block_may_have_mass(
 
 def test_a_coupler_that_jams_is_warned_of(run_kedfem: Command, tmp_path: Path) -> None:
     path = tmp_path / "sketch.toml"
-    path.write_text(
-        SKETCH.replace("distances = [0.9144, 0.762]", "distances = [0.52, 0.762]"), encoding="utf-8"
-    )
+    path.write_text(SKETCH.replace("distances = [0.9144, 0.762]", "distances = [0.52, 0.762]"), encoding="utf-8")
     flat = " ".join(run_kedfem("kinematics", path).err.split())
     least = np.degrees(np.arccos((0.52**2 + 0.762**2 - 1.2192**2) / (2 * 0.52 * 0.762)))
-    assert (
-        f"links.coupler: transmission angle {least:.1f}° at drive angle 120.0°, beyond the usual 40° to 140°"
-        in flat
-    )
+    assert f"links.coupler: transmission angle {least:.1f}° at drive angle 120.0°, beyond the usual 40° to 140°" in flat
 
 
-def test_without_a_drive_the_linkage_rests_and_the_command_says_so(
-    run_kedfem: Command, tmp_path: Path
-) -> None:
+def test_without_a_drive_the_linkage_rests_and_the_command_says_so(run_kedfem: Command, tmp_path: Path) -> None:
     path = tmp_path / "free.toml"
     text = re.sub(
         r"\[drive\].*\[analysis\]\nrevolutions = 2\nsteps_per_revolution = 90",
@@ -409,18 +392,14 @@ def test_without_a_drive_the_linkage_rests_and_the_command_says_so(
     path.write_text(text, encoding="utf-8")
     said = run_kedfem("kinematics", path)
     assert said.code == USER_ERROR
-    wanted = (
-        "drive: is required for kinematics, got none: without one the linkage rests in the reference position"
-    )
+    wanted = "drive: is required for kinematics, got none: without one the linkage rests in the reference position"
     assert wanted in " ".join(said.err.split())
     assert not (tmp_path / "free-kinematics").exists()
 
 
 def test_a_linkage_that_locks_is_the_users_error(run_kedfem: Command, tmp_path: Path) -> None:
     path = tmp_path / "locks.toml"
-    path.write_text(
-        SKETCH.replace("distances = [0.9144, 0.762]", "distances = [0.45, 0.45]"), encoding="utf-8"
-    )
+    path.write_text(SKETCH.replace("distances = [0.9144, 0.762]", "distances = [0.45, 0.45]"), encoding="utf-8")
     said = run_kedfem("kinematics", path)
     assert said.code == USER_ERROR
     assert "joints." in said.err

@@ -73,9 +73,7 @@ def test_speed_and_acceleration_are_the_derivatives_of_the_angle(name):
 def test_the_acceleration_has_no_jumps(name):
     t = np.linspace(0.0, 2.0, 200_001)
     for derivative, slope in zip(drive_angle(LAWS[name], t), (10.0, 120.0, 4000.0), strict=True):
-        assert (
-            np.abs(np.diff(derivative)).max() < slope * 1e-5
-        )  # laws have at most such slopes; a jump is larger
+        assert np.abs(np.diff(derivative)).max() < slope * 1e-5  # laws have at most such slopes; a jump is larger
 
 
 def test_a_linear_ramp_has_constant_acceleration_until_the_speed_is_reached():
@@ -143,9 +141,7 @@ def test_a_load_factor_is_linear_between_its_times_and_held_outside():
 
 
 def test_turns_at_constant_speed_are_a_whole_number_of_steps():
-    scene = Driven(
-        ConstantSpeed(speed=-2.0 * math.pi * 10.0), Analysis(revolutions=3.0, steps_per_revolution=360)
-    )
+    scene = Driven(ConstantSpeed(speed=-2.0 * math.pi * 10.0), Analysis(revolutions=3.0, steps_per_revolution=360))
     grid = time_grid(scene)
     assert grid.steps == 1080
     assert_allclose((grid.step, grid.end), (0.1 / 360, 0.3), rtol=1e-14)
@@ -156,9 +152,7 @@ def test_steps_per_turn_default_to_720():
 
 
 @pytest.mark.parametrize("shape", ["smooth", "linear"])
-@pytest.mark.parametrize(
-    "revolutions", [0.1, 1.0, 4.0]
-)  # within the ramp of 1 s (5 turns at full speed) and after it
+@pytest.mark.parametrize("revolutions", [0.1, 1.0, 4.0])  # within the ramp of 1 s (5 turns at full speed) and after it
 def test_turns_with_a_ramp_end_when_the_angle_is_reached(shape, revolutions):
     motion = Ramp(speed=10.0 * math.pi, time=1.0, shape=shape)
     grid = time_grid(Driven(motion, Analysis(revolutions=revolutions, steps_per_revolution=1000)))
@@ -196,9 +190,7 @@ def test_the_noise_of_a_rounded_table_is_that_of_rounding():
     sigma, share = table_noise(Table(time=tuple(t), angle=tuple(angle)))
     assert_allclose(sigma, np.radians(0.01) / np.sqrt(12), rtol=0.15)
     alone = np.sqrt(6) * sigma * 360**2 / (np.radians(30) * (2 * np.pi) ** 2 / np.sqrt(2))
-    assert_allclose(
-        share, alone / np.hypot(1, alone), rtol=0.15
-    )  # of all second differences, the noise among them
+    assert_allclose(share, alone / np.hypot(1, alone), rtol=0.15)  # of all second differences, the noise among them
     assert share > 0.05
 
 

@@ -80,9 +80,7 @@ def slotted_link(occ: ModuleType) -> Shapes:
 
 def connecting_rod(occ: ModuleType) -> Shapes:
     """A web and two bosses of other thicknesses."""
-    solid = fused(
-        occ, box(occ, 0, -6, -3, 120, 12, 6), post(occ, 0, 0, -8, 8, 18), post(occ, 120, 0, -6, 6, 12)
-    )
+    solid = fused(occ, box(occ, 0, -6, -3, 120, 12, 6), post(occ, 0, 0, -8, 8, 18), post(occ, 120, 0, -6, 6, 12))
     return occ.cut(solid, [post(occ, 0, 0, -9, 9, 11), post(occ, 120, 0, -9, 9, 6)])[0]
 
 
@@ -123,9 +121,7 @@ def boss_on_link(occ: ModuleType) -> Shapes:
 
 def touching_rod(occ: ModuleType) -> Shapes:
     """Bosses of the same radii as the ends of the web: their circles touch its sides."""
-    solid = fused(
-        occ, link(occ, 90, (20, 12), 0, 8), post(occ, 0, 0, -4, 12, 20), post(occ, 90, 0, -3, 11, 12)
-    )
+    solid = fused(occ, link(occ, 90, (20, 12), 0, 8), post(occ, 0, 0, -4, 12, 20), post(occ, 90, 0, -3, 11, 12))
     return occ.cut(solid, [post(occ, 0, 0, -5, 13, 9), post(occ, 90, 0, -5, 13, 6)])[0]
 
 
@@ -144,9 +140,7 @@ def tapered_bar(occ: ModuleType) -> Shapes:
     """From 24 × 12 to 12 × 8 mm."""
     loops = []
     for x, y, z in ((0, 12, 6), (100, 6, 4)):
-        points = [
-            occ.addPoint(MM * x, MM * i * y, MM * j * z) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))
-        ]
+        points = [occ.addPoint(MM * x, MM * i * y, MM * j * z) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
         loops.append(occ.addCurveLoop([occ.addLine(points[i - 1], points[i]) for i in range(4)]))
     return occ.addThruSections(loops, makeSolid=True, makeRuled=True)
 
@@ -183,9 +177,7 @@ def solid_record(gmsh: ModuleType, name: str = "part") -> Solid:
     return Solid(tag, name, occ.getMass(3, tag), low, high, tuple(faces))
 
 
-def meshed(
-    part: Part, sizing: Sizing | None = None, turn: tuple[float, ...] = (), scale: float = 1
-) -> SolidMesh:
+def meshed(part: Part, sizing: Sizing | None = None, turn: tuple[float, ...] = (), scale: float = 1) -> SolidMesh:
     """The mesh of a part, which may be turned about an axis by an angle and moved far away."""
     with part_in_gmsh(part, turn) as (gmsh, solid):
         return layered_mesh(gmsh, solid, sizing or Sizing())
@@ -324,9 +316,7 @@ class TestCusps:
         ):
             found = [refusal_of(plan, cusp) for cusp in cusps(plan)]
             assert len(found) == 4
-            with pytest.raises(
-                OtherMethodError, match="must meet at angles of at least 6°, got two that touch at"
-            ):
+            with pytest.raises(OtherMethodError, match="must meet at angles of at least 6°, got two that touch at"):
                 plan_mesh("part", plan, 0.1, Sizing())
         assert any(place in words for words in found)
 
@@ -445,9 +435,7 @@ class TestRefusals:
             meshed(rounded)
 
     def test_a_ball_has_no_layers(self):
-        with pytest.raises(
-            OtherMethodError, match="part: no layers along one direction, as it has no plane face"
-        ):
+        with pytest.raises(OtherMethodError, match="part: no layers along one direction, as it has no plane face"):
             meshed(lambda occ: [(3, occ.addSphere(0, 0, 0, 0.01))])
 
 
@@ -483,9 +471,7 @@ class TestRandomLayers:
                 for x, R, low, high in zip((0, L), eyes, rise[:2], rise[2:], strict=True)
             ]
             solid = fused(occ, link(occ, L, (web * eyes[0], web * eyes[1]), -3, 3), *bosses)
-            holes = [
-                post(occ, x, 0, -20, 20, share * R) for x, R, share in zip((0, L), eyes, bores, strict=True)
-            ]
+            holes = [post(occ, x, 0, -20, 20, share * R) for x, R, share in zip((0, L), eyes, bores, strict=True)]
             return occ.cut(solid, holes)[0]
 
         with part_in_gmsh(part, (1, 1, 0, tilt)) as (gmsh, solid):

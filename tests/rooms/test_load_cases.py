@@ -83,9 +83,7 @@ def test_a_spinning_bar_bears_its_centrifugal_force(spun: Path, tmp_path: Path) 
     frame = meshio.read(tmp_path / "arm_0000.vtu")
     x = frame.points[:, :2]
     # stretched by ω² ρ L²/(3 E) of 1e-7: the elastic motion adds next to nothing
-    assert_allclose(
-        frame.point_data["acceleration [m/s^2]"][:, :2], -(OMEGA**2) * x, atol=1e-3 * OMEGA**2 * LENGTH
-    )
+    assert_allclose(frame.point_data["acceleration [m/s^2]"][:, :2], -(OMEGA**2) * x, atol=1e-3 * OMEGA**2 * LENGTH)
     assert_allclose(frame.point_data["all forces [N]"].sum(axis=0), 0.0, atol=1e-4 * held)
     assert found.left[0] < 1e-4
     # σ = ρ ω² (L² − x²)/2 at the middle of a prismatic bar; elements of 2 % of its length
@@ -112,9 +110,7 @@ def test_forces_are_in_balance(cases: dict[str, LoadCases], link: str) -> None:
 
 
 @solved_elsewhere
-@pytest.mark.parametrize(
-    "link", ["coupler", "rocker", "arm"]
-)  # the crank's modes leave out some of its shapes
+@pytest.mark.parametrize("link", ["coupler", "rocker", "arm"])  # the crank's modes leave out some of its shapes
 def test_calculix_finds_the_same_stresses(cases: dict[str, LoadCases], link: str) -> None:
     """All stress components at the solver's own integration points, all over the link, within 1 % of the largest.
 
@@ -190,9 +186,7 @@ def test_results_of_another_mesh_are_refused(spun: Path, tmp_path: Path) -> None
     shutil.copytree(spun, folder)
     with h5py.File(folder / "results.h5", "r+") as file:
         file["energy/strain"][...] *= 1.05
-    with pytest.raises(
-        OutputError, match=r"must be of the scene's present files and this kedfem, got a strain"
-    ):
+    with pytest.raises(OutputError, match=r"must be of the scene's present files and this kedfem, got a strain"):
         load_cases(folder, "arm", [5e-4])
 
 

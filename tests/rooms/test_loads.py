@@ -83,9 +83,7 @@ def test_loads_count_by_the_revolutions_under_them() -> None:
 
 def test_a_standing_load_runs_backwards_round_a_turning_shaft() -> None:
     c, s, zero = np.cos(TURN), np.sin(TURN), 0 * TURN
-    R = np.stack(
-        [np.stack([c, -s, zero], 1), np.stack([s, c, zero], 1), np.stack([zero, zero, zero + 1], 1)], 1
-    )
+    R = np.stack([np.stack([c, -s, zero], 1), np.stack([s, c, zero], 1), np.stack([zero, zero, zero + 1], 1)], 1)
     standing = in_axes(np.tile([5.0, 0, 2], (len(TURN), 1)), R)
     assert_allclose(standing, np.stack([5 * c, -5 * s, zero + 2], 1), atol=1e-12)
     turning = in_axes(np.stack([5 * c, 5 * s, zero], 1), R)
@@ -110,9 +108,7 @@ def test_the_axes_of_a_polar_diagram_are_right_handed(axis: list[float]) -> None
         ([2 / 3, 2 / 3, 1 / 3], [2**-0.5, -(2**-0.5), 0]),
     ],
 )
-def test_a_spinning_bar_is_held_by_its_centrifugal_force(
-    axis: list[float], along: list[float], tmp_path: Path
-) -> None:
+def test_a_spinning_bar_is_held_by_its_centrifugal_force(axis: list[float], along: list[float], tmp_path: Path) -> None:
     """m ω² L/2 along the bar, constant in the bar's axes, once round in the ground's; no torque, no power."""
     found = loads(spun(axis, along, tmp_path), last=1.0)
     held = MASS * OMEGA**2 * LENGTH / 2
@@ -141,9 +137,7 @@ def test_a_spinning_bar_is_held_by_its_centrifugal_force(
 
 
 @pytest.mark.parametrize("axis", [[1.0, 0, 0], [0, 0.6, 0.8]])
-def test_the_power_of_a_sliding_drive_is_the_rate_of_kinetic_energy(
-    axis: list[float], tmp_path: Path
-) -> None:
+def test_the_power_of_a_sliding_drive_is_the_rate_of_kinetic_energy(axis: list[float], tmp_path: Path) -> None:
     shape = {"kind": "bar", "between": [[0, 0], [0.2, 0]], "width": 0.02, "thickness": 0.02}
     raw = {
         "links": {"ram": {"material": "steel", "shape": shape, "mesh": {"elements": [4, 1, 1]}}},
@@ -162,9 +156,7 @@ def test_the_power_of_a_sliding_drive_is_the_rate_of_kinetic_energy(
     mass = np.max(told["force [N]"]) / (2 * pi * 0.1 / 0.05**2)
     assert_allclose(told["power [W]"], mass * a * v, atol=1e-3 * np.max(told["power [W]"]))
     assert abs(found.drives["S"]["mean power [W]"]) < 1e-9 * abs(found.drives["S"]["largest power [W]"])
-    with pytest.raises(
-        OutputError, match=r"^--last: counts revolutions of the drive, got a drive that slides"
-    ):
+    with pytest.raises(OutputError, match=r"^--last: counts revolutions of the drive, got a drive that slides"):
         loads(tmp_path / "run", last=1.0)
 
 
@@ -211,9 +203,7 @@ def test_joints_of_every_kind_are_told(name: str, tmp_path: Path) -> None:
         key.split("/")[1] for key, (channel, _) in results.channels.items()
         if key.endswith("/rigid_force") and channel.columns == ("x", "y", "z")
     }  # fmt: skip
-    assert (
-        set(found.joints) - {key.split("/")[1] for key in results.channels if key.endswith("/force")} <= whole
-    )
+    assert set(found.joints) - {key.split("/")[1] for key in results.channels if key.endswith("/force")} <= whole
     assert set(found.joints) >= whole
     assert json.loads(results.scene_json)["joints"].keys() >= found.joints.keys()
     for joint in found.joints:

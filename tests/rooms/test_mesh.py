@@ -29,9 +29,7 @@ GEOMETRY = Path(__file__).parents[2] / "geometry"
 PARTS = {"connecting_rod": 0.18, "crank_web": 0.05, "piston": 0.04}
 
 
-def meshed(
-    folder: Path = HERE, element: str = "hex27", mesh: dict | None = None, **shape: object
-) -> SolidMesh:
+def meshed(folder: Path = HERE, element: str = "hex27", mesh: dict | None = None, **shape: object) -> SolidMesh:
     return link_mesh("arm", LinkScene(shape=shape, element=element, mesh=mesh or {}), folder)
 
 
@@ -111,9 +109,7 @@ class TestBar:
         assert_allclose(volume(mesh), length * 0.02 * 0.01, rtol=1e-12)
 
     def test_has_the_elements_asked_for(self):
-        mesh = meshed(
-            kind="bar", between=[[0, 0], [1, 0]], width=0.1, thickness=0.1, mesh={"elements": [5, 3, 2]}
-        )
+        mesh = meshed(kind="bar", between=[[0, 0], [1, 0]], width=0.1, thickness=0.1, mesh={"elements": [5, 3, 2]})
         assert mesh.cells.shape == (5 * 3 * 2, 27)
         assert mesh.points.shape == (11 * 7 * 5, 3)
 
@@ -154,9 +150,7 @@ class TestPlateLink:
         assert_allclose(volume(mesh), 0.01 * plate_area(L, w, eye, bore), rtol=1e-4)
         least, most = mesh.points.min(axis=0), mesh.points.max(axis=0)
         assert_allclose([least[[0, 2]], most[[0, 2]]], [[-eye / 2, -0.005], [L + eye / 2, 0.005]], atol=1e-14)
-        assert_allclose(
-            [least[1], most[1]], [-eye / 2, eye / 2], rtol=0.005
-        )  # near the top, not always at it
+        assert_allclose([least[1], most[1]], [-eye / 2, eye / 2], rtol=0.005)  # near the top, not always at it
         assert conforming(mesh)
 
     @pytest.mark.parametrize(("L", "w", "eye", "bore"), PLATES)
@@ -168,9 +162,7 @@ class TestPlateLink:
             assert len(wall) >= 3 * 2 * 12  # three levels; twelve elements of two nodes round the bore
 
     def test_volume_error_falls_with_the_fourth_power_of_the_size(self):
-        error = [
-            abs(volume(plate(*PLATES[0], across=n)) / 0.01 / plate_area(*PLATES[0]) - 1) for n in (8, 16, 32)
-        ]
+        error = [abs(volume(plate(*PLATES[0], across=n)) / 0.01 / plate_area(*PLATES[0]) - 1) for n in (8, 16, 32)]
         assert error[1] < error[0] / 12  # 2⁴ = 16
         assert error[2] < error[1] / 12
         assert error[2] < 1e-8
@@ -353,9 +345,7 @@ class TestElements:
         places, step = np.random.default_rng(0).uniform(-1, 1, (7, nodes.shape[1])), 1e-3
         for j, move in enumerate(step * np.eye(nodes.shape[1])):
             # exact for the functions' degree of 2 in each direction
-            slope = (shape_functions(nodes, places + move) - shape_functions(nodes, places - move)) / (
-                2 * step
-            )
+            slope = (shape_functions(nodes, places + move) - shape_functions(nodes, places - move)) / (2 * step)
             assert_allclose(shape_gradients(nodes, places)[:, :, j], slope, atol=1e-12)
 
     @pytest.mark.parametrize("nodes", [QUAD9, HEX8, HEX20, HEX27])
@@ -366,9 +356,7 @@ class TestElements:
         assert_allclose(shape_gradients(nodes, places).sum(axis=1), 0, atol=1e-14)
 
     def test_every_node_of_a_cuboid_is_where_its_number_says(self):
-        mesh = meshed(
-            kind="bar", between=[[0, 0], [2, 0]], width=2, thickness=2, mesh={"elements": [1, 1, 1]}
-        )
+        mesh = meshed(kind="bar", between=[[0, 0], [2, 0]], width=2, thickness=2, mesh={"elements": [1, 1, 1]})
         assert_allclose(mesh.points[mesh.cells[0]] - [1, 0, 0], HEX27, atol=1e-15)
 
     def test_nodes_of_straight_elements_are_means_of_their_corners(self):
@@ -392,9 +380,7 @@ class TestElements:
         assert len(np.unique(corners.cells)) == len(corners.points)
 
     def test_quadratic_puts_back_what_linear_drops_from_straight_elements(self):
-        mesh = meshed(
-            kind="bar", between=[[0, 0], [1, 1]], width=0.2, thickness=0.1, mesh={"elements": [3, 2, 2]}
-        )
+        mesh = meshed(kind="bar", between=[[0, 0], [1, 1]], width=0.2, thickness=0.1, mesh={"elements": [3, 2, 2]})
         again = quadratic(linear(mesh))
         assert again.points.shape == mesh.points.shape
         assert_allclose(again.points[again.cells], mesh.points[mesh.cells], atol=1e-15)
@@ -434,9 +420,7 @@ class TestQuality:
         assert_allclose(mesh_quality(mesh).least, math.sin(math.radians(30)), rtol=1e-12)
 
     def test_names_the_worst_element_and_its_centre(self):
-        mesh = meshed(
-            kind="bar", between=[[0, 0], [1, 0]], width=0.1, thickness=0.1, mesh={"elements": [4, 1, 1]}
-        )
+        mesh = meshed(kind="bar", between=[[0, 0], [1, 0]], width=0.1, thickness=0.1, mesh={"elements": [4, 1, 1]})
         points = mesh.points.copy()
         corner = np.flatnonzero((abs(points - [1, 0.05, 0.05]) < 1e-12).all(axis=1))
         points[corner] -= [0.05, 0.02, 0.02]

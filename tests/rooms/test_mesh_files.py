@@ -128,9 +128,7 @@ def promoted(raw: meshio.Mesh) -> meshio.Mesh:
 
 @pytest.mark.parametrize("quadratic", [False, True])
 @pytest.mark.parametrize("kinds", ["wedges", "pyramids"])
-def test_cells_of_several_kinds_become_tetrahedra_that_fill_the_same(
-    tmp_path: Path, kinds: str, quadratic: bool
-) -> None:
+def test_cells_of_several_kinds_become_tetrahedra_that_fill_the_same(tmp_path: Path, kinds: str, quadratic: bool) -> None:
     cut_box(kinds, quadratic).write(tmp_path / "mixed.msh", file_format="gmsh22")
     mesh = mesh_from_file("mesh", tmp_path / "mixed.msh", 1.0)
     assert mesh.cell_type == "tetra10"
@@ -146,9 +144,7 @@ def test_cells_of_several_kinds_become_tetrahedra_that_fill_the_same(
 def test_curved_edges_stay_where_they_are_in_the_file(tmp_path: Path) -> None:
     """A smooth map of second order: the volume of hex20 beside wedge15 is that of the parts apart."""
     raw = cut_box("wedges", True)
-    bent = raw.points + 0.1 * np.column_stack(
-        [0 * raw.points[:, 0], raw.points[:, 0] ** 2, 0 * raw.points[:, 0]]
-    )
+    bent = raw.points + 0.1 * np.column_stack([0 * raw.points[:, 0], raw.points[:, 0] ** 2, 0 * raw.points[:, 0]])
     meshio.Mesh(bent, raw.cells).write(tmp_path / "bent.msh", file_format="gmsh22")
     mesh = mesh_from_file("mesh", tmp_path / "bent.msh", 1.0)
     # the map is a shear by x²: it keeps volume, and quadratic elements have it exactly
@@ -173,12 +169,8 @@ def test_a_side_that_tetrahedra_divide_the_other_way_is_refused(tmp_path: Path) 
     a, b, c, d, e, f, g, h = second.tolist()
     # five tetrahedra whose diagonal of the common side a d h e is d e: a is the least of the four, which says a h
     five = [[a, b, d, e], [b, c, d, g], [b, d, e, g], [b, e, f, g], [d, e, g, h]]
-    meshio.Mesh(raw.points, [("hexahedron", first[None]), ("tetra", np.array(five))]).write(
-        tmp_path / "x.vtu"
-    )
-    with pytest.raises(
-        MeshError, match=r"mesh: hexahedra, .* got 1 four-sided sides .* put pyramids .* in .*x.vtu"
-    ):
+    meshio.Mesh(raw.points, [("hexahedron", first[None]), ("tetra", np.array(five))]).write(tmp_path / "x.vtu")
+    with pytest.raises(MeshError, match=r"mesh: hexahedra, .* got 1 four-sided sides .* put pyramids .* in .*x.vtu"):
         mesh_from_file("mesh", tmp_path / "x.vtu", 1.0)
 
 
@@ -240,9 +232,7 @@ def test_a_file_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert len(calls) == 2
 
 
-@pytest.mark.parametrize(
-    ("reader", "words"), [(endless, "none within 1 s of processor time"), (killed, "broke down")]
-)
+@pytest.mark.parametrize(("reader", "words"), [(endless, "none within 1 s of processor time"), (killed, "broke down")])
 def test_readers_that_hang_or_break_down_end_in_a_message(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reader: object, words: str
 ) -> None:

@@ -18,8 +18,7 @@ def test_names_of_faces_are_whole_in_a_narrow_terminal(width: int) -> None:
     names = [f"face {k}" for k in (7, 12, 123)]
     oblique, sides = np.array([0.781234, -0.624712, 0.0123]), np.array([[0, 1, 2, 3]])
     faces = tuple(
-        Face(name, "plane", np.array([-0.123456, 0.0123456, 0.2]), oblique, np.nan, False, sides)
-        for name in names
+        Face(name, "plane", np.array([-0.123456, 0.0123456, 0.2]), oblique, np.nan, False, sides) for name in names
     )
     mesh = SolidMesh(0.1 * HEX8, np.arange(8)[None], faces=faces)
     said = io.StringIO()

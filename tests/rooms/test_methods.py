@@ -74,8 +74,7 @@ class TestLadder:
         mesh = made("ball_ended_rod.step")
         assert "tetrahedra" in mesh.method
         assert (
-            "no layers along one direction, as the ball of radius 12 mm near (150, 0, 0) mm (face 14) is"
-            in mesh.method
+            "no layers along one direction, as the ball of radius 12 mm near (150, 0, 0) mm (face 14) is" in mesh.method
         )
         assert mesh.cell_type == "tetra10"
         assert valid_everywhere(mesh.points, mesh.cells).all()
@@ -117,9 +116,7 @@ class TestApart:
             apart("rod.step", PART, 1, busy, 60)
 
     def test_what_breaks_down_is_refused_and_the_next_works(self) -> None:
-        with pytest.raises(
-            MeshError, match=r"^rod.step: must be a part .* work on, got one at which they broke down"
-        ):
+        with pytest.raises(MeshError, match=r"^rod.step: must be a part .* work on, got one at which they broke down"):
             apart("rod.step", PART, LONGEST, os._exit, 3)
         assert apart("rod.step", PART, LONGEST, math.sqrt, 4.0) == 2.0
 
@@ -128,9 +125,7 @@ class TestApart:
         assert capfd.readouterr() == ("", "")
 
     def test_what_takes_too_much_memory_is_given_up_and_the_next_works(self) -> None:
-        with pytest.raises(
-            MeshError, match=r"^rod.step: .*, got one for which they need more than 6 GB of memory; mend"
-        ):
+        with pytest.raises(MeshError, match=r"^rod.step: .*, got one for which they need more than 6 GB of memory; mend"):
             apart("rod.step", PART, LONGEST, np.ones, int(1e9))
         assert apart("rod.step", PART, LONGEST, math.sqrt, 4.0) == 2.0
 
@@ -146,9 +141,7 @@ class TestApart:
         assert apart("rod.step", PART, 1, busy_in, used) != used
 
     @pytest.mark.parametrize("tries", [1, 2])
-    def test_what_no_process_ends_is_tried_once_more_where_the_first_was_used(
-        self, tries: int, tmp_path: Path
-    ) -> None:
+    def test_what_no_process_ends_is_tried_once_more_where_the_first_was_used(self, tries: int, tmp_path: Path) -> None:
         with pytest.raises(ValueError, match="math domain"):
             apart("rod.step", PART, LONGEST, math.sqrt, -1.0)  # its process is ended
         if tries == 2:
@@ -159,14 +152,10 @@ class TestApart:
 
 
 class TestStiffness:
-    @pytest.mark.parametrize(
-        "file", ["crank.step", pytest.param("ball_ended_rod.step", marks=pytest.mark.long)]
-    )
+    @pytest.mark.parametrize("file", ["crank.step", pytest.param("ball_ended_rod.step", marks=pytest.mark.long)])
     def test_rigid_motions_strain_nothing(self, file: str) -> None:
         """K0 u = 0 for the twelve fields 1, x, y, z along each axis that are rigid: [KED, App. A], to rounding."""
-        record = solid_link(
-            "part", made(file), Material(density=1, youngs_modulus=1, poisson_ratio=0.3), np.eye(3)
-        )
+        record = solid_link("part", made(file), Material(density=1, youngs_modulus=1, poisson_ratio=0.3), np.eye(3))
         r, e = record.X - record.X.mean(axis=0), np.eye(3)
         rigid = [np.tile(a, (record.n, 1)) for a in e] + [np.cross(a, r) / np.abs(r).max() for a in e]
         for u in rigid:
@@ -185,17 +174,13 @@ class TestPlacing:
         assert_allclose(axes, [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-15)
 
     def test_the_faces_move_with_the_part(self) -> None:
-        (bore,) = [
-            f for f in made(origin=[1, 2, 3]).faces if f.kind == "cylinder" and abs(f.radius - 0.012) < 1e-6
-        ]
+        (bore,) = [f for f in made(origin=[1, 2, 3]).faces if f.kind == "cylinder" and abs(f.radius - 0.012) < 1e-6]
         assert bore.inward
         assert_allclose(bore.centre[:2], [1, 2], atol=1e-6)
         assert_allclose(abs(bore.direction), [0, 0, 1], atol=1e-6)
 
     def test_a_scale_says_what_a_unit_is(self) -> None:
-        assert_allclose(
-            volume_and_centre(made(scale=0.002))[0], 8 * volume_and_centre(made(scale=0.001))[0], rtol=1e-6
-        )
+        assert_allclose(volume_and_centre(made(scale=0.002))[0], 8 * volume_and_centre(made(scale=0.001))[0], rtol=1e-6)
 
 
 class TestSizes:
@@ -208,17 +193,13 @@ class TestSizes:
             assert 0.75 < 3 * len(made(mesh={"unknowns": wanted}).points) / wanted < 1.33
 
     def test_fewer_unknowns_than_the_shape_allows_are_told(self) -> None:
-        assert made(mesh={"unknowns": 500}).method.endswith(
-            "; the nearest found to the 500 unknowns asked for"
-        )
+        assert made(mesh={"unknowns": 500}).method.endswith("; the nearest found to the 500 unknowns asked for")
 
     def test_layers_are_the_least_through_each_slab(self) -> None:
         assert len(made(mesh={"layers": 3}).cells) > 1.5 * len(made().cells)
 
     def test_a_size_larger_than_the_part_is_refused(self) -> None:
-        with pytest.raises(
-            MeshError, match=r"crank.step: must be larger than its mesh.size 1 \[m\], got 0\.1"
-        ):
+        with pytest.raises(MeshError, match=r"crank.step: must be larger than its mesh.size 1 \[m\], got 0\.1"):
             made(mesh={"size": 1.0})
 
 

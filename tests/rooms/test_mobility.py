@@ -119,9 +119,7 @@ def test_a_planar_link_that_no_joint_holds_has_three_motions() -> None:
     link = linkage(scene)
     told = mobility(scene, link, path(link, 0.0, LITTLE))
     assert (told.freedom, told.equations) == (3, 0)
-    assert [each.words for each in told.free] == [
-        "link 'arm' can turn about z and slide along x and y, held by no joint"
-    ]
+    assert [each.words for each in told.free] == ["link 'arm' can turn about z and slide along x and y, held by no joint"]
 
 
 def test_parallel_cranks_share_a_force_in_their_own_plane_as_well() -> None:
@@ -165,9 +163,7 @@ def test_self_stress_balances_on_every_link_and_does_no_work_in_its_joint() -> N
         np.testing.assert_allclose(np.asarray(each.axis) @ wrenches(drawn, name, stress)[3:], 0.0, atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("joints", "sliders"), [(BAR, ()), (SKEW, ()), (slider_crank(0.1, 0.3, 0.7), ("slider",))]
-)
+@pytest.mark.parametrize(("joints", "sliders"), [(BAR, ()), (SKEW, ()), (slider_crank(0.1, 0.3, 0.7), ("slider",))])
 def test_the_remedy_leaves_the_motion_as_it_was_and_nothing_redundant(
     joints: JointTable, sliders: tuple[str, ...]
 ) -> None:
@@ -224,9 +220,7 @@ def test_making_one_ball_a_universal_joint_stops_the_idle_spin() -> None:
 # -- dead points --------------------------------------------------------------------------------------------
 
 CRANK = (0.5, 0.6, 0.5, 1.0)  # cannot turn fully
-LIMIT = np.arccos(
-    (0.5**2 + 1.0 - 1.1**2) / (2 * 0.5)
-)  # coupler and rocker in line: cosine rule, diagonal b + c
+LIMIT = np.arccos((0.5**2 + 1.0 - 1.1**2) / (2 * 0.5))  # coupler and rocker in line: cosine rule, diagonal b + c
 
 
 def nearest(joints: JointTable, high: float) -> DeadPoint:
@@ -313,9 +307,7 @@ def test_far_from_a_dead_point_no_number_is_told_that_would_be_wrong() -> None:
 
 # -- couplings and several drives -----------------------------------------------------------------------------
 
-WHEELS: JointTable = {
-    name: ("revolute", "ground", f"wheel{name}", (x, 0.0, 0.0), Z) for x, name in enumerate("ABC")
-}
+WHEELS: JointTable = {name: ("revolute", "ground", f"wheel{name}", (x, 0.0, 0.0), Z) for x, name in enumerate("ABC")}
 
 
 def scene_with(joints: JointTable, model: str = "solid", **tables: object) -> Scene:
@@ -380,9 +372,7 @@ def test_messages_of_a_slide_speak_of_its_travel() -> None:
     link = linkage(carried("co-rotational"))
     assert place(link, -0.05) == "drive travel -50 mm"
     scene = carried("co-rotational")
-    motion = rigid_motion(
-        link, path(link, -0.05, 0.05), np.array([0.25]), path_parameter(scene, np.array([0.25]))
-    )
+    motion = rigid_motion(link, path(link, -0.05, 0.05), np.array([0.25]), path_parameter(scene, np.array([0.25])))
     assert moment(link, motion, 0) == "t = 0.25 s, drive travel -25 mm"
     with pytest.raises(MotionError, match="free motion left at drive travel 0 mm, the reference position"):
         linkage(carried("rigid-body"))

@@ -80,9 +80,7 @@ def test_shapes_of_a_linkage_are_those_of_its_softest_position_and_replace_earli
     frame = frames(tmp_path / "here", "shape_1")[0]
     points, moved = np.asarray(frame.points), frame.point_data[DISPLACEMENT]
     near = np.linalg.norm(moved[:, None] - moved[None], axis=2) < 1e-9 * AMPLITUDE
-    touching = (np.linalg.norm(points[:, None] - points[None], axis=2) < 1e-9) & ~np.eye(
-        len(points), dtype=bool
-    )
+    touching = (np.linalg.norm(points[:, None] - points[None], axis=2) < 1e-9) & ~np.eye(len(points), dtype=bool)
     assert touching.any()
     assert near[touching].all()
 

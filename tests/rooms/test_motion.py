@@ -112,14 +112,10 @@ def without(name: str) -> JointTable:
 def test_a_missing_joint_leaves_free_motion_and_the_message_says_of_what() -> None:
     message = refusal(without("D"))
     assert message.startswith(
-        "joints: every motion must be held or driven, got free motion left at drive angle 0 deg, the reference "
-        "position:"
+        "joints: every motion must be held or driven, got free motion left at drive angle 0 deg, the reference position:"
     )
     assert "link 'rocker' can turn about z at joint C (revolute)" in message
-    assert (
-        "links 'coupler' and 'rocker' can move together in one way, by joints B and C; free motions: 2"
-        in message
-    )
+    assert "links 'coupler' and 'rocker' can move together in one way, by joints B and C; free motions: 2" in message
 
 
 def test_an_idle_spin_of_the_coupler_is_named_with_its_axis() -> None:
@@ -195,9 +191,7 @@ def open_rows(random: np.random.Generator) -> list[ConstraintEquation]:
     """Rows of all kinds between bodies 0, 1 and 2, couplings among them, drives on a turn and a travel."""
     axis = np.array([0.48, 0.6, 0.64])  # a unit vector
     turn, travel = turn_row("R", 2, 1, axis), travel_row("P", 1, 0, random.uniform(-1, 1, 3), axis)
-    apart = [
-        replace(row, a_j=random.uniform(-1, 1, 3)) for row in joint_rows("spherical", "S", 2, 0, axis, None)
-    ]
+    apart = [replace(row, a_j=random.uniform(-1, 1, 3)) for row in joint_rows("spherical", "S", 2, 0, axis, None)]
     return [
         *joint_rows("weld", "W", 2, 1, random.uniform(-1, 1, 3), None),
         *joint_rows("prismatic", "P", 1, 0, random.uniform(-1, 1, 3), axis),
@@ -249,9 +243,7 @@ def test_angles_count_on_beyond_a_turn_and_know_large_ones_to_rounding() -> None
     R = np.stack([np.eye(3), np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])])[None]
     q = np.array([[many]])
     f = features(rows, (R, np.zeros((1, 2, 3))), q)
-    np.testing.assert_allclose(
-        residuals(rows, f, q), 1e-9, atol=1.5e-11
-    )  # the sum itself is rounded to 7e-12
+    np.testing.assert_allclose(residuals(rows, f, q), 1e-9, atol=1.5e-11)  # the sum itself is rounded to 7e-12
 
 
 def test_the_angle_of_tilted_axes_depends_on_no_mark() -> None:
@@ -318,9 +310,7 @@ def test_a_turn_is_followed_a_few_grid_points_at_once(monkeypatch: pytest.Monkey
 
 def test_an_arm_alone_turns_with_its_drive() -> None:
     """One link, one revolute at rest in the origin: R is the rotation by φ, p = 0."""
-    scene = linkage_scene(
-        {"A": ("revolute", "ground", "arm", (0.0, 0.0, 0.0), Z)}, motion={**UNIT_SPEED, "speed": 3.0}
-    )
+    scene = linkage_scene({"A": ("revolute", "ground", "arm", (0.0, 0.0, 0.0), Z)}, motion={**UNIT_SPEED, "speed": 3.0})
     t = np.array([0.0, 0.3, 50.0])
     m = motion_at(scene, t)
     np.testing.assert_allclose(m.R[:, 1, 0, 0], np.cos(3 * t), atol=1e-13)

@@ -58,9 +58,7 @@ def with_links(raw: dict[str, Any], **changes: Any) -> dict[str, Any]:
 
 RIGID = {"model": "rigid", "mesh": {"elements": [1, 1, 1]}}
 PARTNERS = {
-    "a pin that the drive carries": lambda: with_links(
-        inverted("solid", "slot", revolutions=0.02), crank=RIGID
-    ),
+    "a pin that the drive carries": lambda: with_links(inverted("solid", "slot", revolutions=0.02), crank=RIGID),
     "a slot in a rigid arm": lambda: with_links(inverted("solid", "slot", revolutions=0.02), arm=RIGID),
     "a rigid block": lambda: with_links(inverted("solid", "prismatic", revolutions=0.02), block=RIGID),
     "a slot in a reduced arm": lambda: with_links(
@@ -202,9 +200,7 @@ def test_joint_forces_balance_inertia_and_loads_of_every_link(kind: str) -> None
 
 
 def assert_balanced(ready: Prepared, blocks: list[Block]) -> None:
-    digits = (
-        5e-7 if any(link.rigid for link in ready.model.links) else 1e-8
-    )  # rigid links are very stiff ones
+    digits = 5e-7 if any(link.rigid for link in ready.model.links) else 1e-8  # rigid links are very stiff ones
     assert max(unbalanced(ready, blocks)) < digits
 
 
@@ -333,9 +329,7 @@ def test_two_rotors_on_shaft_and_bushing_swing_as_two_masses_on_springs() -> Non
 
 def swung(kind: str, rho_inf: float, revolutions: float) -> None:
     """Runs a linkage on and on: no growth, closed joints, forces that do not swing from step to step."""
-    scene = scene_from(
-        inverted("beam", kind, revolutions=revolutions, steps_per_revolution=720, rho_inf=rho_inf)
-    )
+    scene = scene_from(inverted("beam", kind, revolutions=revolutions, steps_per_revolution=720, rho_inf=rho_inf))
     ready, blocks = ran(scene.model_dump())
     open_, most, force = 0.0, [], []
     for block in blocks:
@@ -392,9 +386,7 @@ def test_what_does_not_suit_such_joints_is_refused() -> None:
         scene_from(raw)
     raw = inverted("beam", "slot")
     raw["joints"]["S"]["bushing"] = {"rotational_stiffness": 1.0}
-    with pytest.raises(
-        SceneError, match=r"joints\.S\.bushing\.rotational_stiffness: must .* got a slot joint"
-    ):
+    with pytest.raises(SceneError, match=r"joints\.S\.bushing\.rotational_stiffness: must .* got a slot joint"):
         scene_from(raw)
 
 
@@ -415,9 +407,7 @@ def test_a_light_block_on_a_pin_and_the_pin_itself_in_a_slot_press_alike() -> No
                  "stiff": {"density": 7850, "youngs_modulus": 2e13, "poisson_ratio": 0.3}}  # fmt: skip
     found = []
     for kind in ("slot", "prismatic"):
-        raw = inverted("beam", kind, revolutions=0.5, steps_per_revolution=360, rho_inf=0.8) | {
-            "materials": materials
-        }
+        raw = inverted("beam", kind, revolutions=0.5, steps_per_revolution=360, rho_inf=0.8) | {"materials": materials}
         for name, link in raw["links"].items():
             link["material"] = "feather" if name == "block" else "stiff"
         found.append(channels(*ran(raw))["joints/S/force" if kind == "slot" else "joints/C/force"])
@@ -429,9 +419,7 @@ def test_a_solid_block_on_a_planar_beam_tells_its_force() -> None:
     light = {"density": 1e-3, "youngs_modulus": 2.1e11, "poisson_ratio": 0.3}
     found = []
     for block in ({}, RIGID):
-        raw = with_links(
-            inverted("beam", "prismatic", revolutions=0.1, steps_per_revolution=360), block=block
-        )
+        raw = with_links(inverted("beam", "prismatic", revolutions=0.1, steps_per_revolution=360), block=block)
         raw["links"]["block"]["material"] = "light"
         found.append(channels(*ran(raw | {"materials": {"light": light}})))
     for name in ("joints/S/force", "joints/S/moment", "joints/B/force"):

@@ -82,9 +82,7 @@ def test_an_assembly_becomes_a_scene_whose_joints_close(run_kedfem: Command, ass
     assert {link.material for link in drawn.links.values()} == {"steel"}
     assert [link.shape.solid for link in drawn.links.values()] == list(NAMES[1:])  # type: ignore[union-attr]
     assert "# Ground_plate may be the frame" in text
-    assert (
-        "# bore of radius 4.05 mm of crank_1, pin of radius 4 mm of Ground_plate, together along 7 mm" in text
-    )
+    assert "# bore of radius 4.05 mm of crank_1, pin of radius 4 mm of Ground_plate, together along 7 mm" in text
 
     whole = confirmed(text).replace("[analysis]", '[analysis]\naccuracy = "quick"')
     Path("bars.toml").write_text(whole, encoding="utf-8")
@@ -123,9 +121,7 @@ def test_a_file_that_exists_stays(run_kedfem: Command, assembly: Path) -> None: 
     assert (said.code, said.err) == (USER_ERROR, wanted)
 
 
-@pytest.mark.parametrize(
-    ("name", "text"), [("nothing.step", None), ("bad.step", "no CAD"), ("part.dwg", "x")]
-)
+@pytest.mark.parametrize(("name", "text"), [("nothing.step", None), ("bad.step", "no CAD"), ("part.dwg", "x")])
 def test_bad_files_are_refused_as_by_mesh(
     run_kedfem: Command,  # noqa: F811
     tmp_path: Path,
@@ -147,9 +143,7 @@ def test_options_that_do_not_go_together(run_kedfem: Command) -> None:  # noqa: 
     said = run_kedfem("new", "--from", "a.step", "four-bar")
     assert said.err == "error: KIND: must be left out with --from, got 'four-bar'\n"
     assert run_kedfem("new").err.startswith("error: KIND: must be one of four-bar, ")
-    assert run_kedfem("new", "four-bar", "--scale", "1").err.startswith(
-        "error: --scale: must be combined with --from"
-    )
+    assert run_kedfem("new", "four-bar", "--scale", "1").err.startswith("error: --scale: must be combined with --from")
 
 
 def test_names_of_links_are_those_of_a_scene() -> None:
@@ -163,9 +157,7 @@ def test_names_of_links_are_those_of_a_scene() -> None:
     assert links["part"]["shape"]["file"] == 'a"b.step'
 
 
-def cylinder(
-    r: float, low: float, high: float, inward: bool, at: tuple[float, float] = (0.0, 0.0)
-) -> CadFace:
+def cylinder(r: float, low: float, high: float, inward: bool, at: tuple[float, float] = (0.0, 0.0)) -> CadFace:
     middle = np.array([*at, (low + high) / 2])
     return CadFace(0, "", "cylinder", middle, np.eye(3)[2], r, inward, np.nan, high - low)
 

@@ -108,9 +108,7 @@ def test_the_corner_of_a_rounded_block_is_a_corner_and_a_dome_is_part_of_a_ball(
         import gmsh
 
         rounds = occ.fillet([1], [tag for _, tag in gmsh.model.getEntities(1)], [3.0])
-        lens, _ = occ.intersect(
-            [(3, occ.addSphere(15, 15, -25, 40))], [(3, occ.addCylinder(15, 15, 5, 0, 0, 20, 8))]
-        )
+        lens, _ = occ.intersect([(3, occ.addSphere(15, 15, -25, 40))], [(3, occ.addCylinder(15, 15, 5, 0, 0, 20, 8))])
         occ.fuse(rounds, lens)
 
     found = forms(tmp_path, block)

@@ -75,9 +75,7 @@ def test_channels_of_large_files_are_read_when_they_are_asked_for(
     some = on_demand.Chosen(results.channels, ("drive/torque",))
     assert list(some) == ["drive/torque"]
     assert "gears/g/ratio" not in some
-    add_account(
-        tmp_path / "results.h5", ["one more"], {"steps": 1.5}
-    )  # adds to the file, whose rows are the same
+    add_account(tmp_path / "results.h5", ["one more"], {"steps": 1.5})  # adds to the file, whose rows are the same
     assert_array_equal(read_again(results, "gears/g/ratio"), rows["gears/g/ratio"])
 
 
@@ -92,9 +90,7 @@ def test_a_file_that_became_another_is_not_read_on(tmp_path: Path, monkeypatch: 
     monkeypatch.setattr(on_demand, "AT_ONCE", 0)
     results = read_results(path)
     written(path, count=300)
-    with pytest.raises(
-        OutputError, match="must be the results file that was opened, got that of another run"
-    ):
+    with pytest.raises(OutputError, match="must be the results file that was opened, got that of another run"):
         read_again(results, "drive/torque")
     path.write_bytes(b"nothing")
     with pytest.raises(OutputError, match=r"results.h5: .* got a corrupt file"):
@@ -152,9 +148,7 @@ def test_one_group_opens_as_a_data_set_and_becomes_a_data_frame(tmp_path: Path, 
 def test_a_stopped_run_opens_too(tmp_path: Path) -> None:
     def stopped() -> None:
         with ResultsWriter(tmp_path / "results.h5", CHANNELS, "{}", None, {}) as file:
-            file.append(
-                np.arange(3.0), np.arange(3.0), {c.name: np.ones((3, len(c.columns))) for c in CHANNELS}
-            )
+            file.append(np.arange(3.0), np.arange(3.0), {c.name: np.ones((3, len(c.columns))) for c in CHANNELS})
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -188,16 +182,12 @@ def test_tables_have_the_same_names_and_numbers(tmp_path: Path) -> None:
     assert_array_equal(table["joints/B-2/force y [N]"], rows["joints/B-2/force"][:, 1])
     write_parquet(results, tmp_path / "results.parquet")
     write_csv(results, tmp_path / "results.csv")
-    pandas.testing.assert_frame_equal(
-        pandas.read_parquet(tmp_path / "results.parquet"), table, check_exact=True
-    )
+    pandas.testing.assert_frame_equal(pandas.read_parquet(tmp_path / "results.parquet"), table, check_exact=True)
     read = pandas.read_csv(tmp_path / "results.csv", index_col=0)
     pandas.testing.assert_frame_equal(read, table, rtol=5e-9, atol=0.0)
 
 
-@pytest.mark.parametrize(
-    ("missing", "where"), [("xarray", "to_xarray"), ("pandas", "to_pandas"), ("pyarrow", "parquet")]
-)
+@pytest.mark.parametrize(("missing", "where"), [("xarray", "to_xarray"), ("pandas", "to_pandas"), ("pyarrow", "parquet")])
 def test_what_is_not_installed_is_said_with_the_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, missing: str, where: str
 ) -> None:

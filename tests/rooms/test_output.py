@@ -53,9 +53,7 @@ def filled(name: str, cell_type: str, cells: np.ndarray, points: np.ndarray) -> 
 def warped() -> LinkField:
     """One 27-node cell: (x, y, z) = (2r, 3s + r², 4t + 2rs + r²), whose det J is 24 everywhere."""
     r, s, t = HEX27.T / 2
-    return filled(
-        "warped", "hexahedron27", np.arange(27)[None], np.c_[2 * r, 3 * s + r**2, 4 * t + 2 * r * s + r**2]
-    )
+    return filled("warped", "hexahedron27", np.arange(27)[None], np.c_[2 * r, 3 * s + r**2, 4 * t + 2 * r * s + r**2])
 
 
 def brick() -> LinkField:
@@ -220,14 +218,10 @@ def test_a_failing_frame_leaves_the_list_as_it_was(tmp_path: Path) -> None:
     animation = AnimationWriter(tmp_path, "run")
     animation.add(0.0, [rod()])
     (tmp_path / "run" / "rod_0001.vtu").mkdir()
-    with pytest.raises(
-        OutputError, match=r"rod_0001\.vtu: must be a file that can be written, got Is a directory"
-    ):
+    with pytest.raises(OutputError, match=r"rod_0001\.vtu: must be a file that can be written, got Is a directory"):
         animation.add(1.0, [rod()])
     assert frame_times(tmp_path / "run.pvd") == [(0.0, "run/rod_0000.vtu")]
-    with pytest.raises(
-        OutputError, match=r"free of the frames of an earlier run, got rod_0001\.vtu that cannot be"
-    ):
+    with pytest.raises(OutputError, match=r"free of the frames of an earlier run, got rod_0001\.vtu that cannot be"):
         remove_animation(tmp_path, "run")
 
 
@@ -238,9 +232,7 @@ def test_a_list_that_cannot_grow_stays_as_it_was(tmp_path: Path) -> None:
     while not (listed := tmp_path / "run.pvd").is_file() or listed.stat().st_size < 6000:
         animation.add(float(animation.count), [rod()])
     before, limits = listed.read_bytes(), resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(
-        resource.RLIMIT_FSIZE, (len(before) + 20, limits[1])
-    )  # holds a frame, not the whole row
+    resource.setrlimit(resource.RLIMIT_FSIZE, (len(before) + 20, limits[1]))  # holds a frame, not the whole row
     try:
         with pytest.raises(OutputError, match=r"run\.pvd: must be a file that can be written"):
             animation.add(1e3, [rod()])
@@ -346,9 +338,7 @@ def test_many_curves_go_onto_several_pages(tmp_path: Path) -> None:
     made, force = results(), Channel("joints/A/force", ("x", "y", "z"), "N", "world", "force")
     t = made.time[:, None] * np.ones(3)
     probes = {f"probes/{k}/stress": made.channels["probes/mid/stress"] for k in range(30)}
-    joints = {
-        f"joints/{k}/force": (replace(force, name=f"joints/{k}/force"), (k + 1.0) * t) for k in range(12)
-    }
+    joints = {f"joints/{k}/force": (replace(force, name=f"joints/{k}/force"), (k + 1.0) * t) for k in range(12)}
     written = write_plots(replace(made, channels=probes | joints), tmp_path)
     assert [path.name for path in written] == ["overview.png", "overview-2.png", "overview-3.png"]
     for path in written:
@@ -410,9 +400,7 @@ def test_what_curves_are_drawn_over() -> None:
     assert nothing_driven.degrees is None
 
 
-@pytest.mark.parametrize(
-    "names", [["drive/force"], ["drive/rigid_force"], ["drive/A/torque", "drive/B/torque"]]
-)
+@pytest.mark.parametrize("names", [["drive/force"], ["drive/rigid_force"], ["drive/A/torque", "drive/B/torque"]])
 def test_curves_of_slides_and_of_several_drives_are_over_time(names: list[str]) -> None:
     time = np.linspace(0, 1, 11)
     channels = {name: (Channel(name, ("x",), "N", "", ""), np.ones((11, 1))) for name in names}
@@ -444,9 +432,7 @@ def test_prefixes(peak: float, unit: str, expected: tuple[float, str]) -> None:
 
 def test_a_picture_of_all_kinds_of_links(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     vtu = drawn(tmp_path, links())
-    title = (
-        "Worst frame: σ = 27 MPa at 60°, " + "with a title that is much longer than the picture is wide " * 5
-    )
+    title = "Worst frame: σ = 27 MPa at 60°, " + "with a title that is much longer than the picture is wide " * 5
     write_picture(vtu, tmp_path / "picture.png", title)
     assert_shows_something(tmp_path / "picture.png")
     colours = pixels(tmp_path / "picture.png")
@@ -510,9 +496,7 @@ def drawn_beam(field: LinkField) -> Any:
     return bars(grid, heights(grid))
 
 
-@pytest.mark.parametrize(
-    ("round_", "area"), [(False, 0.1), (True, 12 * np.sin(np.pi / 12) / np.pi * 0.1 * np.pi / 4)]
-)
+@pytest.mark.parametrize(("round_", "area"), [(False, 0.1), (True, 12 * np.sin(np.pi / 12) / np.pi * 0.1 * np.pi / 4)])
 def test_beams_are_drawn_with_their_sections(round_: bool, area: float) -> None:
     """A rod and an arch of two elements: closed, section times length, height across it and thickness along z."""
     straight = drawn_beam(replace(rod(), section=(0.5, 0.2, round_)))
@@ -619,9 +603,7 @@ def test_the_highest_stress_is_cut_free_where_no_side_shows_it(tmp_path: Path) -
 
 
 def test_a_missing_frame(tmp_path: Path) -> None:
-    with pytest.raises(
-        OutputError, match=r"run_0000\.vtu: must be a frame of the animation, got no such file"
-    ):
+    with pytest.raises(OutputError, match=r"run_0000\.vtu: must be a frame of the animation, got no such file"):
         write_picture(tmp_path / "run_0000.vtu", tmp_path / "picture.png", "")
 
 
@@ -639,9 +621,7 @@ def test_a_machine_where_vtk_crashes(tmp_path: Path, monkeypatch: pytest.MonkeyP
     crash.write_text("#!/bin/sh\nkill -SEGV $$\n")
     crash.chmod(0o700)
     monkeypatch.setattr(sys, "executable", str(crash))
-    with pytest.raises(
-        OutputError, match=r"^picture: must be drawn by VTK, .*libEGL.*, got no window \(signal 11\)"
-    ):
+    with pytest.raises(OutputError, match=r"^picture: must be drawn by VTK, .*libEGL.*, got no window \(signal 11\)"):
         write_picture(vtu, tmp_path / "picture.png", "")
     assert not (tmp_path / "picture.png").exists()
 

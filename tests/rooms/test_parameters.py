@@ -154,9 +154,7 @@ def test_what_an_expression_comes_to(text: str, wanted: float, unit: str) -> Non
         ({"parameters": 3}, "parameters", ["table"]),
     ],
 )  # fmt: skip
-def test_a_fault_of_an_expression_is_told_at_its_place(
-    changes: dict[str, Any], where: str, words: list[str]
-) -> None:
+def test_a_fault_of_an_expression_is_told_at_its_place(changes: dict[str, Any], where: str, words: list[str]) -> None:
     found = [each.removeprefix(f"{where}: ") for each in faults(changes) if each.startswith(f"{where}: ")]
     assert len(found) == 1, faults(changes)
     at = 0
@@ -166,9 +164,7 @@ def test_a_fault_of_an_expression_is_told_at_its_place(
 
 def test_a_parameter_with_a_fault_is_named_where_it_is_used() -> None:
     found = faults({"parameters.r": "25 mmm"})
-    assert (
-        "links.arm.shape.between[1][0]: must be an expression, got '=20*r': parameters.r has a fault" in found
-    )
+    assert "links.arm.shape.between[1][0]: must be an expression, got '=20*r': parameters.r has a fault" in found
     assert all("'=" not in each or "must be an expression" in each or "parameters" in each for each in found)
 
 

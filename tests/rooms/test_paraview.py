@@ -58,9 +58,7 @@ def test_drives_are_arrows_at_their_joints(tmp_path: Path) -> None:
             "animation": {"frames": 3},
         }
         del output["animation"]
-        done = analyse(
-            scene_from({**raw, "output": output, "analysis": {**raw["analysis"], "accuracy": "quick"}})
-        )
+        done = analyse(scene_from({**raw, "output": output, "analysis": {**raw["analysis"], "accuracy": "quick"}}))
         _, files = read_collection(done.folder / "animation.pvd")[1]
         points = merged([path for path in files if path.name.startswith("joints")])
         sizes = np.linalg.norm(points.point_data[array], axis=1)
@@ -75,9 +73,7 @@ def test_the_state_names_what_is_there(folder: Path) -> None:
     _, files = read_collection(folder / "animation.pvd")[0]
     arrays = {name for path in files for name in merged([path]).point_data}
     assert {"von Mises [Pa]", "force [N]", "drive torque [N m]"} <= arrays
-    named = {
-        x for x in re.findall(r'"POINTS", "([^"]+)"', text) if "highest" not in x and "displacement" not in x
-    }
+    named = {x for x in re.findall(r'"POINTS", "([^"]+)"', text) if "highest" not in x and "displacement" not in x}
     assert named <= arrays
     peak = max(each.stress for each in results.peaks.values())
     assert f"RescaleTransferFunction(0.0, {peak}" in text
@@ -85,9 +81,7 @@ def test_the_state_names_what_is_there(folder: Path) -> None:
     assert f"size / {longest}" in text
 
 
-@pytest.mark.skipif(
-    not (shutil.which("pvpython") and shutil.which("xvfb-run")), reason="needs ParaView and xvfb"
-)
+@pytest.mark.skipif(not (shutil.which("pvpython") and shutil.which("xvfb-run")), reason="needs ParaView and xvfb")
 def test_paraview_opens_the_state(folder: Path, tmp_path: Path) -> None:
     """Each link a block with its name; a picture at the last time, with colours."""
     from PIL import Image
@@ -108,9 +102,7 @@ SaveScreenshot({str(tmp_path / "a.png")!r}, g["view"], ImageResolution=[800, 600
     )
     screen = ["xvfb-run", "-a", "-s", "-screen 0 1280x1024x24 +extension GLX"]
     for _ in range(3):  # a window that a busy machine's X server does not give ends ParaView at once
-        done = subprocess.run(
-            [*screen, "pvpython", str(shown)], capture_output=True, text=True, timeout=200, check=False
-        )
+        done = subprocess.run([*screen, "pvpython", str(shown)], capture_output=True, text=True, timeout=200, check=False)
         if "CreateAWindow" not in done.stderr:
             break
     assert done.returncode == 0, done.stderr[-2000:]

@@ -20,9 +20,7 @@ from tests.verification.meshes import box, mapped_mesh
 
 
 @pytest.mark.parametrize("model", ["beam", "solid", "plane"])
-def test_a_link_held_at_its_driven_joint_is_the_linkage_of_that_link_alone(
-    model: str, tmp_path: Path
-) -> None:
+def test_a_link_held_at_its_driven_joint_is_the_linkage_of_that_link_alone(model: str, tmp_path: Path) -> None:
     scene = scene_from(arm(model), tmp_path)
     whole = frequencies(scene, Wanted(modes=3, positions=1), tmp_path / "whole")
     found = part_frequencies(link_of_scene(scene, "arm", ["A"]), 3, tmp_path / "part")

@@ -88,9 +88,7 @@ def test_a_radial_engine_is_the_one_that_is_written_by_hand(tmp_path: Path) -> N
     assert set(found.channels) == set(expected.channels)
     for name, (_, value) in expected.channels.items():
         if name.startswith(("probes", "drive")):
-            assert_allclose(
-                found.channels[name][1], value, rtol=1e-9, atol=1e-12 * np.abs(value).max(), err_msg=name
-            )
+            assert_allclose(found.channels[name][1], value, rtol=1e-9, atol=1e-12 * np.abs(value).max(), err_msg=name)
 
 
 def written_out(pattern: Raw, **sections: Any) -> Any:
@@ -189,7 +187,5 @@ def test_a_cad_file_of_a_pattern_is_among_those_that_must_be_within_the_folder(t
 
 def test_a_name_with_a_number_must_be_free() -> None:
     arm = {**BEAM, "shape": {**SHAPE, "between": [[0, 0], [1, 0]]}}
-    with pytest.raises(
-        SceneError, match=r"patterns\.p\.links\.arm: must have a name that is free .* 'arm_2' twice"
-    ):
+    with pytest.raises(SceneError, match=r"patterns\.p\.links\.arm: must have a name that is free .* 'arm_2' twice"):
         written_out({"count": 2, "turn": 1.0, "links": {"arm": arm}}, links={"arm_2": arm})

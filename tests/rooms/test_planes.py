@@ -80,9 +80,7 @@ def test_quality_of_a_plane_mesh_is_that_of_the_solids(kind: str) -> None:
 
 
 def test_the_gate_holds_for_plane_meshes() -> None:
-    with pytest.raises(
-        MeshError, match=r"links.any: scaled Jacobian must be at least 0.99 everywhere, got 0\."
-    ):
+    with pytest.raises(MeshError, match=r"links.any: scaled Jacobian must be at least 0.99 everywhere, got 0\."):
         both("plate_link", min_quality=0.99)
 
 
@@ -149,9 +147,7 @@ def mixed(*fidelities: str, **analysis: Any) -> dict[str, Any]:
     return raw
 
 
-@pytest.mark.parametrize(
-    "kinds", [("plane", "beam", "solid"), ("solid", "plane", "beam"), ("beam", "solid", "plane")]
-)
+@pytest.mark.parametrize("kinds", [("plane", "beam", "solid"), ("solid", "plane", "beam"), ("beam", "solid", "plane")])
 def test_plane_links_beams_and_solids_share_a_scene(kinds: tuple[str, ...]) -> None:
     """Hinges close between rows of two and of three components; condensed is monolithic; pins stay upright."""
     model, _, fast = run(mixed(*kinds))
@@ -220,9 +216,7 @@ def test_a_guide_across_its_edge_is_refused() -> None:
     lower = np.array([-0.026, 0.0275])  # on the end of the skirt, which is across the guide
     raw["points"]["K"] = {"from": "C", "distance": np.hypot(*lower), "angle": np.arctan2(*lower[::-1])}
     raw["joints"]["guide"]["at"] = "K"
-    with pytest.raises(
-        KedfemError, match=r"joints.guide: must sit on a bore of link 'piston', or on an edge along"
-    ):
+    with pytest.raises(KedfemError, match=r"joints.guide: must sit on a bore of link 'piston', or on an edge along"):
         run(raw)
 
 
@@ -272,9 +266,7 @@ def test_gravity_forces_and_pressure_have_their_resultants() -> None:
     links = {link.name: (link, loads) for link, loads in zip(model.links, model.loads, strict=True)}
     bar, (gravity, push, tip, body) = links["bar"]
     density = scene.materials["steel"].density
-    assert_allclose(
-        gravity.forces.sum(axis=0), [0, -9.81 * density * 0.5 * 0.05 * 0.02], rtol=1e-12, atol=1e-12
-    )
+    assert_allclose(gravity.forces.sum(axis=0), [0, -9.81 * density * 0.5 * 0.05 * 0.02], rtol=1e-12, atol=1e-12)
     assert_allclose(push.forces.sum(axis=0), [2e6 * 0.05 * 0.02, 0], rtol=1e-12)
     assert_allclose(tip.forces.sum(axis=0), [3, 4], rtol=1e-12)
     assert_allclose(body.forces.sum(axis=0), [0, 100 * 0.5 * 0.05 * 0.02], rtol=1e-12, atol=1e-12)
@@ -310,9 +302,7 @@ def test_turning_the_whole_scene_turns_the_answer_and_offset_plates_are_only_dra
 def test_torque_of_stiff_plane_links_is_the_virtual_work_of_the_rigid_linkage() -> None:
     found = {}
     for factor in (1, 16):
-        raw = four_bar(
-            "plane", steps_per_revolution=120, revolutions=0.5, initial="quasi-static", rho_inf=0.8
-        )
+        raw = four_bar("plane", steps_per_revolution=120, revolutions=0.5, initial="quasi-static", rho_inf=0.8)
         raw["drive"]["motion"]["speed"] = "60 rpm"
         for key in ("youngs_modulus", "shear_modulus"):
             raw["materials"]["alloy"][key] *= factor
@@ -368,9 +358,7 @@ def test_vtk_takes_9_nodes_in_our_order(tmp_path: Path) -> None:
 
     flat, _ = both("extrusion")
     stress = np.zeros((len(flat.points), 6))
-    field = LinkField(
-        "u", "quad9", flat.cells, flat.points, 0 * flat.points, stress, stress[:, 0], stress[:, :2]
-    )
+    field = LinkField("u", "quad9", flat.cells, flat.points, 0 * flat.points, stress, stress[:, 0], stress[:, :2])
     vtu = tmp_path / "frame.vtu"
     write_frame(vtu, 0.0, [field])
     grid = pyvista.read(vtu)
@@ -387,9 +375,7 @@ def test_plane_links_in_one_plane_are_drawn_one_above_the_other(tmp_path: Path) 
 
     flat, _ = both("bar")
     stress = np.zeros((len(flat.points), 6))
-    one = LinkField(
-        "one", "quad9", flat.cells, flat.points, 0 * flat.points, stress, stress[:, 0], stress[:, :2]
-    )
+    one = LinkField("one", "quad9", flat.cells, flat.points, 0 * flat.points, stress, stress[:, 0], stress[:, :2])
     vtu = tmp_path / "frame.vtu"
     write_frame(vtu, 0.0, [one, replace(one, name="two")])
     grid = pyvista.read(vtu)

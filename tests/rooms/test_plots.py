@@ -38,10 +38,7 @@ def test_efforts_of_several_drives_are_in_one_panel_and_limbs_in_one_for_each_ki
     scene = json.dumps({"joints": {name: {"kind": kind, "at": [0, 0, 0]} for name, kind in kinds.items()}})
     values = {f"joints/{name}/force": (k + 10.0) * np.ones((5, 3)) for k, name in enumerate(kinds)}
     values |= {f"drive/slide_{k}/force": (k + 10.0) * np.ones((5, 1)) for k in range(6)}
-    channels = {
-        name: (Channel(name, ("x", "y", "z")[: y.shape[1]], "N", "world", name), y)
-        for name, y in values.items()
-    }
+    channels = {name: (Channel(name, ("x", "y", "z")[: y.shape[1]], "N", "world", name), y) for name, y in values.items()}
     every = worth_drawing(Results(time, time, channels, "complete", scene))
     pages = {x.name: x.panels[0] for x in every if x.together}
     assert list(pages) == [*(f"joint_forces-{kind}" for kind in LIMBS.values()), "drive_forces"]
@@ -116,9 +113,7 @@ def test_static_positions_are_drawn_over_the_drive() -> None:
     [("travel", [3.0, 4, 0], False), ("displacement", [0.1, 4, 0], False), ("displacement", [3, 4, 0], True),
      ("position", [3, 4, 0], False), ("force", [3, 4, 0], True), ("force", [0, -4, 0.2], False)],
 )  # fmt: skip
-def test_magnitudes_are_drawn_where_they_tell_more_than_a_component(
-    quantity: str, rows: list[float], told: bool
-) -> None:
+def test_magnitudes_are_drawn_where_they_tell_more_than_a_component(quantity: str, rows: list[float], told: bool) -> None:
     channel = Channel(f"probes/p/{quantity}", ("x", "y", "z"), "m", "world", quantity)
     time = np.linspace(0.0, 1.0, 3)
     values = np.outer(time, rows)

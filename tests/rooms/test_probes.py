@@ -85,9 +85,7 @@ QUANTITIES = ("displacement", "position", "travel", "total_velocity", "total_acc
 def test_rigid_and_elastic_motion_add_up_on_links_of_every_kind(kind: str, frames: str) -> None:
     at = {"crank": [0.02, 0.07], "coupler": [L / 3, 0.1], "rocker": [L, 0.03]}
     probes = {
-        f"{link} {quantity}": probe(link, X, quantity, frame="world")
-        for link, X in at.items()
-        for quantity in QUANTITIES
+        f"{link} {quantity}": probe(link, X, quantity, frame="world") for link, X in at.items() for quantity in QUANTITIES
     } | {f"{link} end": probe(link, "B" if link == "crank" else "C", "position") for link in at}
     probes["coupler start"] = probe("coupler", "B", "position")
     done, read = probed(four_bar(kind, frames, probes, initial="quasi-static"))
@@ -103,10 +101,7 @@ def test_rigid_and_elastic_motion_add_up_on_links_of_every_kind(kind: str, frame
             near = 0.02 * np.abs(rate).max()
             np.testing.assert_allclose(difference[20:], rate[1:-1][20:], atol=near)
     assert not values(read, "crank displacement", "displacement").any()  # prescribed: it is the rigid motion
-    ends = [
-        values(read, f"{link}", "position")
-        for link in ("crank end", "coupler start", "coupler end", "rocker end")
-    ]
+    ends = [values(read, f"{link}", "position") for link in ("crank end", "coupler start", "coupler end", "rocker end")]
     n = min(x.shape[1] for x in ends)
     near = 1e-9 if frames == "rigid-body" else 1e-8
     np.testing.assert_allclose(ends[0][:, :n], ends[1][:, :n], atol=near)  # joints hold them together
@@ -147,8 +142,7 @@ def test_a_rigid_motion_of_any_size_deflects_nothing(kind: str, segments: int, j
     raw = {
         "points": {"A": [0.1, 0.2], "B": [0.1 + L, 0.25]},
         "links": {"arm": bar(["A", "B"], **shape), "end": bar(["B", "A"], **LINKS[kind])},
-        "joints": {"A": hinge("A", "ground", "arm")}
-        | ({"B": hinge("B", "arm", "end")} if joints == 2 else {}),
+        "joints": {"A": hinge("A", "ground", "arm")} | ({"B": hinge("B", "arm", "end")} if joints == 2 else {}),
         "analysis": {"end_time": 1e-3, "step": 5e-4},
         "output": {
             "probes": {

@@ -104,16 +104,12 @@ def test_a_part_that_hangs_as_it_is_read_is_tried_in_three_processes(tmp_path: P
     file.write_text("")
     assert apart("part", PART, LONGEST, reading, file, 2) == 3
     file.write_text("")
-    with pytest.raises(
-        MeshError, match=r"^part: must be a part .*, got one that they had not read in time; mend"
-    ):
+    with pytest.raises(MeshError, match=r"^part: must be a part .*, got one that they had not read in time; mend"):
         apart("part", PART, LONGEST, reading, file, 9)
     assert file.read_text() == "xxx"
 
 
-def test_a_part_that_breaks_down_after_a_rest_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_part_that_breaks_down_after_a_rest_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The process that waited has ended by then; that of the next one's end is seen too."""
     monkeypatch.setattr("kedfem.mesh.isolated.IDLE", 0.2)
     monkeypatch.setattr("kedfem.mesh.isolated.PATIENCE", 60)
@@ -134,15 +130,11 @@ def together(here: Path, other: Path) -> int:
     return os.getpid()
 
 
-def test_two_pieces_of_work_are_done_at_once_in_two_processes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_two_pieces_of_work_are_done_at_once_in_two_processes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OMP_NUM_THREADS", "2")
     one, other = tmp_path / "one", tmp_path / "other"
     works = {"a": (one, other), "b": (other, one)}
-    found = side_by_side(
-        {name: partial(apart, "part", PART, LONGEST, together, *files) for name, files in works.items()}
-    )
+    found = side_by_side({name: partial(apart, "part", PART, LONGEST, together, *files) for name, files in works.items()})
     assert list(found) == ["a", "b"]
     assert found["a"] != found["b"]
     assert os.getpid() not in found.values()
@@ -167,9 +159,7 @@ def test_what_goes_on_beside_a_mistake_is_ended_and_what_has_not_begun_is_left(
     works = {"first": (wrong, begun), "second": (waiting, begun), "third": (waiting, never)}
     since = time.monotonic()
     with pytest.raises(MeshError, match=r"^wrong$"):
-        side_by_side(
-            {name: partial(apart, "part", PART, LONGEST, work, file) for name, (work, file) in works.items()}
-        )
+        side_by_side({name: partial(apart, "part", PART, LONGEST, work, file) for name, (work, file) in works.items()})
     assert time.monotonic() - since < 60.0
     assert within(10.0, lambda: not alive(int(begun.read_text())))
     assert apart("part", PART, LONGEST, abs, -4) == 4
@@ -320,24 +310,18 @@ def test_drawing_scripts_end_with_their_parent() -> None:
 @pytest.mark.parametrize(
     ("given", "threads"), [({}, "1"), ({"OMP_NUM_THREADS": "3"}, None), ({"OPENBLAS_NUM_THREADS": "2"}, "2")]
 )
-def test_the_command_line_gives_blas_one_thread_before_it_is_loaded(
-    given: dict[str, str], threads: str | None
-) -> None:
+def test_the_command_line_gives_blas_one_thread_before_it_is_loaded(given: dict[str, str], threads: str | None) -> None:
     told = (
         "import atexit, os, sys; import kedfem.cli; before = 'numpy' in sys.modules\n"
         "atexit.register(lambda: print(before, os.environ.get('OPENBLAS_NUM_THREADS')))\n"
         "sys.argv = ['kedfem', '--help']; kedfem.cli.main()"
     )
     free = {name: value for name, value in os.environ.items() if name not in BLAS_THREADS}
-    done = subprocess.run(
-        [sys.executable, "-c", told], env=free | given, capture_output=True, text=True, check=True
-    )
+    done = subprocess.run([sys.executable, "-c", told], env=free | given, capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == f"False {threads}"
 
 
 def test_what_nothing_uses_is_loaded_when_it_is_used() -> None:
     """scipy loads all that numpy has."""
-    said = subprocess.run(
-        [sys.executable, "-c", QUICK], capture_output=True, text=True, check=True, timeout=60
-    )
+    said = subprocess.run([sys.executable, "-c", QUICK], capture_output=True, text=True, check=True, timeout=60)
     assert said.stdout.strip() == str(["_LazyModule"] * len(UNUSED))

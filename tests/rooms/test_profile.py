@@ -24,9 +24,7 @@ def chain(n: int, rng: np.random.Generator) -> tuple[Profile, np.ndarray, np.nda
     return profile_of(bodies, groups, EACH * n), H, C
 
 
-def solution(
-    of: Profile, H: np.ndarray, C: np.ndarray, compliance: np.ndarray, right: np.ndarray
-) -> np.ndarray:
+def solution(of: Profile, H: np.ndarray, C: np.ndarray, compliance: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Unknowns and multipliers by the profile, in the order of H and C."""
     k = len(H)
     row = np.concatenate([of.unknown[of.number], of.constraint])

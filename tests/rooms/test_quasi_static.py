@@ -18,9 +18,7 @@ def arm(part: float) -> dict[str, Any]:
         "links": {"arm": bar("beam", (0, 0), (0.5, 0), 4)},
         "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": part * first}},
-        "loads": {
-            "P": {"kind": "force", "link": "arm", "at": [0.5, 0], "vector": [0, 10.0], "frame": "link"}
-        },
+        "loads": {"P": {"kind": "force", "link": "arm", "at": [0.5, 0], "vector": [0, 10.0], "frame": "link"}},
         "analysis": {"revolutions": 1, "steps_per_revolution": 2000, "initial": "quasi-static"},
     }
 

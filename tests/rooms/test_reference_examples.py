@@ -30,11 +30,7 @@ def merged(scene: dict[str, object], change: Mapping[str, object]) -> dict[str, 
     """A scene with the tables of an example; a table of another kind replaces the whole one."""
     for key, value in change.items():
         old = scene.get(key)
-        same = (
-            isinstance(old, dict)
-            and isinstance(value, dict)
-            and old.get("kind") == value.get("kind", old.get("kind"))
-        )
+        same = isinstance(old, dict) and isinstance(value, dict) and old.get("kind") == value.get("kind", old.get("kind"))
         scene[key] = merged(old, value) if same else value  # type: ignore[arg-type]
     return scene
 

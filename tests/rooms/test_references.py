@@ -72,18 +72,14 @@ def read(record, which):  # type: ignore[no-untyped-def]
     total = record.h if record.whether else -record.h
     if which == 1:
         return total + record.a[2, 1] + record.place[1][0] + record.inside.numbers[1, 0, 1] + record.rates[2]
-    return (
-        total + record.count + record.last[-1] + record.inside.flag[1] + record.place[0][3] + len(record.last)
-    )
+    return total + record.count + record.last[-1] + record.inside.flag[1] + record.place[0][3] + len(record.last)
 
 
 def test_a_record_is_handed_on_as_it_is() -> None:
     x = np.random.default_rng(1).standard_normal((8, 5))
     for whether in (True, False):
         inside = Inside(x.reshape(2, 4, 5), np.array([3, 4, 5]))
-        record = Record(
-            x[:4, :3], 0.5, (x[0], x[:, 1].copy()), whether, inside, (1.0, 2.0, 4.0), 7, np.arange(4.0)
-        )
+        record = Record(x[:4, :3], 0.5, (x[0], x[:, 1].copy()), whether, inside, (1.0, 2.0, 4.0), 7, np.arange(4.0))
         for which in (1, 2):
             assert read(handed(record), which) == read.py_func(record, which)
     assert handed(None) is None

@@ -148,9 +148,7 @@ def test_beams_are_drawn_with_their_sections_where_frames_have_them(lines: Path)
             cells = np.flatnonzero(grid.cell_data["link"] == int(grid.field_data[f"link {surface.name}"][0]))
             part = grid.extract_cells(cells)
             tree = KDTree(bars(part, heights(part)).points)
-            assert (
-                tree.query(list(surface.world())[k + 1])[0].max() < 2e-6 * part.length
-            )  # corners are merged
+            assert tree.query(list(surface.world())[k + 1])[0].max() < 2e-6 * part.length  # corners are merged
 
 
 def test_large_models_are_thinned_and_say_so(solid: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -195,9 +193,7 @@ def test_mass_properties_are_those_of_a_box(axis: list[float], tmp_path: Path) -
     }  # fmt: skip
     across = np.cross(e, [0.3, 0.9, -0.2])
     raw = arm(link, cycloidal(1.0, 0.1), analysis=TIMES, output=output())
-    raw["joints"] = {
-        "A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0, 0], "axis": list(across)}
-    }
+    raw["joints"] = {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0, 0], "axis": list(across)}}
     ready = meshed(scene_from(raw, tmp_path))
     found = modelled(ready.scene, ready.linkage, ready.model)["arm"]
     m, (a, b, c) = 7850 * 0.4 * 0.03 * 0.02, (0.4, 0.03, 0.02)
@@ -325,9 +321,7 @@ def test_rigid_motions_have_a_page_too(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("package", ["k3d", "jinja2"])
-def test_a_missing_package_is_told_before_the_run(
-    package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_missing_package_is_told_before_the_run(package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, package, None)
     with pytest.raises(OutputError, match=rf"output.report: needs {package}.*pip install 'kedfem\[report\]'"):
         run(swung(report=True), tmp_path)
@@ -430,9 +424,7 @@ def test_natural_frequencies_are_shown_where_they_are_of_the_same_scene(tmp_path
 def test_a_moment_names_the_drives_position_where_there_is_one_drive(drives: int, told: str) -> None:
     """Of several drives results have the position of the first alone."""
     drive = {"joint": "A"}
-    scene = (
-        {"drive": drive, "drives": {}} if drives == 1 else {"drive": None, "drives": {"A": drive, "B": drive}}
-    )
+    scene = {"drive": drive, "drives": {}} if drives == 1 else {"drive": None, "drives": {"A": drive, "B": drive}}
     results = Results(np.zeros(1), np.zeros(1), {}, "complete", "{}", drive=TRAVEL)
     assert moment_told(scene, results, 0.5, 0.02) == told
 

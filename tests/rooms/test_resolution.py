@@ -24,9 +24,7 @@ from tests import scenes
 from tests.scenes import bar, constant_speed, material
 
 L, B, H, E, RHO = 0.5, 0.02, 0.01, 2.1e11, 7850.0  # an arm [m], B along z, of steel
-FIRST = (
-    1.8751040687**2 / (2 * np.pi * L**2) * np.sqrt(E * H**2 / 12 / RHO)
-)  # Euler-Bernoulli's cantilever [Hz]
+FIRST = 1.8751040687**2 / (2 * np.pi * L**2) * np.sqrt(E * H**2 / 12 / RHO)  # Euler-Bernoulli's cantilever [Hz]
 
 
 def arm(model: str, **analysis: Any) -> dict[str, Any]:
@@ -48,9 +46,7 @@ def test_an_arm_vibrates_as_a_cantilever(model: str, reduced: bool) -> None:
         raw["links"]["arm"]["reduction"] = 12
     found = resolution(prepared(scene_from(raw))[0])
     assert found is not None
-    assert_allclose(
-        found.first, FIRST, rtol=0.01
-    )  # shear, and the mean held at the root instead of all of it
+    assert_allclose(found.first, FIRST, rtol=0.01)  # shear, and the mean held at the root instead of all of it
 
 
 def test_steps_in_a_period_are_counted_and_too_few_are_said() -> None:
@@ -62,9 +58,9 @@ def test_steps_in_a_period_are_counted_and_too_few_are_said() -> None:
         assert_allclose(found.steps_per_period, per_period, rtol=0.02)
         assert ["steps in a period" in x for x in resolution_warnings(found)] == [True] * said
         assert not resolution_warnings(found, 0.002)  # what it does not follow is that little
-        assert [
-            "error is estimated to be 10 %: vibration is not" in x for x in resolution_warnings(found, 0.1)
-        ] == [True] * said
+        assert ["error is estimated to be 10 %: vibration is not" in x for x in resolution_warnings(found, 0.1)] == [
+            True
+        ] * said
 
 
 def test_a_harmonic_that_meets_the_first_frequency_is_said() -> None:
@@ -114,6 +110,4 @@ def test_error_of_a_step_is_that_of_a_swinging_mass(rho_inf: float) -> None:
         watcher.add(block)
     theta = (1 - rho_inf) / (1 + rho_inf)  # |α_m − α_f|
     wanted = (2 * np.pi / 40) ** 3 * (1 + 3 * theta**2) / 12 / 2
-    assert_allclose(
-        watcher.relative, wanted, rtol=0.05
-    )  # the arm's own mass, and 40 steps see no maximum exactly
+    assert_allclose(watcher.relative, wanted, rtol=0.05)  # the arm's own mass, and 40 steps see no maximum exactly

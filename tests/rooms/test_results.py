@@ -48,9 +48,7 @@ STRESS = Channel(
 FORCE = Channel("joints/B/force", ("x", "y", "z"), "N", "world", "force on coupler at B")
 TORQUE = Channel("drive/torque", ("torque",), "N m", "", "torque of the drive")
 CHANNELS = [STRESS, FORCE, TORQUE]
-SCENE_TOML = (
-    'title = "Größe"\n' + "# a table of a motion law\n" * 4000
-)  # above the 64 kB of an HDF5 attribute
+SCENE_TOML = 'title = "Größe"\n' + "# a table of a motion law\n" * 4000  # above the 64 kB of an HDF5 attribute
 NOTES = {"solver": "condensed", "factorisations": 3, "alpha": 0.25}
 
 
@@ -74,9 +72,7 @@ def write(path: Path, *blocks: int) -> None:
 
 def run(code: str, *arguments: Path) -> "subprocess.CompletedProcess[str]":
     """Python code in a process of its own."""
-    return subprocess.run(
-        [sys.executable, "-c", code, *map(str, arguments)], capture_output=True, text=True, check=False
-    )
+    return subprocess.run([sys.executable, "-c", code, *map(str, arguments)], capture_output=True, text=True, check=False)
 
 
 def test_what_is_written_is_read(tmp_path: Path) -> None:
@@ -104,15 +100,11 @@ def test_what_was_read_cannot_be_changed(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("row", [0, 3])
-def test_a_value_that_is_not_finite_stops_the_run_with_its_channel(
-    tmp_path: Path, value: float, row: int
-) -> None:
+def test_a_value_that_is_not_finite_stops_the_run_with_its_channel(tmp_path: Path, value: float, row: int) -> None:
     path = tmp_path / "results.h5"
     time, angle, values = rows(4, 5)
     values[FORCE.name][row:, 1] = value
-    with pytest.raises(
-        SolveError, match=f"joints/B/force: must be finite, got {value:g} at t = {time[row]:g} s"
-    ):
+    with pytest.raises(SolveError, match=f"joints/B/force: must be finite, got {value:g} at t = {time[row]:g} s"):
         stopped(path, time, angle, values)
     read = read_results(path)
     assert (read.status, len(read.time)) == ("interrupted", 4 + row)
@@ -307,9 +299,7 @@ def test_a_killed_run_is_not_complete_and_keeps_its_rows(tmp_path: Path) -> None
 def test_a_block_that_was_cut_short_leaves_no_rows(tmp_path: Path) -> None:
     path = tmp_path / "results.h5"
     time, angle, values = rows(4, 3)
-    values[TORQUE.name] = np.full(
-        (3, 1), "words"
-    )  # refused by HDF5 after the channels before it were written
+    values[TORQUE.name] = np.full((3, 1), "words")  # refused by HDF5 after the channels before it were written
 
     def cut_short() -> None:
         with writer(path) as results:
@@ -319,9 +309,7 @@ def test_a_block_that_was_cut_short_leaves_no_rows(tmp_path: Path) -> None:
     with pytest.raises((TypeError, ValueError)):
         cut_short()
     with h5py.File(path, "r") as file:
-        assert {
-            len(file[name]) for name in (STRESS.name, FORCE.name, TORQUE.name, "time", "drive_angle")
-        } == {4}
+        assert {len(file[name]) for name in (STRESS.name, FORCE.name, TORQUE.name, "time", "drive_angle")} == {4}
 
 
 def test_a_run_that_fails_before_its_first_rows_leaves_the_old_results(tmp_path: Path) -> None:
@@ -354,9 +342,7 @@ def test_wrong_blocks_are_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "posix_fallocate"), reason="asks for space in another way")
-def test_a_full_disk_stops_the_run_and_keeps_its_rows(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_stops_the_run_and_keeps_its_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "results.h5"
 
     def full(*_: int) -> None:
@@ -368,9 +354,7 @@ def test_a_full_disk_stops_the_run_and_keeps_its_rows(
             monkeypatch.setattr(os, "posix_fallocate", full)
             results.append(*rows(4, 4))
 
-    with pytest.raises(
-        OutputError, match=r"results\.h5: must be a file that can be written, got No space left"
-    ):
+    with pytest.raises(OutputError, match=r"results\.h5: must be a file that can be written, got No space left"):
         filled()
     read = read_results(path)
     assert (read.status, len(read.time)) == ("interrupted", 4)
@@ -378,9 +362,7 @@ def test_a_full_disk_stops_the_run_and_keeps_its_rows(
 
 def test_two_runs_cannot_write_the_same_file(tmp_path: Path) -> None:
     path = tmp_path / "results.h5"
-    code = (
-        "import sys; from kedfem.results import *\nwith ResultsWriter(sys.argv[1], [], '{}', None, {}): pass"
-    )
+    code = "import sys; from kedfem.results import *\nwith ResultsWriter(sys.argv[1], [], '{}', None, {}): pass"
     with writer(path) as results:
         results.append(*rows(0, 1))
         second = run(code, path)
@@ -398,9 +380,7 @@ def test_a_writer_that_is_refused_leaves_the_files_of_others(tmp_path: Path, cou
         "    w.append(np.zeros(1), np.zeros(1), {'a/b': np.zeros((1, 1))})\n"
     )
     command, pipe = [sys.executable, "-c", code, str(path)], subprocess.PIPE
-    others = [
-        subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) for _ in range(count)
-    ]
+    others = [subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) for _ in range(count)]
     with writer(path) as first:
         assert [each.stdout and each.stdout.readline() for each in others] == ["open\n"] * count
         first.append(*rows(0, 4))
@@ -529,9 +509,7 @@ def test_what_is_no_results_file_is_refused(tmp_path: Path, spoil, message: str)
 def test_a_file_in_the_way_of_the_folder(tmp_path: Path, below: str) -> None:
     (tmp_path / "taken").write_text("mine")
     folder = tmp_path / "taken" / below
-    message = (
-        r"^output\.folder: must be a writable folder, got .*taken is a file: move it, or name another folder"
-    )
+    message = r"^output\.folder: must be a writable folder, got .*taken is a file: move it, or name another folder"
     with pytest.raises(OutputError, match=message):
         ready_folder(folder)
     with pytest.raises(OutputError, match=message):
@@ -570,9 +548,7 @@ def test_a_folder_that_takes_no_files(tmp_path: Path, code: int, monkeypatch: py
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere")
 def test_a_folder_without_permission(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
-    with pytest.raises(
-        OutputError, match=r"^output\.folder: must be a writable folder, got .*Permission denied"
-    ):
+    with pytest.raises(OutputError, match=r"^output\.folder: must be a writable folder, got .*Permission denied"):
         ready_folder(tmp_path)
 
 

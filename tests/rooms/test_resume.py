@@ -107,9 +107,7 @@ def assert_same(one: dict[str, Any], other: dict[str, Any]) -> None:
         assert one[key] == other[key], key
 
 
-@pytest.mark.parametrize(
-    "loop", [pytest.param(loop, marks=() if loop in CHEAP else pytest.mark.long) for loop in LOOPS]
-)
+@pytest.mark.parametrize("loop", [pytest.param(loop, marks=() if loop in CHEAP else pytest.mark.long) for loop in LOOPS])
 def test_a_resumed_run_leaves_what_an_undisturbed_one_does_bit_by_bit(tmp_path: Path, loop: str) -> None:
     kind, analysis = LOOPS[loop]
     whole = content(analyse(scene_of(kind, tmp_path / "whole", analysis)))
@@ -180,9 +178,7 @@ def test_poses_that_return_are_found_again(tmp_path: Path, at: float, points: in
     assert_same(whole, content(analyse(turning(tmp_path / "ended"), resumes=True)))
 
 
-def test_the_envelope_goes_on_with_the_modes_that_it_had(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_envelope_goes_on_with_the_modes_that_it_had(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Looked at after so few steps that there are modes, and steps that wait, in the state."""
     monkeypatch.setattr(envelope, "STEPS", 20)
     whole = content(analyse(turning(tmp_path / "whole")))
@@ -220,9 +216,7 @@ def test_a_run_that_is_ended_twice_goes_on_twice(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changed", "key"), [({"revolutions": 3}, "analysis.revolutions"), ({"rho_inf": 0.5}, "analysis.rho_inf")]
 )
-def test_another_scene_is_refused_with_the_key_that_differs(
-    tmp_path: Path, changed: dict[str, Any], key: str
-) -> None:
+def test_another_scene_is_refused_with_the_key_that_differs(tmp_path: Path, changed: dict[str, Any], key: str) -> None:
     ended_early(turning(tmp_path), 0.5)
     before = read_results(turning(tmp_path).results_folder / "results.h5")
     with pytest.raises(SceneError, match=rf"^{key}: must be .*, got "):
@@ -239,9 +233,7 @@ def test_another_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_without_a_state_nothing_is_resumed(tmp_path: Path) -> None:
-    with pytest.raises(
-        OutputError, match=r"state\.kept: must be the stored state of a run, got nothing there"
-    ):
+    with pytest.raises(OutputError, match=r"state\.kept: must be the stored state of a run, got nothing there"):
         analyse(turning(tmp_path), resumes=True)
     run = analyse(turning(tmp_path))
     with pytest.raises(OutputError, match="the run is complete"):
@@ -317,9 +309,7 @@ def test_what_was_packed_comes_back() -> None:
     assert back["b"][1] == {"k": 0.1, 3: "x"}
 
 
-def test_what_cannot_be_stored_is_no_fault_of_the_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_cannot_be_stored_is_no_fault_of_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(path: Path) -> Any:
         raise OutputError(f"{path}: must be a file that can be written, got No space left on device")
 

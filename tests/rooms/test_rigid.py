@@ -25,9 +25,7 @@ def scene(kind: str, rigid: tuple[str, ...] = (), stiff: tuple[str, ...] = ()) -
     raw["points"]["P"] = {"between": ["A", "B"], "fraction": 0.6}
     raw["gravity"] = [0, -9.81, 0]
     raw["materials"]["hard"] = {"density": 2796, "youngs_modulus": 7.031e15, "shear_modulus": 2.712e15}
-    raw["loads"] = {
-        "pull": {"kind": "force", "link": "crank", "at": "P", "vector": [3, 20, 0], "frame": "world"}
-    }
+    raw["loads"] = {"pull": {"kind": "force", "link": "crank", "at": "P", "vector": [3, 20, 0], "frame": "world"}}
     raw["bodies"] = {"wheel": {"kind": "flywheel", "link": "crank", "at": "A", "inertia": 0.01, "mass": 0.2}}
     for name in rigid:
         raw["links"][name]["model"] = "rigid"

@@ -61,9 +61,7 @@ def test_too_many_unknowns_asked_for_are_refused_before_they_are_made(
         "thickness": 0.02,
         "bore_diameter": 0.05,
     }
-    with pytest.raises(
-        MeshError, match=r"links\.arm: must fit in this machine's memory of 0\.2 GB, got about"
-    ):
+    with pytest.raises(MeshError, match=r"links\.arm: must fit in this machine's memory of 0\.2 GB, got about"):
         build.bare_link(arm(shape=shape, mesh={"unknowns": 400_000}), "arm")
 
 
@@ -72,9 +70,7 @@ def test_the_forecast_is_below_the_count_that_is_made(monkeypatch: pytest.Monkey
     for element in ("hex8", "hex20", "hex27", "tet10"):
         said: list[float] = []
         monkeypatch.setattr(link, "check_room", lambda where, count, *_, said=said: said.append(count))
-        made = link.link_mesh(
-            "arm", arm(element=element, mesh={"elements": [20, 12, 10]}).links["arm"], Path()
-        )
+        made = link.link_mesh("arm", arm(element=element, mesh={"elements": [20, 12, 10]}).links["arm"], Path())
         assert said[1] == 3 * len(made.points)
         assert 0.75 * said[1] < said[0] <= said[1]
 

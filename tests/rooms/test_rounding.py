@@ -124,9 +124,7 @@ def efforts(run: Ran) -> dict[str, np.ndarray]:
 def true_error(run: Ran, reference: Ran) -> float:
     """Of the worst channel of joint forces and torque, of its largest value."""
     found = efforts(run)
-    return max(
-        float(np.abs(found[name] - x).max() / np.abs(x).max()) for name, x in efforts(reference).items()
-    )
+    return max(float(np.abs(found[name] - x).max() / np.abs(x).max()) for name, x in efforts(reference).items())
 
 
 def honest(runs: list[Ran], reference: Ran, each: int = 1) -> None:

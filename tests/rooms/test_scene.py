@@ -144,12 +144,8 @@ lengths = st.floats(0.1, 10.0)
 @given(st.floats(-5, 5), st.floats(-5, 5), lengths, lengths, st.floats(0.01, 0.99))
 def test_circles_that_meet_are_met_at_their_radii(x, y, a, b, part):
     apart = abs(a - b) + part * (a + b - abs(a - b))
-    points = with_points(
-        {"P": [x, y, 2], "Q": [x + apart, y, 2], "R": {"from": ["P", "Q"], "distances": [a, b]}}
-    )
-    assert_allclose(
-        math.dist(points["R"], points["P"]), a, rtol=1e-9
-    )  # cancellation where circles nearly touch
+    points = with_points({"P": [x, y, 2], "Q": [x + apart, y, 2], "R": {"from": ["P", "Q"], "distances": [a, b]}})
+    assert_allclose(math.dist(points["R"], points["P"]), a, rtol=1e-9)  # cancellation where circles nearly touch
     assert_allclose(math.dist(points["R"], points["Q"]), b, rtol=1e-9)
     assert points["R"][1] > y
     assert points["R"][2] == 2
@@ -193,8 +189,7 @@ def test_materials_hold_all_moduli():
 
 def test_a_material_of_the_scene_replaces_a_built_in_one(tmp_path):
     own = "".join(
-        f"[materials.{name}]\ndensity = 1\nyoungs_modulus = 1\npoisson_ratio = 0\n"
-        for name in ("steel", "spare")
+        f"[materials.{name}]\ndensity = 1\nyoungs_modulus = 1\npoisson_ratio = 0\n" for name in ("steel", "spare")
     )
     scene = read_scene(arm(tmp_path, own))
     assert scene.materials["steel"].density == 1.0
@@ -230,11 +225,7 @@ def test_a_scene_from_records_is_the_scene_from_its_file(tmp_path):
     A, B = (0, 0), (0.3, 0)
     records = Scene(
         points={"A": A, "B": B},
-        links={
-            "arm": LinkScene(
-                model="beam", material="steel", shape=Bar(between=(A, B), width=0.01, thickness=0.01)
-            )
-        },
+        links={"arm": LinkScene(model="beam", material="steel", shape=Bar(between=(A, B), width=0.01, thickness=0.01))},
         joints={"A": Joint(kind="revolute", links=("ground", "arm"), at=A)},
         drive=Drive(joint="A", motion=ConstantSpeed(speed=10)),
         analysis=Analysis(revolutions=1),

@@ -23,9 +23,7 @@ def test_tables_are_as_wide_as_they_are_in_a_pipe(monkeypatch: pytest.MonkeyPatc
         assert ("x" * 90 in console.file.getvalue()) is whole
 
 
-def test_progress_in_a_pipe_is_lines(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_progress_in_a_pipe_is_lines(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(screen, "QUIET", 0.0)
     with screen.progress() as watch:
         watch("motion", 0, 0)

@@ -93,9 +93,7 @@ def test_beams_with_frames_that_follow_stay_in_full() -> None:
 def test_reduced_links_need_a_motion_that_the_drive_prescribes() -> None:
     link = bar(1, model="plane", reduction="modal", mesh={"elements": [4, 1]})
     raw = arm(link, None, analysis={"end_time": 0.1, "step": 0.01})
-    with pytest.raises(
-        SceneError, match=r"links\.arm\.reduced: must be left out where motions are free .*, got 1 free"
-    ):
+    with pytest.raises(SceneError, match=r"links\.arm\.reduced: must be left out where motions are free .*, got 1 free"):
         prepared(scene_from(raw))
 
 
@@ -258,9 +256,7 @@ def test_only_links_with_rigid_body_frames_have_a_geometric_error() -> None:
     raw["links"]["rocker"].pop("segments")
     found = ready(raw)
     error, alone = GeometricError(found.model), 0.0
-    for block in transient(
-        found.scene, found.linkage, found.path, found.model, steps_of(found.scene, found.model)
-    ):
+    for block in transient(found.scene, found.linkage, found.path, found.model, steps_of(found.scene, found.model)):
         error.add(block)
         alone = max(alone, float(block.links[-1].strain.max()))
     assert found.model.links[-1].name == "rocker"
@@ -271,8 +267,6 @@ def test_only_links_with_rigid_body_frames_have_a_geometric_error() -> None:
 def test_a_mechanism_that_follows_everywhere_has_none() -> None:
     found = ready(bars(3, segments=3))
     error = GeometricError(found.model)
-    for block in transient(
-        found.scene, found.linkage, found.path, found.model, steps_of(found.scene, found.model)
-    ):
+    for block in transient(found.scene, found.linkage, found.path, found.model, steps_of(found.scene, found.model)):
         error.add(block)
     assert (error.axial, error.strain, error.estimate) == (0.0, 0.0, 0.0)

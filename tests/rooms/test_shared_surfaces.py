@@ -99,9 +99,7 @@ def test_recorded_forces_at_a_ternary_pin_balance_every_link(kind: str) -> None:
             # Newton's second law of the whole link: Σ joints + Σ (P − M R0'') = Σ M δ''
             force = sum(sign * row[f"joints/{j}/force"] for j, sign in acting[link.name].items())
             size = np.abs(s.F).sum()
-            assert_allclose(
-                force, (mass_times(link.mass, s.a) - s.F).sum(axis=0) * plane, rtol=0, atol=1e-8 * size
-            )
+            assert_allclose(force, (mass_times(link.mass, s.a) - s.F).sum(axis=0) * plane, rtol=0, atol=1e-8 * size)
             total = s.R @ (port_vectors(joint, s.port_forces) * plane).sum(axis=0)
             assert_allclose(total, force, rtol=0, atol=1e-8 * size)
         for hinge in ("C", "pin"):

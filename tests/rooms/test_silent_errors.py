@@ -62,9 +62,7 @@ def test_steps_at_an_eased_tolerance_are_counted_and_told(monkeypatch: Any) -> N
     def eased() -> int:
         steps = solvers.steps_of(ready.scene, ready.model)
         list(transient.transient(ready.scene, ready.linkage, ready.path, ready.model, steps))
-        assert (
-            solvers.eased_warning([steps]) == () or "the iterations of" in solvers.eased_warning([steps])[0]
-        )
+        assert solvers.eased_warning([steps]) == () or "the iterations of" in solvers.eased_warning([steps])[0]
         return int(steps.eased)
 
     assert eased() == 0
@@ -108,9 +106,7 @@ def test_a_rigid_link_whose_mass_lies_in_a_plane_is_refused() -> None:
         "gravity": [0, -9.81, 0],
         "analysis": {"end_time": 0.01, "step": 1e-3},
     }
-    with pytest.raises(
-        SceneError, match=r"links.plate: a rigid link must have mass along all its directions"
-    ):
+    with pytest.raises(SceneError, match=r"links.plate: a rigid link must have mass along all its directions"):
         meshed(scene_from(raw))
     raw["bodies"]["sheet"]["inertia"] = [0.012, 0.02, 0.03, 0, 0, 0]
     assert meshed(scene_from(raw)).model.links

@@ -59,9 +59,7 @@ def falling(
 def looked_at(raw: dict[str, Any]) -> SingularPasses:
     ready = meshed(scene_from(raw))
     passes = SingularPasses(ready)
-    for block in leveled(
-        ready.scene, ready.linkage, ready.path, ready.model, level_steps(ready.scene, ready.model)
-    ):
+    for block in leveled(ready.scene, ready.linkage, ready.path, ready.model, level_steps(ready.scene, ready.model)):
         passes.add(block)
     return passes
 

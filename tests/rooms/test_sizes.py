@@ -99,9 +99,7 @@ MISTAKES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("raw", "words", "unit"), [case[1:] for case in MISTAKES], ids=[case[0] for case in MISTAKES]
-)
+@pytest.mark.parametrize(("raw", "words", "unit"), [case[1:] for case in MISTAKES], ids=[case[0] for case in MISTAKES])
 def test_a_wrong_unit_is_told(raw: dict[str, Any], words: str, unit: str) -> None:
     from kedfem.accuracy.prepared import meshed
 

@@ -116,9 +116,7 @@ def nodal(model: Model, snapshot: Snapshot) -> list[np.ndarray]:
 def apart(raw: dict[str, Any], other: dict[str, Any]) -> float:
     """Largest difference of the nodes' displacements in the plane, of the peak."""
     (one, _, a), (two, _, b) = run(raw), run(other)
-    pairs = [
-        (p, q) for x, y in zip(a, b, strict=True) for p, q in zip(nodal(one, x), nodal(two, y), strict=True)
-    ]
+    pairs = [(p, q) for x, y in zip(a, b, strict=True) for p, q in zip(nodal(one, x), nodal(two, y), strict=True)]
     return max(float(np.abs(p - q).max()) for p, q in pairs) / max(float(np.abs(p).max()) for p, _ in pairs)
 
 
@@ -334,9 +332,7 @@ def test_corners_keep_the_directions_of_each_segment() -> None:
 
 def clamped(section: Any, force: np.ndarray, moment: float = 0.0) -> tuple[Any, np.ndarray]:
     """A cantilever of 1 m along x under a force and a torque at its end: the link and its state."""
-    link = spatial_beam_link(
-        "c", straight_axis(np.array([[0.0, 0, 0], [1, 0, 0]]), 2, 3, None), section, STEEL
-    )
+    link = spatial_beam_link("c", straight_axis(np.array([[0.0, 0, 0], [1, 0, 0]]), 2, 3, None), section, STEEL)
     f = np.zeros((link.n, 3))
     f[-4] = force
     f[-2], f[-1] = [0, 0, moment / 2], [0, -moment / 2, 0]  # θ = ½ (p·z − q·y)
@@ -361,8 +357,7 @@ def test_stresses_of_bending_torsion_and_tension(section: Any) -> None:
     if section.kind in most:
         assert abs(edge[3]) == pytest.approx(T * most[section.kind], rel=3e-3)
     turn = (
-        point_rows(link, "p", np.array([1.0, 0, 0.01])).value @ g
-        - point_rows(link, "p", np.array([1.0, 0, 0])).value @ g
+        point_rows(link, "p", np.array([1.0, 0, 0.01])).value @ g - point_rows(link, "p", np.array([1.0, 0, 0])).value @ g
     )
     assert turn[1] == pytest.approx(-0.01 * T / (link.lame[1] * section.torsion_constant), rel=1e-5)
 

@@ -257,9 +257,7 @@ def test_loads_on_what_the_drive_holds_are_named(tmp_path: Path) -> None:
     if raw["links"][name]["model"] == "rigid":
         pytest.fail("the other link bends")
     _, warnings = state_space(scene_from(raw, tmp_path), 2)
-    assert warnings == (
-        "state space: input loads/f does nothing: what it acts on is held by the drive or the ground",
-    )
+    assert warnings == ("state space: input loads/f does nothing: what it acts on is held by the drive or the ground",)
 
 
 def test_what_cannot_be_asked(tmp_path: Path) -> None:

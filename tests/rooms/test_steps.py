@@ -153,9 +153,7 @@ def test_relative_errors_are_of_the_peak_and_interpolate() -> None:
     fine = np.linspace(0, 1, 41)
 
     def run(time: np.ndarray, values: dict[str, np.ndarray]) -> Histories:
-        channels = {
-            name: (Channel(name, ("x", "y")[: v.shape[1]], "N", "world", ""), v) for name, v in values.items()
-        }
+        channels = {name: (Channel(name, ("x", "y")[: v.shape[1]], "N", "world", ""), v) for name, v in values.items()}
         return Histories(time, channels)
 
     def vectors(time: np.ndarray, off: float = 0.0) -> np.ndarray:
@@ -200,9 +198,7 @@ def test_a_signal_as_a_large_link_begins_to_be_solved_ends_the_march(monkeypatch
             if len(calls) == 3:
                 signal.raise_signal(signal.SIGINT)
 
-    before = signal.signal(
-        signal.SIGINT, signal.default_int_handler
-    )  # ignored where a shell runs the tests beside it
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where a shell runs the tests beside it
     sys.setprofile(watch)
     try:
         with pytest.raises(KeyboardInterrupt):

@@ -55,9 +55,7 @@ def loaded() -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("made", [loaded, sliding, lambda: four_bar("plate")])
-def test_stress_modes_hold_every_stress_of_the_rigid_body_motion(
-    made: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_stress_modes_hold_every_stress_of_the_rigid_body_motion(made: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Port forces are those of `closed`; Σ s_i g_i is the static deflection but for rigid motion."""
     monkeypatch.setattr(stiffening, "NEGLIGIBLE", 0.0)  # bending of planar beams has no stress stiffness
     ready = meshed(scene_from(made()))
@@ -77,9 +75,7 @@ def test_stress_modes_hold_every_stress_of_the_rigid_body_motion(
             assert stressed[i].stress is not None
             state = np.tensordot(stressed[i].stress[k], modes.states, 1)
             left = (link.K0 @ state.ravel()).reshape(total.shape) - total
-            assert_allclose(
-                left, 0, rtol=0, atol=1e-6 * np.abs(total).max()
-            )  # of solids, held at three nodes
+            assert_allclose(left, 0, rtol=0, atol=1e-6 * np.abs(total).max())  # of solids, held at three nodes
             B = np.linalg.qr(rigid_modes(link))[0]
             beside = (g[i] - state).ravel()
             beside -= B @ (B.T @ beside)
@@ -89,9 +85,7 @@ def test_stress_modes_hold_every_stress_of_the_rigid_body_motion(
 
 @pytest.mark.parametrize("rho_inf", [1.0, 0.8])
 @pytest.mark.parametrize(("made", "effect"), [(loaded, 0.02), (sliding, 3e-4)])
-def test_stiffened_steps_of_the_system_are_the_monolithic_ones(
-    made: Any, effect: float, rho_inf: float
-) -> None:
+def test_stiffened_steps_of_the_system_are_the_monolithic_ones(made: Any, effect: float, rho_inf: float) -> None:
     ready = meshed(scene_from(stiff(made(), initial="quasi-static", rho_inf=rho_inf)))
     system, monolithic, plain = (
         displacements(ready, steps_of(ready.scene.model_copy(update={"analysis": analysis}), ready.model))
@@ -104,9 +98,7 @@ def test_stiffened_steps_of_the_system_are_the_monolithic_ones(
     assert np.abs(plain[0] - system[0]).max() > effect * np.abs(plain[0]).max()
 
 
-@pytest.mark.parametrize(
-    ("kind", "solver"), [("beam", "condensed"), ("plate", "condensed"), ("beam", "monolithic")]
-)
+@pytest.mark.parametrize(("kind", "solver"), [("beam", "condensed"), ("plate", "condensed"), ("beam", "monolithic")])
 def test_only_a_scene_that_asks_for_stiffening_has_it(kind: str, solver: str) -> None:
     raw = four_bar(kind, solver=solver)
     ready = meshed(scene_from(raw))
@@ -118,9 +110,7 @@ def test_only_a_scene_that_asks_for_stiffening_has_it(kind: str, solver: str) ->
 
 def tip(ready: Prepared) -> np.ndarray:
     """Displacements (T, k) of all links."""
-    blocks = transient(
-        ready.scene, ready.linkage, ready.path, ready.model, steps_of(ready.scene, ready.model)
-    )
+    blocks = transient(ready.scene, ready.linkage, ready.path, ready.model, steps_of(ready.scene, ready.model))
     return np.concatenate([np.hstack([x.u.reshape(len(b), -1) for x in b.links]) for b in blocks])
 
 
@@ -220,9 +210,7 @@ def test_a_fast_rotor_starts_at_rest_in_its_own_frame(beam: str, component: int,
     """Stress stiffness is many times K0 across the arm there; a force that turns with it leaves it where it is."""
     shape = {"kind": "bar", "between": ["A", "B"], "width": 0.02, "thickness": 0.02}
     force = [0.0, 0.0, 0.0]
-    force[component] = (
-        1.0  # below, the start's rate is lost in the rounding of the stretch by centrifugal forces
-    )
+    force[component] = 1.0  # below, the start's rate is lost in the rounding of the stretch by centrifugal forces
     speed = mu * np.sqrt(1e9 * 0.02**2 / 12 / 1000)
     raw = {
         "points": {"A": [0, 0], "B": [1, 0]},
@@ -238,9 +226,7 @@ def test_a_fast_rotor_starts_at_rest_in_its_own_frame(beam: str, component: int,
         "analysis": {"revolutions": 0.5, "steps_per_revolution": 2000, "stiffening": True, "initial": "quasi-static"},
     }  # fmt: skip
     ready = meshed(scene_from(raw))
-    blocks = transient(
-        ready.scene, ready.linkage, ready.path, ready.model, steps_of(ready.scene, ready.model)
-    )
+    blocks = transient(ready.scene, ready.linkage, ready.path, ready.model, steps_of(ready.scene, ready.model))
     at = point_rows(ready.model.links[0], "tip", np.array([1.0, 0, 0])).value
     g = np.concatenate([np.einsum("n,tnd->td", at, block.links[0].g) for block in blocks])
     for c in {0, component}:

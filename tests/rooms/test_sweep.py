@@ -64,9 +64,7 @@ class Inline(Executor):
         return future
 
 
-def swept(
-    tmp_path: Path, *over: str, asked: Asked = QUICK, most: int = 1000, **analysis: Any
-) -> tuple[Swept, int]:
+def swept(tmp_path: Path, *over: str, asked: Asked = QUICK, most: int = 1000, **analysis: Any) -> tuple[Swept, int]:
     raw, runs = arm(**analysis), Inline(most)
     done = sweep(Base(raw, tmp_path, "arm"), axes_of(over, raw), asked, tmp_path / "out", executor=runs)
     return done, runs.runs
@@ -190,9 +188,7 @@ def test_the_joint_of_a_turning_arm_holds_its_centripetal_force_and_its_weight(t
 def test_vectors_in_a_plane_have_a_magnitude_too(tmp_path: Path) -> None:
     """The displacement of a planar beam has x and y alone."""
     raw = arm(kind="static", revolutions=1, steps_per_revolution=4)
-    raw["output"]["probes"] = {
-        "tip": {"link": "arm", "at": [L, 0], "quantity": "displacement", "frame": "world"}
-    }
+    raw["output"]["probes"] = {"tip": {"link": "arm", "at": [L, 0], "quantity": "displacement", "frame": "world"}}
     found = analyse(scene_from(raw, tmp_path))
     tip = found.results.channels["probes/tip/displacement"][1]
     assert tip.shape[1] == 2
@@ -351,9 +347,7 @@ def test_a_sweep_that_was_killed_goes_on_without_a_lost_or_doubled_point(tmp_pat
     killed.kill()
     assert killed.wait() == -signal.SIGKILL
     before = {path.name: path.read_bytes() for path in finished_rows(tmp_path / "killed")}
-    (
-        tmp_path / "killed" / "rows" / "row.0123abcd.part.json"
-    ).touch()  # as one leaves that is killed in the middle
+    (tmp_path / "killed" / "rows" / "row.0123abcd.part.json").touch()  # as one leaves that is killed in the middle
     subprocess.run([*command, "--folder", str(tmp_path / "killed")], check=True, capture_output=True)
     for name, content in before.items():
         assert (tmp_path / "killed" / "rows" / name).read_bytes() == content
@@ -378,9 +372,7 @@ def reduced_four_bar() -> dict[str, Any]:
     }  # fmt: skip
 
 
-def test_points_at_other_speeds_and_dampings_share_their_modes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_points_at_other_speeds_and_dampings_share_their_modes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same peaks as with modes of their own, within the tolerance; found once."""
     monkeypatch.setenv("KEDFEM_CACHE", "off")
     raw, made = reduced_four_bar(), list[int]()
@@ -406,9 +398,7 @@ def test_points_at_other_speeds_and_dampings_share_their_modes(
 
 def base_of(base: Base) -> Base:
     """As a sweep with plain defaults takes it."""
-    return Base(
-        {**base.raw, "analysis": {**base.raw["analysis"], "accuracy": "quick"}}, base.folder, base.stem
-    )
+    return Base({**base.raw, "analysis": {**base.raw["analysis"], "accuracy": "quick"}}, base.folder, base.stem)
 
 
 def done_at(axes: Any, k: int) -> dict[Any, Any]:

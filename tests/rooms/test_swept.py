@@ -188,9 +188,7 @@ def test_a_core_has_a_disc_without_sharp_angles(around: int) -> None:
     points, cells = disc(around)
     assert scaled_jacobian(points, cells).min() > 0.75
     on = np.linalg.norm(points, axis=1) > 1 - 1e-9
-    assert_allclose(
-        np.sort([atan2(y, x) % (2 * pi) for x, y in points[on]]), np.arange(2 * around) * pi / around
-    )
+    assert_allclose(np.sort([atan2(y, x) % (2 * pi) for x, y in points[on]]), np.arange(2 * around) * pi / around)
 
 
 @pytest.mark.long
@@ -243,9 +241,7 @@ def test_what_no_plane_end_sweeps_is_refused(tmp_path: Path) -> None:
         occ.fuse([(3, occ.addCylinder(0, 0, 0, 40, 0, 0, 5))], [(3, occ.addBox(10, -6, -6, 5, 12, 12))])
 
     for draw in (bored, stepped, lambda occ: turned(occ, SHAFT, 2.0)):
-        with pytest.raises(
-            OtherMethodError, match="no plane end sweeps it along lines and arcs to another end"
-        ):
+        with pytest.raises(OtherMethodError, match="no plane end sweeps it along lines and arcs to another end"):
             swept(drawn(tmp_path, draw)[0], method=path_mesh)
 
 

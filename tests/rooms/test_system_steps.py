@@ -79,16 +79,10 @@ def apart(found: dict[Channel, np.ndarray], wanted: dict[Channel, np.ndarray]) -
     most: dict[str, float] = {}
     for each, x in wanted.items():
         most[each.unit] = max(most.get(each.unit, 0.0), float(np.abs(x).max()))
-    return max(
-        float(np.abs(found[each] - x).max()) / most[each.unit]
-        for each, x in wanted.items()
-        if most[each.unit]
-    )
+    return max(float(np.abs(found[each] - x).max()) / most[each.unit] for each, x in wanted.items() if most[each.unit])
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(x, marks=pytest.mark.long) if x in DEAR else x for x in SCENES]
-)
+@pytest.mark.parametrize("name", [pytest.param(x, marks=pytest.mark.long) if x in DEAR else x for x in SCENES])
 def test_all_that_is_recorded_is_as_by_the_oracle(name: str) -> None:
     """It shares the start and the reading of forces, and no step; beside reduced links its tangents keep eight digits."""
     raw = SCENES[name]()
@@ -124,9 +118,7 @@ def undamped() -> dict[str, Any]:
     return raw
 
 
-@pytest.mark.parametrize(
-    "scene", [undamped, *(pytest.param(x, marks=pytest.mark.long) for x in (bushed, large))]
-)
+@pytest.mark.parametrize("scene", [undamped, *(pytest.param(x, marks=pytest.mark.long) for x in (bushed, large))])
 def test_sparse_bodies_move_as_dense_ones(scene: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """From quasi-static starts, whose iterations end at 1e-10 of deflections; rates are of these over a quarter step."""
     raw = scene() | {"damping": {"beta": 1e-5, "alpha": 1.0}}

@@ -71,9 +71,7 @@ def test_the_cylinder_of_a_lift_does_the_work_that_lifts_the_weights(tmp_path: P
         (_, low_end), (_, high_end) = place(theta)
         unit = (high_end - low_end) / length(theta)
         hinges = (500 + STEEL * area) * np.sin(theta) + arm * np.sin(theta)
-        return np.asarray(
-            G * (hinges + barrel * (low_end + unit * half / 2) + piston * (high_end - unit * half / 2))
-        )
+        return np.asarray(G * (hinges + barrel * (low_end + unit * half / 2) + piston * (high_end - unit * half / 2)))
 
     angles = np.linspace(low, np.radians(60.0), 20_001)
     force = np.gradient(potential(angles), angles) / np.gradient(length(angles), angles)
@@ -117,9 +115,7 @@ def test_the_strut_of_a_wishbone_bears_the_wheel_by_its_ratio(tmp_path: Path) ->
         return np.array([-r[1], r[0]])
 
     beside = D - B
-    turns = np.column_stack(
-        [across(D - C), -across(beside)]
-    )  # of upper arm and upright, per turn of the lower arm
+    turns = np.column_stack([across(D - C), -across(beside)])  # of upper arm and upright, per turn of the lower arm
     upper, upright = np.linalg.solve(turns, across(B - A))
     wheel = across(B - A) + upright * across(W - B)
     foot = across(S - A)
@@ -203,9 +199,7 @@ def test_the_legs_of_a_stewart_platform_bear_weight_and_inertia(tmp_path: Path) 
     inner, outer = swings * h, up - swings * h  # velocities of barrel's and rod's ends in the middle, per z'
     M = mass + 6 * (barrel / 3 * inner @ inner + rod / 3 * (up @ up + up @ outer + outer @ outer))
     acceleration = 0.03 * (2 * np.pi) ** 2 / rises
-    forces = [
-        found.channels[f"drive/{leg}_{k}/force"][1][0, 0] for leg in ("left", "right") for k in (1, 2, 3)
-    ]
+    forces = [found.channels[f"drive/{leg}_{k}/force"][1][0, 0] for leg in ("left", "right") for k in (1, 2, 3)]
     assert_allclose(np.sum(forces) * rises, slope + M * acceleration, rtol=1e-3)
 
 
@@ -214,9 +208,7 @@ def test_a_valve_opens_by_the_ratio_of_its_rocker(tmp_path: Path) -> None:
     found = run(template("valve_train"), tmp_path, kind="static", initial="rest", end_time=0.004, step=0.004)
     ratio, lift = 4 / 3, np.array([0, 0.007])
     expected = ratio * (250 + 3e4 * ratio * lift)
-    assert_allclose(
-        found.channels["drive/rigid_force"][1][:, 0], expected, rtol=5e-3
-    )  # the rocker's arms turn
+    assert_allclose(found.channels["drive/rigid_force"][1][:, 0], expected, rtol=5e-3)  # the rocker's arms turn
     assert_allclose(found.channels["drive/force"][1][:, 0], expected, rtol=1e-2)
     stem = found.channels["probes/stem_stress/stress"][1][:, 0]
     assert_allclose(stem, -expected / ratio / (np.pi * 0.003**2), rtol=1e-2)
@@ -245,9 +237,7 @@ def test_a_template_starts_as_it_is(kind: str, tmp_path: Path) -> None:
 @pytest.mark.long
 def test_a_rod_from_cad_is_pressed_by_the_gas_as_by_hand(tmp_path: Path) -> None:
     """The torque by virtual work, slowly; σ = F/A in the web of its shank, where the gas presses most."""
-    (tmp_path / "connecting_rod.step").write_bytes(
-        (files("kedfem") / "templates" / "connecting_rod.step").read_bytes()
-    )
+    (tmp_path / "connecting_rod.step").write_bytes((files("kedfem") / "templates" / "connecting_rod.step").read_bytes())
     raw = template("cad_slider_crank")
     raw["parameters"]["speed"] = "6 rpm"
     raw["output"]["report"] = False
@@ -258,9 +248,7 @@ def test_a_rod_from_cad_is_pressed_by_the_gas_as_by_hand(tmp_path: Path) -> None
     share = np.array([0.3, 0.08, 0.0, 0.0, 0.25, 0.6, 1.0, 0.6])
     force = 8e3 * PchipInterpolator(np.append(degrees, 360.0), np.append(share, 0.3))(np.degrees(found.angle))
     torque = found.channels["drive/rigid_torque"][1][:, 0]
-    inner = (found.angle > np.radians(60.0)) & (
-        found.angle < np.radians(335.0)
-    )  # away from the seam of the period
+    inner = (found.angle > np.radians(60.0)) & (found.angle < np.radians(335.0))  # away from the seam of the period
     assert_allclose(torque[inner], (force * slope)[inner], atol=2e-3 * np.abs(force * slope).max())
     area = 2 * 0.004 * 0.018 + (0.022 - 2 * 0.004) * 0.006  # of its flanges and web, halfway
     pressed = found.channels["probes/shank/stress"][1][:, 0].min()

@@ -103,9 +103,7 @@ MORE = (
 )
 
 
-@pytest.mark.parametrize(
-    "name", [*SOME[:2], *(pytest.param(n, marks=pytest.mark.long) for n in (*SOME[2:], *MORE))]
-)
+@pytest.mark.parametrize("name", [*SOME[:2], *(pytest.param(n, marks=pytest.mark.long) for n in (*SOME[2:], *MORE))])
 def test_parts_of_the_catalogue_are_meshed(name: str, tmp_path: Path) -> None:
     """None refused, det J > 0 all over, at most 45,000 unknowns, volume within 0.5 % of CAD."""
     file, exact = written(name, tmp_path)
@@ -188,9 +186,7 @@ def test_files_of_tetrahedra_are_links(gmsh: ModuleType, tmp_path: Path, order: 
     gmsh.model.occ.synchronize()
     gmsh.option.setNumber("Mesh.ElementOrder", order)
     gmsh.option.setNumber("Mesh.MeshSizeMax", 0.5)
-    low = next(
-        tag for _, tag in gmsh.model.getEntities(2) if gmsh.model.occ.getCenterOfMass(2, tag)[0] < 1e-6
-    )
+    low = next(tag for _, tag in gmsh.model.getEntities(2) if gmsh.model.occ.getCenterOfMass(2, tag)[0] < 1e-6)
     gmsh.model.addPhysicalGroup(2, [low], name="wall")
     gmsh.model.addPhysicalGroup(3, [1], name="body")
     gmsh.model.mesh.generate(3)

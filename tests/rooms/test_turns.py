@@ -22,9 +22,7 @@ OBLIQUE = np.array([1.0, -2.0, 2.0]) / 3
         (0, 0, "turns up to 0° from the reference position"),
     ],
 )
-def test_a_link_that_goes_round_makes_a_full_revolution(
-    axis: np.ndarray, start: float, end: float, said: str
-) -> None:
+def test_a_link_that_goes_round_makes_a_full_revolution(axis: np.ndarray, start: float, end: float, said: str) -> None:
     angles = np.radians(np.linspace(start, end, 73))
     assert _turns(Rotation.from_rotvec(angles[:, None] * axis).as_matrix()) == said
 

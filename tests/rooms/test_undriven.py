@@ -175,9 +175,7 @@ def test_a_scene_without_any_joint_can_be_built() -> None:
     ready = meshed(scene_from(raw))
     assert ready.linkage.mobility == 6
     assert ready.model.coordinates == 21  # of seven nodes
-    for link, rate in zip(
-        ready.model.links, initial_rates(ready.scene, ready.linkage, ready.model), strict=True
-    ):
+    for link, rate in zip(ready.model.links, initial_rates(ready.scene, ready.linkage, ready.model), strict=True):
         x, one = link.X[:, 0], np.ones(link.n)
         np.testing.assert_allclose(rate, np.c_[one, 2 + 30 * (x - 0.5), 30 * one], atol=1e-12)
 

@@ -149,9 +149,7 @@ def _rows(draw: Callable[[ModuleType], None], area: float, exact: float) -> list
         (0.12, meshed(draw, None, unknowns=40_000)),
         (0.03, meshed(draw, None, fillet_angle=np.radians(FINEST_FILLET))),
     )
-    return [
-        Row("Kt, of the net section [-]", exact, factor(link, area), cap, _words(link)) for cap, link in made
-    ]
+    return [Row("Kt, of the net section [-]", exact, factor(link, area), cap, _words(link)) for cap, link in made]
 
 
 @case(
@@ -304,18 +302,14 @@ def section(turned: bool, fine: float = 0.2) -> float:
         mesh, basis.elem, facets=mesh.facets_satisfying(lambda x: np.isclose(x[0], LENGTH)), intorder=6
     )
     force = skfem.LinearForm(lambda v, w: v[0] * (w.x[1] if turned else 1.0)).assemble(end)
-    fixed = np.concatenate(
-        [basis.get_dofs(lambda x, i=i: np.isclose(x[i], 0)).all([f"u^{i + 1}"]) for i in (0, 1)]
-    )
+    fixed = np.concatenate([basis.get_dofs(lambda x, i=i: np.isclose(x[i], 0)).all([f"u^{i + 1}"]) for i in (0, 1)])
     K = sp.csr_matrix(energy.assemble(basis))
     u = skfem.solve(*skfem.condense(K, force, D=np.unique(fixed)))
 
     def off(x):
         return np.array([x[0] - STEP_AT - FILLET, x[1] - TALL])
 
-    arc = mesh.facets_satisfying(
-        lambda x: np.abs(np.hypot(*off(x)) - FILLET) < 0.02 * FILLET, boundaries_only=True
-    )
+    arc = mesh.facets_satisfying(lambda x: np.abs(np.hypot(*off(x)) - FILLET) < 0.02 * FILLET, boundaries_only=True)
     field = skfem.FacetBasis(mesh, basis.elem, facets=arc, intorder=3)
     U, x = field.interpolate(u), field.global_coordinates()
     H, (nx, ny) = U.grad, off(x) / np.hypot(*off(x))

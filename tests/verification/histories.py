@@ -77,9 +77,7 @@ def history(run: Run, steps: int) -> Iterator[Moving]:
     u, v, g1 = run.start or [np.zeros((link.n, 3))] * 3
     now = Instant(of, lambda t: motion_of(run, t), 0.0)
     now.F[:] = work_on(of.parts[0], run.forces(0.0)).ravel()
-    state = begun(
-        now, *(as_coordinates(of, [x]) for x in (u, v)), strained=as_coordinates(of, [g1 @ run.R(0.0).T])
-    )
+    state = begun(now, *(as_coordinates(of, [x]) for x in (u, v)), strained=as_coordinates(of, [g1 @ run.R(0.0).T]))
     yield Moving(u, v)
     for first in range(1, steps + 1, BLOCK):
         t = run.scheme.h * np.arange(first, min(first + BLOCK, steps + 1))

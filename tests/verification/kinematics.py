@@ -50,9 +50,7 @@ def errors(name: str, got: Curve, wanted: Curve, model: str, cap: float = CAP) -
     ]
 
 
-def implicit(
-    f1: np.ndarray, fy: np.ndarray, f11: np.ndarray, f1y: np.ndarray, fyy: np.ndarray
-) -> Sequence[np.ndarray]:
+def implicit(f1: np.ndarray, fy: np.ndarray, f11: np.ndarray, f1y: np.ndarray, fyy: np.ndarray) -> Sequence[np.ndarray]:
     """y' and y'' of f(x, y) = 0 from its partial derivatives."""
     y1 = -f1 / fy
     return y1, -(f11 + 2 * f1y * y1 + fyy * y1**2) / fy
@@ -121,14 +119,10 @@ def planar_slider_crank() -> list[Row]:
     s = np.sqrt(rod**2 - (r * sin) ** 2)
     first = -r * sin - r**2 * sin * cos / s
     second = -r * cos - r**2 * (cos**2 - sin**2) / s - r**4 * (sin * cos) ** 2 / s**3
-    return errors(
-        "slider", got, in_time((r * cos + s, first, second), drive), "3 links, 3 revolutes, a slide"
-    )
+    return errors("slider", got, in_time((r * cos + s, first, second), drive), "3 links, 3 revolutes, a slide")
 
 
-@case(
-    "Spatial slider-crank", "E. J. Haug, Computer-Aided Kinematics and Dynamics of Mechanical Systems (1989)"
-)
+@case("Spatial slider-crank", "E. J. Haug, Computer-Aided Kinematics and Dynamics of Mechanical Systems (1989)")
 def slider_crank_in_space() -> list[Row]:
     """Crank 0.08 m about an axis along x at y = 0.1, z = 0.12; rod 0.3 m; slider on x: x² = l² − y_B² − z_B².
 
@@ -221,9 +215,7 @@ def _rocker_in_space(joints: JointTable, drawn: float, model: str) -> list[Row]:
     w = rssr_points(phi, phi)[0] - RSSR_PIVOT
     C = ((w**2).sum(axis=1) + r**2 - length2) / (2 * r)  # w_y cos ψ + w_z sin ψ = C
     mid, half = np.arctan2(w[:, 2], w[:, 1]), np.arccos(C / np.hypot(w[:, 1], w[:, 2]))
-    psi = min(
-        (np.unwrap(mid + s * half) for s in (1, -1)), key=lambda y: abs(np.angle(np.exp(1j * (y[0] - drawn))))
-    )
+    psi = min((np.unwrap(mid + s * half) for s in (1, -1)), key=lambda y: abs(np.angle(np.exp(1j * (y[0] - drawn)))))
     psi = psi + 2 * np.pi * np.round((drawn - psi[0]) / (2 * np.pi))
     P, Q = rssr_points(phi, psi)
     zero = np.zeros_like(phi)
@@ -234,7 +226,5 @@ def _rocker_in_space(joints: JointTable, drawn: float, model: str) -> list[Row]:
         return np.einsum("tk,tk->t", x, y)
 
     d = P - Q
-    rates = implicit(
-        dot(d, P1), -dot(d, Q1), dot(P1, P1) + dot(d, P2), -dot(P1, Q1), dot(Q1, Q1) - dot(d, Q2)
-    )
+    rates = implicit(dot(d, P1), -dot(d, Q1), dot(P1, P1) + dot(d, P2), -dot(P1, Q1), dot(Q1, Q1) - dot(d, Q2))
     return errors("rocker angle", got, in_time((psi, *rates), drive), model)

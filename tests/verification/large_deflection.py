@@ -49,9 +49,7 @@ def steady_stretch(length: float, speed: float, EA: float, rhoA: float) -> float
     return float(np.tan(alpha * length) / alpha - length)
 
 
-def pendulum_period(
-    mass: float, arm: float, inertia: float, amplitude: float, gravity: float = 9.81
-) -> float:
+def pendulum_period(mass: float, arm: float, inertia: float, amplitude: float, gravity: float = 9.81) -> float:
     """Period of a compound pendulum, 4 √(I/mgd) K(sin(θ0/2)) [s].
 
     Parameters
@@ -96,9 +94,7 @@ def double_pendulum(
     return np.asarray(found.y.T)
 
 
-def double_pendulum_energy(
-    rods: tuple[UniformRod, UniformRod], state: np.ndarray, gravity: float = 9.81
-) -> np.ndarray:
+def double_pendulum_energy(rods: tuple[UniformRod, UniformRod], state: np.ndarray, gravity: float = 9.81) -> np.ndarray:
     """Kinetic and potential energy (T,) of states (T, 4), zero at the pivot's height [J]."""
     first, second = rods
     m1, l1, m2, l2 = first.mass, first.length, second.mass, second.length

@@ -106,9 +106,7 @@ def steps() -> list[Row]:
     return [Row("difference / peak", 0.0, e, caps[n], f"{n} steps a turn") for n, e in time_errors().items()]
 
 
-@case(
-    "Four-bar: solids against beams", "16 beam3 a link against bars of hex27, one turn at 600 rpm", long=True
-)
+@case("Four-bar: solids against beams", "16 beam3 a link against bars of hex27, one turn at 600 rpm", long=True)
 def solids() -> list[Row]:
     """Section 25.4 mm square, links 12 to 36 times as long: beam theory (plane sections, 5/6 of the area in shear) and
 
@@ -140,7 +138,4 @@ def rigid_errors() -> dict[int, float]:
 def rigid_limit() -> list[Row]:
     """rms difference falls as 1/E."""
     caps = {1: 8e-3, 4: 2e-3, 16: 4e-4}
-    return [
-        Row("difference / rms", 0.0, e, caps[n], f"E × {n}, 4 beam3 a link")
-        for n, e in rigid_errors().items()
-    ]
+    return [Row("difference / rms", 0.0, e, caps[n], f"E × {n}, 4 beam3 a link") for n, e in rigid_errors().items()]

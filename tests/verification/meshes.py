@@ -18,9 +18,7 @@ Mapping = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.nd
 PlaneMapping = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
-def mapped_mesh(
-    counts: tuple[int, int, int], mapping: Mapping, nodes: int = 27, closed: bool = False
-) -> SolidMesh:
+def mapped_mesh(counts: tuple[int, int, int], mapping: Mapping, nodes: int = 27, closed: bool = False) -> SolidMesh:
     """counts elements along the unit cube's coordinates (r, s, t), each node at mapping(r, s, t).
 
     closed : the face r = 1 is the face r = 0 again, as in a ring.
@@ -58,15 +56,11 @@ def between_ellipses(r: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return (2 + 1.25 * r) * c, (1 + 1.75 * r) * d
 
 
-def mapped_plane(
-    counts: tuple[int, int], mapping: PlaneMapping, thickness: float, material: Material
-) -> Link:
+def mapped_plane(counts: tuple[int, int], mapping: PlaneMapping, thickness: float, material: Material) -> Link:
     """counts quad9 elements along the unit square's coordinates (r, s), each node at mapping(r, s)."""
     points, cells = rectangle_quads(1.0, 1.0, *counts)
     x, y = mapping(points[:, 0], points[:, 1] + 0.5)
-    return plane_link(
-        "test", QuadMesh(np.stack([x, y, 0 * x], axis=1), cells, thickness), material, np.eye(3)
-    )
+    return plane_link("test", QuadMesh(np.stack([x, y, 0 * x], axis=1), cells, thickness), material, np.eye(3))
 
 
 def model(counts: tuple[int, ...], link: Link, kind: str = "hex27") -> str:

@@ -37,9 +37,7 @@ def of_bar(length: float, side: float, joints: dict[str, Any], **link: Any) -> P
     shape = {"kind": "bar", "between": [[0, 0], [length, 0]], "width": side, "thickness": side}
     raw = {
         "materials": {"m": {"density": 8000, "youngs_modulus": 200e9, "poisson_ratio": 0.3}},
-        "links": {
-            "bar": {"material": "m", "shape": shape, "shear_coefficient": DEEP.shear_coefficient, **link}
-        },
+        "links": {"bar": {"material": "m", "shape": shape, "shear_coefficient": DEEP.shear_coefficient, **link}},
         "joints": joints,
         "analysis": {"end_time": 1, "step": 0.1},
     }
@@ -96,9 +94,7 @@ def tapered_link() -> list[Row]:
                 "mesh": {"size": 0.5},
             }
         },
-        "joints": {
-            "end": {"kind": "weld", "links": ["ground", "membrane"], "at": [0, 0], "coupling": "rigid"}
-        },
+        "joints": {"end": {"kind": "weld", "links": ["ground", "membrane"], "at": [0, 0], "coupling": "rigid"}},
         "analysis": {"end_time": 1, "step": 0.1},
     }
     part = link_of_scene(scene_from(raw), "membrane", ["end"])

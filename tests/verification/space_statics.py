@@ -57,8 +57,7 @@ class Rod:
             size = np.where(self.one[of] != 0, self.length, 1.0).repeat(3) * STEP
             ways = np.diag(size).reshape(-1, len(of), 3)
             pushed = [
-                pulled_back(element, z, element.stiffness * strains_of(element, z))
-                for z in (y[of] + ways, y[of] - ways)
+                pulled_back(element, z, element.stiffness * strains_of(element, z)) for z in (y[of] + ways, y[of] - ways)
             ]
             own = ((pushed[0] - pushed[1]).reshape(len(size), -1) / (2 * size[:, None])).T
             dofs = (3 * of[:, None] + np.arange(3)).ravel()
@@ -120,9 +119,7 @@ def exact_rod(
         def right(_: np.ndarray, x: np.ndarray) -> np.ndarray:
             Q, M = x[3:12].reshape(3, 3, -1), x[12:]
             n, m = np.einsum("ijp,i->jp", Q, P), np.einsum("ijp,ip->jp", Q, M)
-            r1 = np.einsum(
-                "ijp,jp->ip", Q, n / np.array([EA, GA1, GA2])[:, None] + np.array([[1.0], [0], [0]])
-            )
+            r1 = np.einsum("ijp,jp->ip", Q, n / np.array([EA, GA1, GA2])[:, None] + np.array([[1.0], [0], [0]]))
             # n1 bends by κ1 = −θ'·n2, n2 by κ2 = θ'·n1
             k = m / np.array([GJ, EI2, EI1])[:, None] + bend[:, None]
             Q1 = np.stack([k[2] * Q[:, 1] - k[1] * Q[:, 2], k[0] * Q[:, 2] - k[2] * Q[:, 0],
@@ -252,9 +249,7 @@ def hinge_error(elements: int) -> float:
     axis = straight_axis(np.array([[0.0, 0, 0], [0.5, 0, 0]]), elements, 3, None)
     rod = Rod(axis, FLAT, ALLOY)
     along_x, along_z = (1 + int(np.abs(rod.X[1:4, k]).argmax()) for k in (0, 2))
-    pinned = np.array(
-        [0, 1, 2, *(3 * along_z + np.arange(3)), 3 * along_x + 1]
-    )  # two points on z, no turn about it
+    pinned = np.array([0, 1, 2, *(3 * along_z + np.arange(3)), 3 * along_x + 1])  # two points on z, no turn about it
     K, place = rod.stiffness(), 3 * rod.tip + 2
     moved = []
     for held in (pinned, np.arange(12)):

@@ -25,9 +25,7 @@ FLAT = rectangle(0.03, 0.02)
 
 def straight(points: list[list[float]], section: Section, elements: int, nodes: int = 3) -> Link:
     """A beam of straight segments."""
-    return spatial_beam_link(
-        "beam", straight_axis(np.array(points, float), elements, nodes, None), section, ALLOY
-    )
+    return spatial_beam_link("beam", straight_axis(np.array(points, float), elements, nodes, None), section, ALLOY)
 
 
 def text_of(link: Link, elements: str) -> str:
@@ -59,9 +57,7 @@ def clamped_timoshenko(n: int, length: float, section: Section, material: Materi
 
     def closed(x: float) -> float:
         """Of ω = x √(EI/ρA)/L²."""
-        M = np.array(
-            [[0, 1, 0, shear], [0, 0, 1, 0], [0, -(x**2) * I / (A * L**2), 0, -1], [-(x**2), 0, 0, 0]]
-        )
+        M = np.array([[0, 1, 0, shear], [0, 0, 1, 0], [0, -(x**2) * I / (A * L**2), 0, -1], [-(x**2), 0, 0, 0]])
         return float(np.linalg.det(scipy.linalg.expm(M)[2:, 2:]))
 
     trial = np.linspace(0.5, (n + 0.5) ** 2 * np.pi**2, 400 * n)
@@ -111,9 +107,7 @@ def cantilevers() -> list[Row]:
         if name == "tube":  # both planes alike, so that its modes are reported by neither
             found = frequencies(link, free_map(link, ROOT), 2, 80)
             out += [
-                Row(
-                    f"{name}, bending 1 [Hz]", wanted["along y"][0], float(f), 1e-5, text_of(link, "16 beam3")
-                )
+                Row(f"{name}, bending 1 [Hz]", wanted["along y"][0], float(f), 1e-5, text_of(link, "16 beam3"))
                 for f in found
             ]
             continue
@@ -162,9 +156,7 @@ def bent_cantilever(a: float, b: float, section: Section) -> dict[str, float]:
     return {
         "x": (a * b**2 + b**3 / 3) / (E * Iy) + a / (E * A) + b / (k1 * G * A),
         "y": a**3 / (3 * E * Iy) + a / (k1 * G * A) + b / (E * A),
-        "z": (a**3 + b**3) / (3 * E * Iz)
-        + a * b**2 / (G * section.torsion_constant)
-        + (a + b) / (k2 * G * A),
+        "z": (a**3 + b**3) / (3 * E * Iz) + a * b**2 / (G * section.torsion_constant) + (a + b) / (k2 * G * A),
     }
 
 
@@ -228,10 +220,7 @@ def twisted_in_space() -> list[Row]:
     got = [tip_displacement(link, np.eye(3)[k])[k] for k in (1, 2)]
     names, targets = ("along the root's width", "along the root's thickness"), (1.7532e-3, 5.4245e-3)
     # not the solid's: 0.2 % is what the section's shape is worth beside Timoshenko's theory
-    return [
-        Row(n, t, float(g), 0.0025, text_of(link, "12 beam3"))
-        for n, t, g in zip(names, targets, got, strict=True)
-    ]
+    return [Row(n, t, float(g), 0.0025, text_of(link, "12 beam3")) for n, t, g in zip(names, targets, got, strict=True)]
 
 
 # -- solids -------------------------------------------------------------------------------------------------

@@ -118,13 +118,9 @@ def oldham_coupling() -> list[Row]:
     rows = []
     for tongue in ("prismatic", "planar"):
         joints = oldham(e, drawn, tongue)
-        model = (
-            f"3 links, 2 revolutes, a slide, a {'second slide' if tongue == 'prismatic' else 'planar joint'}"
-        )
+        model = f"3 links, 2 revolutes, a slide, a {'second slide' if tongue == 'prismatic' else 'planar joint'}"
         got, drive = angle_of(joints, "shaft2", Z, drawn)
-        rows += errors(
-            "driven shaft", got, in_time((drawn + drive[0], *np.outer([1, 0], np.ones_like(T))), drive), model
-        )
+        rows += errors("driven shaft", got, in_time((drawn + drive[0], *np.outer([1, 0], np.ones_like(T))), drive), model)
         scene = linkage_scene(joints, motion=TURN)
         centre = place(motion_at(scene, T), body(scene, "disc"), np.asarray(joints["B"][3]))
         z = e * np.exp(2j * (drawn + drive[0])) / 2

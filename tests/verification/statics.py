@@ -14,9 +14,7 @@ from .cases import Row, case
 from .linear import deflection, free_map, held, mean_support
 from .meshes import Mapping, between_ellipses, box, mapped_link, model
 
-MACNEAL = (
-    "MacNeal, Harder: A proposed standard set of problems to test finite element accuracy, FEAD 1 (1985) 3–20"
-)
+MACNEAL = "MacNeal, Harder: A proposed standard set of problems to test finite element accuracy, FEAD 1 (1985) 3–20"
 LE10 = "The Standard NAFEMS Benchmarks, TNSB rev. 3 (1990), test LE10"
 PLATE = Material(density=1, youngs_modulus=210e9, poisson_ratio=0.3)
 D = np.array([2.0, 0.0, 0.6])
@@ -102,9 +100,7 @@ def tip_deflections(link: Link) -> np.ndarray:
     surface = face_surface(link, "tip", np.array([6.0, 0, 0]))
     area = surface_weights(link, surface)
     loads = [np.outer(area / area.sum(), axis) for axis in np.eye(3)]
-    loads.append(
-        np.stack([0 * area, -surface.fit[3] / 2, surface.fit[2] / 2], axis=1)
-    )  # work = mean rotation about x
+    loads.append(np.stack([0 * area, -surface.fit[3] / 2, surface.fit[2] / 2], axis=1))  # work = mean rotation about x
     return np.array([(f * deflection(link, T, f)).sum() for f in loads])
 
 
@@ -148,16 +144,12 @@ def straight_beams() -> list[Row]:
 def straight_planar_beams() -> list[Row]:
     """Six elements, bent about either axis (slenderness 30, 60): full integration of the shear would lock."""
     out = []
-    for name, target, section in zip(
-        LOADS[1:], PUBLISHED[1:], (rectangle(0.2, 0.1), rectangle(0.1, 0.2)), strict=True
-    ):
+    for name, target, section in zip(LOADS[1:], PUBLISHED[1:], (rectangle(0.2, 0.1), rectangle(0.1, 0.2)), strict=True):
         for nodes, cap in ((2, 0.008), (3, 0.0005)):
             link = beam_link("beam", np.array([[0.0, 0, 0], [6, 0, 0]]), section, SLENDER, 6, nodes)
             force = np.outer(link.X[:, 0] == 6, [0.0, 1.0, 0.0])
             v = deflection(link, free_map(link, held((link.X[:, 0] == 0, "xyz"))), force)
-            out.append(
-                Row(name, target, float((force * v).sum()), cap, f"6 beam{nodes}, {3 * link.n} unknowns")
-            )
+            out.append(Row(name, target, float((force * v).sum()), cap, f"6 beam{nodes}, {3 * link.n} unknowns"))
     return out
 
 

@@ -84,12 +84,8 @@ def test_gears_turn_in_proportion(gear: dict[str, object], ratio: float) -> None
     angle, wheel = ratio * m.phi, body(scene, "wheel")
     assert_allclose(m.R[:, wheel, 0, 0], np.cos(angle), atol=1e-12 * max(1, abs(ratio)))
     assert_allclose(m.R[:, wheel, 1, 0], np.sin(angle), atol=1e-12 * max(1, abs(ratio)))
-    assert_allclose(
-        m.omega[:, wheel, 2], ratio * 8 * (1 - np.cos(2 * np.pi * T)), atol=1e-12 * abs(ratio) * 16
-    )
-    assert_allclose(
-        m.alpha[:, wheel, 2], ratio * 16 * np.pi * np.sin(2 * np.pi * T), atol=1e-12 * abs(ratio) * 100
-    )
+    assert_allclose(m.omega[:, wheel, 2], ratio * 8 * (1 - np.cos(2 * np.pi * T)), atol=1e-12 * abs(ratio) * 16)
+    assert_allclose(m.alpha[:, wheel, 2], ratio * 16 * np.pi * np.sin(2 * np.pi * T), atol=1e-12 * abs(ratio) * 100)
 
 
 @pytest.mark.parametrize(
@@ -167,9 +163,7 @@ def test_a_planetary_gear_obeys_willis() -> None:
     assert_allclose(m.omega[:, body(scene, "arm"), 2], arm * omega, atol=1e-11)
     assert_allclose(m.omega[:, body(scene, "planet"), 2], (arm - (1 - arm) * 24 / 18) * omega, atol=1e-11)
     angle = arm * m.phi
-    assert_allclose(
-        m.R[:, body(scene, "arm"), :2, 0], np.stack([np.cos(angle), np.sin(angle)], 1), atol=1e-11
-    )
+    assert_allclose(m.R[:, body(scene, "arm"), :2, 0], np.stack([np.cos(angle), np.sin(angle)], 1), atol=1e-11)
 
 
 # -- several drives --------------------------------------------------------------------------------------------------
@@ -228,9 +222,7 @@ def test_rates_per_drive_add_up() -> None:
     rates = [0.9 * (1 - np.cos(2 * np.pi * T)), -0.6 * 140 * T**3 * (1 - T) ** 3]
     total = sum(one.v_phi * rate[:, None, None] for one, rate in zip(each, rates, strict=True))
     assert_allclose(m.v, total, atol=1e-13)
-    first = linkage_scene(
-        five_bar(), None, sections=drives(left=("A", steady(1.0)), right=("E", steady(0.0)))
-    )
+    first = linkage_scene(five_bar(), None, sections=drives(left=("A", steady(1.0)), right=("E", steady(0.0))))
     alone = motion_at(first, np.zeros(1))
     assert_allclose(alone.v[0], m.v_phi[0], atol=1e-13)
     assert_allclose(alone.omega[0], m.omega_phi[0], atol=1e-13)
@@ -253,17 +245,12 @@ def arm() -> tuple[Scene, list[np.ndarray]]:
         for k in range(6)
     }
     height = [1.1, -0.7, 0.9, 2.0, -1.4, 3.0]
-    laws = {
-        f"d{k}": (f"J{k}", {"kind": "cycloidal", "angle": h, "rise": 1.0 + 0.1 * k})
-        for k, h in enumerate(height)
-    }
+    laws = {f"d{k}": (f"J{k}", {"kind": "cycloidal", "angle": h, "rise": 1.0 + 0.1 * k}) for k, h in enumerate(height)}
     x = [T / (1.0 + 0.1 * k) for k in range(6)]
     q = [h * (u - np.sin(2 * np.pi * u) / (2 * np.pi)) for h, u in zip(height, x, strict=True)]
     # where a joint's first link is the lower one of two moving links, its turn is that of the lower against the upper
     signs = [1 if k % 2 or k == 0 else -1 for k in range(6)]
-    return linkage_scene(joints, None, sections=drives(**laws)), [
-        s * a for s, a in zip(signs, q, strict=True)
-    ]
+    return linkage_scene(joints, None, sections=drives(**laws)), [s * a for s, a in zip(signs, q, strict=True)]
 
 
 def test_an_open_arm_with_six_drives_is_a_product_of_rotations() -> None:
@@ -351,9 +338,7 @@ def test_more_drives_than_motions_are_refused() -> None:
 def test_gears_against_each_other_are_a_structure() -> None:
     """A loop of three wheels with outer teeth locks."""
     at = ((0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.15, 0.26, 0.0))
-    joints: JointTable = {
-        name: ("revolute", "ground", f"wheel {name}", x, Z) for name, x in zip("ABC", at, strict=True)
-    }
+    joints: JointTable = {name: ("revolute", "ground", f"wheel {name}", x, Z) for name, x in zip("ABC", at, strict=True)}
     gears = {f"{a}{b}": {"joints": [a, b], "ratio": -1} for a, b in ("AB", "BC", "CA")}
     assert "got a structure without any mobility" in refused(linkage_scene(joints, sections={"gears": gears}))
 
@@ -361,9 +346,7 @@ def test_gears_against_each_other_are_a_structure() -> None:
 def test_a_slide_driven_too_far_is_told_the_travel() -> None:
     """Crank and rod in line at x = 0.4 m: 0.4 − x_drawn."""
     joints = slider_crank(0.1, 0.3, np.radians(60))
-    scene = linkage_scene(
-        joints, "guide", {"kind": "cycloidal", "travel": 0.2, "rise": 1.0}, sliders=("slider",)
-    )
+    scene = linkage_scene(joints, "guide", {"kind": "cycloidal", "travel": 0.2, "rise": 1.0}, sliders=("slider",))
     message = refused(scene)
     assert "joints.guide" in message
     travel = re.search(r"locks \(dead point\) at drive travel (\S+) mm", message)

@@ -21,9 +21,7 @@ SLOW = {"joint": "A", "motion": {"kind": "constant_speed", "speed": "60 rpm"}}
 
 
 def alloy(factor: float) -> dict[str, Any]:
-    return {
-        "alloy": {"density": 2796, "youngs_modulus": factor * 7.031e10, "shear_modulus": factor * 2.712e10}
-    }
+    return {"alloy": {"density": 2796, "youngs_modulus": factor * 7.031e10, "shear_modulus": factor * 2.712e10}}
 
 
 def spatial(factor: float) -> Any:
@@ -48,9 +46,7 @@ def errors(kind: str, factor: float) -> dict[str, float]:
     """rms difference of each elastic channel from its rigid counterpart, of the latter's rms."""
     ready = meshed({"planar": planar, "spatial": spatial}[kind](factor))
     recorded = recording(ready.scene, ready.model, None, ready.path)
-    blocks = transient(
-        ready.scene, ready.linkage, ready.path, ready.model, steps_of(ready.scene, ready.model)
-    )
+    blocks = transient(ready.scene, ready.linkage, ready.path, ready.model, steps_of(ready.scene, ready.model))
     taken = [{each.channel.name: each.rows(block) for each in recorded} for block in blocks]
     columns = {each.channel.name: each.channel.columns for each in recorded}
     out = {}

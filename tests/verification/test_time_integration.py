@@ -101,9 +101,7 @@ def test_every_member_is_of_order_two_on_a_turning_link(kind: str, damped: bool,
     errors = []
     for steps in (250, 500, 1000):
         scheme = generalised_alpha(END / steps, rho_inf)
-        run = Run(
-            link, grounded(link, fixed), scheme, damping(damped), lambda t: inertia_load(link, t), orientation
-        )
+        run = Run(link, grounded(link, fixed), scheme, damping(damped), lambda t: inertia_load(link, t), orientation)
         *_, last = history(run, steps)
         errors.append(np.abs(last.u.ravel() - exact).max() / np.abs(exact).max())
     orders = np.log2(np.array(errors[:-1]) / errors[1:])

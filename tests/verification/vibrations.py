@@ -13,9 +13,7 @@ from .linear import free_map, frequencies, frequency_of, held, mean_support
 from .meshes import box, mapped_link, model
 
 STEEL = Material(density=8000, youngs_modulus=200e9, poisson_ratio=0.3)  # of all NAFEMS FV tests used here
-NAFEMS = (
-    "Abbassian, Dawswell, Knowles: Selected benchmarks for natural frequency analysis, NAFEMS R0015 (1987)"
-)
+NAFEMS = "Abbassian, Dawswell, Knowles: Selected benchmarks for natural frequency analysis, NAFEMS R0015 (1987)"
 CUBE = Material(density=1, youngs_modulus=1, poisson_ratio=0.499)
 
 
@@ -119,9 +117,7 @@ def timoshenko(n: int, length: float, section: Section, material: Material) -> f
     return float(np.sqrt(2 * c / (b + np.sqrt(b**2 - 4 * a * c))) / (2 * np.pi))
 
 
-DEEP = rectangle(
-    2.0, 2.0, shear_coefficient=10 * (1 + 0.3) / (12 + 11 * 0.3)
-)  # Cowper's κ gives FV5's numbers
+DEEP = rectangle(2.0, 2.0, shear_coefficient=10 * (1 + 0.3) / (12 + 11 * 0.3))  # Cowper's κ gives FV5's numbers
 
 
 def pinned_beam(elements: int, nodes: int = 3) -> tuple[Link, np.ndarray]:
@@ -183,9 +179,7 @@ def soft_cube() -> list[Row]:
     text = model(counts, link)
     return [
         Row("first elastic [Hz]", 0.26260, first, 0.001, text),
-        Row(
-            "Lamé mode [Hz]", lame_mode(CUBE), frequency_of(link, lame_shape(link.X), 30, 0.26), 0.0025, text
-        ),
+        Row("Lamé mode [Hz]", lame_mode(CUBE), frequency_of(link, lame_shape(link.X), 30, 0.26), 0.0025, text),
     ]
 
 
@@ -206,8 +200,6 @@ def ring() -> list[Row]:
 
     link = mapped_link(counts, ring_mapping, material, closed=True)
     got = frequencies(link, free_map(link, held()), 14, 200)[6:]
-    names = [
-        f"{what} {n}" for n in (2, 3) for what in ("in plane, n =", "out of plane, n =") for _ in range(2)
-    ]
+    names = [f"{what} {n}" for n in (2, 3) for what in ("in plane, n =", "out of plane, n =") for _ in range(2)]
     targets = [205.89, 205.89, 210.55, 210.55, 587.92, 587.92, 588.88, 588.88]
     return rows(names, targets, got, 0.003, model(counts, link))

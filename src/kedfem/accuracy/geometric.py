@@ -191,9 +191,7 @@ def slides(model: Model) -> list[tuple[str, int]]:
     return found
 
 
-def slopes(
-    link: Link, of: Slices, history: LinkHistory, R: Float[np.ndarray, "T 3 3"]
-) -> Float[np.ndarray, "T c 3"]:
+def slopes(link: Link, of: Slices, history: LinkHistory, R: Float[np.ndarray, "T 3 3"]) -> Float[np.ndarray, "T c 3"]:
     """ψ between slices: how far the link's line has turned off its axis in the rigid-body motion [rad]."""
     along = (R @ of.axis)[:, None]
     change = np.diff(in_space(link, of.means @ history.u), axis=1)
@@ -241,9 +239,7 @@ def _remedy(found: GeometricError, error: float) -> str:
     return f"{stiffening}{corotational} is right at any deflection"
 
 
-def _projected(
-    full: Link, Q: Float[np.ndarray, "n s"], chosen: Float[np.ndarray, "c n"]
-) -> Float[np.ndarray, "c s"]:
+def _projected(full: Link, Q: Float[np.ndarray, "n s"], chosen: Float[np.ndarray, "c n"]) -> Float[np.ndarray, "c s"]:
     """Coefficients of modes Q that come nearest to weights of nodes, by the functions' share in the volume."""
     share = np.sqrt(_volumes(full))[:, None]
     return np.asarray(np.linalg.lstsq(share * Q, share * chosen.T, rcond=None)[0].T)

@@ -57,9 +57,7 @@ def open_modes(scene: Scene) -> list[str]:
     return [n for n, x in links if elastic(x, "solid", "plane") and "reduction" not in x.model_fields_set]
 
 
-def with_mesh(
-    search: Trials, scene: Scene, left_open: Sequence[str], allowed: float
-) -> tuple[Scene, float, float]:
+def with_mesh(search: Trials, scene: Scene, left_open: Sequence[str], allowed: float) -> tuple[Scene, float, float]:
     """The scene with the coarsest mesh of links whose model is open whose error is allowed, that error, and by what
     it is finer."""
     names = [
@@ -145,9 +143,7 @@ def with_segments(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, 
     return (scene, 0.0) if error == math.inf else (ladder[k][1], error)
 
 
-def first_enough(
-    search: Trials, ladder: Sequence[tuple[float, Scene]], allowed: float, finer: str
-) -> tuple[int, float]:
+def first_enough(search: Trials, ladder: Sequence[tuple[float, Scene]], allowed: float, finer: str) -> tuple[int, float]:
     """Which of ever finer scenes, each with how fine it is, is the first whose error is allowed, and that error.
 
     What two of them differ by shows what is left beyond the finer one; infinite if these two could not be compared.
@@ -194,9 +190,7 @@ def stubby_warning(model: Model) -> tuple[str, ...]:
     )
 
 
-def with_simpler_links(
-    search: Trials, scene: Scene, left_open: list[str], allowed: float
-) -> tuple[Scene, float]:
+def with_simpler_links(search: Trials, scene: Scene, left_open: list[str], allowed: float) -> tuple[Scene, float]:
     """The scene with links made rigid, beams or plane as far as that changes little, and by how much it does.
 
     Allowed is what the mesh left of both shares: a simpler link is compared with the one on that mesh.

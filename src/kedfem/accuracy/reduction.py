@@ -156,9 +156,7 @@ def reduced(
 
     def first(share: float) -> Functions:
         return [
-            None
-            if basis is None
-            else basis.first(given.get(link.name, _count(link, basis, share * tolerance)))
+            None if basis is None else basis.first(given.get(link.name, _count(link, basis, share * tolerance)))
             for link, basis in zip(full.model.links, found, strict=True)
         ]
 
@@ -254,9 +252,7 @@ def _run(full: Prepared, Q: Functions, moments: Collection[int]) -> tuple[Prepar
     return small, histories(small, moments)
 
 
-def _enriched(
-    full: Prepared, parts: Sequence[Substructure], small: Prepared, kept: Sequence[Snapshot]
-) -> Functions:
+def _enriched(full: Prepared, parts: Sequence[Substructure], small: Prepared, kept: Sequence[Snapshot]) -> Functions:
     """Functions with the answers to the residual at some moments added."""
     answers = residual_deflections(full.model, parts, small.model, kept)
     links = zip(full.model.links, small.model.links, zip(*answers, strict=True), strict=True)

@@ -249,9 +249,7 @@ def single_level(fast: float) -> tuple[float, float]:
     return finer, 1 + finer
 
 
-def single_errors(
-    fine: Histories, coarse: Histories, stops: bool
-) -> tuple[dict[str, float], dict[str, float]]:
+def single_errors(fine: Histories, coarse: Histories, stops: bool) -> tuple[dict[str, float], dict[str, float]]:
     """Channel → error of two marches by themselves: of the finer one, and of that with steps twice as long.
 
     Parameters

@@ -20,9 +20,7 @@ def new(
         str | None,
         typer.Argument(metavar="KIND", help="One of: " + ", ".join(KINDS) + "; left out with --from."),
     ] = None,
-    path: Annotated[
-        Path | None, typer.Argument(metavar="FILE", help="Default: KIND.toml or ASSEMBLY.toml here.")
-    ] = None,
+    path: Annotated[Path | None, typer.Argument(metavar="FILE", help="Default: KIND.toml or ASSEMBLY.toml here.")] = None,
     assembly: Annotated[
         Path | None,
         option(

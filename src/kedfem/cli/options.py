@@ -30,9 +30,7 @@ def given(**keys: Any) -> dict[str, Any]:
 
 ScenePath = Annotated[Path, typer.Argument(metavar="SCENE", help="The scene file (TOML).")]
 Quick = Annotated[bool, flag("--quick", "Plain defaults for what the scene leaves open.")]
-Within = Annotated[
-    bool, flag("--within", "Refuse a scene that names files or folders outside its own folder.")
-]
+Within = Annotated[bool, flag("--within", "Refuse a scene that names files or folders outside its own folder.")]
 Solid = Annotated[str | None, option("Which solid of an assembly.", "NAME")]
 Size = Annotated[str | None, option("Edge length of a part's elements, e.g. '3 mm'.", "LENGTH")]
 Across = Annotated[int | None, option("Elements across a part's smallest width; 2 if nothing else is given.")]

@@ -86,9 +86,7 @@ def frequencies(
             "NAME",
         ),
     ] = None,
-    material: Annotated[
-        str, option("Of a part: one that is built in, or '{ density = … }'.", "NAME")
-    ] = "steel",
+    material: Annotated[str, option("Of a part: one that is built in, or '{ density = … }'.", "NAME")] = "steel",
     solid: Solid = None,
     size: Size = None,
     across: Across = None,

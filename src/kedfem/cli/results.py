@@ -10,21 +10,13 @@ from kedfem.cli.running import PAGE
 from kedfem.cli.screen import progress, say, say_written, show, warn
 from kedfem.errors import OutputError, SceneError
 
-Given = Annotated[
-    Path, typer.Argument(metavar="SCENE|RESULTS", help="A scene, results.h5, or the folder that has it.")
-]
+Given = Annotated[Path, typer.Argument(metavar="SCENE|RESULTS", help="A scene, results.h5, or the folder that has it.")]
 
 
 def loads(
-    results: Annotated[
-        Path, typer.Argument(metavar="RESULTS", help="results.h5, or the folder that has it.")
-    ],
-    last: Annotated[
-        float | None, option("Of the drive, at the end, that count; default: all.", "REVOLUTIONS")
-    ] = None,
-    link: Annotated[
-        str | None, option("Load cases of this link instead, for a static analysis of it.", "NAME")
-    ] = None,
+    results: Annotated[Path, typer.Argument(metavar="RESULTS", help="results.h5, or the folder that has it.")],
+    last: Annotated[float | None, option("Of the drive, at the end, that count; default: all.", "REVOLUTIONS")] = None,
+    link: Annotated[str | None, option("Load cases of this link instead, for a static analysis of it.", "NAME")] = None,
     at: Annotated[
         list[float] | None,
         option(
@@ -76,9 +68,7 @@ def compare(
     ],
     over: Annotated[
         str | None,
-        option(
-            "time or drive, what curves are over; default: the drive's position where runs have other speeds."
-        ),
+        option("time or drive, what curves are over; default: the drive's position where runs have other speeds."),
     ] = None,
     folder: Annotated[Path | None, goes_to("compare beside the first results")] = None,
 ) -> None:
@@ -95,9 +85,7 @@ def compare(
 
 def report(
     given: Given,
-    file: Annotated[
-        Path | None, option("Where it goes; default: report.html beside the results.", "FILE")
-    ] = None,
+    file: Annotated[Path | None, option("Where it goes; default: report.html beside the results.", "FILE")] = None,
     within: Within = False,
 ) -> None:
     """One page about a run for any browser, without network: motion in three dimensions, curves, loads, warnings.

@@ -154,12 +154,8 @@ def accuracy(
 
 def sweep(
     scene: ScenePath,
-    over: Annotated[
-        list[str], option("A key or parameter, and a,b,c or from:to:count; several: a grid.", "KEY=VALUES")
-    ],
-    samples: Annotated[
-        int | None, option("Points of a Latin hypercube instead of a grid; each KEY=from:to.")
-    ] = None,
+    over: Annotated[list[str], option("A key or parameter, and a,b,c or from:to:count; several: a grid.", "KEY=VALUES")],
+    samples: Annotated[int | None, option("Points of a Latin hypercube instead of a grid; each KEY=from:to.")] = None,
     last: Annotated[float, option("Whose extremes count, the last ones.", "REVOLUTIONS")] = 1.0,
     workers: Annotated[int | None, option("Processes; as many as there are cores.")] = None,
     cluster: Annotated[

@@ -70,11 +70,7 @@ def elastic_model(
         If a load or body does not fit its link.
     """
     cut = {name: parted(scene, name, link) for name, link in bare_links(scene, known).items()}
-    links = {
-        key: part
-        for name, link in cut.items()
-        for key, part in zip(keys(name, link), link.parts, strict=True)
-    }
+    links = {key: part for name, link in cut.items() for key, part in zip(keys(name, link), link.parts, strict=True)}
     links = with_stiff_ports(scene, links)
     ground = moving_grounds(scene)
     links |= {name: moving_ground(scene, name, hub) for name, hub in ground.items()}
@@ -90,22 +86,17 @@ def elastic_model(
         wanted = "must hold a link that the drive does not simply carry along, got rigid ones only"
         raise SceneError([Fault(("links",), wanted)])
     prescribed = tuple(
-        replace(x, loads=patterns(scene, {x.link.name: x.link}, prescribed=True)[x.link.name])
-        for x in prescribed
+        replace(x, loads=patterns(scene, {x.link.name: x.link}, prescribed=True)[x.link.name]) for x in prescribed
     )
     numbers = {key: k for k, key in enumerate(links)}
-    sliders = tuple(
-        _slider(scene, name, links, numbers) for name in scene.links if slider_axis(scene, name) is not None
-    )
+    sliders = tuple(_slider(scene, name, links, numbers) for name in scene.links if slider_axis(scene, name) is not None)
     for slider in sliders:
         key = list(links)[slider.carrier]
         links[key] = with_point_mass(links[key], slider.weights, slider.mass)
     links, limits = made_rigid(scene, links, linkage, along, thicken=elements)
     sliders = tuple(slider_on(slider, list(links.values())[slider.carrier]) for slider in sliders)
     cuts = [shared for name, link in cut.items() for shared in _shared(name, link)]
-    layout = LinkageLayout(
-        {name: k for k, name in enumerate(linkage.bodies)}, slot_travels(scene, linkage, along)
-    )
+    layout = LinkageLayout({name: k for k, name in enumerate(linkage.bodies)}, slot_travels(scene, linkage, along))
     held = joined(scene, links, cuts, layout, elements, bars=elements)
     loads = patterns(scene, links)
     for slider in sliders:
@@ -146,21 +137,13 @@ def with_scene_body(scene: Scene, where: str, body: Body, links: Mapping[str, Li
     """The link or segment that carries a body, and it with the body."""
     at = np.asarray(body.at)
     near = 1e-6 * max(link.size for link in links.values() if link.name == body.link)
-    here = [
-        j
-        for j in scene.joints.values()
-        if body.link in j.links and np.linalg.norm(np.subtract(j.at, at)) <= near
-    ]
+    here = [j for j in scene.joints.values() if body.link in j.links and np.linalg.norm(np.subtract(j.at, at)) <= near]
     axis = next((unit(j.axis) for j in here if j.axis and j.kind != "prismatic"), None)
     faces = next((j.face_names(body.link) for j in here if body.link in j.faces), ())
     if scene.links[body.link].model == "rigid" and links[body.link].kind == "solid":
-        return body.link, _carrying(
-            links[body.link], rigid_link_surface(links[body.link], at), where, body, axis
-        )
+        return body.link, _carrying(links[body.link], rigid_link_surface(links[body.link], at), where, body, axis)
     try:
-        key, surface = on_part(
-            links, body.link, at, lambda link: joint_surface(link, f"{where}.at", at, axis, faces)
-        )
+        key, surface = on_part(links, body.link, at, lambda link: joint_surface(link, f"{where}.at", at, axis, faces))
     except MeshError:
         if not isinstance(body, PointMass):
             raise
@@ -170,9 +153,7 @@ def with_scene_body(scene: Scene, where: str, body: Body, links: Mapping[str, Li
     return key, _carrying(links[key], surface, where, body, axis)
 
 
-def _carrying(
-    link: Link, surface: CouplingSurface, where: str, body: Body, axis: Float[np.ndarray, "3"] | None
-) -> Link:
+def _carrying(link: Link, surface: CouplingSurface, where: str, body: Body, axis: Float[np.ndarray, "3"] | None) -> Link:
     at = np.asarray(body.at)
     match body:
         case Flywheel(mass=mass, inertia=inertia):
@@ -185,9 +166,7 @@ def _carrying(
         case RigidBody(mass=mass, inertia=inertia, centre=centre):
             if is_flat(surface):
                 wanted, got = (
-                    ("an end or a corner", "another node")
-                    if link.kind == "spatial_beam"
-                    else ("a bore", "a flat face")
+                    ("an end or a corner", "another node") if link.kind == "spatial_beam" else ("a bore", "a flat face")
                 )
                 raise MeshError(
                     f"{where}.at: a rigid body with full inertia must sit on {wanted}, got {got} of '{link.name}'"
@@ -210,9 +189,7 @@ def _slider(scene: Scene, name: str, links: dict[str, Link], numbers: dict[str, 
     elastic = {link.name for link in links.values()}
     held = [(key, other) for key, joint in joints.items() for other in joint.links if other in elastic]
     if not held:
-        raise MeshError(
-            f"links.{name}: a rigid slider must be joined to an elastic link, got none: give it a shape"
-        )
+        raise MeshError(f"links.{name}: a rigid slider must be joined to an elastic link, got none: give it a shape")
     key, other = held[0]
     carrier, surface = part_surface(scene, key, links, other)
     weights = port_weights(surface, np.array([joints[key].at]))[0]

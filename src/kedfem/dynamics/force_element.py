@@ -79,9 +79,7 @@ Vectors = Float[np.ndarray, "T 2 2 3"]
 """Two vectors of each of two ends over time; the second is zero where there is none."""
 
 
-def placed(
-    element: ForceElement, motion: RigidMotion, links: Sequence[LinkHistory] = ()
-) -> tuple[Vectors, Vectors]:
+def placed(element: ForceElement, motion: RigidMotion, links: Sequence[LinkHistory] = ()) -> tuple[Vectors, Vectors]:
     """Vectors of both ends and their rates.
 
     Parameters
@@ -119,9 +117,7 @@ def coordinate(element: ForceElement, x: Vectors, before: float = 0.0) -> Times:
     """
     if element.kind != TURN:
         gap = x[:, 0, 0] - x[:, 1, 0]
-        return np.asarray(
-            (_axis(element, x) * gap).sum(axis=1) if element.kind == SLIDE else np.linalg.norm(gap, axis=1)
-        )
+        return np.asarray((_axis(element, x) * gap).sum(axis=1) if element.kind == SLIDE else np.linalg.norm(gap, axis=1))
     drawn = np.zeros((1, 2, 2, 3))
     for e, end in enumerate(element.ends):
         drawn[0, e, : len(end.X)] = end.X

@@ -79,12 +79,8 @@ def law_of(element: Spring | Motor | Limit) -> Law:
             given, factor = element.curve, element.stiffness_factor
             curve = None if given is None else Curve(OVER[given.over], pieces(given).negative)
             if is_constant(factor):
-                return SpringLaw(
-                    factor.value[0] * element.stiffness, element.damping, element.free, curve=curve
-                )
-            return SpringLaw(
-                element.stiffness, element.damping, element.free, factor=factor_law(factor), curve=curve
-            )
+                return SpringLaw(factor.value[0] * element.stiffness, element.damping, element.free, curve=curve)
+            return SpringLaw(element.stiffness, element.damping, element.free, factor=factor_law(factor), curve=curve)
         case AngleLimit() | TravelLimit():
             return Stop(*element.range, element.stiffness, element.damping)
         case _:
@@ -169,18 +165,14 @@ class _Ends:
     ) -> End:  # fmt: skip
         """An end on link k; of a planar one without what its rows have beside displacements."""
         mask = (1.0, 1.0, 0.0) if self.links[k].planar else IN_SPACE
-        return End(
-            k, self.numbers[k], form, weights, X, mask, np.zeros(3) if offset is None else offset, link
-        )
+        return End(k, self.numbers[k], form, weights, X, mask, np.zeros(3) if offset is None else offset, link)
 
 
 def _in_face(where: str, link: Link, surface: CouplingSurface, axis: Vector) -> Vector:
     """The direction within a flat coupling surface across an axis."""
     t = np.cross(face_normal(surface), axis)
     if np.linalg.norm(t) < 1e-6 or not holds(surface, t):
-        raise MeshError(
-            f"{where}: must sit on a bore of link '{link.name}' to be turned, got a face across its axis"
-        )
+        raise MeshError(f"{where}: must sit on a bore of link '{link.name}' to be turned, got a face across its axis")
     return np.asarray(t / np.linalg.norm(t))
 
 

@@ -39,9 +39,7 @@ class Deformed:
     g1: Nodal
 
 
-def rotation(
-    link: Link, fit: Float[np.ndarray, "n 3"], y: Nodal, angle: float
-) -> tuple[Float[np.ndarray, "d d"], float]:
+def rotation(link: Link, fit: Float[np.ndarray, "n 3"], y: Nodal, angle: float) -> tuple[Float[np.ndarray, "d d"], float]:
     """Q of Σ y_a ⊗ fit_a; of a planar link with its angle, which counts turns.
 
     Parameters

@@ -102,9 +102,7 @@ def rotation(i, kind, fit, y, Q, angle, A, U, change):  # type: ignore[no-untype
         change[0], change[1], change[2] = U[2, 1] - U[1, 2], U[0, 2] - U[2, 0], U[1, 0] - U[0, 1]
         turn_of(U, change)
         size = max(abs(change[0]), abs(change[1]), abs(change[2]))
-        if (
-            size > 0.5
-        ):  # a slender segment shows its twist by small numbers: Newton's step may be far too long
+        if size > 0.5:  # a slender segment shows its twist by small numbers: Newton's step may be far too long
             for b in range(3):
                 change[b] *= 0.5 / size
         rodrigues(change, Q[i], U)

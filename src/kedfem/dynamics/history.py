@@ -94,8 +94,7 @@ def joined(parts: Sequence[list[LinkHistory]]) -> list[LinkHistory]:
         return parts[0] if parts else []
     names = [each.name for each in fields(LinkHistory) if each.name != "products"]
     every: list[dict[str, Any]] = [
-        {name: np.concatenate([getattr(x, name) for x in each]) for name in names}
-        for each in zip(*parts, strict=True)
+        {name: np.concatenate([getattr(x, name) for x in each]) for name in names} for each in zip(*parts, strict=True)
     ]
     return [LinkHistory(**each) for each in every]
 
@@ -193,10 +192,7 @@ class Block:
 
     def at(self, k: int) -> "Snapshot":
         """The k-th of its time points."""
-        moments = [
-            LinkMoment(**{f.name: getattr(each, f.name)[k] for f in fields(LinkMoment)})
-            for each in self.links
-        ]
+        moments = [LinkMoment(**{f.name: getattr(each, f.name)[k] for f in fields(LinkMoment)}) for each in self.links]
         return Snapshot(self.step + k, self.motion, k, moments)
 
 

@@ -100,9 +100,7 @@ class Inertias:
         for load in loads:
             f = in_space(link, load.forces)
             couple = float(link.one @ load.forces[:, 2]) if link.kind == "beam" else 0.0
-            self.loads.append(
-                RigidLoad(body, link.one @ f, arms.T @ f, couple, load.follows, load.factor, load.share)
-            )
+            self.loads.append(RigidLoad(body, link.one @ f, arms.T @ f, couple, load.follows, load.factor, load.share))
 
     def centre_of(self, body: int) -> Vector | None:
         """Centre of mass of a body, in the reference position [m]; None without mass."""
@@ -176,9 +174,7 @@ def acting(inertias: Inertias, motion: RigidMotion) -> Wrenches:
     return force, moment
 
 
-def load_wrench(
-    load: RigidLoad, motion: RigidMotion
-) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]:
+def load_wrench(load: RigidLoad, motion: RigidMotion) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]:
     """Force and moment of a load over time, about the point drawn at the linkage's centre."""
     R, factor = motion.R[:, load.body], load.factor(motion.t, motion.phi)
     factor = (factor * shares(load.share, motion, load.body))[:, None]

@@ -33,14 +33,10 @@ def load_weights(
         case BodyLoad():
             return {key: link.volume for key, link in parts.items()}
         case SurfaceLoad():
-            return {
-                key: surface_weights(parts[key], surface) for key, surface in face(where, load, parts).items()
-            }
+            return {key: surface_weights(parts[key], surface) for key, surface in face(where, load, parts).items()}
 
 
-def at_point(
-    where: str, name: str, at: Vector, parts: Mapping[str, Link]
-) -> tuple[str, Float[np.ndarray, " n"]]:
+def at_point(where: str, name: str, at: Vector, parts: Mapping[str, Link]) -> tuple[str, Float[np.ndarray, " n"]]:
     """The segment of a link that a force at a point acts on, and how much of it each function takes."""
     return on_part(parts, name, at, lambda link: point_weights(where, link, at))
 
@@ -52,16 +48,12 @@ def point_weights(where: str, link: Link, at: Vector) -> Float[np.ndarray, " n"]
     return rows.value
 
 
-def face(
-    where: str, load: SurfaceLoad | PressureLoad, parts: Mapping[str, Link]
-) -> dict[str, CouplingSurface]:
+def face(where: str, load: SurfaceLoad | PressureLoad, parts: Mapping[str, Link]) -> dict[str, CouplingSurface]:
     """A plane face may run over several segments: all of it that each has; a curved one is on one segment."""
     at = np.asarray(load.at)
     for link in parts.values():
         if not link.meshed:
-            raise SceneError(
-                f"{where}: a {load.kind} needs a solid or a plane link, got the beam '{link.name}'"
-            )
+            raise SceneError(f"{where}: a {load.kind} needs a solid or a plane link, got the beam '{link.name}'")
     key, surface = on_part(parts, load.link, at, lambda x: face_surface(x, f"{where}.at", at))
     found = {key: surface}
     for other in parts.keys() - {key} if is_flat(surface) else ():

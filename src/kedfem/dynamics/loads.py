@@ -58,9 +58,7 @@ class Pattern:
     load: str = ""
 
 
-def patterns(
-    scene: Scene, links: Mapping[str, Link], prescribed: bool = False
-) -> dict[str, tuple[Pattern, ...]]:
+def patterns(scene: Scene, links: Mapping[str, Link], prescribed: bool = False) -> dict[str, tuple[Pattern, ...]]:
     """All loads P on links or their segments, by key, [KED, eqs. (15)(16)], gravity first.
 
     Parameters
@@ -117,9 +115,7 @@ def _always(t: Times, phi: Times) -> Times:
     return np.ones_like(t)
 
 
-def _load_patterns(
-    scene: Scene, where: str, load: Load, links: Mapping[str, Link]
-) -> dict[str, list[Pattern]]:
+def _load_patterns(scene: Scene, where: str, load: Load, links: Mapping[str, Link]) -> dict[str, list[Pattern]]:
     """The patterns of a load on each segment of its link."""
     parts = {key: link for key, link in links.items() if link.name == load.link}
     factor = factor_law(load.factor)
@@ -140,9 +136,7 @@ def _load_patterns(
             return {}
 
 
-def _torque(
-    scene: Scene, where: str, load: TorqueLoad, parts: Mapping[str, Link]
-) -> dict[str, list[Pattern]]:
+def _torque(scene: Scene, where: str, load: TorqueLoad, parts: Mapping[str, Link]) -> dict[str, list[Pattern]]:
     """A couple on the segment of its coupling surface; of fixed direction m it is Σ (m · R e_k) of that about R e_k."""
     m, factor = np.asarray(load.vector), factor_law(load.factor)
     at = np.asarray(scene.joints[load.joint].at if load.joint is not None else load.at)
@@ -153,9 +147,7 @@ def _torque(
     return {key: [Pattern(one, True, factor, (axis, m)) for one, axis in about]}
 
 
-def _couples(
-    scene: Scene, where: str, load: TorqueLoad, link: Link, at: Vector
-) -> Float[np.ndarray, "3 n d"]:
+def _couples(scene: Scene, where: str, load: TorqueLoad, link: Link, at: Vector) -> Float[np.ndarray, "3 n d"]:
     """Forces of unit couples about x, y and z on a link's coupling surface."""
     if link.kind == "beam":
         out = np.zeros((3, link.n, 3))
@@ -184,9 +176,7 @@ def initial_forces(scene: Scene, links: Sequence[Link]) -> list[Float[np.ndarray
     for name, force in scene.analysis.initial_deflection.items():
         where = f"analysis.initial_deflection.{name}"
         if all(link.name != force.link or link.rigid for link in links):
-            raise SceneError(
-                f"{where}.link: must name an elastic link, got '{force.link}', which does not deform"
-            )
+            raise SceneError(f"{where}.link: must name an elastic link, got '{force.link}', which does not deform")
         key, weights = at_point(where, force.link, np.asarray(force.at), parts)
         out[int(key)] += np.outer(weights, as_rows(parts[key], np.asarray(force.force)))
     return out
@@ -210,16 +200,12 @@ def amounts(load: Pattern, motion: RigidMotion, body: int) -> Float[np.ndarray, 
     return load.factor(motion.t, motion.phi) * shares(load.share, motion, body)
 
 
-def shares(
-    share: tuple[Vector, Vector] | None, motion: RigidMotion, body: int
-) -> Float[np.ndarray, " T"] | float:
+def shares(share: tuple[Vector, Vector] | None, motion: RigidMotion, body: int) -> Float[np.ndarray, " T"] | float:
     """The cosine that a load's factor is multiplied by, see `Pattern`."""
     return 1.0 if share is None else np.asarray(motion.R[:, body] @ share[0] @ share[1])
 
 
-def applied(
-    link: Link, loads: tuple[Pattern, ...], motion: RigidMotion, body: int
-) -> Float[np.ndarray, "T n d"]:
+def applied(link: Link, loads: tuple[Pattern, ...], motion: RigidMotion, body: int) -> Float[np.ndarray, "T n d"]:
     """P − M R0'' over time, world components, [KED, eqs. (17)(18)]: R0'' = 1 ⊗ p'' + X R''ᵀ.
 
     All patterns of the link are combined in one product, component first in memory.

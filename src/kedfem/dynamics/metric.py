@@ -34,8 +34,7 @@ def element_tables(links: Sequence[Link], parts: Sequence[Coordinates]) -> Eleme
     every = [(links[k], links[k].element, parts[k]) for k in which]
     made = [_own(link, element, part, width) for link, element, part in every if element is not None]
     tables = (
-        _padded([own[k] for own in made], size, int if k in WHOLE_NUMBERS else float)
-        for k, size in enumerate(DIMENSIONS)
+        _padded([own[k] for own in made], size, int if k in WHOLE_NUMBERS else float) for k, size in enumerate(DIMENSIONS)
     )
     return Elements(number, *tables)
 

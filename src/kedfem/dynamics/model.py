@@ -119,9 +119,7 @@ def mesh_methods(model: Model) -> dict[str, str]:
     return {link.name: method for link in links if (method := (link.full or link).method)}
 
 
-def on_segment(
-    links: Sequence[Link], name: str, at: Float[np.ndarray, "3"], found: Callable[[Link], T]
-) -> tuple[int, T]:
+def on_segment(links: Sequence[Link], name: str, at: Float[np.ndarray, "3"], found: Callable[[Link], T]) -> tuple[int, T]:
     """The number of the link of a name, or of its segment, that has something at a drawn point, and what was found.
 
     Raises

@@ -37,8 +37,4 @@ def moving_ground(scene: Scene, name: str, hub: str) -> Link:
         link, mass=(none,) * 3, m1=np.zeros_like(link.m1), mX=np.zeros_like(link.mX), volume=np.zeros(link.n)
     )
     mass = scene.links[name].mass
-    return (
-        with_body(massless, rigid_link_surface(massless, at), mass, at, np.zeros((3, 3)))
-        if mass
-        else massless
-    )
+    return with_body(massless, rigid_link_surface(massless, at), mass, at, np.zeros((3, 3))) if mass else massless

@@ -25,9 +25,7 @@ def reduced_model(model: Model, functions: Sequence[Float[np.ndarray, "_ s"] | N
             joints[k] = replace(joint, nodes=np.arange(link.n), weights=joint.weights @ on[joint.nodes])
             loads[k] = tuple(_load_on(load, link) for load in model.loads[k])
             sliders = [slider_on(slider, link) if slider.carrier == k else slider for slider in sliders]
-    return replace(
-        model, links=tuple(links), joints=tuple(joints), loads=tuple(loads), sliders=tuple(sliders), cuts=cuts
-    )
+    return replace(model, links=tuple(links), joints=tuple(joints), loads=tuple(loads), sliders=tuple(sliders), cuts=cuts)
 
 
 def stored_model(model: Model) -> Model | None:
@@ -55,9 +53,7 @@ def _cut_on(cut: SharedCut, key: str, link: Link) -> SharedCut:
     """A cut, its weights on the functions of a link that has become a reduced one."""
     if key not in cut.keys:
         return cut
-    one, other = (
-        x @ on_functions(link) if key == name else x for name, x in zip(cut.keys, cut.weights, strict=True)
-    )
+    one, other = (x @ on_functions(link) if key == name else x for name, x in zip(cut.keys, cut.weights, strict=True))
     return replace(cut, weights=(one, other))
 
 
@@ -65,6 +61,4 @@ def slider_on(slider: Slider, link: Link) -> Slider:
     """A slider on the reduced copy of its carrier."""
     if link.Q is None:
         return slider
-    return replace(
-        slider, weights=slider.weights @ link.Q, loads=tuple(_load_on(load, link) for load in slider.loads)
-    )
+    return replace(slider, weights=slider.weights @ link.Q, loads=tuple(_load_on(load, link) for load in slider.loads))

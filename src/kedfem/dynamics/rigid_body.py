@@ -72,9 +72,7 @@ def forcings(model: Model, motion: RigidMotion) -> list[Forcing]:
     return forcing_of(model, motion, [applied(link, loads, motion, body) for link, loads, body in every])
 
 
-def forcing_of(
-    model: Model, motion: RigidMotion, loads: Sequence[Float[np.ndarray, "T _ _"]]
-) -> list[Forcing]:
+def forcing_of(model: Model, motion: RigidMotion, loads: Sequence[Float[np.ndarray, "T _ _"]]) -> list[Forcing]:
     """The same where P − M R0'' is known."""
     every = zip(model.links, model.bodies, loads, strict=True)
     return [Forcing(motion.R[:, body, : link.d, : link.d], F) for link, body, F in every]

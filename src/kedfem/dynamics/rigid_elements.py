@@ -59,9 +59,7 @@ class RigidElements:
             forces[:, i] = Q[:, None, None, None] * unit
         return x, forces
 
-    def wrenches(
-        self, motion: RigidMotion
-    ) -> Iterator[tuple[End, Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]]:
+    def wrenches(self, motion: RigidMotion) -> Iterator[tuple[End, Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]]:
         """Force and moment about the world's origin (T, 3) of every end."""
         x, forces = self.over(motion)
         for i, e, end in self.ends():

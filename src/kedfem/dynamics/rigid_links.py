@@ -32,9 +32,7 @@ LIGHT = 1e-3  # second moment of a planar beam's mass beside inertia of its sect
 COMPACT = 1e-7  # of mass times length²: second moments, below which forces would be off by more than 1e-4
 LAMINA = 1e-8  # of second moments of mass: a sheet of a millimetre by a metre has 1e-6
 INSTANTS = 400  # at which rotations are looked up: a tenth of what the smallest models take to make
-MOUNTED = (
-    3e3  # times the frequency on the mounts: a link's own strain is 1e-7 of deflections, rounding up to 4e-7
-)
+MOUNTED = 3e3  # times the frequency on the mounts: a link's own strain is 1e-7 of deflections, rounding up to 4e-7
 
 
 def made_rigid(

@@ -88,9 +88,7 @@ class Stiffening:
         forces = port_forces(self.parts, R, loads, rows)
         return [
             replace(each, stress=_factors(modes, part, load, force))
-            for each, modes, part, load, force in zip(
-                forcing, self.modes, self.parts, loads, forces, strict=True
-            )
+            for each, modes, part, load, force in zip(forcing, self.modes, self.parts, loads, forces, strict=True)
         ]
 
     def _loads(self, forcing: Sequence[Forcing], motion: RigidMotion) -> list[Float[np.ndarray, "T n d"]]:
@@ -134,9 +132,7 @@ def stiffening(model: Model, elements: RigidElements | None = None) -> Stiffenin
     return Stiffening(parts, modes, model.rows, elements)
 
 
-def stress_modes(
-    link: Link, part: Substructure, loads: Sequence[Pattern], elements: Sequence[Nodal] = ()
-) -> StressModes:
+def stress_modes(link: Link, part: Substructure, loads: Sequence[Pattern], elements: Sequence[Nodal] = ()) -> StressModes:
     """Static states of a link under all loads in balance that the rigid-body motion can put on it, and their k.
 
     Parameters

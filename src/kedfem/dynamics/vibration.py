@@ -40,9 +40,7 @@ class Vibration:
         """Its frequency, and the link that moves most."""
         name, share = next(iter(self.shares.items()))
         mostly = (
-            f"{100 * share:.0f} % of its kinetic energy in link {name!r}"
-            if len(self.shares) > 1
-            else f"of link {name!r}"
+            f"{100 * share:.0f} % of its kinetic energy in link {name!r}" if len(self.shares) > 1 else f"of link {name!r}"
         )
         return f"at about {self.frequency:.4g} Hz, {mostly}"
 
@@ -59,10 +57,7 @@ def vibration(over: PeriodMap, solver: Steps, found: Periodic) -> Vibration:
     by = 1.0 if over.linear else SMALL * over.size(x) / over.size(found.shape)
     motion, *base, frames = _states(over, solver, x, at)
     _, *moved, _ = _states(over, solver, over.possible(x + by * found.shape), at)
-    u, v, g = (
-        [after - before for after, before in zip(*each, strict=True)]
-        for each in zip(moved, base, strict=True)
-    )
+    u, v, g = ([after - before for after, before in zip(*each, strict=True)] for each in zip(moved, base, strict=True))
     largest = max(float(np.linalg.norm(each, axis=-1).max()) for each in u) or 1.0
     snapshots = tuple(
         Snapshot(int(at[f]) + 1, motion, f, [
@@ -71,9 +66,7 @@ def vibration(over: PeriodMap, solver: Steps, found: Periodic) -> Vibration:
         ])
         for f in range(len(at))
     )  # fmt: skip
-    moving, still = (
-        [_mass_product(link, x) for link, x in zip(model.links, of, strict=True)] for of in (v, u)
-    )
+    moving, still = ([_mass_product(link, x) for link, x in zip(model.links, of, strict=True)] for of in (v, u))
     energy = dict.fromkeys((link.name for link in model.links), 0.0)
     for link, part in zip(model.links, moving, strict=True):
         energy[link.name] += part

@@ -222,9 +222,7 @@ class _Reader:
         return np.hstack([np.zeros((count, 0)), *rows]).T
 
 
-def _history(
-    link: Link, R: Float[np.ndarray, "c d d"], field: str, x: Float[np.ndarray, "c n d"]
-) -> LinkHistory:
+def _history(link: Link, R: Float[np.ndarray, "c d d"], field: str, x: Float[np.ndarray, "c n d"]) -> LinkHistory:
     """A link with one of u, v, a and nothing else."""
     none = np.zeros_like(x)
     own = LinkHistory(none, none, none, none, R, none, np.zeros((len(x), 0)), np.zeros(len(x)))

@@ -122,9 +122,7 @@ def _rigid(link: Link) -> Float[np.ndarray, "k r"]:
     return found if link.planar else found[:, [0, 1, 2, 4, 5, 3]]
 
 
-def _translation(
-    link: Link, surface: CouplingSurface, at: Float[np.ndarray, "3"]
-) -> Float[np.ndarray, "3 k"]:
+def _translation(link: Link, surface: CouplingSurface, at: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 k"]:
     """Of the affine field of a coupling surface at a joint's place."""
     weights = port_weights(surface, at[None])[0]
     out = np.zeros((3, link.n, link.d))

@@ -22,9 +22,7 @@ class Campbell:
     values: Float[np.ndarray, "S P f"]
     varies: bool
 
-    def bands(
-        self, speeds: Float[np.ndarray, " x"]
-    ) -> tuple[Float[np.ndarray, "f x"], Float[np.ndarray, "f x"]]:
+    def bands(self, speeds: Float[np.ndarray, " x"]) -> tuple[Float[np.ndarray, "f x"], Float[np.ndarray, "f x"]]:
         """The least and the greatest frequency of all positions."""
         squares = np.moveaxis(self.values**2, 0, -1).reshape(-1, len(self.speeds))
         found = [np.interp(speeds**2, self.speeds**2, f) for f in squares]

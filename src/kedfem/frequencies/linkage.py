@@ -192,9 +192,7 @@ def _at_speeds(
     return found, ()
 
 
-def _over(
-    solver: Frozen | Stiffened, motion: RigidMotion, watch: Watch, since: int, total: int
-) -> list[Modes]:
+def _over(solver: Frozen | Stiffened, motion: RigidMotion, watch: Watch, since: int, total: int) -> list[Modes]:
     """Modes at each position; shapes of the first vibration's lowest frequency so far alone."""
     out: list[Modes] = []
     lowest = np.inf

@@ -68,9 +68,7 @@ class PartFrequencies:
         return float(self.part.link.one @ self.part.link.m1[:, 0])
 
 
-def part_from_file(
-    file: FilePath, given: LinkScene, material: Material, faces: Sequence[str | ChosenFace] = ()
-) -> Part:
+def part_from_file(file: FilePath, given: LinkScene, material: Material, faces: Sequence[str | ChosenFace] = ()) -> Part:
     """A part from CAD or from a mesh file, some of its faces clamped.
 
     Parameters

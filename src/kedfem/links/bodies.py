@@ -20,9 +20,7 @@ def inertia_of(euler: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
     return np.asarray(np.trace(euler) * np.eye(3) - euler)
 
 
-def flywheel_tensor(
-    surface: CouplingSurface, axis: Float[np.ndarray, "3"], inertia: float
-) -> Float[np.ndarray, "3 3"]:
+def flywheel_tensor(surface: CouplingSurface, axis: Float[np.ndarray, "3"], inertia: float) -> Float[np.ndarray, "3 3"]:
     """Euler tensor of a flywheel with moment of inertia J about an axis [kg m²].
 
     On a bore a thin disc, ½ J (1 − a aᵀ). A flat face does not know how its displacement changes along its normal, so

@@ -48,10 +48,7 @@ def bare_links(scene: Scene, known: Mapping[str, Link] | None = None) -> dict[st
     made = known or {}
     names = [name for name, link in scene.links.items() if link.shape is not None]
     spatial, meshes = spatial_beams(scene), part_meshes(scene, [name for name in names if name not in made])
-    return {
-        name: made[name] if name in made else bare_link(scene, name, spatial, meshes.get(name))
-        for name in names
-    }
+    return {name: made[name] if name in made else bare_link(scene, name, spatial, meshes.get(name)) for name in names}
 
 
 def part_meshes(scene: Scene, names: Iterable[str]) -> dict[str, SolidMesh]:
@@ -83,9 +80,7 @@ def link_axes(link: LinkScene) -> Float[np.ndarray, "3 3"]:
             return np.eye(3)
 
 
-def bare_link(
-    scene: Scene, name: str, spatial: frozenset[str] | None = None, mesh: SolidMesh | None = None
-) -> Link:
+def bare_link(scene: Scene, name: str, spatial: frozenset[str] | None = None, mesh: SolidMesh | None = None) -> Link:
     """The record of one link that has a shape, without attached bodies.
 
     Parameters
@@ -165,9 +160,7 @@ def most_segments(scene: Scene, name: str) -> int:
     return most_slices(link.X, along(link, _ends(scene, name, link)))
 
 
-def _usual_segments(
-    link: Link, material: Material, ends: Float[np.ndarray, "p 3"], whole: list[Interval]
-) -> Segments:
+def _usual_segments(link: Link, material: Material, ends: Float[np.ndarray, "p 3"], whole: list[Interval]) -> Segments:
     """SEGMENTS of a link, or as many as its mesh can be divided into, none shorter than the link is wide.
 
     Cuts of stubby slices would soften the link, which bends little anyway.

@@ -156,9 +156,7 @@ def extreme_stresses(
     return von_mises(stress), np.stack([fibres.min(axis=0), fibres.max(axis=0)], axis=1)
 
 
-def stress_modes(
-    recovery: StressRecovery, link: Link, modes: Float[np.ndarray, "r k"]
-) -> Float[np.ndarray, "p 6 r"]:
+def stress_modes(recovery: StressRecovery, link: Link, modes: Float[np.ndarray, "r k"]) -> Float[np.ndarray, "p 6 r"]:
     """Stresses of states (r, dn) of a link, full or reduced, at all places of `recovery.stressed` at once.
 
     Returns

@@ -157,9 +157,7 @@ def rigid_modes(link: Link) -> Float[np.ndarray, "k r"]:
     return out.reshape(-1, 3)
 
 
-def rigid_motions(
-    X: Float[np.ndarray, "n 3"], one: Float[np.ndarray, " n"], d: int
-) -> Float[np.ndarray, "k r"]:
+def rigid_motions(X: Float[np.ndarray, "n 3"], one: Float[np.ndarray, " n"], d: int) -> Float[np.ndarray, "k r"]:
     """Translations and turns about the origin, (n functions, d components) by motions."""
     motions = [np.outer(one, e) for e in np.eye(d)]
     for i, j in ((0, 1), (1, 2), (2, 0))[: 1 if d == 2 else 3]:

@@ -208,9 +208,7 @@ def _smoothed(link: Link, slice_of: Int[np.ndarray, " e"], count: int) -> Int[np
     return slice_of
 
 
-def _slice(
-    link: Link, material: Material, elements: Int[np.ndarray, " e"]
-) -> tuple[Link, Int[np.ndarray, " n"]]:
+def _slice(link: Link, material: Material, elements: Int[np.ndarray, " e"]) -> tuple[Link, Int[np.ndarray, " n"]]:
     """A link of some elements of another, and which of its functions they are."""
     from scipy.spatial import cKDTree
 
@@ -229,9 +227,7 @@ def _slice(
     return part, same
 
 
-def _slice_faces(
-    link: Link, elements: Int[np.ndarray, " e"], used: Int[np.ndarray, " n"]
-) -> tuple[Face, ...]:
+def _slice_faces(link: Link, elements: Int[np.ndarray, " e"], used: Int[np.ndarray, " n"]) -> tuple[Face, ...]:
     """Faces of a link that have names, with the sides that are of some of its elements, if any."""
     mesh, faces = link.basis.mesh, []
     for each in link.faces:

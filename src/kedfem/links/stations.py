@@ -245,9 +245,7 @@ def _near(s: Float[np.ndarray, " k"], travel: tuple[float, float]) -> slice:
     return slice(first, max(end, first + FEWEST))
 
 
-def _check_travel(
-    where: str, name: str, reach: tuple[float, float], travel: tuple[float, float], slack: float
-) -> None:
+def _check_travel(where: str, name: str, reach: tuple[float, float], travel: tuple[float, float], slack: float) -> None:
     if travel[0] < reach[0] - slack or travel[1] > reach[1] + slack:
         raise MeshError(
             f"{where}: the pin must stay on link '{name}', which reaches from {reach[0]:.6g} to {reach[1]:.6g} m "

@@ -98,9 +98,7 @@ def _with_hollows(
     if angle == sizing.hollow:
         return found
     words = "no finer" if angle >= USUAL else f"by {np.degrees(angle):.3g}° an element"
-    return replace(
-        found, method=f"{found.method}; fillets and free bores {words}, as others would be bad or too many"
-    )
+    return replace(found, method=f"{found.method}; fillets and free bores {words}, as others would be bad or too many")
 
 
 def subdivided_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
@@ -156,9 +154,7 @@ def _least_jacobian(mesh: SolidMesh) -> float:
     return float(scaled_jacobian(mesh.points, mesh.cells).min())
 
 
-def _tried(
-    gmsh: ModuleType, solid: Solid, sizing: Sizing, coarser: float, complaints: list[str]
-) -> Iterator[SolidMesh]:
+def _tried(gmsh: ModuleType, solid: Solid, sizing: Sizing, coarser: float, complaints: list[str]) -> Iterator[SolidMesh]:
     """gmsh's tetrahedra under one setting after the other, where it makes any that are valid."""
     size = coarser * tetrahedron_size(solid, sizing)
     turn = min(_TURN * coarser, np.pi / 3) * min(1.0, sizing.turn / USUAL)

@@ -13,9 +13,7 @@ _FINEST = 4.0  # the least size elsewhere over the least one here
 
 
 @contextmanager
-def finer_hollows(
-    gmsh: ModuleType, solid: Solid, sizing: Sizing, turn: float, finest: float
-) -> Iterator[None]:
+def finer_hollows(gmsh: ModuleType, solid: Solid, sizing: Sizing, turn: float, finest: float) -> Iterator[None]:
     """For a while gmsh's elements turn by the sizing's `hollow` along hollow faces, elsewhere as by its own options.
 
     gmsh knows one angle and one least size for all faces. What it asks for is the radius of curvature times that angle;

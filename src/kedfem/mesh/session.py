@@ -89,9 +89,7 @@ def boundary(gmsh: ModuleType, dimension: int, *tags: int) -> set[int]:
     return {abs(int(tag)) for _, tag in gmsh.model.getBoundary(entities, combined=False, oriented=False)}
 
 
-def touching(
-    bounds: Sequence[set[int]], alike: Callable[[int, int], bool] = lambda one, other: True
-) -> list[list[int]]:
+def touching(bounds: Sequence[set[int]], alike: Callable[[int, int], bool] = lambda one, other: True) -> list[list[int]]:
     """Entities in groups that hang together: those that share some of what bounds them, and are alike."""
     owners: dict[int, list[int]] = {}
     for i, own in enumerate(bounds):

@@ -85,8 +85,7 @@ def _closed(scene: Scene) -> tuple[Scene, Assembly]:
         raise MotionError("\n".join(_told(scene, name, wanted, misfit) for name, misfit in misfits.items()))
     middle = scene_centre(scene)
     shifts = {
-        name: Shift(c + middle, size * x[:3], x[3:])
-        for name, c, x in zip(scene.links, centres, change, strict=True)
+        name: Shift(c + middle, size * x[:3], x[3:]) for name, c, x in zip(scene.links, centres, change, strict=True)
     }
     ways = {name: _way(scene, name, shift) for name, shift in shifts.items()}
     return closed_scene(scene, shifts), Assembly(misfits, ways)
@@ -104,9 +103,7 @@ def assembly_warning(assembly: Assembly) -> tuple[str, ...]:
     )
 
 
-def least_change(
-    rows: Rows, centres: Float[np.ndarray, "n 3"], size: float
-) -> tuple[Change, Float[np.ndarray, " m"]]:
+def least_change(rows: Rows, centres: Float[np.ndarray, "n 3"], size: float) -> tuple[Change, Float[np.ndarray, " m"]]:
     """Displacements (of centres, in units of size) and rotation vectors of n bodies that close rows, of the least norm.
 
     Each iteration solves J(x) x⁺ = J(x) x − r(x) with least |x⁺|. At the end r = 0 and x is in the span of Jᵀ: no
@@ -188,8 +185,7 @@ def _misfits(scene: Scene, rows: list[ConstraintEquation]) -> dict[str, float]:
 def _told(scene: Scene, name: str, wanted: str, misfit: float) -> str:
     """The refusal of one joint, with both of its points."""
     points = (
-        f"({', '.join(f'{part:.6g}' for part in point)}) on {link!r}"
-        for link, point in scene.joints[name].points.items()
+        f"({', '.join(f'{part:.6g}' for part in point)}) on {link!r}" for link, point in scene.joints[name].points.items()
     )
     return f"joints.{name}.at: {wanted}, got {' and '.join(points)}, {misfit:.4g} apart"
 

@@ -161,9 +161,7 @@ def settled(
     return Moving(poses, first, second, twists(link, x[..., 2]), gap, steps, factor)
 
 
-def _gaps(
-    link: Linkage, chosen: Choice, poses: Poses, aim: Target
-) -> tuple[Features, Float[np.ndarray, "T m"]]:
+def _gaps(link: Linkage, chosen: Choice, poses: Poses, aim: Target) -> tuple[Features, Float[np.ndarray, "T m"]]:
     """How far rows are from what they shall be, in units of size, and what they are made of."""
     own = chosen.target(aim)
     f = features(chosen.rows, poses, own.near)
@@ -173,10 +171,7 @@ def _gaps(
 def _in_parts(link: Linkage, chosen: Choice, guess: Poses, aim: Target, rates: Rates, few: int) -> Moving:
     """A few points at a time."""
     blocks = [slice(k, k + few) for k in range(0, max(len(aim), 1), few)]
-    parts = [
-        settled(link, chosen, (guess[0][b], guess[1][b]), aim.at(b), (rates[0][b], rates[1][b]))
-        for b in blocks
-    ]
+    parts = [settled(link, chosen, (guess[0][b], guess[1][b]), aim.at(b), (rates[0][b], rates[1][b])) for b in blocks]
     return parts[0] if len(parts) == 1 else _joined(parts)
 
 

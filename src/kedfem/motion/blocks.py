@@ -67,9 +67,7 @@ class Blocks:
         x = self._solved(values, rhs)[0]
         return np.moveaxis(x[:, :, self.place].reshape(*x.shape[:2], -1), 1, 2)
 
-    def left(
-        self, values: Float[np.ndarray, "T e 6"], rhs: Float[np.ndarray, "T m c"]
-    ) -> Float[np.ndarray, "T m c"]:
+    def left(self, values: Float[np.ndarray, "T e 6"], rhs: Float[np.ndarray, "T m c"]) -> Float[np.ndarray, "T m c"]:
         """What the least squares leave of J x = rhs: its part on the null space of Jᵀ."""
         return np.swapaxes(self._solved(values, rhs)[1], 1, 2)
 
@@ -82,9 +80,7 @@ class Blocks:
             raise np.linalg.LinAlgError("rows leave a motion free")
         return x, left
 
-    def least_norm(
-        self, values: Float[np.ndarray, "T e 6"], rhs: Float[np.ndarray, "T b 6"]
-    ) -> Float[np.ndarray, "T m"]:
+    def least_norm(self, values: Float[np.ndarray, "T e 6"], rhs: Float[np.ndarray, "T b 6"]) -> Float[np.ndarray, "T m"]:
         """The least y with Jᵀ y = rhs.
 
         Raises

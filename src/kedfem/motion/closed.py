@@ -103,9 +103,7 @@ def closed_scene(scene: Scene, shifts: Mapping[str, Shift]) -> Scene:
             "bodies": {name: _moved(body, shifts[body.link]) for name, body in scene.bodies.items()},
             "springs": {name: _spring(spring, shifts) for name, spring in scene.springs.items()},
             "output": scene.output.model_copy(update={"probes": probes}),
-            "analysis": analysis.model_copy(
-                update={"initial_motions": motions, "initial_deflection": deflection}
-            ),
+            "analysis": analysis.model_copy(update={"initial_motions": motions, "initial_deflection": deflection}),
         }
     )
 

@@ -58,9 +58,7 @@ def coordinates(scene: Scene, linkage: Linkage) -> list[Coordinate]:
     return [each for name, joint in scene.joints.items() for each in _of(name, joint, linkage)]
 
 
-def counted_on(
-    angle: Float[np.ndarray, "T c"], before: Float[np.ndarray, " c"] | None
-) -> Float[np.ndarray, "T c"]:
+def counted_on(angle: Float[np.ndarray, "T c"], before: Float[np.ndarray, " c"] | None) -> Float[np.ndarray, "T c"]:
     """Angles beyond ±π, from the last ones of the time before on [rad]."""
     if before is None:
         return np.asarray(np.unwrap(angle, axis=0))
@@ -90,8 +88,5 @@ def _of(name: str, joint: Joint, linkage: Linkage) -> list[Coordinate]:
         line = (against, body) if back else (body, against)
         out.append(Coordinate(name, "travel", "length", *line, at, axis, none))
     if joint.kind == "planar":
-        out += [
-            Coordinate(name, f"travel_{k}", "length", body, against, at, e, none)
-            for k, e in ((1, e1), (2, e2))
-        ]
+        out += [Coordinate(name, f"travel_{k}", "length", body, against, at, e, none) for k, e in ((1, e1), (2, e2))]
     return out

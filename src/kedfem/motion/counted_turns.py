@@ -57,9 +57,7 @@ def _counting(scene: Scene) -> Iterator[tuple[str, str]]:
         yield from ((f"joints.{name}", name) for name, joint in scene.joints.items() if joint.kind == "screw")
 
 
-def turn_of(
-    scene: Scene, link: Linkage, along: Path, name: str, tau: Float[np.ndarray, " T"]
-) -> Float[np.ndarray, " T"]:
+def turn_of(scene: Scene, link: Linkage, along: Path, name: str, tau: Float[np.ndarray, " T"]) -> Float[np.ndarray, " T"]:
     """Turn of a joint about its axis at places of the path, counted along it [rad]; its grid is fine enough for that."""
     joint = scene.joints[name]
     i, j = (link.bodies.index(each) for each in moving_pair(joint)[:2])

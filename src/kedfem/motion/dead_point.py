@@ -11,9 +11,7 @@ from kedfem.motion.path import Path, aimed, predicted
 from kedfem.motion.values import Poses, features, jacobian
 from kedfem.scene import Scene
 
-SEARCHED = np.radians(
-    60.0
-)  # joints, and drives beyond their range (slides by size, times by a quarter of the path)
+SEARCHED = np.radians(60.0)  # joints, and drives beyond their range (slides by size, times by a quarter of the path)
 INWARD = 0.01  # of a step of the path: how far apart places are from which it is led on
 FOLD, CROSSING = 0.5, 1.0  # powers of the distance with which the least singular value vanishes
 
@@ -51,9 +49,7 @@ def _rows(link: Linkage, poses: Poses, near: Float[np.ndarray, "T A"]) -> Float[
     return jacobian(link.rows, features(link.rows, poses, near), len(link.bodies), link.size)
 
 
-def _off(
-    scene: Scene, link: Linkage, poses: Poses, near: Float[np.ndarray, "1 A"]
-) -> tuple[str | None, float]:
+def _off(scene: Scene, link: Linkage, poses: Poses, near: Float[np.ndarray, "1 A"]) -> tuple[str | None, float]:
     """The joint that turns most on the way to the singular position, and by how much.
 
     All bodies are moved along the motion v that the rows hold least, joints left open to second order, until uᵀ J v is

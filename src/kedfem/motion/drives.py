@@ -8,9 +8,7 @@ from kedfem.arrays import Float
 from kedfem.scene import MotionLaw, Scene, drive_angle
 
 Driven = tuple[Float[np.ndarray, "T D"], Float[np.ndarray, "T D"], Float[np.ndarray, "T D"]]
-STEP = np.radians(
-    12.0
-)  # of a drive between grid points of a path [rad], of a slide in lengths of the linkage
+STEP = np.radians(12.0)  # of a drive between grid points of a path [rad], of a slide in lengths of the linkage
 SAMPLES = 4001  # of laws over a path, to find the fastest
 
 
@@ -37,10 +35,7 @@ class Drives:
         if len(self) == 1:
             return tau[:, None], np.ones((len(tau), 1)), np.zeros((len(tau), 1))
         columns = [drive_angle(law, tau) for law in self.laws]
-        q, q1, q2 = (
-            np.stack([c[k] for c in columns], axis=1) if columns else np.zeros((len(tau), 0))
-            for k in range(3)
-        )
+        q, q1, q2 = (np.stack([c[k] for c in columns], axis=1) if columns else np.zeros((len(tau), 0)) for k in range(3))
         return q, q1, q2
 
     def step(self, low: float, high: float) -> float:

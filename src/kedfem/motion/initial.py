@@ -36,9 +36,7 @@ class Wanted:
     value: float
 
 
-def initial_twists(
-    scene: Scene, linkage: Linkage
-) -> tuple[Float[np.ndarray, "B 3"], Float[np.ndarray, "B 3"]]:
+def initial_twists(scene: Scene, linkage: Linkage) -> tuple[Float[np.ndarray, "B 3"], Float[np.ndarray, "B 3"]]:
     """Velocities that all joints allow, with the speeds asked for, the drive held: they add to the rigid-body velocities.
 
     What these leave open: joints that are not named move as little against each other as can be, in the sum of squares

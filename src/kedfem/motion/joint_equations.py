@@ -60,9 +60,7 @@ def rows_of(
     return rows
 
 
-def _reaching(
-    row: ConstraintEquation, joint: Joint, bodies: tuple[str, ...], centre: np.ndarray
-) -> ConstraintEquation:
+def _reaching(row: ConstraintEquation, joint: Joint, bodies: tuple[str, ...], centre: np.ndarray) -> ConstraintEquation:
     """A row of a joint whose links are drawn apart: gaps are between their own points."""
     if row.kind != GAP:
         return row
@@ -76,9 +74,7 @@ def moving_pair(joint: Joint) -> tuple[str, str]:
     return (other, one) if one == GROUND else (one, other)
 
 
-def coordinate_row(
-    scene: Scene, name: str, bodies: tuple[str, ...], turns: bool | None = None
-) -> ConstraintEquation:
+def coordinate_row(scene: Scene, name: str, bodies: tuple[str, ...], turns: bool | None = None) -> ConstraintEquation:
     """Turn or travel of a joint; if not said which, the turn of all but slides."""
     joint = scene.joints[name]
     i, j = (bodies.index(link) for link in moving_pair(joint))

@@ -245,9 +245,7 @@ def _other_drives(scene: Scene, drawn: Drawn) -> list[str]:
     return out
 
 
-def _holding(
-    scene: Scene, J: np.ndarray, bodies: tuple[str, ...], size: float, free: int
-) -> list[ConstraintEquation]:
+def _holding(scene: Scene, J: np.ndarray, bodies: tuple[str, ...], size: float, free: int) -> list[ConstraintEquation]:
     """Rows that hold as many joint motions as are free in the reference position: those that these change most, of equal
     ones the first.
     """

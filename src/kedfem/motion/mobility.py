@@ -65,9 +65,7 @@ def planar(drawn: Drawn) -> Drawn:
     held = np.eye(drawn.J.shape[1]).reshape(len(drawn.links), 6, -1)[:, ACROSS].reshape(-1, drawn.J.shape[1])
     names = [name for (name, _), J in rows.items() for _ in J] + [PLANE] * len(held)
     driven = [moves for (_, moves), J in rows.items() for _ in J] + [False] * len(held)
-    return replace(
-        drawn, J=np.concatenate([*rows.values(), held]), rows=tuple(names), driven=np.array(driven, bool)
-    )
+    return replace(drawn, J=np.concatenate([*rows.values(), held]), rows=tuple(names), driven=np.array(driven, bool))
 
 
 def _in_plane(rows: Float[np.ndarray, "m k"]) -> Float[np.ndarray, "n k"]:

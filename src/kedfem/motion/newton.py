@@ -144,9 +144,7 @@ def orthonormal(R: Float[np.ndarray, "... 3 3"]) -> Float[np.ndarray, "... 3 3"]
     """The rotation next to a matrix that almost is one: Newton steps R (3 − Rᵀ R)/2 to it, one or a few."""
     for _ in range(5):
         off = np.swapaxes(R, -1, -2) @ R - I3
-        R = R - 0.5 * (
-            R @ np.clip(off, -1.0, 1.0)
-        )  # of what is far from one it shall not grow beyond measure
+        R = R - 0.5 * (R @ np.clip(off, -1.0, 1.0))  # of what is far from one it shall not grow beyond measure
         if np.abs(off).max(initial=0.0) < NEARLY:
             break
     return np.asarray(R)

@@ -138,12 +138,7 @@ def _open(scene: Scene, along: Path, time: float, asked: str) -> Iterator[str]:
     if not returned and any(_gone(motion, time) for motion in laws.values() if not isinstance(motion, Table)):
         yield (f"{asked}: must be of a linkage that returns, got one that is elsewhere after {time:.6g} s")
     for name, curve in curves(scene):
-        if (
-            curve.over == "time"
-            and not is_constant(curve)
-            and curve.period
-            and not _whole(time, curve.period)
-        ):
+        if curve.over == "time" and not is_constant(curve) and curve.period and not _whole(time, curve.period):
             yield f"{name}.period: must be a part of the motion's period, got {curve.period:.6g} s"
     for name, factor in factors(scene):
         if factor.over == "time" or is_constant(factor) or not gone:

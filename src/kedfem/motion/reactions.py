@@ -61,9 +61,7 @@ class Reactions:
         at_rows = np.swapaxes(self.Q, 1, 2) @ A
         return np.asarray(-self.column * np.swapaxes(np.linalg.solve(self.U, at_rows), 1, 2))
 
-    def open_directions(
-        self, A: Float[np.ndarray, "T m c"]
-    ) -> tuple[Float[np.ndarray, "c c"], Float[np.ndarray, "c c"]]:
+    def open_directions(self, A: Float[np.ndarray, "T m c"]) -> tuple[Float[np.ndarray, "c c"], Float[np.ndarray, "c c"]]:
         """Along which directions A λ is open, and along which there is any at all.
 
         Returns
@@ -112,9 +110,7 @@ class BlockReactions:
         rows, own = self._own(joint, body, at)
         return np.asarray(np.einsum("wtek,te->wtk", own, multipliers[:, rows]))
 
-    def open_directions(
-        self, A: Float[np.ndarray, "T m c"]
-    ) -> tuple[Float[np.ndarray, "c c"], Float[np.ndarray, "c c"]]:
+    def open_directions(self, A: Float[np.ndarray, "T m c"]) -> tuple[Float[np.ndarray, "c c"], Float[np.ndarray, "c c"]]:
         """Along which directions A λ is open, and along which there is any at all."""
         repeated = self.blocks.rows > 6 * self.blocks.count  # else rows hold every motion once
         D = self.blocks.left(self.values, A) if repeated else np.zeros_like(A)

@@ -58,9 +58,7 @@ def features(rows: Rows, poses: Poses, near: Float[np.ndarray, "T A"]) -> Featur
     u[:, g] += p[:, rows.i[g]] - p[:, rows.j[g]] - arm_j[:, g]
     value = _dot(u, w)
     product = _dot(hand_i, hand_j)
-    value[k] = near.T + np.angle(
-        product * np.exp(-1j * near.T)
-    )  # sines of large angles are reduced without loss
+    value[k] = near.T + np.angle(product * np.exp(-1j * near.T))  # sines of large angles are reduced without loss
     return Features(u, w, arm_i, arm_j, value, hand_i, hand_j, product, _cross(hand_i, hand_j) / product)
 
 

@@ -93,9 +93,7 @@ def slider_drawn(model: Model, slider: Slider) -> Point:
     return np.asarray(slider.weights @ model.links[slider.carrier].X)
 
 
-def slider_place(
-    model: Model, slider: Slider, snapshot: Snapshot, deformation_scale: float
-) -> tuple[Point, Point]:
+def slider_place(model: Model, slider: Slider, snapshot: Snapshot, deformation_scale: float) -> tuple[Point, Point]:
     """Where it is at one time point, and its elastic displacement."""
     link, body = model.links[slider.carrier], model.bodies[slider.carrier]
     motion, k = snapshot.motion, snapshot.k

@@ -71,9 +71,7 @@ def fatigue_warning(found: Fatigue | None) -> tuple[str, ...]:
     return tuple(out)
 
 
-def fields(
-    scene: Scene, model: Model, recoveries: Sequence[StressRecovery], snapshot: Snapshot
-) -> list[LinkField]:
+def fields(scene: Scene, model: Model, recoveries: Sequence[StressRecovery], snapshot: Snapshot) -> list[LinkField]:
     """What a frame shows of each link, deformed as the animation exaggerates it."""
     return link_fields(model, recoveries, snapshot, _scale(scene), scene)
 

@@ -56,9 +56,7 @@ def draw_several(given: Any, count: int) -> Any:
 
     columns = min(3, count)
     rows = math.ceil(count / columns)
-    figure, axes = plt.subplots(
-        rows, columns, figsize=(5.0 * columns, 4.9 * rows), layout="constrained", squeeze=False
-    )
+    figure, axes = plt.subplots(rows, columns, figsize=(5.0 * columns, 4.9 * rows), layout="constrained", squeeze=False)
     for i, place in enumerate(axes.ravel()):
         place.set_axis_off()
         if i < count:

@@ -52,9 +52,7 @@ def write_shapes(folder: Path, shapes: Sequence[Shape], gravity: Gravity = (0, 0
         _write(folder, f"{STEM}_{k}", shape.title, frames, 0, gravity)
 
 
-def write_growing(
-    folder: Path, title: str, frames: Sequence[tuple[float, Fields]], gravity: Gravity = (0, 0, 0)
-) -> None:
+def write_growing(folder: Path, title: str, frames: Sequence[tuple[float, Fields]], gravity: Gravity = (0, 0, 0)) -> None:
     """A vibration about a moving mechanism: ``growing.pvd``, and ``growing.png`` of the frame where it is largest.
 
     Parameters
@@ -74,9 +72,7 @@ def _largest(fields: Sequence[LinkField]) -> float:
     return max(float(np.linalg.norm(each.displacement, axis=1).max(initial=0.0)) for each in fields)
 
 
-def _write(
-    folder: Path, name: str, title: str, frames: Sequence[tuple[float, Fields]], k: int, gravity: Gravity
-) -> None:
+def _write(folder: Path, name: str, title: str, frames: Sequence[tuple[float, Fields]], k: int, gravity: Gravity) -> None:
     """An animation of frames of one amplitude, and a picture of the k-th, where displacements are largest."""
     still = frames[k][1](1.0, 0.0)
     size = float(np.linalg.norm(np.ptp(np.concatenate([each.points for each in still]), axis=0)))

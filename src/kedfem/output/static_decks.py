@@ -46,9 +46,7 @@ def _rigid(link: Link) -> Float[np.ndarray, "c 6"]:
     return np.column_stack([*(np.tile(e, len(X)) for e in np.eye(3)), *turns])
 
 
-def write_deck(
-    path: Path, link: Link, material: Material, cases: Sequence[LoadCase], comments: Iterable[str]
-) -> None:
+def write_deck(path: Path, link: Link, material: Material, cases: Sequence[LoadCase], comments: Iterable[str]) -> None:
     """The deck, with lines of comment at its head."""
     held = supports(link)
     with text_file(path) as file:

@@ -86,9 +86,7 @@ def picture_axes(
     return across, np.cross(direction, across)
 
 
-def sides(
-    direction: Float[np.ndarray, " 3"], upwards: Float[np.ndarray, " 3"]
-) -> list[Float[np.ndarray, " 3"]]:
+def sides(direction: Float[np.ndarray, " 3"], upwards: Float[np.ndarray, " 3"]) -> list[Float[np.ndarray, " 3"]]:
     """A direction to look from, then that from behind, then those mirrored at other axes, from below last."""
     mirrored = [direction * signs for signs in product((1.0, -1.0), repeat=3)]
     main = int(np.abs(direction).argmax())

@@ -45,9 +45,7 @@ def write_mesh(mesh: SolidMesh, path: Path) -> None:
         write_vtu(part, mesh.points, cells, cell_data={"scaled_jacobian": [quality]})
 
 
-def write_points(
-    path: Path, parts: Sequence[tuple[str, Points, Cells]], values: Mapping[str, np.ndarray]
-) -> None:
+def write_points(path: Path, parts: Sequence[tuple[str, Points, Cells]], values: Mapping[str, np.ndarray]) -> None:
     """Links in the reference position with values at their points.
 
     Parameters
@@ -63,9 +61,7 @@ def write_points(
         complete(part, "".join(_number(f"link {name}", k) for k, name in enumerate(names)))
 
 
-def write_cells(
-    path: Path, parts: Sequence[tuple[Points, Cells]], name: str, values: Sequence[np.ndarray]
-) -> None:
+def write_cells(path: Path, parts: Sequence[tuple[Points, Cells]], name: str, values: Sequence[np.ndarray]) -> None:
     """Elements in the reference position, points and cells of each part, with one value each, called `name`."""
     with replacing(path) as part:
         write_vtu(part, *_together(parts), cell_data={name: list(values)})

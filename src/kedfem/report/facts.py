@@ -43,9 +43,7 @@ def facts(results: Results, highest: Peak | None, moment: Callable[[float, float
     return out
 
 
-def _largest(
-    results: Results, beginning: str, endings: tuple[str, ...]
-) -> tuple[str, float, str, int] | None:
+def _largest(results: Results, beginning: str, endings: tuple[str, ...]) -> tuple[str, float, str, int] | None:
     """What the channel is, largest magnitude, unit and row among channels of elastic links, or of rigid ones."""
     found = None
     for name, (channel, values) in results.channels.items():
@@ -140,9 +138,7 @@ def _rpm(slowest: float, fastest: float) -> str:
     return f"{low} rpm" if low == high else f"{low} to {high} rpm"
 
 
-def loads_tables(
-    joints: Mapping[str, Mapping[str, float]], drives: Mapping[str, Mapping[str, float]]
-) -> list[Table]:
+def loads_tables(joints: Mapping[str, Mapping[str, float]], drives: Mapping[str, Mapping[str, float]]) -> list[Table]:
     """Numbers for suppliers of bearings and motors, by name of the joint."""
     out = []
     if joints:

@@ -180,9 +180,7 @@ def _scale_of(highest: float) -> list[str]:
     return [with_prefix(highest * part, "Pa") for part in (1.0, 0.75, 0.5, 0.25)] + ["0"]
 
 
-def _frames(
-    scene: Mapping[str, Any], results: Results, shown: Animated, highest: Peak | None
-) -> Sequence[str]:
+def _frames(scene: Mapping[str, Any], results: Results, shown: Animated, highest: Peak | None) -> Sequence[str]:
     """What each frame is; after the last one links are in the reference position, and no instant."""
     angles = np.interp(shown.times, results.time, results.angle) if len(results.time) else 0 * shown.times
     captions = [_moment(scene, results, float(t), float(x)) for t, x in zip(shown.times, angles, strict=True)]
@@ -202,9 +200,7 @@ def _marks(scene: Mapping[str, Any], highest: Peak | None) -> list[Mark]:
     return marks
 
 
-def _loads(
-    raw: Mapping[str, Any], results: Results, folder: Path, missing: list[str]
-) -> tuple[list[Table], list[Curve]]:
+def _loads(raw: Mapping[str, Any], results: Results, folder: Path, missing: list[str]) -> tuple[list[Table], list[Curve]]:
     """Tables of loads, and polar diagrams of those of bearings."""
     if not len(results.time):
         return [], []

@@ -59,9 +59,7 @@ class Mark:
     hot: bool = False
 
 
-def viewer(
-    shown: Animated, highest: float, marks: Sequence[Mark], gravity: Float[np.ndarray, "3"], first: int
-) -> str:
+def viewer(shown: Animated, highest: float, marks: Sequence[Mark], gravity: Float[np.ndarray, "3"], first: int) -> str:
     """An HTML document that messages give the frame; after the last one links are undeformed, with highest stresses.
 
     Parameters
@@ -160,9 +158,7 @@ def first_view(
     return np.array([*picture_axes(towards, up, gravity), towards])
 
 
-def _listens(
-    shown: Animated, taken: Float[np.ndarray, "3"], gravity: Float[np.ndarray, "3"], first: int
-) -> str:
+def _listens(shown: Animated, taken: Float[np.ndarray, "3"], gravity: Float[np.ndarray, "3"], first: int) -> str:
     """The script with the first view, that of the picture of the highest stress: all links in all frames."""
     axes = first_view(shown, taken, gravity)
     low, high = bounds(shown.surfaces, axes)

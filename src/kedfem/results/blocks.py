@@ -8,9 +8,7 @@ from kedfem.arrays import Float
 from kedfem.results.records import Channel
 
 
-def require_channels(
-    channels: Sequence[Channel], length: int, values: Mapping[str, Float[np.ndarray, "b c"]]
-) -> None:
+def require_channels(channels: Sequence[Channel], length: int, values: Mapping[str, Float[np.ndarray, "b c"]]) -> None:
     """Names and shapes of a block; ValueError where they are others."""
     expected = {channel.name: (length, len(channel.columns)) for channel in channels}
     found = {name: np.shape(block) for name, block in values.items()}
@@ -19,9 +17,7 @@ def require_channels(
         raise ValueError(f"values: must be the channels with their shapes, differs in {wrong}")
 
 
-def not_finite(
-    time: Float[np.ndarray, " b"], values: Mapping[str, Float[np.ndarray, "b c"]]
-) -> tuple[int, str] | None:
+def not_finite(time: Float[np.ndarray, " b"], values: Mapping[str, Float[np.ndarray, "b c"]]) -> tuple[int, str] | None:
     """The first row that holds something that is not finite, and what to say of it."""
     first, message = len(time), ""
     for name, block in values.items():

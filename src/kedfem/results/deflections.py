@@ -62,9 +62,7 @@ def _along(R: Float[np.ndarray, "T 3 3"], drawn: Drawn, now: Rows) -> Float[np.n
     return np.asarray(flip @ turn @ R)
 
 
-def _mean_motion(
-    model: Model, name: str
-) -> Callable[[Block], tuple[Rows, Drawn, Float[np.ndarray, "T 3 3"]]]:
+def _mean_motion(model: Model, name: str) -> Callable[[Block], tuple[Rows, Drawn, Float[np.ndarray, "T 3 3"]]]:
     """The rigid motion of least mean square distance, by mass: centre now and in the reference position, orientation."""
     here = [(k, link, model.bodies[k]) for k, link in enumerate(model.links) if link.name == name]
     mass = sum(float(link.one @ link.m1[:, 0]) for _, link, _ in here)

@@ -83,9 +83,7 @@ def _moved_alike(runs: Sequence[Results]) -> bool:
     return True
 
 
-def _smooth(
-    x: Float[np.ndarray, " n"], y: Float[np.ndarray, "n c"], at: Float[np.ndarray, " T"]
-) -> np.ndarray:
+def _smooth(x: Float[np.ndarray, " n"], y: Float[np.ndarray, "n c"], at: Float[np.ndarray, " T"]) -> np.ndarray:
     """Values between rows: the rows themselves where they are there, else the cubic spline through them."""
     order = np.argsort(x)
     x, y = x[order], y[order]

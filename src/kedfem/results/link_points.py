@@ -118,9 +118,7 @@ def _value(link: Link, where: str, at: Drawn) -> tuple[Float[np.ndarray, " n"], 
     return value, X
 
 
-def seen_from(
-    x: Rows, R: Float[np.ndarray, "T 3 3"], X: Drawn, axes: Float[np.ndarray, "3 3"] | None
-) -> Rows:
+def seen_from(x: Rows, R: Float[np.ndarray, "T 3 3"], X: Drawn, axes: Float[np.ndarray, "3 3"] | None) -> Rows:
     """What x differs by from the rigid X, in axes that turn with the frame, or in the world's."""
     if axes is None:
         return np.asarray(x - R @ X)

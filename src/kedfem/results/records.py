@@ -44,9 +44,7 @@ ANGLE = Channel("drive_angle", (), "rad", "", "drive angle from the reference po
 TRAVEL = Channel("drive_travel", (), "m", "", "drive travel from the reference position")
 
 
-def largest_by_unit(
-    channels: Iterable[tuple[Channel, Float[np.ndarray, "T c"]]], size: float = 0.0
-) -> dict[str, float]:
+def largest_by_unit(channels: Iterable[tuple[Channel, Float[np.ndarray, "T c"]]], size: float = 0.0) -> dict[str, float]:
     """Unit → the largest magnitude of all channels that have it: what is nothing beside that is rounding.
 
     Parameters

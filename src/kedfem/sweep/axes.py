@@ -96,10 +96,7 @@ def _axis(where: Where, spec: str) -> Axis:
             return Axis(where, tuple(map(_word, words)), None, "")
         unit = next((unit for _, unit in found if unit), "")
         numbers = np.array([_in(where, *pair, unit) for pair in found])
-        full = [
-            word if given else f"{word} {unit}".rstrip()
-            for word, (_, given) in zip(words, found, strict=True)
-        ]
+        full = [word if given else f"{word} {unit}".rstrip() for word, (_, given) in zip(words, found, strict=True)]
         return Axis(where, tuple(map(_word, full)), numbers, unit)
     parts = spec.split(":")
     if len(parts) != 3 or not parts[2].strip().isdigit() or not 2 <= int(parts[2]) <= MOST:

@@ -59,9 +59,7 @@ def write_table(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row]) -> No
     units = column_units(rows)
     header = [f"{axis.key} [{axis.unit}]" if axis.unit else axis.key for axis in axes]
     header += ["status", "settled", "change of the last turn"]
-    header += [
-        f"{name} {kind} [{'s' if kind == 'when' else unit}]" for name, unit in units.items() for kind in KINDS
-    ]
+    header += [f"{name} {kind} [{'s' if kind == 'when' else unit}]" for name, unit in units.items() for kind in KINDS]
 
     def line(k: int, row: Row) -> list[object]:
         values = [axis.values[k] if axis.numbers is None else f"{axis.numbers[k]:.15g}" for axis in axes]

@@ -255,8 +255,7 @@ def change(results: Results, turn: float) -> float:
     last = results.time > end - turn + half
     before = (results.time > end - 2 * turn + half) & ~last
     now, then = (
-        {name: (unit, np.abs(values).max()) for name, unit, values in columns(results, some)}
-        for some in (last, before)
+        {name: (unit, np.abs(values).max()) for name, unit, values in columns(results, some)} for some in (last, before)
     )
     largest: dict[str, float] = {}
     for unit, size in (*now.values(), *then.values()):

@@ -94,9 +94,7 @@ def forecast(ready: Prepared) -> tuple[Cost, KedfemError | None]:
     except KedfemError as error:
         return estimated_cost(scene, model), error
     frames = len(frame_steps(scene)) if seen else 0
-    return replace(
-        cost, steps=cost.steps + frames * _frame(ready, recoveries, seen[-1])
-    ) if frames else cost, None
+    return replace(cost, steps=cost.steps + frames * _frame(ready, recoveries, seen[-1])) if frames else cost, None
 
 
 def _frame(ready: Prepared, recoveries: list[StressRecovery], now: Snapshot) -> float:

@@ -22,9 +22,7 @@ def facts(title: str | Text, rows: Iterable[Sequence[str | Text]] = (), **look: 
     return listed(title, (), rows, show_header=False, **look)
 
 
-def listed(
-    title: str | Text, columns: Iterable[Column], rows: Iterable[Sequence[str | Text]] = (), **look: Any
-) -> Table:
+def listed(title: str | Text, columns: Iterable[Column], rows: Iterable[Sequence[str | Text]] = (), **look: Any) -> Table:
     """A table of rows under columns."""
     table = Table(*columns, title=title, **look)
     for row in rows:

@@ -153,8 +153,7 @@ def _speeds(found: Frequencies, ranges: Mapping[tuple[int, int], str], harmonics
     caption = "* at the drive's speed" + ("; – alone: beyond the speeds examined" if beyond else "")
     columns = [*left("mode"), *right(*(f"{k}×" for k in harmonics))]
     rows = (
-        (str(mode), *(ranges.get((mode, k), "–") for k in harmonics))
-        for mode in sorted({mode for mode, _ in ranges})
+        (str(mode), *(ranges.get((mode, k), "–") for k in harmonics)) for mode in sorted({mode for mode, _ in ranges})
     )
     title = Text(f"Drive speeds at which its harmonics meet them [rpm]; {turns}")
     return listed(title, columns, rows, caption=Text(caption))

@@ -63,9 +63,7 @@ def _chosen(link: LinkScene) -> str:
     mesh = ", ".join(f"{key} {_size(key, value)}" for key, value in sizes) if link.shape else ""
     segments = "" if link.segments is None else f", {link.segments} segments"
     open_kind = isinstance(link.shape, Cad | MeshFile) and "element" not in link.model_fields_set
-    kind = (
-        f"{link.element} " if link.element and not open_kind else ""
-    )  # a file's shape says what it is meshed with
+    kind = f"{link.element} " if link.element and not open_kind else ""  # a file's shape says what it is meshed with
     return f"{'reduced ' * link.reduced}{kind}{link.model}" + (f" ({mesh})" if mesh else "") + segments
 
 

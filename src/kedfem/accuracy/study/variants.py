@@ -63,9 +63,7 @@ def fidelities(scene: Scene) -> list[Fidelity]:
     each = [families(link) for link in _shaped(scene)]
     kinds: tuple[Family, ...] = ("beam", "plane", "solid")
     common = [family for family in kinds if each and all(family in f for f in each)]
-    out = [
-        Fidelity(family, reduced) for family in common for reduced in (False, True)[: 1 + (family != "beam")]
-    ]
+    out = [Fidelity(family, reduced) for family in common for reduced in (False, True)[: 1 + (family != "beam")]]
     pair = scene.joints[scene.driven].links if scene.driven else ()
     driven = next((name for name in pair if name in scene.links), None)
     if driven and len(each) > 1 and scene.links[driven] in _shaped(scene):
@@ -142,8 +140,7 @@ def further_variants(scene: Scene, reference: Variant) -> list[Variant]:
         if first.tolerance is not None:
             out += [replace(first, tolerance=tolerance) for tolerance in TOLERANCES]
             out += [
-                replace(first, fineness=f, steps=s, tolerance=TOLERANCES[-1])
-                for f, s in zip(finer, more, strict=False)
+                replace(first, fineness=f, steps=s, tolerance=TOLERANCES[-1]) for f, s in zip(finer, more, strict=False)
             ]
     out += [replace(reference, fineness=f) for f in FINENESS if f <= reference.fineness]
     out += [replace(reference, steps=s) for s in (1, *more)]

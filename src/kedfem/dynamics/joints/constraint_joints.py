@@ -106,9 +106,7 @@ def bore_axis(joint: Joint, link: str) -> Float[np.ndarray, "3"] | None:
     return unit(joint.axis)
 
 
-def held_rows(
-    joint: Joint, driven: bool
-) -> tuple[Float[np.ndarray, "r 3"], Float[np.ndarray, "r 3"], list[int]]:
+def held_rows(joint: Joint, driven: bool) -> tuple[Float[np.ndarray, "r 3"], Float[np.ndarray, "r 3"], list[int]]:
     """Directions of what a joint holds, in the reference position: gap and turn of each row, and the axis of its frame
     that this is along or about, −1 of a screw's thread. That of a universal joint's cross is left open."""
     frame, (gaps, turns) = joint_frame(joint), CONSTRAINED[joint.kind]
@@ -142,9 +140,7 @@ def mounted(joint: Joint, axis: int, turning: bool) -> tuple[float, float] | Non
     return stiffness[axis], (of.rotational_damping if turning else of.damping)[axis]
 
 
-def stiffnesses(
-    scene: Scene, name: str, gap: Float[np.ndarray, "r 3"], axes: list[int]
-) -> Float[np.ndarray, " r"]:
+def stiffnesses(scene: Scene, name: str, gap: Float[np.ndarray, "r 3"], axes: list[int]) -> Float[np.ndarray, " r"]:
     """Stiffness of a joint's rows: of its bushing, its drive's shaft; infinite where they hold."""
     joint, drive, out = scene.joints[name], scene.driven_joints.get(name), np.full(len(axes), np.inf)
     for r, (axis, turning) in enumerate(zip(axes, (not row.any() for row in gap), strict=True)):
@@ -161,9 +157,7 @@ def in_plane(gap: Float[np.ndarray, "r 3"], turn: Float[np.ndarray, "r 3"]) -> B
     return np.asarray((np.abs(gap[:, :2]).max(axis=1) > 1e-9) | (np.abs(turn[:, 2]) > 1e-9))
 
 
-def surface_ports(
-    surface: CouplingSurface, link: Link, where: str
-) -> tuple[Ports, Float[np.ndarray, "p 6 d"]]:
+def surface_ports(surface: CouplingSurface, link: Link, where: str) -> tuple[Ports, Float[np.ndarray, "p 6 d"]]:
     """Port points of a coupling surface: its middle, and one off it in each direction that it knows; u₀ and θ from them.
 
     With ∂_k u the rate of change along direction e_k,

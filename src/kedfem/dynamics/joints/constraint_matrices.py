@@ -11,9 +11,7 @@ from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side
 from kedfem.motion.constraints import cross
 from kedfem.motion.rigid import RigidMotion
 
-REPEATED = (
-    1e-10  # of a row on ports: what is left on the interface unknowns if other joints hold the same already
-)
+REPEATED = 1e-10  # of a row on ports: what is left on the interface unknowns if other joints hold the same already
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,9 +32,7 @@ class JointRows:
 
     def at(self, k: int) -> sp.csr_array:
         """C (r, k) at one time point."""
-        return sp.csr_array(
-            (self.entries[k], self.columns, self.row_at), (len(self.stiffness), self.unknowns)
-        )
+        return sp.csr_array((self.entries[k], self.columns, self.row_at), (len(self.stiffness), self.unknowns))
 
 
 Directions = tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T r 3"], Float[np.ndarray, "T r 3"]]
@@ -52,14 +48,10 @@ def joint_rows(joints: Sequence[ConstraintJoint], motion: RigidMotion, unknowns:
     entries = [rows_over(joint, motion, x).reshape(len(motion.t), -1) for joint, x in every]
     columns = np.concatenate([np.tile(x, len(joint.gap)) for joint, x in every])
     stiffness = np.concatenate([joint.stiffness for joint in joints])
-    return JointRows(
-        np.concatenate(entries, axis=1), np.append(0, np.cumsum(width)), columns, unknowns, stiffness
-    )
+    return JointRows(np.concatenate(entries, axis=1), np.append(0, np.cumsum(width)), columns, unknowns, stiffness)
 
 
-def rows_over(
-    joint: ConstraintJoint, motion: RigidMotion, columns: Int[np.ndarray, " c"]
-) -> Float[np.ndarray, "T r c"]:
+def rows_over(joint: ConstraintJoint, motion: RigidMotion, columns: Int[np.ndarray, " c"]) -> Float[np.ndarray, "T r c"]:
     """Rows of one joint, gap · (u_i − u_j) + turn · (θ_i − θ_j), on the interface unknowns given: all that it touches."""
     C = np.zeros((len(motion.t), len(joint.gap), len(columns)))
     shares = port_rows(joint, motion)
@@ -103,9 +95,7 @@ def travel(joint: ConstraintJoint, motion: RigidMotion) -> Float[np.ndarray, " T
     return np.asarray(seen_from(motion, joint.bodies, joint.at) @ joint.axis)
 
 
-def seen_from(
-    motion: RigidMotion, bodies: tuple[int, int], at: Float[np.ndarray, "3"]
-) -> Float[np.ndarray, "T 3"]:
+def seen_from(motion: RigidMotion, bodies: tuple[int, int], at: Float[np.ndarray, "3"]) -> Float[np.ndarray, "T 3"]:
     """Where a point of body i is in the frame of body j, from where both are drawn (T, 3) [m]."""
     i, j = bodies
     point = motion.p[:, i] + motion.R[:, i] @ at

@@ -115,9 +115,7 @@ def rigid_points(link: Link, key: str, layout: LinkageLayout) -> ConstraintJoint
     surface, length = rigid_link_surface(link, centre), link.size / 2
     points = centre + length * np.concatenate([np.zeros((1, 3)), np.eye(3)])
     weights = surface.fit[0] + length * np.concatenate([np.zeros((1, link.n)), surface.fit[1:]])
-    side = Side(
-        layout.bodies[link.name], points, np.repeat(ONLY_U, 4, axis=0), keys=(key,) * 4, weights=weights
-    )
+    side = Side(layout.bodies[link.name], points, np.repeat(ONLY_U, 4, axis=0), keys=(key,) * 4, weights=weights)
     return ConstraintJoint(f"rigid.{key}", centre, (side.body, 0), (side, None))
 
 

@@ -105,17 +105,11 @@ def joined(
     stiff = [rigid_points(link, key, layout) for key, link in links.items() if bars and can_be_bars(link)]
     rows = [row for row in (*held_by_rows, *geared, *acting, *stiff) if any(row.all_sides)]
     sides = [(row.name, side) for row in rows for side in row.all_sides]
-    columns: dict[
-        int, list[int]
-    ] = {}  # of each side's own unknowns: all components of its ports; a slider's own travel
+    columns: dict[int, list[int]] = {}  # of each side's own unknowns: all components of its ports; a slider's own travel
     for name, side in sides:
         d = side.surface.shape[2]
-        columns[id(side)] = (
-            [first_of[side.slider]] if side.slider else [*range(unknowns, unknowns + d * len(side.keys))]
-        )
-        for key, weights, point in zip(
-            side.keys, side.weights, side.points if side.keys else (), strict=True
-        ):
+        columns[id(side)] = [first_of[side.slider]] if side.slider else [*range(unknowns, unknowns + d * len(side.keys))]
+        for key, weights, point in zip(side.keys, side.weights, side.points if side.keys else (), strict=True):
             ports[key].append(_Port(weights, point, name, range(d), unknowns, np.eye(d)))
             unknowns += d
     for name, joint in scene.joints.items():
@@ -179,9 +173,7 @@ def _mixed(
             f"joints.{name}: must be a hinge or a weld between a planar link and one in space, "
             f"got a {joint.kind} joint of {kinds}"
         )
-    planar_first = {
-        link: surfaces[link] for link in sorted(surfaces, key=lambda each: not links[each].planar)
-    }
+    planar_first = {link: surfaces[link] for link in sorted(surfaces, key=lambda each: not links[each].planar)}
     unknowns = 0
     for link, surface in surfaces.items():
         points = port_points(scene, name, joint, planar_first if welds else {link: surface}, links)
@@ -208,9 +200,7 @@ def _components(scene: Scene, name: str, joint: Joint, held: list[Link]) -> list
         return [0, 1]
     if any(link.kind == "plane" for link in held):
         kinds = " and ".join(f"'{link.name}' ({link.kind})" for link in held)
-        raise MeshError(
-            f"joints.{name}: must be a hinge between a beam and a plane link, got a {joint.kind} of {kinds}"
-        )
+        raise MeshError(f"joints.{name}: must be a hinge between a beam and a plane link, got a {joint.kind} of {kinds}")
     return [0, 1, 2]
 
 

@@ -11,9 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from kedfem.arrays import Bool, Float, Int
 from kedfem.dynamics.joints.attachments import Attachment, used_columns
 
-DEPENDENT = (
-    1e-9  # relative: ports of one coupling surface repeat each other to rounding, others differ by far more
-)
+DEPENDENT = 1e-9  # relative: ports of one coupling surface repeat each other to rounding, others differ by far more
 ROUNDING = 1e-13  # entries of relations of order one that couple nothing
 Block = tuple[Int[np.ndarray, " r"], Int[np.ndarray, " c"], Float[np.ndarray, "r c"]]
 """Rows and columns of a matrix, and what it has there."""
@@ -132,9 +130,7 @@ def _null_space(A: sp.csr_array, parts_of: Sequence[Block]) -> sp.csr_array:
     return every[:, np.argsort(first, kind="stable")]
 
 
-def _assembled(
-    parts: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]], shape: tuple[int, int]
-) -> sp.csr_array:
+def _assembled(parts: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]], shape: tuple[int, int]) -> sp.csr_array:
     """Dense parts at their rows and columns."""
     if not parts:
         return sp.csr_array(shape)

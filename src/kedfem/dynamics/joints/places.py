@@ -18,11 +18,7 @@ T = TypeVar("T")
 
 def slider_axis(scene: Scene, name: str) -> Float[np.ndarray, "3"] | None:
     """Direction in which a rigid slider (a rigid link without a shape) can move; None if the link is not one."""
-    if (
-        scene.links[name].model != "rigid"
-        or scene.links[name].shape is not None
-        or name in moving_grounds(scene)
-    ):
+    if scene.links[name].model != "rigid" or scene.links[name].shape is not None or name in moving_grounds(scene):
         return None
     guide = slider_guide(scene, name)
     return joint_axis(scene.joints[guide]) if guide else None
@@ -52,10 +48,7 @@ def on_part(
         That of the nearest segment, if none has it.
     """
     parts = {key: link for key, link in links.items() if link.name == name}
-    gap = {
-        key: float(np.linalg.norm((link.full or link).nodes - at, axis=1).min())
-        for key, link in parts.items()
-    }
+    gap = {key: float(np.linalg.norm((link.full or link).nodes - at, axis=1).min()) for key, link in parts.items()}
     first: KedfemError | None = None
     for key in sorted(parts, key=lambda key: gap[key]):
         try:
@@ -65,9 +58,7 @@ def on_part(
     raise first or MeshError(f"links.{name}: must be elastic, got no link of that name")
 
 
-def part_surface(
-    scene: Scene, joint: str, links: Mapping[str, Link], name: str
-) -> tuple[str, CouplingSurface]:
+def part_surface(scene: Scene, joint: str, links: Mapping[str, Link], name: str) -> tuple[str, CouplingSurface]:
     """The segment of a link on which a joint sits, and the coupling surface."""
     at = np.asarray(scene.joints[joint].at)
     return on_part(links, name, at, lambda link: surface_of(scene, joint, link))

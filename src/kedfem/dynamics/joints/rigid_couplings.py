@@ -22,9 +22,7 @@ def with_stiff_ports(scene: Scene, links: Mapping[str, Link]) -> dict[str, Link]
     out, done = dict(links), set()
     meshed = {link.name for link in links.values() if link.meshed}
     for name, joint in scene.joints.items():
-        for link in (
-            joint.links[:1] if joint.kind == "slot" else joint.links
-        ):  # a slot's line is no coupling surface
+        for link in joint.links[:1] if joint.kind == "slot" else joint.links:  # a slot's line is no coupling surface
             if link not in meshed or not joint.stiff(link) or scene.links[link].model == "rigid":
                 continue
             key, surface = part_surface(scene, name, out, link)

@@ -64,9 +64,7 @@ class Bordered:
         try:
             self.factor = splu(self.matrix)
         except RuntimeError as error:
-            raise SolveError(
-                "joints: bodies must be held by joints or springs, got some that move freely"
-            ) from error
+            raise SolveError("joints: bodies must be held by joints or springs, got some that move freely") from error
 
     def solved(self, f: Flat, target: Flat, closes: bool = False) -> tuple[Flat, Flat]:
         """z and m, refined once.
@@ -91,9 +89,7 @@ def independent_rows(C: sp.csr_array, compliance: Flat) -> Int[np.ndarray, " q"]
     size = row_sizes(C)
     hard = np.flatnonzero((compliance == 0.0) & (size > DEPENDENT))
     soft = np.flatnonzero(compliance != 0.0)
-    unit = sp.csr_array((C.data / np.where(size > 0, size, 1.0)[_row_of(C)], C.indices, C.indptr), C.shape)[
-        hard
-    ]
+    unit = sp.csr_array((C.data / np.where(size > 0, size, 1.0)[_row_of(C)], C.indices, C.indptr), C.shape)[hard]
     if len(hard) and not _independent(unit):
         _, upper, order = scipy.linalg.qr(unit.T.toarray(), mode="economic", pivoting=True)
         hard = hard[order[: int((np.abs(np.diag(upper)) > DEPENDENT).sum())]]

@@ -58,9 +58,7 @@ class Cholesky:
         try:
             cholmod.numeric(columnwise, self._factor)
         except ArithmeticError as err:
-            raise SolveError(
-                f"{what}: effective matrix must be positive definite, got a pivot ≤ 0 ({err})"
-            ) from err
+            raise SolveError(f"{what}: effective matrix must be positive definite, got a pivot ≤ 0 ({err})") from err
         self._column = matrix(0.0, (A.shape[0], 1))
         self._view = np.asarray(self._column)[:, 0]
 
@@ -100,6 +98,4 @@ class Cholesky:
         sizes = counts[last] - 1
         below = np.concatenate([np.zeros(0, int), *(rows[at[k] + 1 : at[k + 1]] for k in last)])
         L[at[:-1]] = 1 / L[at[:-1]]
-        return Triangle(
-            first, np.append(0, np.cumsum(sizes)), below, at, L, np.array(place).ravel().astype(int)
-        )
+        return Triangle(first, np.append(0, np.cumsum(sizes)), below, at, L, np.array(place).ravel().astype(int))

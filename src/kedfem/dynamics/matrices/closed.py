@@ -26,9 +26,7 @@ class Closed:
     held: Sequence[Int[np.ndarray, " c"]]
     RB: Sequence[Float[np.ndarray, "p c"]]
     unknowns: int
-    interface: (
-        Callable[[Float[np.ndarray, " k"]], tuple[Float[np.ndarray, " k"], Float[np.ndarray, " r"]]] | None
-    )
+    interface: Callable[[Float[np.ndarray, " k"]], tuple[Float[np.ndarray, " k"], Float[np.ndarray, " r"]]] | None
 
     def coupled(self, rhs: Sequence[NodalOf]) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]]]:
         """g (n, d) of all links and λ (q,) on them at their ports, link frames, from right-hand sides (n, d) there."""
@@ -45,23 +43,15 @@ class Closed:
                 z[c] += b.T @ (part.S @ x)
             z, _ = self.interface(z)
         forces = [part.S @ (b @ z[c] - x) for part, b, c, x in each]
-        g = [
-            x + (part.Y @ force).reshape(x.shape)
-            for part, x, force in zip(self.parts, y, forces, strict=True)
-        ]
+        g = [x + (part.Y @ force).reshape(x.shape) for part, x, force in zip(self.parts, y, forces, strict=True)]
         return g, [force[: len(part.attachment.keep)] for part, force in zip(self.parts, forces, strict=True)]
 
 
-def coupled_all(
-    parts: Sequence[Substructure], cases: Sequence[tuple[Closed, Sequence[NodalOf]]]
-) -> list[list[NodalOf]]:
+def coupled_all(parts: Sequence[Substructure], cases: Sequence[tuple[Closed, Sequence[NodalOf]]]) -> list[list[NodalOf]]:
     """g of several linkages with closed joints and their rhs, as of `coupled`: each link's solves go together."""
     if not cases:
         return []
-    answers = [
-        part.solve_many(np.stack([rhs[k].ravel() for _, rhs in cases], axis=1))
-        for k, part in enumerate(parts)
-    ]
+    answers = [part.solve_many(np.stack([rhs[k].ravel() for _, rhs in cases], axis=1)) for k, part in enumerate(parts)]
     return [
         case.answer([X[:, k].reshape(r.shape) for X, r in zip(answers, rhs, strict=True)])[0]
         for k, (case, rhs) in enumerate(cases)

@@ -82,9 +82,7 @@ def component_first(T: Sequence[Float[np.ndarray, "n n"]], K: Any) -> Float[np.n
     """Tᵀ K T of a matrix on states, component by component."""
     n, d = len(T[0]), len(T)
     blocks = as_dense(K).reshape(n, d, n, d).transpose(1, 0, 3, 2)
-    return np.concatenate(
-        [np.concatenate([T[i].T @ blocks[i, :, j] @ T[j] for j in range(d)], axis=1) for i in range(d)]
-    )
+    return np.concatenate([np.concatenate([T[i].T @ blocks[i, :, j] @ T[j] for j in range(d)], axis=1) for i in range(d)])
 
 
 def coordinates(link: Link, part: Coordinates, rows: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "d n"]:

@@ -94,11 +94,7 @@ def semidefinite_factor(G: Float[np.ndarray, "r r"]) -> tuple[Float[np.ndarray, 
     kept: list[int] = []
     for i in range(len(G)):
         n = len(kept)
-        row = (
-            scipy.linalg.solve_triangular(L[:n, :n], G[i, kept], lower=True, check_finite=False)
-            if n
-            else G[i, :0]
-        )
+        row = scipy.linalg.solve_triangular(L[:n, :n], G[i, kept], lower=True, check_finite=False) if n else G[i, :0]
         left = G[i, i] - row @ row
         if left > DEPENDENT * G[i, i]:
             L[n, :n], L[n, n] = row, np.sqrt(left)

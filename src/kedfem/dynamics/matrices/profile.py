@@ -60,11 +60,7 @@ def near_diagonal(groups: Sequence[Group], k: int) -> Int[np.ndarray, " k"]:
     touched = sp.lil_array((max(len(groups), 1), max(k, 1)))
     for row, group in enumerate(groups):
         touched[row, group] = 1.0
-    order = (
-        reverse_cuthill_mckee(sp.csr_array(touched.T @ touched), symmetric_mode=True)[:k]
-        if k
-        else np.zeros(0, int)
-    )
+    order = reverse_cuthill_mckee(sp.csr_array(touched.T @ touched), symmetric_mode=True)[:k] if k else np.zeros(0, int)
     number = np.empty(k, int)
     number[order] = np.arange(k)
     return number

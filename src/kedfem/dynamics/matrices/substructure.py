@@ -126,9 +126,7 @@ class _Dense:
         try:
             self._factor = scipy.linalg.cho_factor(A.toarray(), check_finite=False)
         except np.linalg.LinAlgError as error:
-            raise SolveError(
-                f"links.{name}: effective matrix must be positive definite, got {error}"
-            ) from error
+            raise SolveError(f"links.{name}: effective matrix must be positive definite, got {error}") from error
 
     def solve(self, b: np.ndarray) -> np.ndarray:
         """x with A x = b, of vectors and columns."""
@@ -189,6 +187,4 @@ def effective_matrix(link: Link, c_M: float, c_K: float) -> sp.csr_array:
 def mass_matrix(link: Link) -> sp.csr_array:
     """M = m ⊗ I, (dn, dn), [KED, eqs. (9)(11)]."""
     unit = np.eye(link.d)
-    return sp.csr_array(
-        sum(sp.kron(m, sp.diags_array(unit[k]), format="csr") for k, m in enumerate(link.mass))
-    )
+    return sp.csr_array(sum(sp.kron(m, sp.diags_array(unit[k]), format="csr") for k, m in enumerate(link.mass)))

@@ -13,9 +13,7 @@ from kedfem.links.record import Link
 from kedfem.motion.rigid import RigidMotion
 
 
-def reduced_at(
-    model: Model, motion: RigidMotion, only: Collection[str], count: Callable[[Link, Basis], int]
-) -> Model:
+def reduced_at(model: Model, motion: RigidMotion, only: Collection[str], count: Callable[[Link, Basis], int]) -> Model:
     """The model with some links reduced in the first modes that its loads excite at the times of a motion.
 
     Parameters

@@ -88,9 +88,7 @@ class Frozen:
     factorisations : of links, so far
     """
 
-    def __init__(
-        self, system: System, count: int, free: int = 0, least: float = 0.0, preloaded: bool = False
-    ) -> None:
+    def __init__(self, system: System, count: int, free: int = 0, least: float = 0.0, preloaded: bool = False) -> None:
         self.system, self.count, self.free, self.least = system, count, free, least
         self.preloaded = preloaded
         elastic = [link for link in system.model.links if not link.rigid] or list(system.model.links)
@@ -155,9 +153,7 @@ class Frozen:
         now = Instant(self.of, lambda t: motion, float(motion.t[0]), self._like)
         self._like = now
         found = asked(now)
-        return now, LinearEquations(
-            self.of, self.held, now.R, with_preloads(now, found) if self.preloaded else found
-        )
+        return now, LinearEquations(self.of, self.held, now.R, with_preloads(now, found) if self.preloaded else found)
 
     def _lowest(self, motion: RigidMotion) -> tuple[Float[np.ndarray, " f"], Float[np.ndarray, "N f"]]:
         """ω² in rising order, and shapes on the coordinates of all bodies."""
@@ -199,9 +195,7 @@ def require_drive(scene: Scene, free: bool) -> None:
     SceneError
     """
     if free and scene.driven is None:
-        raise SceneError(
-            "--free: must be combined with a drive that lets go, got a scene without one: leave it out"
-        )
+        raise SceneError("--free: must be combined with a drive that lets go, got a scene without one: leave it out")
 
 
 def tangent_warning(system: System, what: str) -> tuple[str, ...]:
@@ -212,11 +206,7 @@ def tangent_warning(system: System, what: str) -> tuple[str, ...]:
         if isinstance(each.law, Stop) or ((curve := curve_of(each.law)) is not None and curve.over != TIME)
     )
     names = ", ".join(dict.fromkeys(bent))
-    return (
-        (f"{what}: force laws that are not linear enter with their tangent at rest: {names}",)
-        if names
-        else ()
-    )
+    return (f"{what}: force laws that are not linear enter with their tangent at rest: {names}",) if names else ()
 
 
 def _ready(system: System, shift: float) -> Ready:

@@ -129,9 +129,7 @@ def motions_without_strain(link: Link, support: Support) -> int:
     B = rigid_modes(link)
     B = B / np.sqrt(np.einsum("kr,kr->r", B, mass_matrix(link) @ B))
     clamped = B[np.repeat(support.clamped, link.d)]
-    hold = np.concatenate(
-        [clamped / max(np.abs(clamped).max(initial=0.0), 1e-300), _independent(support.rows) @ B]
-    )
+    hold = np.concatenate([clamped / max(np.abs(clamped).max(initial=0.0), 1e-300), _independent(support.rows) @ B])
     if not len(hold):
         return int(B.shape[1])
     values = np.linalg.svd(hold / np.abs(hold).max(), compute_uv=False)

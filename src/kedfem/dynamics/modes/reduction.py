@@ -129,9 +129,7 @@ class _Krylov:
             self._T[level, k] = self._T[k, level] = _dot(M_b, x)
 
 
-def _krylov(
-    model: Model, parts: Sequence[Substructure], instants: Sequence[Instant], levels: int
-) -> list[_Krylov]:
+def _krylov(model: Model, parts: Sequence[Substructure], instants: Sequence[Instant], levels: int) -> list[_Krylov]:
     """Of the linkage frozen at some instants, from its static deflection under P − M R0'' there, link frames.
 
     All instants go level by level, so that their solves go together.
@@ -156,9 +154,7 @@ def _mass_norm(model: Model, x: Sequence[NodalOf]) -> tuple[float, list[NodalOf]
     return float(np.sqrt(max(_dot(x, Mx), 0.0))), Mx
 
 
-def energy_sorted(
-    link: Link, ports: Float[np.ndarray, "n p"], deflections: Sequence[Float[np.ndarray, "n d"]]
-) -> Basis:
+def energy_sorted(link: Link, ports: Float[np.ndarray, "n p"], deflections: Sequence[Float[np.ndarray, "n d"]]) -> Basis:
     """Scalar components of deflections, orthonormal in an energy-like product and sorted by their weight in it."""
     H = energy_product(link)
     S = np.concatenate(deflections, axis=1)
@@ -171,9 +167,7 @@ def energy_sorted(
     return Basis(np.concatenate([rigid, E], axis=1), functions, weights / size)
 
 
-def enriched(
-    link: Link, deflections: Sequence[Float[np.ndarray, "n d"]], most: int
-) -> Float[np.ndarray, "n s"]:
+def enriched(link: Link, deflections: Sequence[Float[np.ndarray, "n d"]], most: int) -> Float[np.ndarray, "n s"]:
     """The modes of a reduced link and those components of deflections that have most strain energy beside them.
 
     Parameters

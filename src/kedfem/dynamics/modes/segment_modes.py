@@ -66,14 +66,10 @@ def segment_basis(
     at_ports = (joint.weights @ x[joint.nodes] for x in (rigid, functions))
     kept, others, losses = _eliminated(K, C, *at_ports)
     whole = float(np.vdot(C, (C.reshape(len(C), -1) @ K).reshape(C.shape)))
-    return Basis(
-        np.concatenate([rigid, functions @ kept], axis=1), functions @ others, np.sqrt(losses / whole)
-    )
+    return Basis(np.concatenate([rigid, functions @ kept], axis=1), functions @ others, np.sqrt(losses / whole))
 
 
-def _relative(
-    link: Link, modes: Float[np.ndarray, "k r"], g: Float[np.ndarray, "n d"]
-) -> Float[np.ndarray, "n d"]:
+def _relative(link: Link, modes: Float[np.ndarray, "k r"], g: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "n d"]:
     """A deflection without the segment's mean rigid motion."""
     M = np.stack([mass_times(link.mass, x.reshape(link.n, link.d)).ravel() for x in modes.T], axis=1)
     return np.asarray(g - (modes @ np.linalg.solve(modes.T @ M, M.T @ g.ravel())).reshape(g.shape))
@@ -97,9 +93,7 @@ def _free(
     balanced = scipy.linalg.null_space(rigid_modes(link).T @ W[:, here], rcond=1e-9)
     q = W.shape[1]
     y = part.Y[:, here] @ balanced
-    F = np.linalg.inv(part.S)[
-        q:, q:
-    ]  # what the anchors take is given back: forces in balance need none of it
+    F = np.linalg.inv(part.S)[q:, q:]  # what the anchors take is given back: forces in balance need none of it
     return np.asarray(y - part.Y[:, q:] @ np.linalg.lstsq(F, y[part.anchors], rcond=1e-9)[0])
 
 
@@ -126,9 +120,7 @@ def _turned_ports(
         arms = joint.points[port[here]] - joint.points[group].mean(axis=0)
         e = np.eye(3)[joint.keep[here] % link.d]
         needed = np.stack([_shortened(w, arms, e, link.d) for w in moved.T], axis=1)
-        c = np.linalg.lstsq(
-            np.concatenate([W[:, here].T @ answers, modes[here]], axis=1), needed, rcond=1e-9
-        )[0]
+        c = np.linalg.lstsq(np.concatenate([W[:, here].T @ answers, modes[here]], axis=1), needed, rcond=1e-9)[0]
         out.append(answers @ c[: answers.shape[1]])
     return [x.reshape(link.n, link.d) for each in out for x in each.T]
 
@@ -144,9 +136,7 @@ def _shortened(
 def _groups(joint: Attachment, d: int) -> list[Int[np.ndarray, " p"]]:
     """Ports that belong together: of each joint, and of each cut the d that follow each other."""
     cuts = np.flatnonzero([name == "" for name in joint.joints])
-    named = [
-        np.flatnonzero([x == name for x in joint.joints]) for name in dict.fromkeys(joint.joints) if name
-    ]
+    named = [np.flatnonzero([x == name for x in joint.joints]) for name in dict.fromkeys(joint.joints) if name]
     return [*named, *(cuts[k : k + d] for k in range(0, len(cuts), d))]
 
 

@@ -39,9 +39,7 @@ class Combination:
     weights: Float[np.ndarray, " l"]
     corrections: list[Fields] = field(default_factory=list)
 
-    def blocks(
-        self, first: int, taken: Sequence[Block], strides: Sequence[int], fine: bool
-    ) -> Iterator[Block]:
+    def blocks(self, first: int, taken: Sequence[Block], strides: Sequence[int], fine: bool) -> Iterator[Block]:
         """Of a span of time: all time points of the finest level, if these are wanted; then those of all levels."""
         levels = tuple(
             replace(block.chosen(slice(stride - 1, None, stride)), step=first)
@@ -50,10 +48,7 @@ class Combination:
         motion, every = levels[0].motion, range(len(self.model.links))
         seen = [[_fields(self.model, k, block) for k in every] for block in levels]
         combined = [
-            {
-                name: sum(w * each[k][name] for w, each in zip(self.weights, seen, strict=True))
-                for name in LINEAR
-            }
+            {name: sum(w * each[k][name] for w, each in zip(self.weights, seen, strict=True)) for name in LINEAR}
             for k in every
         ]
         if fine:

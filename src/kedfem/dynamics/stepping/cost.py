@@ -47,9 +47,7 @@ def estimated_cost(scene: Scene, model: Model) -> Cost:
     N, fill, levels = _unknowns(model), _fill(model), scene.analysis.extrapolation_levels or 1
     bandwidth, rate = _machine()
     small = bool((N <= SMALL).all())
-    step = (LOOP if small else OVERHEAD) + float(
-        (SOLVE_BYTES * fill + 8 * ARRAY_PASSES * N).sum()
-    ) / bandwidth
+    step = (LOOP if small else OVERHEAD) + float((SOLVE_BYTES * fill + 8 * ARRAY_PASSES * N).sum()) / bandwidth
     if any(link.fit is not None for link in model.links):
         step *= ITERATIONS
     return Cost(

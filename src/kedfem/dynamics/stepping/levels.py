@@ -147,9 +147,7 @@ def leveled(
         done += count
 
 
-def _single(
-    scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps, marks: Marks
-) -> Iterator[Block]:
+def _single(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps, marks: Marks) -> Iterator[Block]:
     """All time points of a march by itself, from those on that were handed on before."""
     since = marks.done
     for block in transient(scene, linkage, along, model, solver, marks.levels[0]):
@@ -246,7 +244,5 @@ def balanced(
 
     c_m, c_f = 1 - scheme.alpha_m, 1 - scheme.alpha_f
     begin = (scheme.alpha_m * before - scheme.alpha_f * balance) / c_f
-    out, _ = lfilter(
-        [c_m / c_f, scheme.alpha_m / c_f], [1.0, scheme.alpha_f / c_f], own, axis=0, zi=begin[None]
-    )
+    out, _ = lfilter([c_m / c_f, scheme.alpha_m / c_f], [1.0, scheme.alpha_f / c_f], own, axis=0, zi=begin[None])
     return np.asarray(out)

@@ -30,9 +30,7 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
     tolerance = (FREE if scene.driven is None else CONVERGED) if corotational(scene) else None
     monolithic = scene.analysis.solver == "monolithic"
-    return Steps(
-        scene, scene_system(scene, model, stresses_of(scene, model)), model, scheme, tolerance, monolithic
-    )
+    return Steps(scene, scene_system(scene, model, stresses_of(scene, model)), model, scheme, tolerance, monolithic)
 
 
 def stresses_of(scene: Scene, model: Model) -> Stiffening | None:

@@ -55,9 +55,7 @@ def coarse_map(scene: Scene, linkage: Linkage, along: Path, model: Model) -> Per
     return period_map(scene, linkage, along, small, solver, start)
 
 
-def period_map(
-    scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps, start: State
-) -> PeriodMap:
+def period_map(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps, start: State) -> PeriodMap:
     """The map of a solver's steps over the period of a steady motion."""
     motion_at = motion_of(scene, linkage, along)
     return PeriodMap(solver.ready, start, motion_at, time_grid(scene).end, block_length(model))

@@ -77,9 +77,7 @@ def transient(
     _marched(solver, state)
 
 
-def _positions(
-    scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps, mark: Mark
-) -> Iterator[Block]:
+def _positions(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps, mark: Mark) -> Iterator[Block]:
     """All positions of a static or quasi-static analysis, each with the deflection at which all forces balance."""
     grid, motion_at, of, state = time_grid(scene), motion_of(scene, linkage, along), solver.ready, mark.state
     shared = Instant(of, motion_at, 0.0)
@@ -158,9 +156,7 @@ def _moment(linkage: Linkage, motion: RigidMotion, k: int) -> str:
         return f"t = {motion.t[k]:.6g} s"
     x = float(motion.phi[k])
     turn = f"drive angle {np.degrees(x):.6g} deg"
-    return (
-        f"t = {motion.t[k]:.6g} s, {turn if linkage.drives.turning[0] else f'drive travel {1e3 * x:.6g} mm'}"
-    )
+    return f"t = {motion.t[k]:.6g} s, {turn if linkage.drives.turning[0] else f'drive travel {1e3 * x:.6g} mm'}"
 
 
 def _finite(linkage: Linkage, block: Block) -> Iterator[Block]:

@@ -47,9 +47,7 @@ ELEMENTS = ("springs", "motors", "limits")  # sections of a scene
 Vector = Float[np.ndarray, "3"]
 
 
-def system_of(
-    scene: Scene, linkage: Linkage, along: Path | None = None, model: Model | None = None
-) -> System:
+def system_of(scene: Scene, linkage: Linkage, along: Path | None = None, model: Model | None = None) -> System:
     """The system of a scene.
 
     Parameters
@@ -119,9 +117,7 @@ class _Builder:
         for i, j in combinations(range(len(ends)), 2):
             a, b = side.points[i], side.points[j]
             long = Term(record.DISTANCE, ends[i], ends[j], a, b, zero)
-            self.add(
-                joint.name, (long, Term(record.DISTANCE, ground, ground, a, b, zero, -1.0)), Held(), joint
-            )
+            self.add(joint.name, (long, Term(record.DISTANCE, ground, ground, a, b, zero, -1.0)), Held(), joint)
 
     def between_prescribed(self, known: set[str]) -> None:
         """Springs, motors and limits between the ground and what drives carry: no unknowns, but hubs bear them."""
@@ -130,9 +126,7 @@ class _Builder:
                 if f"{kind}.{name}" in known:
                     continue
                 points = getattr(element, "between", None)
-                links = (
-                    [end.link for end in points] if points else ordered(self.scene.joints[str(element.joint)])
-                )
+                links = [end.link for end in points] if points else ordered(self.scene.joints[str(element.joint)])
                 i, j = (self.linkage.bodies.index(link) for link in links)
                 none = ConstraintJoint(f"{kind}.{name}", np.zeros(3), (i, j), (None, None))
                 self.element(none, element)

@@ -36,11 +36,7 @@ def dot(a, b):  # type: ignore[no-untyped-def]
 @inner
 def triple(a, b, c):  # type: ignore[no-untyped-def]
     """a · (b × c)."""
-    return (
-        a[0] * (b[1] * c[2] - b[2] * c[1])
-        + a[1] * (b[2] * c[0] - b[0] * c[2])
-        + a[2] * (b[0] * c[1] - b[1] * c[0])
-    )
+    return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
 
 
 @inner

@@ -31,9 +31,7 @@ from kedfem.links.record import BeamPoint, Link
 from kedfem.scene import Pieces
 
 KINDS = {"solid": 0, "spatial_beam": 0, "plane": 1, "beam": 2}
-TOLERANCE = (
-    1e-9  # change of a pass, of what a step moves: far below what co-rotational frames are compared to, 1e-7
-)
+TOLERANCE = 1e-9  # change of a pass, of what a step moves: far below what co-rotational frames are compared to, 1e-7
 SMALLEST = 1e-13  # of a system's size: what a step of one that is at rest may be out by
 
 
@@ -81,9 +79,7 @@ def body_arrays(system: System, parts: Sequence[Part], profile: Profile) -> Bodi
     Y, W = ([x[:0] if isinstance(part, SparsePart) else x for x, part in zip(each, parts, strict=True)]
             for each in ([part.Y.T for part in parts], [part.W for part in parts]))  # fmt: skip
     stiff = [
-        component_first(part.T, link.K0)
-        if frame == record.COROTATIONAL and part.G.size
-        else np.zeros(part.G.shape)
+        component_first(part.T, link.K0) if frame == record.COROTATIONAL and part.G.size else np.zeros(part.G.shape)
         for link, part, frame in zip(links, parts, frames, strict=True)
     ]
     return Bodies(
@@ -228,9 +224,7 @@ def _rows(vectors: Sequence[np.ndarray]) -> Float[np.ndarray, "r 3"]:
     return np.array(vectors, float).reshape(-1, 3)
 
 
-def factored(
-    links: Sequence[Link], joints: Sequence[Attachment], c: Coefficients | None = None
-) -> list[Part]:
+def factored(links: Sequence[Link], joints: Sequence[Attachment], c: Coefficients | None = None) -> list[Part]:
     """All bodies with A = c_M M + c_K K0, or M alone."""
     c_M, c_K = (1.0, 0.0) if c is None else (c.c_M, c.c_K)
     return [

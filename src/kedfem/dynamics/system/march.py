@@ -96,10 +96,7 @@ def driving(of: Ready, motion: RigidMotion, loads: Loads | None = None) -> Drivi
     """
     model = of.system.model
     forcing = forcings(model, motion) if loads is None else forcing_of(model, motion, loads)
-    F = [
-        work_over_time(part, x.F).reshape(len(motion.t), -1)
-        for part, x in zip(of.parts, forcing, strict=True)
-    ]
+    F = [work_over_time(part, x.F).reshape(len(motion.t), -1) for part, x in zip(of.parts, forcing, strict=True)]
     drives = motion.drives if motion.drives.shape[1] else np.zeros((len(motion.t), 1))
     stations = [line_weights(end, motion) for end in of.system.ends if end.line is not None]
     weights = np.concatenate([np.zeros((len(motion.t), 0)), *stations], axis=1)
@@ -202,9 +199,7 @@ def compiled_steps(of: Ready) -> Callable[..., tuple[int, int]]:
     return cast("Callable[..., tuple[int, int]]", marched)
 
 
-def _in_parts(
-    of: Ready, state: State, last: float, between: Motion, halvings: int, met: bool
-) -> tuple[State, History]:
+def _in_parts(of: Ready, state: State, last: float, between: Motion, halvings: int, met: bool) -> tuple[State, History]:
     """One step in two, each of these in two again where it must be; where a stop is met if that is why."""
     if met:
         from kedfem.dynamics.system.starts.impacts import divided  # which marches

@@ -85,9 +85,7 @@ def constraints_end(c, ends, of, driving, t, state, trial, work, history):  # ty
             e = along(row, columns, trial.z)
         else:
             rigid_motion = (driving.R[t], driving.v[t], driving.omega[t])
-            e, rate = coordinate(
-                ends, of, a, rigid_motion, trial.moving, trial.turned, trial.row, work.end, work.vectors
-            )
+            e, rate = coordinate(ends, of, a, rigid_motion, trial.moving, trial.turned, trial.row, work.end, work.vectors)
             if of.drive[a] >= 0:
                 e -= driving.drives[t, of.drive[a]]
         second = n0 * (e - state.e[0, a]) - n1 * state.e[1, a] - n2 * state.e[2, a]

@@ -185,9 +185,7 @@ def _row_by_row(of: Int[np.ndarray, "L 3"], every: Sequence[Any]) -> Masses:
         of,
         ends_of([m.shape[0] + 1 for m in every]),
         np.concatenate([none, *(m.indptr + end for m, end in zip(every, ends, strict=False))])[1:],
-        np.concatenate([none, *(m.indices for m in every)])[1:].astype(
-            np.uint32
-        ),  # else asked whether it is negative
+        np.concatenate([none, *(m.indices for m in every)])[1:].astype(np.uint32),  # else asked whether it is negative
         np.concatenate([np.zeros(1), *(m.data for m in every)])[1:],
     )
 

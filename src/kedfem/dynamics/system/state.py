@@ -138,9 +138,7 @@ def room(bodies: Bodies) -> Work:
     )  # fmt: skip
 
 
-def empty_history(
-    T: int, bodies: Bodies, of: Constraints, F: Float[np.ndarray, "T N"] | None = None
-) -> History:
+def empty_history(T: int, bodies: Bodies, of: Constraints, F: Float[np.ndarray, "T N"] | None = None) -> History:
     """Room for T time points; of applied forces that are known beforehand none.
 
     What steps write of every body is not set to zero before. It is one array, which asks for memory of the system anew

@@ -125,9 +125,7 @@ def begin(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type:
         for x in range(bodies.at[i], bodies.at[i + 1]):
             trial.u[x] = state.u[x] + h * state.v[x] + h * h / 2 * state.a[x]
         if bodies.frame[i] == STRESSED:
-            stressed_begin(
-                bodies.stresses, c, bodies, i, R[bodies.motion[i]], driving.F[t], state, trial, work.room
-            )
+            stressed_begin(bodies.stresses, c, bodies, i, R[bodies.motion[i]], driving.F[t], state, trial, work.room)
             continue
         frame_copied(state.Q[i], trial.Q[i])
         trial.angle[i] = state.angle[i]

@@ -121,8 +121,7 @@ class Steps:
         self.riders = {bodies.index(x.name): (x.carrier, x.weights) for x in system.model.sliders}
         joints = list(zip(model.links, model.joints, system.model.joints, strict=True))
         self._inverse = [
-            np.linalg.pinv(port_columns(joint, link.n)) if self.elements else None
-            for link, joint, _ in joints
+            np.linalg.pinv(port_columns(joint, link.n)) if self.elements else None for link, joint, _ in joints
         ]
         self._to_ports = [
             None if x is None else x @ port_columns(held, link.n)

@@ -107,9 +107,7 @@ def tangent_fit(x: Float[np.ndarray, "m 2"], r: float) -> Float[np.ndarray, "m 3
     return np.asarray(np.outer(dN, [*tangent, 0.0]) / (tangent @ tangent))
 
 
-def element_stiffness(
-    x: Float[np.ndarray, "m 2"], rigidity: Float[np.ndarray, "3"]
-) -> Float[np.ndarray, "k k"]:
+def element_stiffness(x: Float[np.ndarray, "m 2"], rigidity: Float[np.ndarray, "3"]) -> Float[np.ndarray, "k k"]:
     """Stiffness of one element by reduced integration (m − 1 Gauss points), [KED, eqs. (13)(21)].
 
     Parameters

@@ -29,9 +29,7 @@ class Axis:
     up: Float[np.ndarray, "3"] | None = None
 
 
-def straight_axis(
-    points: Float[np.ndarray, "p 3"], elements: int, nodes: int, up: Float[np.ndarray, "3"] | None
-) -> Axis:
+def straight_axis(points: Float[np.ndarray, "p 3"], elements: int, nodes: int, up: Float[np.ndarray, "3"] | None) -> Axis:
     """Straight segments between points, each with directions of its own.
 
     Parameters
@@ -56,9 +54,7 @@ def straight_axis(
     return Axis(np.concatenate(segments), node % many, line_cells(first, nodes), hub, up)
 
 
-def smooth_axis(
-    points: Float[np.ndarray, "p 3"], elements: int, nodes: int, up: Float[np.ndarray, "3"] | None
-) -> Axis:
+def smooth_axis(points: Float[np.ndarray, "p 3"], elements: int, nodes: int, up: Float[np.ndarray, "3"] | None) -> Axis:
     """A cubic spline through points; the section's directions are carried along it without turning about it.
 
     Parameters
@@ -90,9 +86,7 @@ def directions(along: Float[np.ndarray, "3"], up: Float[np.ndarray, "3"] | None)
     return line_axes(np.zeros(3), along).T if up is None else section_axes(along / np.linalg.norm(along), up)
 
 
-def chord_axes(
-    points: Float[np.ndarray, "p 3"], up: Float[np.ndarray, "3"] | None
-) -> Float[np.ndarray, "3 3"]:
+def chord_axes(points: Float[np.ndarray, "p 3"], up: Float[np.ndarray, "3"] | None) -> Float[np.ndarray, "3 3"]:
     """Link axes of a line through points as columns, x as of `polyline_axes`, z as near to `up` as can be, if given."""
     axes = polyline_axes(points)
     level = up is not None and np.linalg.norm(np.cross(up, axes[:, 0])) > LEVEL * np.linalg.norm(up)

@@ -33,9 +33,7 @@ def nearest_on_beam(link: Link, point: Float[np.ndarray, "3"]) -> tuple[float, i
     return beyond, e, r, offset
 
 
-def beam_coordinates(
-    x: Float[np.ndarray, "m 2"], point: Float[np.ndarray, "2"]
-) -> tuple[float, float, float]:
+def beam_coordinates(x: Float[np.ndarray, "m 2"], point: Float[np.ndarray, "2"]) -> tuple[float, float, float]:
     """Parent coordinate of the nearest axis point, signed offset to the left of the axis, distance beyond the ends."""
     r = nearest_parameter(x, point)
     N, dN = shape_functions(r, len(x))
@@ -44,9 +42,7 @@ def beam_coordinates(
     return r, float(t[0] * d[1] - t[1] * d[0]), abs(float(t @ d))
 
 
-def fibre_row(
-    link: Link, element: int, r: float, offset: float, kinks: Points | None = None
-) -> Float[np.ndarray, " k"]:
+def fibre_row(link: Link, element: int, r: float, offset: float, kinks: Points | None = None) -> Float[np.ndarray, " k"]:
     """σ_xx = E (ε − offset κ) of a fibre (3n,): the strains at the nearest Gauss points, interpolated to r.
 
     Parameters

@@ -91,9 +91,7 @@ def i_profile(
     inner = h - 2 * f
     ratio = s / f
     meeting = -0.042 + 0.2204 * ratio - 0.0725 * ratio**2
-    torsion = (
-        2 / 3 * b * f**3 * (1 - 0.63 * f / b) + inner * s**3 / 3 + 2 * meeting * (f + s**2 / (4 * f)) ** 4
-    )
+    torsion = 2 / 3 * b * f**3 * (1 - 0.63 * f / b) + inner * s**3 / 3 + 2 * meeting * (f + s**2 / (4 * f)) ** 4
     return Section(
         "i", h, b, 2 * b * f + inner * s, (b * h**3 - (b - s) * inner**3) / 12,
         (2 * f * b**3 + inner * s**3) / 12, torsion, shear_coefficients, walls=(s, f),
@@ -138,9 +136,7 @@ def scene_section(shape: SectionShape, shear_coefficient: float | None, poisson_
 def cowper(poisson_ratio: float, m: float) -> float:
     """Shear coefficient of a circle with a bore m times its diameter: Cowper, J. Appl. Mech. 33 (1966)."""
     ring = (1 + m**2) ** 2
-    return (
-        6 * (1 + poisson_ratio) * ring / ((7 + 6 * poisson_ratio) * ring + (20 + 12 * poisson_ratio) * m**2)
-    )
+    return 6 * (1 + poisson_ratio) * ring / ((7 + 6 * poisson_ratio) * ring + (20 + 12 * poisson_ratio) * m**2)
 
 
 def cowper_box(poisson_ratio: float, height: float, thickness: float) -> float:
@@ -165,9 +161,7 @@ def rectangle_torsion(height: float, thickness: float) -> float:
     """J of a rectangle by Saint-Venant's series: a b³/3 (1 − 192/π⁵ (b/a) Σ tanh(nπa/2b)/n⁵), n odd, b ≤ a [m⁴]."""
     b, a = sorted((height, thickness))
     n = np.arange(1, TERMS, 2)
-    return float(
-        a * b**3 / 3 * (1 - 192 / np.pi**5 * b / a * np.sum(np.tanh(n * np.pi * a / (2 * b)) / n**5))
-    )
+    return float(a * b**3 / 3 * (1 - 192 / np.pi**5 * b / a * np.sum(np.tanh(n * np.pi * a / (2 * b)) / n**5)))
 
 
 def torsion_stress(section: Section, y: float, z: float) -> tuple[float, float]:
@@ -254,9 +248,7 @@ def _box_outline(h: float, t: float, wall: float) -> tuple[Float[np.ndarray, "c 
     return np.concatenate([round_it * [h, t], round_it * [h - wall, t - wall]]), ring
 
 
-def _i_outline(
-    h: float, t: float, web: float, flange: float
-) -> tuple[Float[np.ndarray, "c 2"], Int[np.ndarray, "q 4"]]:
+def _i_outline(h: float, t: float, web: float, flange: float) -> tuple[Float[np.ndarray, "c 2"], Int[np.ndarray, "q 4"]]:
     """Both edges of the flanges at their ends and at the web, and the middle of the web; h and t are half the extents."""
     columns, rows = (-t, -web / 2, web / 2, t), (-h, flange - h, h - flange, h)
     points = [[y, z] for y in rows for z in columns] + [[0.0, -web / 2], [0.0, web / 2]]

@@ -82,9 +82,7 @@ def rigidities(section: Section, E: float, G: float) -> Float[np.ndarray, "6"]:
                      G * section.torsion_constant])  # fmt: skip
 
 
-def space_stiffness(
-    x: Float[np.ndarray, "m 3 3"], rigidity: Float[np.ndarray, "6"]
-) -> Float[np.ndarray, "k k"]:
+def space_stiffness(x: Float[np.ndarray, "m 3 3"], rigidity: Float[np.ndarray, "6"]) -> Float[np.ndarray, "k k"]:
     """Stiffness of one element, [KED, eq. (13)].
 
     The strains of the beam by reduced integration (m − 1 Gauss points); those within the section at the nodes, as
@@ -141,8 +139,7 @@ def spatial_beam_link(
     lumped = _diagonal(hubs[:, 0], HUB_INERTIA * material.density * cube, n)
     m = sp.csr_array(triples.T @ m @ triples + lumped)
     K0 = sp.csr_array(
-        vectors.T @ K @ vectors
-        + hub_stiffness(X, hubs, hubs_stiff * rigidity[0] * length_of(axis.frame[:, 0], cells))
+        vectors.T @ K @ vectors + hub_stiffness(X, hubs, hubs_stiff * rigidity[0] * length_of(axis.frame[:, 0], cells))
     )
     mass = (m, m, m)
     m1, mX = mass_constants(mass, one, X)

@@ -31,18 +31,14 @@ def beam_strains(link: Link, element: int, r: float) -> Float[np.ndarray, "6 k"]
     return np.asarray(out.reshape(6, -1))
 
 
-def section_stress(
-    link: Link, strains: Float[np.ndarray, "6 k"], y: float, z: float
-) -> Float[np.ndarray, "3 k"]:
+def section_stress(link: Link, strains: Float[np.ndarray, "6 k"], y: float, z: float) -> Float[np.ndarray, "3 k"]:
     """Rows of σ_xx = E (ε + y κ1 + z κ2) and of the shear stresses of torsion σ_xy, σ_zx, axes (tangent, n1, n2)."""
     xy, zx = torsion_stress(section_of(link), y, z)
     twist = link.lame[1] * strains[5]
     return np.stack([link.E * (strains[0] + y * strains[3] + z * strains[4]), xy * twist, zx * twist])
 
 
-def nearest_on_axis(
-    link: Link, point: Float[np.ndarray, "3"]
-) -> tuple[float, int, float, tuple[float, float]]:
+def nearest_on_axis(link: Link, point: Float[np.ndarray, "3"]) -> tuple[float, int, float, tuple[float, float]]:
     """How far a point is outside the beam, and the element, parent coordinate and (y, z) of its section there."""
     found = []
     for e in range(len(link.cells)):

@@ -54,9 +54,7 @@ def spatial_stress_stiffness(link: Link, g: Float[np.ndarray, "n 3"]) -> sp.csr_
     return sp.csr_array(k + _hubs(link, frame, g))
 
 
-def _element(
-    link: Link, x: Float[np.ndarray, "m 3 3"], u: Float[np.ndarray, "m 3 3"]
-) -> Float[np.ndarray, "k k"]:
+def _element(link: Link, x: Float[np.ndarray, "m 3 3"], u: Float[np.ndarray, "m 3 3"]) -> Float[np.ndarray, "k k"]:
     m, section = len(x), section_of(link)
     rigidity = rigidities(section, link.E, link.lame[1])
     EA, _, _, EI_y, EI_z, _ = rigidity

@@ -92,9 +92,7 @@ def distance(link: Link, each: Candidate, point: Float[np.ndarray, "3"]) -> floa
     return float(_to_triangles(point, np.concatenate(triangles)).min())
 
 
-def _to_triangles(
-    point: Float[np.ndarray, "3"], corners: Float[np.ndarray, "t 3 3"]
-) -> Float[np.ndarray, " t"]:
+def _to_triangles(point: Float[np.ndarray, "3"], corners: Float[np.ndarray, "t 3 3"]) -> Float[np.ndarray, " t"]:
     """Distances from a point to triangles: to their planes if it is above them, else to the nearest edge [m]."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)

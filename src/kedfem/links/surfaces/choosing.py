@@ -47,9 +47,7 @@ def with_chosen_faces(scene: Scene, link: Link) -> Link:
     return replace(link, faces=(*link.faces, *found.values())) if found else link
 
 
-def chosen_surface(
-    link: Link, where: str, choice: ChosenFace, near: Vector, offered: Sequence[Candidate]
-) -> Candidate:
+def chosen_surface(link: Link, where: str, choice: ChosenFace, near: Vector, offered: Sequence[Candidate]) -> Candidate:
     """The one surface of a link that a choice means.
 
     Parameters
@@ -73,9 +71,7 @@ def chosen_surface(
             return meant[0]
     alike = [each for each in ordered if each.form == choice.form]
     offered = meant or alike or [each for each in ordered if each.form != "other"]
-    those = ", ".join(
-        f"{each.kind} {as_choice(link, each)} {length(far[id(each)])} away" for each in offered[:MOST]
-    )
+    those = ", ".join(f"{each.kind} {as_choice(link, each)} {length(far[id(each)])} away" for each in offered[:MOST])
     more = f", and {len(offered) - MOST} more" if len(offered) > MOST else ""
     if meant:
         wanted, got = f"mean one face of link '{link.name}'", f"{len(meant)} such faces"

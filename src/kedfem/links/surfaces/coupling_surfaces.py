@@ -263,9 +263,7 @@ def facet_surface(
     return CouplingSurface(fit, origin, directions, spread, facets, link.d)
 
 
-def _principal(
-    covariance: Float[np.ndarray, "3 3"], d: int
-) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]:
+def _principal(covariance: Float[np.ndarray, "3 3"], d: int) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]:
     """Standard deviations, widest first, and their directions as rows; in a plane the third is z."""
     variance, vectors = np.linalg.eigh(covariance[:d, :d])
     spread, directions = np.zeros(3), np.eye(3)

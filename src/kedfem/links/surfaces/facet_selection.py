@@ -42,9 +42,7 @@ def named_facets(link: Link, where: str, faces: Sequence[str]) -> Facets:
     return facets
 
 
-def picked(
-    link: Link, where: str, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"] | None
-) -> Facets:
+def picked(link: Link, where: str, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"] | None) -> Facets:
     """As `_picked`; of a mesh that has been asked for the same before what was found then.
 
     A joint is looked for on the same mesh some dozen times in a run: by every model that choices and estimates make.
@@ -59,9 +57,7 @@ def picked(
     return before[key]
 
 
-def _picked(
-    link: Link, where: str, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"] | None
-) -> Facets:
+def _picked(link: Link, where: str, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"] | None) -> Facets:
     """A ball if no axis is given; else a bore about the axis (or one of the link's), a journal, a flat face.
 
     A MeshError says that there is none, or that it cannot be determined which.

@@ -56,9 +56,7 @@ def ambiguous(link: Link, where: str, point: Vector, found: Sequence[Round]) -> 
     )
 
 
-def _units(
-    link: Link, point: Vector, axis: Vector | None, gap: float, offered: Sequence[Candidate]
-) -> str | None:
+def _units(link: Link, point: Vector, axis: Vector | None, gap: float, offered: Sequence[Candidate]) -> str | None:
     """Whether the part would have the joint's point if it were 1000 times larger or smaller."""
     low, high = link.nodes.min(axis=0), link.nodes.max(axis=0)
     room = 0.01 * link.size
@@ -75,10 +73,7 @@ def _units(
 
 def _fits(each: Candidate, point: Vector, axis: Vector | None) -> bool:
     straight = axis is None or abs(each.direction @ axis) > np.cos(np.radians(STRAIGHT))
-    return (
-        bool(straight and each.beside(point) <= 0.01 * each.radius)
-        and each.distance(point) <= 2 * each.length
-    )
+    return bool(straight and each.beside(point) <= 0.01 * each.radius) and each.distance(point) <= 2 * each.length
 
 
 def _beside(point: Vector, axis: Vector | None, offered: Sequence[Candidate]) -> str | None:
@@ -104,9 +99,7 @@ def _listed(link: Link, offered: Sequence[Candidate], point: Vector) -> str | No
         return f"it has {text}" + (f", and {more} more" if more > 0 else "")
     for kind in ("plane face", "face"):
         if faces := [each for each in offered if each.kind == kind]:
-            apart, nearest = min(
-                ((distance(link.full or link, x, point), x) for x in faces), key=itemgetter(0)
-            )
+            apart, nearest = min(((distance(link.full or link, x, point), x) for x in faces), key=itemgetter(0))
             return f"its nearest face is the {described(nearest)}, {length(apart)} away"
     return None
 

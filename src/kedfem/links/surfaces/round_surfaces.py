@@ -81,18 +81,14 @@ def rounds(link: Link, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3
     return [each for each in found if each.gap <= FAR * (each.high - each.low + each.radius)]
 
 
-def _of_one_radius(
-    which: Int[np.ndarray, " k"], radius: Float[np.ndarray, " f"]
-) -> list[Int[np.ndarray, " _"]]:
+def _of_one_radius(which: Int[np.ndarray, " k"], radius: Float[np.ndarray, " f"]) -> list[Int[np.ndarray, " _"]]:
     """Facets sorted by radius and divided where it differs."""
     order = which[radius[which].argsort()]
     steps = np.flatnonzero(np.diff(radius[order]) > CYLINDER_TOLERANCE * radius[order[:-1]])
     return [part for part in np.split(order, steps + 1) if len(part)]
 
 
-def _pieces(
-    link: Link, facets: Int[np.ndarray, " f"], which: Int[np.ndarray, " k"]
-) -> list[Int[np.ndarray, " _"]]:
+def _pieces(link: Link, facets: Int[np.ndarray, " f"], which: Int[np.ndarray, " k"]) -> list[Int[np.ndarray, " _"]]:
     """Facets divided into those that hang together."""
     first, second = neighbours(link, facets[which])
     label = components(first, second, np.ones(len(first), bool), len(which))
@@ -130,9 +126,7 @@ def ball(link: Link, point: Float[np.ndarray, "3"]) -> Int[np.ndarray, " f"]:
     return facets[:0]
 
 
-def _domed(
-    link: Link, facets: Int[np.ndarray, " f"], point: Float[np.ndarray, "3"]
-) -> Bool[np.ndarray, " f"]:
+def _domed(link: Link, facets: Int[np.ndarray, " f"], point: Float[np.ndarray, "3"]) -> Bool[np.ndarray, " f"]:
     """Whether facets are as far from a point within as at their corners."""
     distance = np.linalg.norm(surface_quadrature(link, facets).x - point, axis=2)
     return np.asarray(np.ptp(distance, axis=1) <= DOMED * distance.max(axis=1))

@@ -63,9 +63,7 @@ def surface_quadrature(link: Link, facets: Int[np.ndarray, " f"]) -> Surface:
     return Surface(x, dA, N, dofs, normals)
 
 
-def middle_facet(
-    link: Link, facets: Int[np.ndarray, " f"], centre: Float[np.ndarray, "3"]
-) -> Float[np.ndarray, "3"]:
+def middle_facet(link: Link, facets: Int[np.ndarray, " f"], centre: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
     """The middle of the facet whose middle is nearest to a place [m]."""
     middles = link.X[link.basis.mesh.facets[:, facets]].mean(axis=0)
     return np.asarray(middles[np.linalg.norm(middles - centre, axis=1).argmin()])
@@ -160,9 +158,7 @@ def smooth_face(link: Link, point: Float[np.ndarray, "3"]) -> Int[np.ndarray, " 
     return np.asarray(facets[connected(int(near[height[near].argmin()]), first, second, smooth, len(facets))])
 
 
-def neighbours(
-    link: Link, facets: Int[np.ndarray, " f"]
-) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]:
+def neighbours(link: Link, facets: Int[np.ndarray, " f"]) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]:
     """Pairs of facets (their positions in the list) that share an edge, two of their corner nodes; in a plane one."""
     numbers = np.sort(link.basis.mesh.facets[:, facets].T, axis=1)
     starts = numbers.shape[1] * np.arange(len(facets) + 1)

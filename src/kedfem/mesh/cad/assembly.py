@@ -57,8 +57,7 @@ def _read(path: Path, scale: float | None) -> list[AssemblySolid]:
     file = cad_file(path.name, path, scale)
     with gmsh_model() as gmsh:
         return [
-            AssemblySolid(solid.name, solid.extent, tuple(round_faces(gmsh, solid)))
-            for solid in all_solids(gmsh, file)
+            AssemblySolid(solid.name, solid.extent, tuple(round_faces(gmsh, solid))) for solid in all_solids(gmsh, file)
         ]
 
 
@@ -139,9 +138,7 @@ def _of_two(solids: Sequence[AssemblySolid], pair: tuple[int, int]) -> list[Meet
     return [_together(group) for group in several]
 
 
-def _meeting(
-    solids: Sequence[AssemblySolid], pair: tuple[int, int], faces: tuple[CadFace, CadFace]
-) -> Meeting | None:
+def _meeting(solids: Sequence[AssemblySolid], pair: tuple[int, int], faces: tuple[CadFace, CadFace]) -> Meeting | None:
     """Two round faces, the first a hole, as a meeting; None if they do not meet."""
     hole, pin = faces
     if not hole.inward or not _fits(hole, pin):

@@ -38,9 +38,7 @@ def with_faces(gmsh: ModuleType, solid: Solid, mesh: SolidMesh) -> SolidMesh:
     return replace(mesh, faces=joined_faces(gmsh, solid, of_tag))
 
 
-def joined_faces(
-    gmsh: ModuleType, solid: Solid, sides: dict[int, Int[np.ndarray, "_ c"]]
-) -> tuple[Face, ...]:
+def joined_faces(gmsh: ModuleType, solid: Solid, sides: dict[int, Int[np.ndarray, "_ c"]]) -> tuple[Face, ...]:
     """The faces of a mesh from the corners of the sides on each face of its solid; those of one surface are one."""
     found = []
     for group in one_surface(gmsh, solid):

@@ -62,9 +62,7 @@ def cad_file(where: str, path: Path, scale: float | None) -> CadFile:
     try:
         text = path.read_bytes()
     except OSError as error:
-        raise MeshError(
-            f"{where}: must be a file that can be read, got {path}: {error.strerror or error}"
-        ) from error
+        raise MeshError(f"{where}: must be a file that can be read, got {path}: {error.strerror or error}") from error
     if not text.strip():
         raise MeshError(f"{where}: {wanted}, got an empty file at {path}")
     _check_form(where, path, form, text)

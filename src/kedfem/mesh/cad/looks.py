@@ -64,10 +64,7 @@ def common_axes(solid: Solid, every: list[Looks]) -> list[Axis]:
     for look in every:
         for axis in _own_axes(solid, look, every):
             for i, (area, known) in enumerate(found):
-                if (
-                    max(np.linalg.norm(np.cross(axis[1], d)) for d in (known[1], axis[0] - known[0]))
-                    < 10 * OFF
-                ):
+                if max(np.linalg.norm(np.cross(axis[1], d)) for d in (known[1], axis[0] - known[0])) < 10 * OFF:
                     found[i] = area + look.face.area, known
                     break
             else:
@@ -84,10 +81,7 @@ def _own_axes(solid: Solid, look: Looks, every: list[Looks]) -> list[Axis]:
         return [((face.centre - solid.middle) / solid.extent, face.direction)]
     if face.kind == "sphere":
         across = [other.normals[0] for other in every if other.face.kind == "plane"]
-        return [
-            ((face.centre - solid.middle) / solid.extent, axis)
-            for axis in across or [np.array([0.0, 0.0, 1.0])]
-        ]
+        return [((face.centre - solid.middle) / solid.extent, axis) for axis in across or [np.array([0.0, 0.0, 1.0])]]
     screws = np.hstack([np.cross(look.places, look.normals), look.normals])
     values, vectors = np.linalg.eigh(screws.T @ screws / len(screws))
     along, moment = vectors[:3, 0], vectors[3:, 0]

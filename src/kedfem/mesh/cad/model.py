@@ -68,9 +68,7 @@ def all_solids(gmsh: ModuleType, file: CadFile) -> list[Solid]:
     return [_solid(gmsh, file, tag, name, bodies[tag]) for tag, name in zip(tags, names, strict=True)]
 
 
-def _named_solids(
-    gmsh: ModuleType, file: CadFile
-) -> tuple[list[int], list[str], dict[int, Body | None], str]:
+def _named_solids(gmsh: ModuleType, file: CadFile) -> tuple[list[int], list[str], dict[int, Body | None], str]:
     """The tags of a file's solids, now in gmsh's model, names, bodies in the file's text, and what was mended."""
     tags, mended = read_solids(gmsh, file)
     most = max(len(boundary(gmsh, 3, tag)) for tag in tags)
@@ -142,17 +140,12 @@ def leave_only(gmsh: ModuleType, solid: int) -> None:
     gmsh.model.occ.synchronize()
 
 
-def _solid_names(
-    gmsh: ModuleType, file: CadFile, tags: list[int], bodies: dict[int, Body | None]
-) -> list[str]:
+def _solid_names(gmsh: ModuleType, file: CadFile, tags: list[int], bodies: dict[int, Body | None]) -> list[str]:
     """A name of its own for each solid: of its product, else of its body; those of one name are numbered."""
     names = _product_names(gmsh, file, len(tags))
     often = Counter(names)
     own = [(body.name if body else "") for body in bodies.values()]
-    names = [
-        mine if mine and (not name or often[name] > 1) else name
-        for name, mine in zip(names, own, strict=True)
-    ]
+    names = [mine if mine and (not name or often[name] > 1) else name for name, mine in zip(names, own, strict=True)]
     names = [name or "solid" for name in names]
     often, seen = Counter(names), Counter[str]()
     for i, name in enumerate(names):

@@ -38,9 +38,7 @@ class Places:
     normals: Float[np.ndarray, "q 3"]
 
 
-def cad_faces(
-    gmsh: ModuleType, where: str, solid: int, extent: float, names: dict[int, str]
-) -> tuple[CadFace, ...]:
+def cad_faces(gmsh: ModuleType, where: str, solid: int, extent: float, names: dict[int, str]) -> tuple[CadFace, ...]:
     """All faces of a solid, in the order of their tags.
 
     gmsh's normals point out of a solid, mostly: it is looked whether they do. On faces swept by curves, as IGES has
@@ -157,9 +155,7 @@ def _inner_places(gmsh: ModuleType, tag: int, most: int) -> Places:
     return Places(grid.at[chosen], grid.points[chosen], grid.normals[chosen])
 
 
-def _outward_sign(
-    gmsh: ModuleType, where: str, of: tuple[int, CadFace], extent: float, inner: Places
-) -> float:
+def _outward_sign(gmsh: ModuleType, where: str, of: tuple[int, CadFace], extent: float, inner: Places) -> float:
     """Whether gmsh's normals of a face point out of the solid (1) or into it (-1), by a step to either side."""
     solid, face = of
     step = max(_STEP_OFF * extent, _LEAST_STEP) * inner.normals

@@ -124,14 +124,7 @@ def _corner_mean(step: StepText, face: int) -> Float[np.ndarray, "3"]:
         match step.kind(at):
             case "VERTEX_POINT":
                 vertices.add(at)
-            case (
-                "FACE_BOUND"
-                | "FACE_OUTER_BOUND"
-                | "EDGE_LOOP"
-                | "VERTEX_LOOP"
-                | "ORIENTED_EDGE"
-                | "EDGE_CURVE"
-            ):
+            case "FACE_BOUND" | "FACE_OUTER_BOUND" | "EDGE_LOOP" | "VERTEX_LOOP" | "ORIENTED_EDGE" | "EDGE_CURVE":
                 level += step.refers(at)
     points = [_point(step, point) for vertex in vertices for point in step.refers(vertex)]
     return np.mean(points, axis=0) if points else np.full(3, np.nan)
@@ -151,9 +144,7 @@ def own_name(name: str) -> str:
 
 def _decoded(text: str) -> str:
     r"""A string of a STEP file with its signs for other letters, \X2\00E4\X0\ for ä, read."""
-    text = re.sub(
-        r"\\X2\\((?:[0-9A-Fa-f]{4})+)\\X0\\", lambda found: bytes.fromhex(found[1]).decode("utf-16-be"), text
-    )
+    text = re.sub(r"\\X2\\((?:[0-9A-Fa-f]{4})+)\\X0\\", lambda found: bytes.fromhex(found[1]).decode("utf-16-be"), text)
     text = re.sub(r"\\X\\([0-9A-Fa-f]{2})", lambda found: chr(int(found[1], 16)), text)
     return text.replace("''", "'").replace("\\\\", "\\")
 

@@ -42,9 +42,7 @@ def determinant_bounds(
     return np.concatenate(lower), np.concatenate(upper)
 
 
-def valid_everywhere(
-    points: Float[np.ndarray, "n d"], cells: Int[np.ndarray, "e k"]
-) -> Bool[np.ndarray, " e"]:
+def valid_everywhere(points: Float[np.ndarray, "n d"], cells: Int[np.ndarray, "e k"]) -> Bool[np.ndarray, " e"]:
     """Which elements are proven to have det J > 0 all over: by a cheap test if it suffices, else by the bounds.
 
     Shapes are those of :func:`determinant_bounds`.
@@ -134,9 +132,7 @@ def _grid(line: np.ndarray, d: int) -> np.ndarray:
     return np.stack(np.meshgrid(*[line] * d, indexing="ij"), axis=-1).reshape(-1, d)
 
 
-def _sampled(
-    p: int, line: Float[np.ndarray, " p"], d: int
-) -> tuple[Float[np.ndarray, "q d"], Float[np.ndarray, "c q"]]:
+def _sampled(p: int, line: Float[np.ndarray, " p"], d: int) -> tuple[Float[np.ndarray, "q d"], Float[np.ndarray, "c q"]]:
     """Places where a polynomial of degree p in each of d coordinates is sampled, and its coefficients from values."""
     return _grid(line, d), reduce(np.kron, [np.linalg.inv(_bernstein(p, line))] * d)
 
@@ -158,9 +154,7 @@ _LATTICE = np.array(
 
 
 @cache
-def _tetrahedron_tables() -> tuple[
-    Float[np.ndarray, "q k d"], Float[np.ndarray, "c q"], Float[np.ndarray, "c m"]
-]:
+def _tetrahedron_tables() -> tuple[Float[np.ndarray, "q k d"], Float[np.ndarray, "c q"], Float[np.ndarray, "c m"]]:
     """`_tables` of a tet10: its halves are the eight tetrahedra between its corners and the middles of its edges."""
     samples = _LATTICE / _CUBIC
     inverse = np.linalg.inv(_simplex_bernstein(samples))

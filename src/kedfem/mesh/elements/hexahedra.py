@@ -91,9 +91,7 @@ def rectangle_quads(
     return points, cells
 
 
-def extruded(
-    points: Float[np.ndarray, "n 2"], quads: Int[np.ndarray, "e 9"], thickness: float, layers: int
-) -> SolidMesh:
+def extruded(points: Float[np.ndarray, "n 2"], quads: Int[np.ndarray, "e 9"], thickness: float, layers: int) -> SolidMesh:
     """hex27 mesh of a plate: plane quad9 cells, counter-clockwise, swept over -thickness/2 ≤ z ≤ thickness/2 [m].
 
     Nodes level by level from below.
@@ -159,15 +157,12 @@ def without_spare_nodes(mesh: SolidMesh) -> SolidMesh:
 def placed(mesh: SolidMesh, origin: Float[np.ndarray, "3"], axes: Float[np.ndarray, "3 3"]) -> SolidMesh:
     """The mesh moved rigidly: its x, y, z run along the rows of `axes` from `origin` [m]."""
     faces = tuple(
-        replace(face, centre=origin + face.centre @ axes, direction=face.direction @ axes)
-        for face in mesh.faces
+        replace(face, centre=origin + face.centre @ axes, direction=face.direction @ axes) for face in mesh.faces
     )
     return replace(mesh, points=origin + mesh.points @ axes, faces=faces)
 
 
-def frame_along(
-    line: Float[np.ndarray, "3"], up: Float[np.ndarray, "3"] | None = None
-) -> Float[np.ndarray, "3 3"]:
+def frame_along(line: Float[np.ndarray, "3"], up: Float[np.ndarray, "3"] | None = None) -> Float[np.ndarray, "3 3"]:
     """Rows x, y, z of the frame of a link drawn along `line`: x along it, z as near to `up`, global z, as can be.
 
     A line along `up` has the frame's z along global x; one along x too, along global z.

@@ -55,9 +55,7 @@ class Quality:
         return edges, np.histogram(inside, edges)[0].astype(np.int64)
 
 
-def scaled_jacobian(
-    points: Float[np.ndarray, "n d"], cells: Int[np.ndarray, "e k"]
-) -> Float[np.ndarray, " e"]:
+def scaled_jacobian(points: Float[np.ndarray, "n d"], cells: Int[np.ndarray, "e k"]) -> Float[np.ndarray, " e"]:
     """Least of det J / (|J_1| ··· |J_d|) over the nodes and the Gauss points of each element, J_j = ∂X/∂ξ_j.
 
     Of a tetrahedron √2 det J over the largest product of the three edges that meet in a corner, edges as J makes them.

@@ -111,9 +111,7 @@ def _factors(
     return [(line[nodes[:, i] + 1, :, i].T, slope[nodes[:, i] + 1, :, i].T) for i in range(nodes.shape[1])]
 
 
-def _brackets(
-    nodes: Places, x: Float[np.ndarray, "q d"]
-) -> tuple[Float[np.ndarray, "q k"], Float[np.ndarray, "q k d"]]:
+def _brackets(nodes: Places, x: Float[np.ndarray, "q d"]) -> tuple[Float[np.ndarray, "q k"], Float[np.ndarray, "q k d"]]:
     """What makes a serendipity corner vanish at the middles of its edges, (Σ ξ_j ξ_aj − 2), and its gradient."""
     corner = (nodes != 0).all(axis=1) & (len(nodes) == len(HEX20))
     bracket = np.where(corner, x @ nodes.T - 2.0, 1.0)

@@ -77,9 +77,7 @@ def straightened(mesh: SolidMesh) -> SolidMesh:
     return without_spare_nodes(replace(mesh, cells=mesh.cells[:, :4]))
 
 
-def edge_middles(
-    points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e k"]
-) -> Float[np.ndarray, "e 6 3"]:
+def edge_middles(points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e k"]) -> Float[np.ndarray, "e 6 3"]:
     """Middles of the straight edges of tetrahedra [m]."""
     return np.asarray(points[cells[:, EDGES]].mean(axis=2))
 

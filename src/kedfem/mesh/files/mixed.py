@@ -105,9 +105,7 @@ def _middles(
         pairs += [corners[:, [i, j]] for i, j in edges]
         places += list(np.swapaxes(M, 0, 1))
         for side in (each for each in _SIDES[count] if len(each) == 4):
-            round_ = [
-                edges.index((i, j) if (i, j) in edges else (j, i)) for i, j in pairwise([*side, side[0]])
-            ]
+            round_ = [edges.index((i, j) if (i, j) in edges else (j, i)) for i, j in pairwise([*side, side[0]])]
             centre = M[:, round_].sum(axis=1) / 2 - X[:, side].sum(axis=1) / 4  # of a serendipity side
             if cells.shape[1] == len(HEX27):
                 middle = node_numbers(HEX27, HEX27[list(side)].mean(axis=0, keepdims=True))[0]

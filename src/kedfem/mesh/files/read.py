@@ -101,9 +101,7 @@ def _check_cells(where: str, path: Path, raw: RawMesh, points: np.ndarray) -> No
             raise MeshError(f"{where}: coordinates must be finite, {got}")
 
 
-def _cells(
-    where: str, path: Path, raw: RawMesh, points: np.ndarray
-) -> tuple[np.ndarray, Int[np.ndarray, "e k"]]:
+def _cells(where: str, path: Path, raw: RawMesh, points: np.ndarray) -> tuple[np.ndarray, Int[np.ndarray, "e k"]]:
     """The cells, all of one kind, and the nodes."""
     blocks = {kind: cells for kind, cells in raw.cells.items() if len(cells)}
     if len(blocks) == 1 and (kind := next(iter(blocks))) in CELL_TYPES.values():
@@ -125,9 +123,7 @@ def _pieces(mesh: SolidMesh) -> int:
     return int(connected_components(graph, directed=False)[0])
 
 
-def named_faces(
-    raw: RawMesh, points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e k"]
-) -> tuple[Face, ...]:
+def named_faces(raw: RawMesh, points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e k"]) -> tuple[Face, ...]:
     """The sets of sides and nodes in a mesh file that lie on the outside of its elements, in the order of their names.
 
     Sets without a side on the outside are left out; of a set of nodes the sides all of whose corners are in it.

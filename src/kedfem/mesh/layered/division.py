@@ -124,17 +124,13 @@ def _gaps(plan: Plan) -> list[Float[np.ndarray, " m"]]:
         ahead = np.einsum("pqi,pi->pq", arms, normals) > 0.85 * distances
         opposed = normals @ normals.T < -0.7
         least = np.where(ahead & opposed & (distances > 0), distances, np.inf).min(axis=1)
-        for (i, own, _), gap in zip(
-            sides, np.split(least, np.cumsum([len(s[1]) for s in sides])[:-1]), strict=True
-        ):
+        for (i, own, _), gap in zip(sides, np.split(least, np.cumsum([len(s[1]) for s in sides])[:-1]), strict=True):
             forward = gap if np.array_equal(own, plan.curves[i].samples) else gap[::-1]
             gaps[i] = np.minimum(gaps[i], forward)
     return gaps
 
 
-def _points_and_normals(
-    curve: Curve, forward: bool
-) -> tuple[Float[np.ndarray, "m 2"], Float[np.ndarray, "m 2"]]:
+def _points_and_normals(curve: Curve, forward: bool) -> tuple[Float[np.ndarray, "m 2"], Float[np.ndarray, "m 2"]]:
     """Samples in the direction of a loop and unit normals to its left."""
     points = curve.samples if forward else curve.samples[::-1]
     along = np.gradient(points, axis=0)
@@ -196,9 +192,7 @@ def _from_outside(plan: Plan, fitting: tuple[Mapping | None, ...]) -> list[tuple
     return sorted(rings, key=extent, reverse=True)
 
 
-def _opposite(
-    plan: Plan, places: dict[int, Float[np.ndarray, " n"]], region: Region
-) -> Float[np.ndarray, " n"]:
+def _opposite(plan: Plan, places: dict[int, Float[np.ndarray, " n"]], region: Region) -> Float[np.ndarray, " n"]:
     """Lengths of arc along the inner curve of a ring, evenly, turned to face the nodes of the outer loop."""
     (number, _), *_ = region.loops[1]
     curve, outer = plan.curves[number], _loop_nodes(plan, places, region.loops[0])
@@ -227,9 +221,7 @@ def _opposite(
     return np.append(lengths, lengths[0] + curve.length)
 
 
-def _loop_nodes(
-    plan: Plan, places: dict[int, Float[np.ndarray, " n"]], loop: Loop
-) -> Float[np.ndarray, "_ 2"]:
+def _loop_nodes(plan: Plan, places: dict[int, Float[np.ndarray, " n"]], loop: Loop) -> Float[np.ndarray, "_ 2"]:
     """Nodes along a loop, each once."""
     parts = []
     for i, forward in loop:

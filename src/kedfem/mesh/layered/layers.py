@@ -77,9 +77,7 @@ def layer_directions(gmsh: ModuleType, solid: Solid) -> tuple[Float[np.ndarray, 
             found.append(direction)
         else:
             largest = max(slanted, key=lambda face: face.area)
-            words = (
-                f"the {face_in_words(largest)} is neither along nor across {direction_in_words(direction)}"
-            )
+            words = f"the {face_in_words(largest)} is neither along nor across {direction_in_words(direction)}"
             obstacles.append((sum(face.area for face in slanted), words))
     if not found:
         obstacle = min(obstacles)[1] if obstacles else "it has no plane face"
@@ -99,8 +97,7 @@ def _slanted(gmsh: ModuleType, solid: Solid) -> list[tuple[Float[np.ndarray, "3"
     flat = [face for face in solid.faces if _fits(normals[face.tag], normals[face.tag][0])]
     directions = _directions([normals[face.tag][0] for face in flat], [face.area for face in flat])
     return [
-        (direction, [face for face in solid.faces if not _fits(normals[face.tag], direction)])
-        for direction in directions
+        (direction, [face for face in solid.faces if not _fits(normals[face.tag], direction)]) for direction in directions
     ]
 
 

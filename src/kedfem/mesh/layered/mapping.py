@@ -112,9 +112,7 @@ def _facing_curves(plan: Plan, loops: tuple[Loop, ...]) -> list[tuple[list[int],
     return [([i], [int(j)]) for (i, _), j in zip(outer, turned, strict=True)]
 
 
-def _uneven_sides(
-    plan: Plan, found: list[Mapping | None], counts: list[int]
-) -> tuple[int, list[int], int] | None:
+def _uneven_sides(plan: Plan, found: list[Mapping | None], counts: list[int]) -> tuple[int, list[int], int] | None:
     """A region with opposite sides that do not agree: its number, the side with less, and what that must have."""
     for number, (mapping, region) in enumerate(zip(found, plan.regions, strict=True)):
         for pair in _sides_of(plan, mapping, region.loops) if mapping else []:

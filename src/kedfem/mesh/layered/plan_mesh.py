@@ -62,8 +62,7 @@ def plan_mesh(where: str, plan: Plan, size: float, sizing: Sizing) -> PlanMesh:
     division, fitting = divided(plan, size, sizing)
     rims = [_rim(division, region) for region in plan.regions]
     fills = [
-        _filled(where, plan, region, rim[1], fit)
-        for region, rim, fit in zip(plan.regions, rims, fitting, strict=True)
+        _filled(where, plan, region, rim[1], fit) for region, rim, fit in zip(plan.regions, rims, fitting, strict=True)
     ]
     points, cells = [division.points], []
     used = len(division.points)
@@ -103,9 +102,7 @@ def _rim(division: Division, region: Region) -> tuple[Int[np.ndarray, " n"], Rim
     return numbers, Rim(division.points[numbers], own, np.concatenate(middles))
 
 
-def _filled(
-    where: str, plan: Plan, region: Region, rim: Rim, mapping: Mapping | None
-) -> tuple[PlaneQuads, int]:
+def _filled(where: str, plan: Plan, region: Region, rim: Rim, mapping: Mapping | None) -> tuple[PlaneQuads, int]:
     """The cells of one region and gmsh's algorithm that made them, 0 if it is mapped."""
     best = best_quads([mapped(rim, mapping)]) if mapping else None
     algorithm = 0
@@ -182,9 +179,7 @@ def _drawn(gmsh: ModuleType, rim: Rim, step: int) -> int:
     return int(surface)
 
 
-def _on_rim(
-    rim: Rim, step: int, points: Float[np.ndarray, "n 2"], cells: Int[np.ndarray, "e 4"]
-) -> PlaneQuads | None:
+def _on_rim(rim: Rim, step: int, points: Float[np.ndarray, "n 2"], cells: Int[np.ndarray, "e 4"]) -> PlaneQuads | None:
     """The mesh with the rim's nodes first, at their places; None if its boundary is another one."""
     diagonals = points[cells[:, 2:]] - points[cells[:, :2]]
     if np.linalg.det(diagonals).sum() < 0:

@@ -58,9 +58,7 @@ def plan_of_slabs(gmsh: ModuleType, solid: Solid, direction: Float[np.ndarray, "
         yield plan
 
 
-def _cut_plan(
-    gmsh: ModuleType, axes: Float[np.ndarray, "3 3"], extent: float, heights: Float[np.ndarray, " h"]
-) -> Plan:
+def _cut_plan(gmsh: ModuleType, axes: Float[np.ndarray, "3 3"], extent: float, heights: Float[np.ndarray, " h"]) -> Plan:
     """The plan of the only solid in gmsh's model, which is of unit extent."""
     [(_, solid)] = gmsh.model.getEntities(3)
     middles = (heights[1:] + heights[:-1]) / 2
@@ -77,9 +75,7 @@ def plan_axes(direction: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
     return np.stack([x, np.cross(z, x), z])
 
 
-def _slab_heights(
-    gmsh: ModuleType, solid: Solid, direction: Float[np.ndarray, "3"]
-) -> Float[np.ndarray, " h"]:
+def _slab_heights(gmsh: ModuleType, solid: Solid, direction: Float[np.ndarray, "3"]) -> Float[np.ndarray, " h"]:
     """Heights of the caps along the direction, divided by the solid's extent."""
     heights = []
     for face in solid.faces:
@@ -93,9 +89,7 @@ def _slab_heights(
     return np.asarray(ordered[np.append(True, np.diff(ordered) > _SAME)])
 
 
-def _slab_section(
-    gmsh: ModuleType, solid: int, axes: Float[np.ndarray, "3 3"], height: float
-) -> list[tuple[int, int]]:
+def _slab_section(gmsh: ModuleType, solid: int, axes: Float[np.ndarray, "3 3"], height: float) -> list[tuple[int, int]]:
     """The faces in which a plane cuts the solid, moved along its normal to height 0."""
     occ = gmsh.model.occ
     low, high = np.reshape(occ.getBoundingBox(3, solid), (2, 3))
@@ -271,8 +265,7 @@ def _oriented(curves: tuple[Curve, ...], loops: list[Loop]) -> tuple[Loop, ...]:
     areas = [signed_area(loop_samples(curves, loop)) for loop in loops]
     order = sorted(range(len(loops)), key=lambda i: -abs(areas[i]))
     return tuple(
-        loops[i] if (areas[i] > 0) == (i == order[0]) else tuple((c, not way) for c, way in loops[i][::-1])
-        for i in order
+        loops[i] if (areas[i] > 0) == (i == order[0]) else tuple((c, not way) for c, way in loops[i][::-1]) for i in order
     )
 
 

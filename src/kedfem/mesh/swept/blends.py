@@ -89,9 +89,7 @@ def _without(gmsh: ModuleType, solid: Solid, faces: Sequence[CadFace], concave: 
                 if _defeatured(trial, solid, group).volume < solid.volume:
                     raise OtherMethodError(f"{solid.name}: a concave fillet is in the way of layers")
     bare = _defeatured(gmsh, solid, goes)
-    names = {
-        face.tag: (_same(face, solid.faces, solid.extent, loose=True) or face).name for face in bare.faces
-    }
+    names = {face.tag: (_same(face, solid.faces, solid.extent, loose=True) or face).name for face in bare.faces}
     return Solid(bare.tag, bare.name, bare.volume, bare.low, bare.high,
                  cad_faces(gmsh, solid.name, bare.tag, solid.extent, names))  # fmt: skip
 

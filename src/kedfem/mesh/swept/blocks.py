@@ -110,9 +110,7 @@ def _transfinite(gmsh: ModuleType, groups: list[set[int]], counts: list[int]) ->
     return gmsh_hexahedra(gmsh, points, np.searchsorted(tags, nodes[0]).reshape(-1, len(HEX27)))
 
 
-def gmsh_hexahedra(
-    gmsh: ModuleType, points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e 27"]
-) -> SolidMesh:
+def gmsh_hexahedra(gmsh: ModuleType, points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e 27"]) -> SolidMesh:
     """The mesh of hexahedra whose nodes are in gmsh's order, which may have numbered them the other way round."""
     theirs = np.reshape(gmsh.model.mesh.getElementProperties(_HEX27)[4], (-1, 3)).round()
     mesh = without_spare_nodes(SolidMesh(points, cells[:, node_numbers(theirs, HEX27)]))

@@ -56,9 +56,7 @@ def disc(around: int) -> tuple[Float[np.ndarray, "n 2"], Int[np.ndarray, "e 9"]]
     return full.points, full.cells
 
 
-def core_mesh(
-    plan: Plan, region: Region, radius: float, stations: Float[np.ndarray, " s"], around: int
-) -> SolidMesh:
+def core_mesh(plan: Plan, region: Region, radius: float, stations: Float[np.ndarray, " s"], around: int) -> SolidMesh:
     """hex27 mesh of what a region about the axis becomes when it turns: x along the axis, y and z across it.
 
     By the solid's extent. Each layer is a disc that changes from the form of one end to that of the other.

@@ -188,9 +188,7 @@ def _leg(gmsh: ModuleType, solid: Solid, walls: list[Looks], frame: Frame) -> tu
         passed = {edge: leg.passed(_places(gmsh, edge)) for edge in edges}
         travel = float(max(each.max() for each in passed.values()))
         ends = {edge for edge, each in passed.items() if each.min() > travel - slack}
-        through = {
-            edge for edge, each in passed.items() if each.min() < slack and each.max() > travel - slack
-        }
+        through = {edge for edge, each in passed.items() if each.min() < slack and each.max() > travel - slack}
         first = {edge for edge, each in passed.items() if each.max() < slack}
         if ends and len(ends | through | first) == len(passed):
             return replace(leg, travel=travel), ends
@@ -205,9 +203,7 @@ def _motions(solid: Solid, walls: list[Looks], frame: Frame) -> Iterator[Leg]:
         return
     for point, axis in common_axes(solid, walls):
         arm = own - point - ((own - point) @ axis) * axis
-        if max(abs(axis @ ahead), abs(arm @ ahead)) < OFF and all(
-            wall.turns_about((point, axis)) for wall in walls
-        ):
+        if max(abs(axis @ ahead), abs(arm @ ahead)) < OFF and all(wall.turns_about((point, axis)) for wall in walls):
             yield Leg(frame, solid.extent * arm)
 
 

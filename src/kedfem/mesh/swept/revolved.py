@@ -92,9 +92,7 @@ def _mesh_about(gmsh: ModuleType, solid: Solid, turn: Frame, sizing: Sizing, sha
 
 
 @contextmanager
-def _meridian(
-    gmsh: ModuleType, solid: Solid, turn: Frame, sizing: Sizing, share: float
-) -> Iterator[_Meridian]:
+def _meridian(gmsh: ModuleType, solid: Solid, turn: Frame, sizing: Sizing, share: float) -> Iterator[_Meridian]:
     """The meridian section in a copy of the model: x along the axis, y from it, in sizes of the solid."""
     radial = np.array([0, np.cos(_ASIDE), np.sin(_ASIDE)]) @ turn.axes
     axes = np.stack([turn.axes[0], radial, np.cross(turn.axes[0], radial)])
@@ -112,9 +110,7 @@ def _meridian(
         yield _Meridian(without_spare_curves(replace(whole, regions=outside)), whole, inside, radius, size)
 
 
-def _section(
-    gmsh: ModuleType, solid: Solid, turn: Frame, axes: Float[np.ndarray, "3 3"]
-) -> list[tuple[int, int]]:
+def _section(gmsh: ModuleType, solid: Solid, turn: Frame, axes: Float[np.ndarray, "3 3"]) -> list[tuple[int, int]]:
     """The faces in which half a plane through the axis cuts the solid, moved with the axis' point to the origin."""
     [(_, tag)] = gmsh.model.getEntities(3)
     middle = (solid.middle - turn.origin) @ turn.axes[0] / solid.extent
@@ -177,9 +173,7 @@ def _turned(flat: PlanMesh, around: int) -> SolidMesh:
     return without_spare_nodes(turned)
 
 
-def _with_core(
-    mesh: SolidMesh, flat: PlanMesh, meridian: _Meridian, region: Region, around: int
-) -> SolidMesh:
+def _with_core(mesh: SolidMesh, flat: PlanMesh, meridian: _Meridian, region: Region, around: int) -> SolidMesh:
     """The mesh with a core put in, the nodes between them taken once."""
     loop = region.loops[0]
     samples = np.concatenate([meridian.whole.curves[i].samples for i, _ in loop])

@@ -58,9 +58,7 @@ def signed_von_mises(H: Float[np.ndarray, "k 6 T"], d: Float[np.ndarray, "k 6"])
     return np.asarray(np.where(np.matmul(d[:, None], H)[:, 0] < 0, -size, size))
 
 
-def normal_stresses(
-    H: Float[np.ndarray, "k 6 T"], axes: Float[np.ndarray, "k 3 3"]
-) -> Float[np.ndarray, "k P T"]:
+def normal_stresses(H: Float[np.ndarray, "k 6 T"], axes: Float[np.ndarray, "k 3 3"]) -> Float[np.ndarray, "k P T"]:
     """Normal stress on planes at right angles to the surface [Pa]."""
     angle = np.radians(np.arange(0.0, 180.0, STEP))
     n = _normals(axes, angle, np.pi / 2)
@@ -111,9 +109,7 @@ def _sheared(
     return _rows(n, n), np.cos(turn) * both[0] + np.sin(turn) * both[1]
 
 
-def _normals(
-    axes: Float[np.ndarray, "k 3 3"], angle: Float[np.ndarray, " P"], tilt: float
-) -> Float[np.ndarray, "k P 3"]:
+def _normals(axes: Float[np.ndarray, "k 3 3"], angle: Float[np.ndarray, " P"], tilt: float) -> Float[np.ndarray, "k P 3"]:
     """Unit normals of planes by the angle of their trace in the surface and from the surface's normal."""
     of = np.stack([np.sin(tilt) * np.cos(angle), np.sin(tilt) * np.sin(angle)], axis=1)
     return np.asarray(np.einsum("pa,kac->kpc", of, axes[:, :2]) + np.cos(tilt) * axes[:, None, 2])

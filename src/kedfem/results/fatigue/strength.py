@@ -106,9 +106,7 @@ def _of_strains(data: FatigueData, known: StrainLife, E: float) -> Strength:
     return Strength(falling, N, ENDLESS * endurance, M, endurance, cycles, np.nan, np.nan, 1.0, data)
 
 
-def material_factors(
-    data: FatigueData, gradient: float = 0.0, cycle: tuple[float, float] = (1.0, 0.0)
-) -> Any:
+def material_factors(data: FatigueData, gradient: float = 0.0, cycle: tuple[float, float] = (1.0, 0.0)) -> Any:
     """The steps of the FKM guideline for local stresses, chapter 4, as pyLife takes them: a table's only row.
 
     Parameters
@@ -181,9 +179,7 @@ def reversed_collective(cycles: Any, M: float) -> Any:
     return HaighDiagram.from_dict(segments).transform(cycles, -1.0)
 
 
-def verdict(
-    h: Float[np.ndarray, " T"], strength: Strength, gradient: float, safety: float, periods: float
-) -> Verdict:
+def verdict(h: Float[np.ndarray, " T"], strength: Strength, gradient: float, safety: float, periods: float) -> Verdict:
     """Damage and utilisation of a history at a hot spot.
 
     Parameters
@@ -224,9 +220,7 @@ def _interpolated(strength: Strength, x: Float[np.ndarray, " c"]) -> Float[np.nd
     return np.asarray(N[j - 1] + (N[j] - N[j - 1]) / (S[j] - S[j - 1]) * (x - S[j - 1]))
 
 
-def _borne(
-    strength: Strength, gradient: float, cycle: tuple[float, float], alternating: float
-) -> tuple[float, float]:
+def _borne(strength: Strength, gradient: float, cycle: tuple[float, float], alternating: float) -> tuple[float, float]:
     """The amplitude [Pa] that is borne with the mean of a cycle, and the support factor."""
     if strength.data.group is None:
         return strength.endurance * cycle[0] / alternating, 1.0

@@ -29,9 +29,7 @@ class ConstraintForces:
     @cached_property
     def rows(self) -> tuple[Float[np.ndarray, "r k"], Float[np.ndarray, "r n"]]:
         """Rows of all joints in the reference position, and the combinations of them that say nothing."""
-        still = resting(
-            1 + max((b for joint in self.model.rows for b in joint.bodies), default=0), np.zeros(1)
-        )
+        still = resting(1 + max((b for joint in self.model.rows for b in joint.bodies), default=0), np.zeros(1))
         found = joint_rows(self.model.rows, still, self.model.interface_unknowns)
         C = sp.csr_array((0, 0)) if found is None else found.at(0)
         silent, null = np.ones(C.shape[0], bool), []

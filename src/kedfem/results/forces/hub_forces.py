@@ -31,9 +31,7 @@ def constrained_joints(scene: Scene, model: Model, prescribed: PrescribedBody) -
     return [x.name for x in model.rows if x.name in joints and prescribed.link.name in joints[x.name].links]
 
 
-def hub_wrench(
-    scene: Scene, model: Model, prescribed: PrescribedBody, forces: Forces
-) -> tuple[Wrench, list[Held]]:
+def hub_wrench(scene: Scene, model: Model, prescribed: PrescribedBody, forces: Forces) -> tuple[Wrench, list[Held]]:
     """What holds a prescribed link in balance: P − M R0'', motors, springs, other joints, and the hub's; these joints."""
     link, hub = prescribed.link, np.asarray(scene.joints[prescribed.hub].at)
     held: list[Held] = []
@@ -73,9 +71,7 @@ def hub_wrench(
     return wrench, held
 
 
-def _geared(
-    scene: Scene, model: Model, prescribed: PrescribedBody, block: Block, about: Rows
-) -> tuple[Rows, Rows]:
+def _geared(scene: Scene, model: Model, prescribed: PrescribedBody, block: Block, about: Rows) -> tuple[Rows, Rows]:
     """Force and moment about points that gears exert on a prescribed link: along the coordinates of their joints."""
     force, moment = np.zeros((2, len(block), 3))
     rows = {row.name: row for row in model.rows}

@@ -127,9 +127,7 @@ def in_axes(x: Vectors, R: Float[np.ndarray, "T 3 3"]) -> Vectors:
     return np.asarray((x[:, None] @ R)[:, 0])
 
 
-def joint_loads(
-    scene: Scene, results: Results, linked: Linkage | None, motion: RigidMotion | None
-) -> list[JointLoad]:
+def joint_loads(scene: Scene, results: Results, linked: Linkage | None, motion: RigidMotion | None) -> list[JointLoad]:
     """Of all joints whose whole force the results show, elastic if they have it, else that of rigid links.
 
     Parameters
@@ -175,9 +173,7 @@ def acted_links(name: str, joint: Joint, description: str) -> tuple[str, str]:
     raise ValueError(f"joint {name}: no link is said that the force acts on, in {description!r}")
 
 
-def drive_loads(
-    scene: Scene, results: Results, linked: Linkage | None, motion: RigidMotion | None
-) -> list[DriveLoad]:
+def drive_loads(scene: Scene, results: Results, linked: Linkage | None, motion: RigidMotion | None) -> list[DriveLoad]:
     """Of all drives whose effort the results show, elastic if they have it, else that of rigid links."""
     out = []
     for name in scene.driven_joints:

@@ -125,9 +125,7 @@ def _arms(attachment: Attachment, joint: str, at: Float[np.ndarray, "3"]) -> Flo
     return np.asarray(attachment.points[[name == joint for name in attachment.joints]] - at)
 
 
-def resultant(
-    link: Link, arms: Float[np.ndarray, "_ p 3"], f: Float[np.ndarray, "T p d"]
-) -> tuple[Rows, Rows]:
+def resultant(link: Link, arms: Float[np.ndarray, "_ p 3"], f: Float[np.ndarray, "T p d"]) -> tuple[Rows, Rows]:
     """Force and moment of port forces, all in one frame."""
     if link.kind == "beam":  # third component is a moment
         return in_space(link, f).sum(axis=1), f.sum(axis=1) * [0, 0, 1]

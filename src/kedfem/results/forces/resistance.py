@@ -135,9 +135,7 @@ def _changes(
     return g, Cg
 
 
-def _change(
-    now: Float[np.ndarray, "T ..."], before: Float[np.ndarray, "1 ..."]
-) -> Float[np.ndarray, "T ..."]:
+def _change(now: Float[np.ndarray, "T ..."], before: Float[np.ndarray, "1 ..."]) -> Float[np.ndarray, "T ..."]:
     """In each step."""
     out = np.empty_like(now)
     np.subtract(now[1:], now[:-1], out=out[1:])

@@ -82,9 +82,7 @@ class RigidForces:
             self._motion = motion
         return self._rows
 
-    def _borne(
-        self, motion: RigidMotion, step: int | None, wrench: Float[np.ndarray, "T b 6"]
-    ) -> dict[str, Rows]:
+    def _borne(self, motion: RigidMotion, step: int | None, wrench: Float[np.ndarray, "T b 6"]) -> dict[str, Rows]:
         """All channels where forces and moments act on the bodies; of many bodies without a matrix of responses."""
         names = [each.channel.name for each in self.every]
         if self.linkage.blocks is not None:
@@ -133,9 +131,7 @@ class RigidForces:
         return found.effort(self.linkage.drives.joints.index(each.joint))
 
 
-def rigid_forces(
-    scene: Scene, linkage: Linkage, inertias: Inertias, along: Path | None = None
-) -> RigidForces:
+def rigid_forces(scene: Scene, linkage: Linkage, inertias: Inertias, along: Path | None = None) -> RigidForces:
     """What can be determined of a driven scene: drives, and with a path all joints; nothing where links move freely too.
 
     A free motion is held in the rigid linkage, by what no link has there.

@@ -181,9 +181,7 @@ def enveloped(heads, parts, C, rest, residuals, first, highest, at):  # type: ig
     for i in range(p):
         sizes_of(heads, parts, i, size)
         for k in range(anchors):
-            full += looked_at(
-                heads, parts, size, C, rest, i, min(k * width, T - 1), first, seen, k, highest, at
-            )
+            full += looked_at(heads, parts, size, C, rest, i, min(k * width, T - 1), first, seen, k, highest, at)
         count += anchors
         for k in range(anchors - 1):
             top = 0

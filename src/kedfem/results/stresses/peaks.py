@@ -71,15 +71,10 @@ def hot_spots(
     most : how many of each link
     """
     names = dict.fromkeys(each.link for each in found if not np.isnan(each.stress).all())
-    return {
-        name: _of([(e, w) for e, w in zip(found, near, strict=True) if e.link == name], when, most)
-        for name in names
-    }
+    return {name: _of([(e, w) for e, w in zip(found, near, strict=True) if e.link == name], when, most) for name in names}
 
 
-def _of(
-    parts: list[tuple[LinkEnvelope, Sequence[str]]], when: Float[np.ndarray, "2 T"], most: int
-) -> list[Peak]:
+def _of(parts: list[tuple[LinkEnvelope, Sequence[str]]], when: Float[np.ndarray, "2 T"], most: int) -> list[Peak]:
     """Of one link, in segments or not."""
     points = np.concatenate([drawn_points(each.recovery) for each, _ in parts])
     stress = np.concatenate([each.stress[VON_MISES] for each, _ in parts])

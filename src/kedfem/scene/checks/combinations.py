@@ -65,9 +65,7 @@ def joints(parts: Parts) -> Iterator[Told]:
             turns = joint.record.bushing.rotational_stiffness is not None
             facts["bushing"] = "against rotations" if turns else "given"
             if kind == "slot" and not turns and unlike_across(joint.record.bushing):
-                planar = all(
-                    category(x) == "plane" or (category(x) == "beam" and x.name not in spatial) for x in held
-                )
+                planar = all(category(x) == "plane" or (category(x) == "beam" and x.name not in spatial) for x in held)
                 facts["bushing"] = "given" if planar else "unlike across the line"
         yield "joints", facts, joint.where, words
 

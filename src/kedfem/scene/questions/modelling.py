@@ -33,9 +33,7 @@ def corotational(scene: Scene) -> bool:
 SHARED = ("revolute", "spherical", "weld")  # kinds that hold points together, wherever these go
 
 
-def by_constraint_equations(
-    joint: Joint, drive: Drive | None = None, kinds: frozenset[str] = frozenset()
-) -> bool:
+def by_constraint_equations(joint: Joint, drive: Drive | None = None, kinds: frozenset[str] = frozenset()) -> bool:
     """Whether a joint cannot be said of points that its links share for good.
 
     Parameters

@@ -43,9 +43,7 @@ def plane_scene(scene: Scene) -> bool:
     """Whether no link moves out of a plane z = constant: planar beams, plane links, what drives and joints carry."""
     spatial, flat = spatial_beams(scene), False
     for name, link in scene.links.items():
-        in_plane = link.category == "plane" or (
-            (link.category == "beam" or link.rigid_line) and name not in spatial
-        )
+        in_plane = link.category == "plane" or ((link.category == "beam" or link.rigid_line) and name not in spatial)
         if not in_plane and (link.category != "rigid" or link.rigid_line or rigid_in_space(scene, name)):
             return False
         flat = flat or in_plane

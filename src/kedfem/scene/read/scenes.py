@@ -85,9 +85,7 @@ def scene_from(
     return _scene(raw, Path(folder), source=source, stem=stem)
 
 
-def _scene(
-    raw: Mapping[str, Any], folder: Path, *, source: str | None, stem: str, sketch: bool = False
-) -> Scene:
+def _scene(raw: Mapping[str, Any], folder: Path, *, source: str | None, stem: str, sketch: bool = False) -> Scene:
     try:
         raw = with_includes(raw, folder) if isinstance(raw, Mapping) and KEY in raw else raw
         scene = raw if isinstance(raw, Scene) and raw.checked else validated(raw, folder, sketch=sketch)

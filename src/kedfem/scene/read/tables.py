@@ -49,9 +49,7 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _heading_factors(
-    path: Path, row: list[str], names: tuple[str, str], si: tuple[str, str]
-) -> tuple[float, float]:
+def _heading_factors(path: Path, row: list[str], names: tuple[str, str], si: tuple[str, str]) -> tuple[float, float]:
     """SI units per unit of each column, from a heading such as 'time [ms], angle (deg)'."""
     said = [NAMES & set(re.split(r"[^a-z]+", cell.lower())) for cell in row]
     if len(row) != 2 or any(words and name not in words for words, name in zip(said, names, strict=True)):

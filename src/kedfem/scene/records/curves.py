@@ -109,9 +109,7 @@ def curve_faults(
             faults.append(Fault((key, i), message))
             break
     if len(value) != len(at):
-        faults.append(
-            Fault((values,), f"must hold one value for each of the {len(at)} of {key}, got {len(value)}")
-        )
+        faults.append(Fault((values,), f"must hold one value for each of the {len(at)} of {key}, got {len(value)}"))
     return faults
 
 

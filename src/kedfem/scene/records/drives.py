@@ -162,9 +162,7 @@ class Harmonic(_Rise):
     """α: 0 begins at full speed, `"-90 deg"` at rest"""
 
 
-MotionLaw = Annotated[
-    ConstantSpeed | Ramp | Table | Cycloidal | Polynomial | Harmonic, Field(discriminator="kind")
-]
+MotionLaw = Annotated[ConstantSpeed | Ramp | Table | Cycloidal | Polynomial | Harmonic, Field(discriminator="kind")]
 
 
 class Drive(Record):

@@ -124,9 +124,7 @@ class _Source:
         except ValueError:
             return False
         if name[0] in self.known:
-            message = (
-                f"'{unit}{more[1]}{name[0]}' may mean the unit {name[0]!r} or the parameter of that name"
-            )
+            message = f"'{unit}{more[1]}{name[0]}' may mean the unit {name[0]!r} or the parameter of that name"
             raise ValueError(f"{message}; write ({name[0]}) for the parameter, or give it another name")
         return True
 
@@ -244,9 +242,7 @@ def called(name: str, given: list[Any]) -> Any:
         value = ALIKE[name](*(float(each.m_as(unit)) for each in given))
         return quantity(value, "rad" if name == "atan2" else unit)
     if not given[0].dimensionless or crossed(given[0]._units, "rad/s"):
-        raise ValueError(
-            f"{name} takes {'an angle' if name in ANGLES else 'a number'}, not {named(given[0])}"
-        )
+        raise ValueError(f"{name} takes {'an angle' if name in ANGLES else 'a number'}, not {named(given[0])}")
     number = float(given[0].m_as("rad" if name in ANGLES else ""))
     try:
         value = ANGLES[name](number) if name in ANGLES else NUMBERS[name](number)

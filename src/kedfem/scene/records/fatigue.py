@@ -102,18 +102,14 @@ class FatigueData(Record):
             least, most = STRENGTHS["aluminium" if "aluminium" in self.group else "steel"]
             if not least <= Rm <= most:
                 wanted = f"must be between {least:.4g} and {most:.4g} [Pa] for {self.group}"
-                yield Fault(
-                    ("tensile_strength",), f"{wanted}, where the guideline's formulas hold, got {Rm:.6g}"
-                )
+                yield Fault(("tensile_strength",), f"{wanted}, where the guideline's formulas hold, got {Rm:.6g}")
         strength = self.endurance_stress
         if Rm is not None and strength is not None and strength >= Rm:
             wanted = f"must be below the tensile strength, {Rm:.6g} [Pa]"
             yield Fault(("endurance_stress",), f"{wanted}, got {strength:.6g}")
         if isinstance(self.slope_beyond, float) and self.slope is not None and self.slope_beyond < self.slope:
             wanted = f"must be at least the slope above, {self.slope:g}"
-            yield Fault(
-                ("slope_beyond",), f"{wanted}, got {self.slope_beyond:g}: smaller amplitudes last longer"
-            )
+            yield Fault(("slope_beyond",), f"{wanted}, got {self.slope_beyond:g}: smaller amplitudes last longer")
         data = self.strain_life
         if data is not None and data.ductility_exponent >= data.strength_exponent:
             wanted = f"must be below strength_exponent, {data.strength_exponent:g}"

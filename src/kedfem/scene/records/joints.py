@@ -89,9 +89,7 @@ def several(value: object) -> object:
 Faces = Annotated[tuple[Annotated[FaceName, BeforeValidator(face_choice)], ...], BeforeValidator(several)]
 
 
-JointKind = Literal[
-    "revolute", "spherical", "weld", "prismatic", "cylindrical", "screw", "universal", "planar", "slot"
-]
+JointKind = Literal["revolute", "spherical", "weld", "prismatic", "cylindrical", "screw", "universal", "planar", "slot"]
 DIRECTED = ("prismatic", "cylindrical", "screw", "planar", "slot")  # points may part along or across an axis
 ROTARY = ("revolute", "cylindrical", "screw")  # joints that turn about their axis
 SQUARE = 1e-6  # axes of a cross whose cosine is less are at right angles
@@ -109,9 +107,7 @@ def three(value: object) -> Any:
 Rates = Annotated[tuple[Rate, Rate, Rate], BeforeValidator(three)]
 Dampers = Annotated[tuple[Damper, Damper, Damper], BeforeValidator(three)]
 TurningRates = Annotated[tuple[TurningRate, TurningRate, TurningRate], BeforeValidator(three)]
-TurningDampers = Annotated[
-    tuple[RotationalDamper, RotationalDamper, RotationalDamper], BeforeValidator(three)
-]
+TurningDampers = Annotated[tuple[RotationalDamper, RotationalDamper, RotationalDamper], BeforeValidator(three)]
 
 
 class Bushing(Record):

@@ -19,9 +19,7 @@ from kedfem.scene.records.wording import one_of, shown
 
 GROUND = "ground"
 ELEMENTS: dict[str, Any] = {"solid": "hex20", "plane": "quad9", "beam": "beam3"}
-Element = Literal[
-    "hex27", "hex20", "hex8", "tet10", "quad9", "beam3", "beam2", "beam4", "beam5", "beam7", "beam9"
-]
+Element = Literal["hex27", "hex20", "hex8", "tet10", "quad9", "beam3", "beam2", "beam4", "beam5", "beam7", "beam9"]
 Count = Annotated[StrictInt, Field(ge=1)]
 Frames = Literal["rigid-body", "co-rotational"]
 
@@ -54,9 +52,7 @@ class Meshing(Record):
     defeature_size: PositiveLength | None = None
     """a part from CAD: rounds of less radius, chamfers of shorter sides and grooves are left out where it can be swept
     then, concave ones too; if not given, convex ones below 1.5 % of its size; none where a joint, load or probe sits"""
-    fillet_angle: Annotated[float, Quantity("rad", least=math.radians(2), most=math.radians(45))] | None = (
-        None
-    )
+    fillet_angle: Annotated[float, Quantity("rad", least=math.radians(2), most=math.radians(45))] | None = None
     """a part from CAD, extrusion or part: most that an element turns along a fillet, or a bore without a joint; if not
     given 22.5° of extrusions and parts, 45° of CAD that is swept, 30° of tetrahedra; where `analysis.accuracy` finds the
     mesh open 15° to 45°"""
@@ -142,10 +138,7 @@ class LinkScene(Record):
             return []
         if self.model != "rigid":
             keys = [key for key in ("centre", "inertia") if getattr(self, key) is not None]
-            return [
-                Fault((key,), f"must be given for a rigid link only, got model {self.model!r}")
-                for key in keys
-            ]
+            return [Fault((key,), f"must be given for a rigid link only, got model {self.model!r}") for key in keys]
         present = [key for key in ("shape", "material") if getattr(self, key) is not None]
         if present:
             together = " and ".join(present)

@@ -140,9 +140,7 @@ def outline_polygon(outline: tuple[Any, ...]) -> tuple[Float[np.ndarray, "n 2"],
         if isinstance(item, Arc):
             points = arc_points(corners[-1], np.array(item.via[:2]), np.array(item.to[:2]))
             if points is None:
-                raise ValueError(
-                    f"must have arcs through three points not in line, got [{i}] with its points in line"
-                )
+                raise ValueError(f"must have arcs through three points not in line, got [{i}] with its points in line")
             corners += list(points)
             straight += [False] * len(points)
         else:
@@ -172,9 +170,7 @@ def arc_points(
     return np.asarray(centre + radius * np.column_stack([np.cos(angles), np.sin(angles)]))
 
 
-def segment_distances(
-    point: Float[np.ndarray, "*m 1 2"], polygon: Float[np.ndarray, "n 2"]
-) -> Float[np.ndarray, "*m n"]:
+def segment_distances(point: Float[np.ndarray, "*m 1 2"], polygon: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "*m n"]:
     """Distances of points from each side of a polygon."""
     P, side = polygon, np.roll(polygon, -1, axis=0) - polygon
     along = ((point - P) * side).sum(-1) / np.maximum((side**2).sum(-1), 1e-300)

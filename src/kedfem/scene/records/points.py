@@ -42,9 +42,7 @@ def known_points(points: Mapping[str, XYZ]) -> Iterator[None]:
         _known_points.reset(token)
 
 
-def padded(
-    value: object, what: str = "a point: a name, two or three coordinates [m], or a construction"
-) -> object:
+def padded(value: object, what: str = "a point: a name, two or three coordinates [m], or a construction") -> object:
     """Two or three coordinates as three: z = 0 unless given."""
     value = value.tolist() if hasattr(value, "tolist") else value
     if isinstance(value, (list, tuple)) and len(value) in {2, 3}:
@@ -147,8 +145,7 @@ class CirclesPoint(Record):
         gap = max(apart - (a + b), abs(a - b) - apart)
         if gap > 1e-9 * (a + b) or apart == 0.0:
             raise fault(
-                f"circles of radius {a:.6g} and {b:.6g} must meet [m], got centres {apart:.6g} apart: "
-                f"a gap of {gap:.6g}"
+                f"circles of radius {a:.6g} and {b:.6g} must meet [m], got centres {apart:.6g} apart: a gap of {gap:.6g}"
             )
         along = (a**2 - b**2 + apart**2) / (2.0 * apart)
         across = math.sqrt(max(a**2 - along**2, 0.0)) * (1.0 if self.side == "left" else -1.0)
@@ -256,6 +253,4 @@ def stored_point(at: XYZ) -> object:
     return dict(at.points) if isinstance(at, Apart) else at
 
 
-JointPoint = Annotated[
-    tuple[Length, Length, Length], WrapValidator(joint_point), PlainSerializer(stored_point)
-]
+JointPoint = Annotated[tuple[Length, Length, Length], WrapValidator(joint_point), PlainSerializer(stored_point)]

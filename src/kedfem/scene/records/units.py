@@ -18,14 +18,10 @@ from kedfem.scene.records.wording import shown
 if TYPE_CHECKING:
     import pint
 
-NUMBER = re.compile(
-    r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*([^0-9\s+-].*?|)\s*", re.ASCII
-)
+NUMBER = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*([^0-9\s+-].*?|)\s*", re.ASCII)
 LONGEST = 60  # letters of a unit
 RPM = 30 / math.pi  # revolutions per minute of 1 rad/s
-NAMED = (
-    r"\(*(?!inf\b|nan\b)(?:[A-Za-zµμΩ][A-Za-zµμΩ_0-9]{0,30}|°|%)(?:(?:\^|\*\*) ?-?[1-9]|⁻?[¹²³⁴⁵⁶⁷⁸⁹])?\)*"
-)
+NAMED = r"\(*(?!inf\b|nan\b)(?:[A-Za-zµμΩ][A-Za-zµμΩ_0-9]{0,30}|°|%)(?:(?:\^|\*\*) ?-?[1-9]|⁻?[¹²³⁴⁵⁶⁷⁸⁹])?\)*"
 UNIT = re.compile(rf"(?:{NAMED}|1(?= ?/))(?:(?: ?[*/·] ?| ){NAMED})*")
 """Names with powers of one digit, multiplied and divided: nothing that could be reckoned with."""
 
@@ -115,9 +111,7 @@ def si_number(text: str, unit: str) -> float:
         clear = "rpm or rad/s" if unit == "rad/s" else "Hz"
         raise ValueError(f"turns or radians per second? give it in {clear}")
     turns = revolutions(got._units)
-    if isinstance(text, Evaluated) and not (
-        unit == "rad" and turns < 0.0
-    ):  # 1/6 turn is 1/(6 turn), no angle
+    if isinstance(text, Evaluated) and not (unit == "rad" and turns < 0.0):  # 1/6 turn is 1/(6 turn), no angle
         turns = 0.0
     if got.dimensionality != wanted.dimensionality or turns not in (0.0, revolutions(wanted._units)):
         raise ValueError(f"the unit {given!r} is of another kind{meant(given, unit)}" if given else "no unit")

@@ -52,9 +52,7 @@ def poses(
     return x, _rotations(_directions(end, R, u), end)
 
 
-def _directions(
-    end: End, R: Float[np.ndarray, "T 3 3"], u: Float[np.ndarray, "T p d"]
-) -> Float[np.ndarray, "T 3 3"]:
+def _directions(end: End, R: Float[np.ndarray, "T 3 3"], u: Float[np.ndarray, "T p d"]) -> Float[np.ndarray, "T 3 3"]:
     """Directions of a surface as they are, row k direction k."""
     d = end.onto.shape[1]
     D = np.zeros((len(u), 3, 3))

@@ -34,9 +34,7 @@ class Stressed:
     def over(self, forcing: Sequence[Forcing], motion: RigidMotion) -> Terms:
         """Terms over the times of a motion."""
         every = []
-        for each, entries, size in zip(
-            self.stiffening.over(forcing, motion), self.entries, self.size, strict=True
-        ):
+        for each, entries, size in zip(self.stiffening.over(forcing, motion), self.entries, self.size, strict=True):
             every.append(fewer_terms(each.factors * size, entries / size[:, None]))
         sizes = [k.shape[1] for _, k in every for _ in range(len(k))]
         flat = np.concatenate([np.zeros(0), *(k.ravel() for _, k in every)])

@@ -89,9 +89,7 @@ class Monolithic:
         self.of = [slice(a, b) for a, b in pairwise(ends)]
         self.N, self.k = int(ends[-1]), self.system.unknowns
         self.hard = [n for n, x in enumerate(self.system.constraints) if isinstance(x.law, Held | Driven)]
-        self.linear = all(link.fit is None for link in model.links) and all(
-            x.linear for x in self.system.constraints
-        )
+        self.linear = all(link.fit is None for link in model.links) and all(x.linear for x in self.system.constraints)
         sizes = [float(abs(link.K0).max()) * link.size for link in model.links]
         self.rounding = 0.0 if self.linear else ROUNDING * max(sizes)
         self.masses = [sp.csr_array(mass_matrix(link)) for link in model.links]
@@ -99,9 +97,7 @@ class Monolithic:
         self.W = sp.csr_array(sp.block_diag([port_columns(joint, link.n).T for link, joint in every]))
         self.B = interface_matrix(model.joints)
 
-    def rates(
-        self, x: np.ndarray, x0: np.ndarray, v0: np.ndarray, a0: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def rates(self, x: np.ndarray, x0: np.ndarray, v0: np.ndarray, a0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Newmark's formulas."""
         n, r = self.scheme.acceleration, self.scheme.rate
         return r[0] * (x - x0) - r[1] * v0 - r[2] * a0, n[0] * (x - x0) - n[1] * v0 - n[2] * a0

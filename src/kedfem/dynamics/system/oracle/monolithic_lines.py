@@ -17,9 +17,7 @@ NEAR = 1e-15  # of places by bisection
 Column = Float[np.ndarray, " _"]
 
 
-def measured(
-    system: System, term: Term, at: tuple[Any, Any, Column], near: float
-) -> tuple[float, Column, float]:
+def measured(system: System, term: Term, at: tuple[Any, Any, Column], near: float) -> tuple[float, Column, float]:
     """A term's value, its gradient by z, and an angle to be near the next time.
 
     Parameters
@@ -67,9 +65,7 @@ def off_line(
     slides = away @ turned + curve(s, 1) @ (by_pin - moved)
     slides = slides / (curve(s, 1) @ curve(s, 1) - curve(s, 2) @ away)
     by_tangent = (turned + np.outer(curve(s, 2), slides)) / np.linalg.norm(curve(s, 1))
-    spin = (
-        np.cross(axis, tangent) / (1 + axis @ tangent) @ by_tangent
-    )  # about the tangent, of the smallest rotation
+    spin = np.cross(axis, tangent) / (1 + axis @ tangent) @ by_tangent  # about the tangent, of the smallest rotation
     return float(n @ away), n @ (by_pin - moved) - (away @ np.cross(tangent, n)) * spin
 
 

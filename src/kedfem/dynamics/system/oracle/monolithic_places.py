@@ -59,9 +59,7 @@ def turned_load(
         from scipy.spatial.transform import Rotation
 
         turn = Rotation.from_rotvec([0, 0, float(weights[0] @ u[:, 2])]).as_matrix() @ R
-        return np.asarray(
-            load.forces @ np.block([[turn[:2, :2].T, np.zeros((2, 1))], [np.zeros((1, 2)), 1.0]])
-        )
+        return np.asarray(load.forces @ np.block([[turn[:2, :2].T, np.zeros((2, 1))], [np.zeros((1, 2)), 1.0]]))
     moved = drawn @ R.T
     moved[:, : link.d] += weights @ u
     turn = _orthonormal(moved) @ _orthonormal(drawn).T
@@ -135,9 +133,7 @@ def placed(end: End, R: Any, p: Any, z: Column) -> Pose:
     return Pose(x, Q, by_x, Q @ np.linalg.solve(np.trace(U) * np.eye(3) - (U + U.T) / 2, axial))
 
 
-def point(
-    pose: Pose, end: End, a: Float[np.ndarray, "3"]
-) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 k"]]:
+def point(pose: Pose, end: End, a: Float[np.ndarray, "3"]) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 k"]]:
     """Where a point of an end is, and how this changes with z."""
     arm = pose.Q @ (a - end.origin)
     return pose.x + arm, pose.by_x + np.cross(pose.by_Q, arm, axisa=0, axisb=0, axisc=0)
@@ -148,9 +144,7 @@ def valued(system: System, term: Term, poses: list[Pose], near: float) -> tuple[
     one, other = poses
     if term.kind == record.DISTANCE:
         ends = system.ends[term.i], system.ends[term.j]
-        arms = [
-            pose.Q @ (a - end.origin) for pose, a, end in zip(poses, (term.a, term.a_j), ends, strict=True)
-        ]
+        arms = [pose.Q @ (a - end.origin) for pose, a, end in zip(poses, (term.a, term.a_j), ends, strict=True)]
         gap = one.x + arms[0] - other.x - arms[1]
         size = float(np.linalg.norm(gap))
         n = gap / size

@@ -49,9 +49,7 @@ def monolithic_march(
             history.R[t, k, : link.d, : link.d] = mean_orientation(link, u, R)
             history.g[t, own(of, k)] = _coordinates(of, k, link, g[0])
             K0 = [frame.K0 for frame in frames_of(link)] or [link.K0]
-            history.energy[t, k] = sum(
-                0.5 * float(x.ravel() @ (K @ x.ravel())) for K, x in zip(K0, g, strict=True)
-            )
+            history.energy[t, k] = sum(0.5 * float(x.ravel() @ (K @ x.ravel())) for K, x in zip(K0, g, strict=True))
             b = np.searchsorted(of.bodies.beams.segment, k)
             for e, (point, x) in enumerate(zip(points_of(link), g, strict=False)):
                 history.strain[t, b, :, e] = point.strains @ x.ravel()

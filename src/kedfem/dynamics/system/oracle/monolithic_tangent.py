@@ -125,9 +125,7 @@ def inverse(J: sp.csr_array, C: Matrix) -> Inverse:
     try:
         factors = splu(sp.csc_array(scaled @ sp.diags_array(columns)))
     except RuntimeError as singular:
-        raise SolveError(
-            f"analysis.solver: the monolithic solver's equations must be regular, got {singular}"
-        ) from None
+        raise SolveError(f"analysis.solver: the monolithic solver's equations must be regular, got {singular}") from None
     least = np.linalg.pinv(C.T, rcond=REPEATED) @ C.T if len(independent) < len(C) else np.eye(len(C))
 
     def solution(right: Column) -> Column:

@@ -129,9 +129,7 @@ def centripetal(now: Instant, u: Flat, v: Flat, which: Sequence[bool]) -> Flat:
     return out
 
 
-def own_spin(
-    link: Link, v: Float[np.ndarray, "n d"], x: Float[np.ndarray, "n d"]
-) -> Float[np.ndarray, "3 3"]:
+def own_spin(link: Link, v: Float[np.ndarray, "n d"], x: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "3 3"]:
     """[ω]× of the rigid motion nearest to rates of a body at places x: the skew part of their gradient."""
     k = 2 if link.planar else 3
     if link.kind == "beam":  # its axis alone does not determine it

@@ -236,12 +236,7 @@ def value(system: System, term: Term, one: tuple[Series, Series], other: tuple[S
     """A term of two ends' poses, as a series (3,)."""
     (x_i, Q_i), (x_j, Q_j) = one, other
     if term.kind in (GAP, DISTANCE):
-        gap = (
-            x_i
-            + Q_i @ (term.a - system.ends[term.i].origin)
-            - x_j
-            - Q_j @ (term.a_j - system.ends[term.j].origin)
-        )
+        gap = x_i + Q_i @ (term.a - system.ends[term.i].origin) - x_j - Q_j @ (term.a_j - system.ends[term.j].origin)
         return product(np.dot, gap, Q_j @ term.b) if term.kind == GAP else root(product(np.dot, gap, gap))
     if term.kind == TURN:
         return product(np.dot, Q_i @ term.a, Q_j @ term.b)

@@ -219,9 +219,7 @@ def _differenced(first: Instant, motion_at: Motion, h: float) -> tuple[Moved, fl
     return _moved(instants, u, felt, h), left  # the rates that dampers have felt: u balances these
 
 
-def _moved(
-    instants: Sequence[Instant], u: Float[np.ndarray, "5 N"], v: Float[np.ndarray, "5 N"], h: float
-) -> Moved:
+def _moved(instants: Sequence[Instant], u: Float[np.ndarray, "5 N"], v: Float[np.ndarray, "5 N"], h: float) -> Moved:
     """At the first of five instants, h after each other."""
     now, strained = instants[0], np.empty(u.shape[1])
     for k, link in enumerate(now.of.system.model.links):

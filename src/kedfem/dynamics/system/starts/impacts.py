@@ -40,9 +40,7 @@ def divided(of: Ready, state: State, last: float, between: Motion, halvings: int
     alone, reached = march(free, state, between(np.array([last])), between, halvings - 1)
     share = np.where(apart, _met(of.constraints, state, reached, h), np.inf)
     first = float(share.min())
-    if not np.isfinite(
-        first
-    ):  # another force brings it there, such as that of a stop which is met in the same step
+    if not np.isfinite(first):  # another force brings it there, such as that of a stop which is met in the same step
         return march(of, state, between(np.array([last])), between, 0)
     met = share <= first + NEAR
     if first >= 1 - NEAR:
@@ -75,13 +73,9 @@ def _met(of: Constraints, state: State, reached: History, h: float) -> Coordinat
         e0, e1, v0, v1 = state.e[0, n], reached.e[-1, n], h * state.e[1, n], h * reached.rate[-1, n]
         for limit in of.numbers[n, :2]:
             if (limit - e0) * (e1 - limit) >= 0 and e1 != e0 and np.isfinite(limit):
-                cubic = np.polynomial.Polynomial(
-                    [e0 - limit, v0, 3 * (e1 - e0) - 2 * v0 - v1, 2 * (e0 - e1) + v0 + v1]
-                )
+                cubic = np.polynomial.Polynomial([e0 - limit, v0, 3 * (e1 - e0) - 2 * v0 - v1, 2 * (e0 - e1) + v0 + v1])
                 roots = cubic.roots()
-                real = roots.real[
-                    (np.abs(roots.imag) < 1e-9) & (roots.real >= -1e-9) & (roots.real <= 1 + 1e-9)
-                ]
+                real = roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real >= -1e-9) & (roots.real <= 1 + 1e-9)]
                 out[n] = min(out[n], float(np.clip(real, 0.0, 1.0).min(initial=1.0)))
     return out
 

@@ -97,9 +97,7 @@ class Instant:
         self.R, self.omega = motion.R[0][of.bodies.motion], motion.omega[0][of.bodies.motion]
         self.travels = travels(of.system, self.at)
         self.always: Always = always(of) if like is None else like.always
-        self._turnings = of.stressed and of.stressed.stiffening.turnings(
-            forcings(of.system.model, motion), motion
-        )
+        self._turnings = of.stressed and of.stressed.stiffening.turnings(forcings(of.system.model, motion), motion)
 
     def stress(self, u: Flat) -> Flat:
         """Forces by the stresses of the rigid-body motion, R (k g P), at a displacement; none without stiffening."""
@@ -114,9 +112,7 @@ class Instant:
         """All bodies at a displacement and rate; loads that turn with them are taken from their internal forces."""
         of, spins = self.of, cross_matrix(self.omega)
         still = self.always.still
-        out = [
-            inside(still, k, self.R[k], spins[k], u[own(of, k)], v[own(of, k)]) for k in range(len(self.R))
-        ]
+        out = [inside(still, k, self.R[k], spins[k], u[own(of, k)], v[own(of, k)]) for k in range(len(self.R))]
         pushed = self.pushed(u) - self.stress(u)
         return [replace(each, f=each.f - pushed[own(of, k)]) for k, each in enumerate(out)]
 

@@ -38,9 +38,7 @@ class Still:
             for part, link in zip(of.parts, of.system.model.links, strict=True)
         ]
         self.rigid = [_rigid(link, part) for link, part in zip(of.system.model.links, of.parts, strict=True)]
-        none = (
-            np.zeros_like(of.c.acceleration) if isinstance(of.c.acceleration, np.ndarray) else (0.0, 0.0, 0.0)
-        )
+        none = np.zeros_like(of.c.acceleration) if isinstance(of.c.acceleration, np.ndarray) else (0.0, 0.0, 0.0)
         self._c = of.c._replace(acceleration=none, rate=none, late=0.0, early=0.0, alpha=0.0, beta=0.0)
         self._state, self._work = empty_state(of.bodies, of.constraints), room(of.bodies)
         self._trial = empty_trial(of.bodies, of.ends, of.constraints, self._state)
@@ -181,9 +179,7 @@ def turned_rate(spin: Float[np.ndarray, "3 3"], x: Nodal) -> Nodal:
     return np.asarray(x @ spin[:d, :d].T)
 
 
-def inside(
-    still: Still, k: int, R: Float[np.ndarray, "3 3"], spin: Float[np.ndarray, "3 3"], u: Flat, v: Flat
-) -> Inside:
+def inside(still: Still, k: int, R: Float[np.ndarray, "3 3"], spin: Float[np.ndarray, "3 3"], u: Flat, v: Flat) -> Inside:
     """Body k at the displacement u with the rate v.
 
     Parameters

@@ -56,9 +56,7 @@ def held_body(A: Float[np.ndarray, "N N"], W: Float[np.ndarray, "q N"]) -> HeldB
     try:
         G = Z @ np.linalg.solve(Z.T @ A @ Z, Z.T)
     except np.linalg.LinAlgError as error:
-        raise SolveError(
-            f"a body held at its interface points must have a definite matrix, got {error}"
-        ) from error
+        raise SolveError(f"a body held at its interface points must have a definite matrix, got {error}") from error
     M = V[:, :q] @ np.linalg.inv(L[:q]).T
     Y, left = M - G @ (A @ M), M - G.T @ (A.T @ M)
     return HeldBody(G, Y, left, left.T @ A @ Y, W)
@@ -111,9 +109,7 @@ class LinearEquations:
     asked : constraints that repeat others get no force
     """
 
-    def __init__(
-        self, of: Ready, held: Sequence[HeldBody], R: Float[np.ndarray, "_ 3 3"], asked: Asked
-    ) -> None:
+    def __init__(self, of: Ready, held: Sequence[HeldBody], R: Float[np.ndarray, "_ 3 3"], asked: Asked) -> None:
         self.of, self.held, self.R, self.asked = of, held, R, asked
         joints = of.system.model.joints
         self.columns = [joint.columns for joint in joints]
@@ -127,9 +123,7 @@ class LinearEquations:
         H = sp.coo_array((np.concatenate([b.ravel() for b in blocks]), index), (k, k))
         self.bordered = Bordered(H, asked.C, asked.compliance)
 
-    def solved(
-        self, r: Flat, moved: Flat | None = None, more: Flat | float = 0.0, alone: bool = False
-    ) -> Solved:
+    def solved(self, r: Flat, moved: Flat | None = None, more: Flat | float = 0.0, alone: bool = False) -> Solved:
         """All bodies under given right-hand sides.
 
         Parameters
@@ -145,9 +139,7 @@ class LinearEquations:
         for i, (each, RB) in enumerate(zip(self.held, self.RB, strict=True)):
             here = slice(int(at[i]), int(at[i + 1]))
             local.append(self.turned(i, r[here], back=True))
-            offset.append(
-                np.zeros(len(each.W)) if moved is None else each.W @ self.turned(i, moved[here], back=True)
-            )
+            offset.append(np.zeros(len(each.W)) if moved is None else each.W @ self.turned(i, moved[here], back=True))
             f[self.columns[i]] += RB.T @ (each.left.T @ local[i] + each.S @ offset[i])
         z, m = self.bordered.solved(f, (0.0 if alone else 1.0) * self.asked.target)
         x, forces = np.zeros(len(r)), np.zeros(int(ports[-1]))

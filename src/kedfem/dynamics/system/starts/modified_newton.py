@@ -124,9 +124,7 @@ def _too_stiff(now: Instant) -> str:
     return f"link '{stiff}' is {ratio}: give it model = 'rigid', or take initial = 'rest'"
 
 
-def _by_newton(
-    now: Instant, u: Flat, more: Callable[[Flat, Flat], Flat], spins: Spins | None, z1: Flat | None
-) -> Flat:
+def _by_newton(now: Instant, u: Flat, more: Callable[[Flat, Flat], Flat], spins: Spins | None, z1: Flat | None) -> Flat:
     """The same by Newton's method with all that rotates with bodies, which costs more an iteration."""
     found = solution(Equilibrium(now, more, spins, z1), u)
     if found.moves:

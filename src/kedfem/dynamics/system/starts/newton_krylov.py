@@ -82,9 +82,7 @@ class Equilibrium:
     z1 : rates of the interface unknowns
     """
 
-    def __init__(
-        self, now: Instant, more: Callable[[Flat, Flat], Flat], spins: Spins | None, z1: Flat | None
-    ) -> None:
+    def __init__(self, now: Instant, more: Callable[[Flat, Flat], Flat], spins: Spins | None, z1: Flat | None) -> None:
         self.now, self.more, self.z1 = now, more, z1
         self.inertia = TurningBodies(now, spins)
         self.bodies = TurningBodies(now, None)
@@ -193,9 +191,7 @@ class Equilibrium:
         """What moves most along a change, and whose force changes most between two points."""
         of = self.now.of
         far = [float(np.abs(rows(of, k, change[own(of, k)])).max(initial=0.0)) for k in range(len(of.parts))]
-        words = (
-            f"link '{of.system.model.links[int(np.argmax(far))].name}' moves most from iteration to iteration"
-        )
+        words = f"link '{of.system.model.links[int(np.argmax(far))].name}' moves most from iteration to iteration"
         forces = np.abs(new.laws - at.laws)
         if forces.any():
             words += f", and the force of {of.system.constraints[int(np.argmax(forces))].name} changes most"
@@ -217,11 +213,7 @@ class Equilibrium:
             strain = (R.T @ change[here].reshape(d, -1)).ravel()
             strain = strain - B @ (B.T @ strain)
             strain = rows(of, k, strain)
-            shape = (
-                (before - np.outer(link.one, share @ before)) @ R
-                + strain
-                - np.outer(link.one, share @ strain)
-            )
+            shape = (before - np.outer(link.one, share @ before)) @ R + strain - np.outer(link.one, share @ strain)
             placed = np.outer(link.one, share @ after) + shape @ turned.T
             u[here] += coordinates(link, of.parts[k], placed - after).ravel()
         return np.asarray(u)
