@@ -1,7 +1,6 @@
 """Products of bodies' mass and stiffness with vectors, and what sparse bodies do while their interface points are held.
 
 Arrays of the latter are found by their addresses: each body has its own, as factors are too large for copies in one.
-Where no body is sparse, `mass` and `arrays` may be None, and nothing of this is compiled.
 """
 
 from kedfem.compiled import compiled, inner
@@ -11,14 +10,12 @@ from kedfem.dynamics.system.reference import integers_at, reals_at
 
 
 @inner
-def mass_times(of, bodies, i, x, out):  # type: ignore[no-untyped-def]
+def mass_times(bodies, i, x, out):  # type: ignore[no-untyped-def]
     """out becomes M x of a sparse body, in whichever axes; of a matrix that is symmetric rows end at their diagonal.
 
     One that all three components share is read once.
     """
-    if of is None:
-        return
-    n, d = bodies.functions[i], bodies.components[i]
+    n, d, of = bodies.functions[i], bodies.components[i], bodies.mass
     shared = d == 3 and of.of[i, 0] == of.of[i, 1] == of.of[i, 2]
     for b in range(1 if shared else d):
         at = of.at[of.of[i, b]]
@@ -126,11 +123,9 @@ def add_answer(arrays, w, out):  # type: ignore[no-untyped-def]
 
 
 @inner
-def sparse_held(every, bodies, i, trial, called):  # type: ignore[no-untyped-def]
+def sparse_held(bodies, i, trial, called):  # type: ignore[no-untyped-def]
     """trial.held = Ã⁻¹ r and trial.reaction of a sparse body from trial.r."""
-    if every is None:
-        return
-    arrays, first, last = every[i], bodies.at[i], bodies.at[i + 1]
+    arrays, first, last = bodies.arrays[i], bodies.at[i], bodies.at[i + 1]
     taken = arrays[0, 1] > 0
     if not taken:
         called(i)
@@ -148,16 +143,8 @@ def displaced(bodies, i, trial, out):  # type: ignore[no-untyped-def]
         product(bodies.G, bodies.G_at[i], N, N, trial.r[first:last], out)
         add_transposed(bodies.Y, bodies.Y_at[i], q, N, w, out)
     else:
-        sparse_displaced(bodies.arrays, i, trial.held[first:last], w, out[:N])
-
-
-@inner
-def sparse_displaced(every, i, held, w, out):  # type: ignore[no-untyped-def]
-    """The same of a sparse one."""
-    if every is None:
-        return
-    copied(held, out)
-    add_answer(every[i], w, out)
+        copied(trial.held[first:last], out[:N])
+        add_answer(bodies.arrays[i], w, out[:N])
 
 
 @inner
@@ -166,15 +153,7 @@ def add_at_ports(bodies, i, x, out):  # type: ignore[no-untyped-def]
     if bodies.dense[i]:
         add_transposed(bodies.W, bodies.Y_at[i], len(x), bodies.at[i + 1] - bodies.at[i], x, out)
         return
-    add_at_points(bodies.arrays, i, x, out)
-
-
-@inner
-def add_at_points(every, i, x, out):  # type: ignore[no-untyped-def]
-    """The same of a sparse one."""
-    if every is None:
-        return
-    at, place, weight, _, _, _, _ = condensed(every[i])
+    at, place, weight, _, _, _, _ = condensed(bodies.arrays[i])
     for k in range(len(x)):
         for m in range(at[k], at[k + 1]):
             out[place[m]] += weight[m] * x[k]
@@ -191,15 +170,7 @@ def take_ports(bodies, i, u, out):  # type: ignore[no-untyped-def]
                 x += row[m] * u[m]
             out[k] -= x
         return
-    take_points(bodies.arrays, i, u, out)
-
-
-@inner
-def take_points(every, i, u, out):  # type: ignore[no-untyped-def]
-    """The same of a sparse one."""
-    if every is None:
-        return
-    at, place, weight, _, _, _, _ = condensed(every[i])
+    at, place, weight, _, _, _, _ = condensed(bodies.arrays[i])
     for k in range(len(out)):
         x = 0.0
         for m in range(at[k], at[k + 1]):
