@@ -106,12 +106,7 @@ def _space(study: _Study, kinds: Sequence[str], quick: bool) -> list[str]:
         finest = [study.ran(FINEST, STEPS, kind, "co-rotational", 1) for kind in kinds]
         errors = [_percent(worst(a.curve, b.curve)) for a, b in zip(found, finest, strict=True)]
         rows.append((f"{count} {element}", str(found[0].unknowns), *errors, f"{1e3 * found[0].seconds:.0f}"))
-    header = (
-        "mesh of a link",
-        "unknowns",
-        *(f"error in space, {kind}" for kind in kinds),
-        "3,000 steps [ms]",
-    )
+    header = ("mesh of a link", "unknowns", *(f"error in space, {kind}" for kind in kinds), "3,000 steps [ms]")
     return table(header, rows)
 
 
@@ -159,16 +154,8 @@ def _reduced(study: _Study, exact: Curve) -> list[str]:
     rows = []
     finest = study.ran(FINEST, STEPS, "damped", "co-rotational", 1).curve
     for segments, tolerance in REDUCED:
-        link = {
-            "model": "solid",
-            "mesh": {"elements": [24, 2, 1]},
-            "reduction": "modal",
-            "segments": segments,
-        }
-        ran = run(
-            four_bar(link, STEPS, "damped", frames="co-rotational", reduction_tolerance=tolerance),
-            study.repeats,
-        )
+        link = {"model": "solid", "mesh": {"elements": [24, 2, 1]}, "reduction": "modal", "segments": segments}
+        ran = run(four_bar(link, STEPS, "damped", frames="co-rotational", reduction_tolerance=tolerance), study.repeats)
         study.done[f"reduced, {segments} segments, {tolerance}"] = ran
         rows.append((
             str(segments), _percent(tolerance), str(ran.unknowns), _percent(worst(ran.curve, finest)),

@@ -74,11 +74,7 @@ def run(scene: Scene, repeats: int) -> Ran:
     iterations, factorised = getattr(solver, "iterations", 0) / steps, solver.factorisations
     times = [stepping(ready, solver, steps) for _ in range(repeats)]
     return Ran(
-        stress[:: steps // SAMPLES],
-        min(times, default=float("nan")),
-        ready.model.unknowns,
-        iterations,
-        factorised,
+        stress[:: steps // SAMPLES], min(times, default=float("nan")), ready.model.unknowns, iterations, factorised
     )
 
 

@@ -25,15 +25,7 @@ def bench_elements(folder: Path, quick: bool) -> None:
             finest = part.sizes["hex27"][-1] if quick else part.reference
             exact[str(part.shape)] = answer(part, "hex27", finest, 1)
         found[part.name] = _measured(part, exact[str(part.shape)], quick)
-    header = (
-        "part",
-        "element",
-        "mesh",
-        "unknowns",
-        "factor [ms]",
-        "solve [ms]",
-        *(f"{q} [%]" for q in QUANTITIES),
-    )
+    header = ("part", "element", "mesh", "unknowns", "factor [ms]", "solve [ms]", *(f"{q} [%]" for q in QUANTITIES))
     write_page(folder, "performance/elements", [table(header, _rows(found)), *_after(found)])
     _write_plot(folder, found)
 

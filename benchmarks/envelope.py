@@ -23,16 +23,7 @@ QUICK = ("four_bar_beams", "bennett")
 
 def bench_envelope(folder: Path, quick: bool) -> None:
     """Seconds of all steps of an example, of its envelope, and how many points and times that examined; a table."""
-    header = (
-        "example",
-        "points",
-        "steps",
-        "the steps [s]",
-        "the envelope [s]",
-        "ratio",
-        "examined",
-        "with all modes",
-    )
+    header = ("example", "points", "steps", "the steps [s]", "the envelope [s]", "ratio", "examined", "with all modes")
     rows = [_measured(name) for name in (QUICK if quick else EXAMPLES)]
     write_page(folder, "performance/envelope", [table(header, rows)])
 

@@ -23,11 +23,7 @@ def bench_forecasts(folder: Path, quick: bool) -> None:
         told, run = apart("benchmarks.forecasts", "told", name), apart("benchmarks.forecasts", "run", name)
         cells = [name, f"{run['unknowns']:,.0f}", f"{run['steps']:,.0f}"]
         for key, unit, form in (("factor", 1.0, ".2f"), ("stepping", 1.0, ".2f"), ("memory", 1e6, ".0f")):
-            cells += [
-                f"{told[key] / unit:{form}}",
-                f"{run[key] / unit:{form}}",
-                f"{told[key] / run[key]:.2f}",
-            ]
+            cells += [f"{told[key] / unit:{form}}", f"{run[key] / unit:{form}}", f"{told[key] / run[key]:.2f}"]
         rows.append(tuple(cells))
     header = ["scene", "unknowns", "steps"]
     for what in ("factor [s]", "steps [s]", "memory [MB]"):

@@ -116,18 +116,9 @@ def truss(n: int) -> Raw:
             one = np.cross(d, Z)
             other = np.cross(d, one)
             axes = [(x / np.linalg.norm(x)).tolist() for x in (one, other)]
-            joints[f"U{j}_{k}"] = {
-                "kind": "universal",
-                "links": [middle[j], name],
-                "at": node[j].tolist(),
-                "axes": axes,
-            }
+            joints[f"U{j}_{k}"] = {"kind": "universal", "links": [middle[j], name], "at": node[j].tolist(), "axes": axes}
             if k in middle:
-                joints[f"S{j}_{k}"] = {
-                    "kind": "spherical",
-                    "links": [middle[k], name],
-                    "at": node[k].tolist(),
-                }
+                joints[f"S{j}_{k}"] = {"kind": "spherical", "links": [middle[k], name], "at": node[k].tolist()}
             else:
                 middle[k] = name
     return scene(links, joints, drive=turning("A"))
@@ -160,12 +151,7 @@ def measured(topology: str, n: int) -> Raw:
     raw = make(n)
     spent = ran(raw)
     after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return {
-        "links": len(raw["links"]),
-        "seconds": spent,
-        "memory": 1024.0 * (after - before),
-        "peak": 1024.0 * after,
-    }
+    return {"links": len(raw["links"]), "seconds": spent, "memory": 1024.0 * (after - before), "peak": 1024.0 * after}
 
 
 def one(topology: str, n: int, limit: float, checkout: Path | None) -> Raw | None:

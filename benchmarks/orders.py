@@ -49,11 +49,7 @@ def bench_orders(folder: Path, quick: bool) -> None:
     """Tables of three studies, and their curves."""
     tables: list[list[str]] = []
     costs: list[tuple[str, ...]] = []
-    studies = {
-        "orders": rigid_body(four_bar),
-        "orders_corotational": corotational,
-        "orders_slides": rigid_body(slide),
-    }
+    studies = {"orders": rigid_body(four_bar), "orders_corotational": corotational, "orders_slides": rigid_body(slide)}
     for name, study in studies.items():
         found = {scene: study(raw, quick) for scene, raw in list(SCENES.items())[: 1 if quick else None]}
         tables += [_table(found, asked) for asked in ASKED]

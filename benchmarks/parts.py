@@ -81,11 +81,7 @@ def answer(part: BenchPart, element: str, size: Size, repeats: int) -> Answer:
     link = part_link(part, element, size)
     deflection, u = loaded(part, link)
     stress = von_mises((point_rows(link, "stress", np.asarray(part.stressed)).stress @ u.ravel())[None])
-    values = {
-        "deflection": np.array([deflection]),
-        "frequencies": frequencies(link, part.near),
-        "stress": stress,
-    }
+    values = {"deflection": np.array([deflection]), "frequencies": frequencies(link, part.near), "stress": stress}
     return Answer(values, 3 * link.n, *_work(link, repeats))
 
 
@@ -258,8 +254,7 @@ PARTS = (
         stressed=(0.1, 0.0, 0.001),
         near=250.0,
         sizes=dict.fromkeys(
-            ("hex27", "hex20", "tet10"),
-            ((2, 1, 1), (4, 2, 1), (8, 4, 1), (16, 8, 1), (32, 16, 1), (40, 20, 1)),
+            ("hex27", "hex20", "tet10"), ((2, 1, 1), (4, 2, 1), (8, 4, 1), (16, 8, 1), (32, 16, 1), (40, 20, 1))
         )
         | {"hex8": ((16, 8, 1), (32, 16, 1), (64, 32, 1), (96, 48, 1))},
         reference=(48, 24, 2),

@@ -107,12 +107,7 @@ def _estimates(scenes: dict[str, dict[str, object]], tolerances: Sequence[float]
         rows.append(row)
     header = ["scene"]
     for tolerance in tolerances:
-        header += [
-            f"{100 * tolerance:g} % asked for: modes, at most",
-            "true error",
-            "estimate / true",
-            "single channels",
-        ]
+        header += [f"{100 * tolerance:g} % asked for: modes, at most", "true error", "estimate / true", "single channels"]
     low, high = min(ratios), max(ratios)
     lowest = rows[ratios.index(low) // len(tolerances)][0]
     within = np.mean([1 / 3 <= ratio <= 3 for ratio in ratios])

@@ -10,10 +10,7 @@ LENGTHS = {"crank": ("A", "B"), "coupler": ("B", "C"), "rocker": ("C", "D")}
 
 
 def bar_four_bar(
-    elements: tuple[int, int, int],
-    solver: str = "condensed",
-    steps_per_revolution: int = 720,
-    revolutions: float = 1.0,
+    elements: tuple[int, int, int], solver: str = "condensed", steps_per_revolution: int = 720, revolutions: float = 1.0
 ) -> Scene:
     """[KED]'s four-bar (Nath and Ghosh 1980) with bars of 27-node hexahedra, 600 rpm.
 
@@ -23,11 +20,7 @@ def bar_four_bar(
     """
     bar = {"kind": "bar", "width": 0.0254, "thickness": 0.0254}
     raw = four_bar_of(bar, {"element": "hex27", "mesh": {"elements": list(elements)}})
-    raw["analysis"] = {
-        "revolutions": revolutions,
-        "steps_per_revolution": steps_per_revolution,
-        "solver": solver,
-    }
+    raw["analysis"] = {"revolutions": revolutions, "steps_per_revolution": steps_per_revolution, "solver": solver}
     return scene_from(raw)
 
 
@@ -49,22 +42,12 @@ def plate_four_bar(model: str, across: int, thickness: float, steps_per_revoluti
     model : solid (one layer of hexahedra) or plane, on the same quadrilaterals
     across : elements across the waist
     """
-    plate = {
-        "kind": "plate_link",
-        "width": 0.0254,
-        "thickness": thickness,
-        "eye_diameter": 0.045,
-        "bore_diameter": 0.02,
-    }
+    plate = {"kind": "plate_link", "width": 0.0254, "thickness": thickness, "eye_diameter": 0.045, "bore_diameter": 0.02}
     element = {"solid": "hex27", "plane": "quad9"}[model]
     raw = four_bar_of(plate, {"model": model, "element": element, "mesh": {"elements_across": across}})
     raw["drive"]["motion"]["speed"] = "150 rpm"
     raw["damping"] = {"ratio": 0.02, "frequencies": [20, 200]}
-    raw["analysis"] = {
-        "revolutions": 1,
-        "steps_per_revolution": steps_per_revolution,
-        "initial": "quasi-static",
-    }
+    raw["analysis"] = {"revolutions": 1, "steps_per_revolution": steps_per_revolution, "initial": "quasi-static"}
     raw["output"] = {
         "probes": {
             "stress": {"link": "rocker", "at": "M", "quantity": "stress"},
@@ -79,12 +62,7 @@ def four_bar_of(shape: dict[str, Any], link: dict[str, Any]) -> dict[str, Any]:
     links = {
         name: {"material": "alloy", "shape": {**shape, "between": list(ends)}, **link} for name, ends in LENGTHS.items()
     }
-    joined = {
-        "A": ("ground", "crank"),
-        "B": ("crank", "coupler"),
-        "C": ("coupler", "rocker"),
-        "D": ("rocker", "ground"),
-    }
+    joined = {"A": ("ground", "crank"), "B": ("crank", "coupler"), "C": ("coupler", "rocker"), "D": ("rocker", "ground")}
     return {
         "title": "Four-bar",
         "points": {
@@ -193,13 +171,7 @@ def _rssr() -> dict[str, Any]:
 
 def _bell_crank() -> dict[str, Any]:
     """A crank that rocks an extruded bell crank by a rod."""
-    rod = {
-        "kind": "plate_link",
-        "width": 0.02,
-        "thickness": 0.012,
-        "eye_diameter": 0.03,
-        "bore_diameter": 0.012,
-    }
+    rod = {"kind": "plate_link", "width": 0.02, "thickness": 0.012, "eye_diameter": 0.03, "bore_diameter": 0.012}
     bell = {
         "kind": "extrusion",
         "thickness": 0.012,

@@ -45,10 +45,7 @@ def _measured(factored: Factored, A: sp.csr_array, b: np.ndarray) -> tuple[str, 
 
 
 def _solvers() -> dict[str, Factored]:
-    out: dict[str, Factored] = {
-        "CHOLMOD (cvxopt)": lambda A: Cholesky(A, "bench").solve,
-        "SuperLU (SciPy)": _superlu,
-    }
+    out: dict[str, Factored] = {"CHOLMOD (cvxopt)": lambda A: Cholesky(A, "bench").solve, "SuperLU (SciPy)": _superlu}
     try:
         import pypardiso  # noqa: F401
     except ImportError:

@@ -52,10 +52,7 @@ def bench_steps(folder: Path, quick: bool) -> None:
     header = ("unknowns", "monolithic [ms/step]", "condensed [ms/step]", "ratio", "of it bare triangular solves",
               "factorisations in the run", "difference of u after 5 steps")  # fmt: skip
     write_page(folder, "performance/steps", [table(header, rows)])
-    curves = {
-        "monolithic (assemble, sparse LU)": (unknowns, monolithic_times),
-        "condensed": (unknowns, condensed_times),
-    }
+    curves = {"monolithic (assemble, sparse LU)": (unknowns, monolithic_times), "condensed": (unknowns, condensed_times)}
     write_loglog(folder, "steps", curves, ("unknowns", "seconds per step"))
 
 

@@ -34,12 +34,7 @@ def four_bar(elements: int = 1, **more: Any) -> dict[str, Any]:
     """The four-bar of the source's example, steel bars, one quadratic beam a link; a drive that speeds up."""
     A, B, C, D = (0.0, 0.0), (0.3048, 0.0), (0.9, 0.69), (0.9144, 0.0)
     ends = {"crank": (A, B), "coupler": (B, C), "rocker": (C, D)}
-    joints = {
-        "A": ("ground", "crank"),
-        "B": ("crank", "coupler"),
-        "C": ("coupler", "rocker"),
-        "D": ("rocker", "ground"),
-    }
+    joints = {"A": ("ground", "crank"), "B": ("crank", "coupler"), "C": ("coupler", "rocker"), "D": ("rocker", "ground")}
     at = {"A": A, "B": B, "C": C, "D": D}
     return {
         "links": {name: bar("beam", *each, elements) for name, each in ends.items()},
@@ -84,12 +79,7 @@ def speeds(raw: dict[str, Any], few: int) -> tuple[float, float, float]:
     return few / min(old), STEPS / min(new[1:]), float(after.passes[0]) / STEPS
 
 
-PAIRS = (
-    (200, 30),
-    (60, 6),
-    (40, 4),
-    (20, 3),
-)  # steps, and how often they are taken, solves after them each time
+PAIRS = ((200, 30), (60, 6), (40, 4), (20, 3))  # steps, and how often they are taken, solves after them each time
 SOLIDS = {  # elements of crank, coupler and rocker
     "a solid link of 951 unknowns beside two reduced ones": ([4, 1, 1], [16, 2, 1], [4, 1, 1]),
     "solids of 5,265 unknowns each": ([24, 4, 3],) * 3,

@@ -39,13 +39,7 @@ def varied_scenes() -> dict[str, dict[str, Any]]:
 
 
 def _force(link: str, at: str, vector: list[float], factor: Any = None) -> dict[str, Any]:
-    return {
-        "kind": "force",
-        "link": link,
-        "at": at,
-        "vector": vector,
-        **({"factor": factor} if factor else {}),
-    }
+    return {"kind": "force", "link": link, "at": at, "vector": vector, **({"factor": factor} if factor else {})}
 
 
 def _four_bar(

@@ -32,18 +32,8 @@ def _half_section(occ: ModuleType) -> int:
     leaves = sqrt(BALL**2 - NECK**2)
     half, rise = LENGTH / 2, SHANK - NECK
     run = sqrt(NECK_RADIUS**2 - (NECK_RADIUS - rise) ** 2)
-    profile = [
-        (-BALL, 0.0),
-        (leaves, NECK),
-        (leaves + NECK_LENGTH, NECK),
-        (leaves + NECK_LENGTH + run, SHANK),
-    ]
-    centres: list[tuple[float, float] | None] = [
-        (0.0, 0.0),
-        None,
-        (leaves + NECK_LENGTH, NECK + NECK_RADIUS),
-        None,
-    ]
+    profile = [(-BALL, 0.0), (leaves, NECK), (leaves + NECK_LENGTH, NECK), (leaves + NECK_LENGTH + run, SHANK)]
+    centres: list[tuple[float, float] | None] = [(0.0, 0.0), None, (leaves + NECK_LENGTH, NECK + NECK_RADIUS), None]
     profile += [(2 * half - x, y) for x, y in reversed(profile)]
     centres += [centre and (2 * half - centre[0], centre[1]) for centre in reversed(centres[:-1])]
     points = [occ.addPoint(x, y, 0) for x, y in profile]

@@ -14,19 +14,7 @@ from types import ModuleType
 
 import gmsh
 
-from geometry.drawing import (
-    Point,
-    box,
-    disc,
-    joined,
-    plate,
-    prism,
-    rounded,
-    sharp_edges,
-    strap,
-    upright,
-    without,
-)
+from geometry.drawing import Point, box, disc, joined, plate, prism, rounded, sharp_edges, strap, upright, without
 from geometry.make import empty_model
 from geometry.step_files import write_step
 from kedfem.errors import MeshError
@@ -109,10 +97,7 @@ def lever_with_rounded_edges(occ: Occ) -> int:
     body = strap(occ, (0, 0, 16), (90, 0, 11), (0, 12))
     body = without(occ, body, [disc(occ, (0, 0, 8), (-1, 13)), disc(occ, (90, 0, 5), (-1, 13))])
     return rounded(
-        occ,
-        body,
-        1.0,
-        lambda at, along: abs(along[2]) < 0.5 and hypot(*at[:2]) > 9 and hypot(at[0] - 90, at[1]) > 6,
+        occ, body, 1.0, lambda at, along: abs(along[2]) < 0.5 and hypot(*at[:2]) > 9 and hypot(at[0] - 90, at[1]) > 6
     )
 
 
@@ -132,9 +117,7 @@ def ribbed_bell_crank(occ: Occ) -> int:
     hubs = [occ.addCone(*at, -8, 0, 0, 16, r, r - 1) for at, r in (((0, 0), 14), ((70, 0), 10), ((0, 55), 9))]
     body = joined(occ, [web, *ribs, *hubs])
     return without(
-        occ,
-        body,
-        [disc(occ, (0, 0, 8), (-9, 13)), disc(occ, (70, 0, 5), (-9, 13)), disc(occ, (0, 55, 4.5), (-9, 13))],
+        occ, body, [disc(occ, (0, 0, 8), (-9, 13)), disc(occ, (70, 0, 5), (-9, 13)), disc(occ, (0, 55, 4.5), (-9, 13))]
     )
 
 
@@ -152,16 +135,7 @@ def i_section_rod(occ: Occ) -> int:
 
 @part
 def bent_bracket(occ: Occ) -> int:
-    corners = [
-        (0, 0, 0),
-        (60, 0, 5),
-        (60, 40, 5),
-        (100, 40, 0),
-        (100, 43, 0),
-        (57, 43, 2),
-        (57, 3, 2),
-        (0, 3, 0),
-    ]
+    corners = [(0, 0, 0), (60, 0, 5), (60, 40, 5), (100, 40, 0), (100, 43, 0), (57, 43, 2), (57, 3, 2), (0, 3, 0)]
     body = plate(occ, corners, (0, 50))
     occ.synchronize()
     holes = [rod(occ, (x, -1, 25), (0, 60, 0), r) for x, r in ((20, 6), (85, 5))]
@@ -171,16 +145,7 @@ def bent_bracket(occ: Occ) -> int:
 
 @part
 def u_channel(occ: Occ) -> int:
-    corners = [
-        (-30, 40, 0),
-        (-30, 0, 6),
-        (30, 0, 6),
-        (30, 40, 0),
-        (27, 40, 0),
-        (27, 3, 3),
-        (-27, 3, 3),
-        (-27, 40, 0),
-    ]
+    corners = [(-30, 40, 0), (-30, 0, 6), (30, 0, 6), (30, 40, 0), (27, 40, 0), (27, 3, 3), (-27, 3, 3), (-27, 40, 0)]
     body = plate(occ, corners, (0, 80))
     return without(occ, body, [rod(occ, (-40, 25, z), (80, 0, 0), 5) for z in (20, 60)])
 
@@ -212,11 +177,7 @@ def crossing_bores(occ: Occ) -> int:
 def stepped_shaft(occ: Occ) -> int:
     body = joined(
         occ,
-        [
-            rod(occ, (0, 0, 0), (40, 0, 0), 10),
-            rod(occ, (40, 0, 0), (50, 0, 0), 15),
-            rod(occ, (90, 0, 0), (30, 0, 0), 8),
-        ],
+        [rod(occ, (0, 0, 0), (40, 0, 0), 10), rod(occ, (40, 0, 0), (50, 0, 0), 15), rod(occ, (90, 0, 0), (30, 0, 0), 8)],
     )
     return rounded(
         occ,
@@ -323,12 +284,7 @@ def spur_gear(occ: Occ) -> int:
     teeth, module = 24, 3.0
     pitch, corners = teeth * module / 2, []
     for k in range(teeth):
-        for angle, r in (
-            (-0.27, pitch - 3.7),
-            (-0.13, pitch + 2.9),
-            (0.13, pitch + 2.9),
-            (0.27, pitch - 3.7),
-        ):
+        for angle, r in ((-0.27, pitch - 3.7), (-0.13, pitch + 2.9), (0.13, pitch + 2.9), (0.27, pitch - 3.7)):
             phi = (2 * pi * k + 2 * pi * angle) / teeth
             corners.append((r * cos(phi), r * sin(phi), 0.0))
     body = plate(occ, corners, (0, 15))
@@ -371,11 +327,7 @@ def spoked_wheel(occ: Occ) -> int:
 def flanged_pipe(occ: Occ) -> int:
     body = joined(
         occ,
-        [
-            rod(occ, (0, 0, 0), (80, 0, 0), 20),
-            rod(occ, (0, 0, 0), (10, 0, 0), 40),
-            rod(occ, (70, 0, 0), (10, 0, 0), 36),
-        ],
+        [rod(occ, (0, 0, 0), (80, 0, 0), 20), rod(occ, (0, 0, 0), (10, 0, 0), 40), rod(occ, (70, 0, 0), (10, 0, 0), 36)],
     )
     bolts = [rod(occ, (-1, 31 * cos(k * pi / 3), 31 * sin(k * pi / 3)), (12, 0, 0), 4) for k in range(6)]
     body = without(occ, body, [rod(occ, (-1, 0, 0), (82, 0, 0), 16), *bolts])
@@ -484,11 +436,7 @@ def forged_rocker(occ: Occ) -> int:
     return without(
         occ,
         body,
-        [
-            rod(occ, (0, -15, 0), (0, 30, 0), 9),
-            rod(occ, (45, 0, -15), (0, 0, 26), 5),
-            occ.addSphere(-48, 0, 6, 7),
-        ],
+        [rod(occ, (0, -15, 0), (0, 30, 0), 9), rod(occ, (45, 0, -15), (0, 0, 26), 5), occ.addSphere(-48, 0, 6, 7)],
     )
 
 
@@ -517,11 +465,7 @@ def cylinder_barrel(occ: Occ) -> int:
 def gusseted_mount(occ: Occ) -> int:
     body = joined(
         occ,
-        [
-            box(occ, (0, 80), (0, 60), (0, 8)),
-            box(occ, (0, 8), (0, 60), (0, 60)),
-            *(prism_xz(occ, y) for y in (5, 49)),
-        ],
+        [box(occ, (0, 80), (0, 60), (0, 8)), box(occ, (0, 8), (0, 60), (0, 60)), *(prism_xz(occ, y) for y in (5, 49))],
     )
     holes = [disc(occ, (x, y, 4), (-1, 9)) for x in (40, 70) for y in (20, 40)]
     return without(occ, body, [rod(occ, (-1, 30, 35), (10, 0, 0), 12), *holes])
@@ -553,9 +497,7 @@ def tubular_wishbone(occ: Occ) -> int:
     eyes = [rod(occ, (x - 16, y, 0), (32, 0, 0), 14) for x, y in ends]
     body = joined(occ, [*arms, *eyes, disc(occ, (120, 0, 18), (-14, 14))])
     return without(
-        occ,
-        body,
-        [*(rod(occ, (x - 17, y, 0), (34, 0, 0), 9) for x, y in ends), disc(occ, (120, 0, 11), (-15, 15))],
+        occ, body, [*(rod(occ, (x - 17, y, 0), (34, 0, 0), 9) for x, y in ends), disc(occ, (120, 0, 11), (-15, 15))]
     )
 
 
@@ -627,9 +569,7 @@ def bored_block_in_inches(occ: Occ) -> int:
 @part
 def boom_in_metres(occ: Occ) -> int:
     shell = without(
-        occ,
-        box(occ, (0, 2.4), (-0.1, 0.1), (-0.15, 0.15)),
-        [box(occ, (-1, 3), (-0.085, 0.085), (-0.135, 0.135))],
+        occ, box(occ, (0, 2.4), (-0.1, 0.1), (-0.15, 0.15)), [box(occ, (-1, 3), (-0.085, 0.085), (-0.135, 0.135))]
     )
     body = joined(occ, [shell, *(rod(occ, (x, -0.12, 0.15), (0, 0.24, 0), 0.07) for x in (0.3, 2.1))])
     return without(occ, body, [rod(occ, (x, -0.13, 0.15), (0, 0.26, 0), 0.04) for x in (0.3, 2.1)])

@@ -29,11 +29,7 @@ HALF_EYE, HALF_FLANGE, HALF_WEB = 10.0, 8.0, 2.5  # heights
 BOLT, BOLT_HEAD, BOLT_AT = 7.0, 11.0, 26.0  # diameters, and how far from the crank pin's axis
 PISTON, BORE = 78.0, 78.6  # diameters
 SKIRT, CEILING, CROWN = -28.0, 27.0, 36.0  # x from the pin's axis
-GROOVES = (
-    (14.0, 3.0),
-    (21.0, 2.0),
-    (27.0, 2.0),
-)  # x from the pin's axis and width of a groove: oil ring, two others
+GROOVES = ((14.0, 3.0), (21.0, 2.0), (27.0, 2.0))  # x from the pin's axis and width of a groove: oil ring, two others
 GROOVE_DEPTH, RING_BEHIND, RING_GAP, RING_PLAY = 3.5, 0.2, 0.4, 0.05
 WALL, LAND, HALF_GAP, BOSS = 4.5, 4.0, 12.5, 34.0
 PIN_HOLE, PIN_HALF = 12.0, 33.0

@@ -90,10 +90,7 @@ def pieces(name: str) -> tuple[int, int, float]:
     with TemporaryDirectory() as folder:
         file, _ = catalogue.written(name, Path(folder))
         shape = Cad(file=file.name, scale=catalogue.UNITS.get(name))
-        with (
-            solid_model(PLACE, file, name, shape) as (gmsh, solid),
-            gmsh_copy(gmsh, 1 / solid.extent) as copy,
-        ):
+        with solid_model(PLACE, file, name, shape) as (gmsh, solid), gmsh_copy(gmsh, 1 / solid.extent) as copy:
             occ = copy.model.occ
             whole = copy.model.getEntities(3)
             tools = [each for face in cutting_faces(solid) for each in surface(copy, face, solid.extent)]

@@ -82,13 +82,7 @@ def capabilities_page() -> str:
     ]
     loads = [[kind, *(cell("loads", {"element": kind, "link": link}) for link in LINKS)] for kind in LOADS]
     lines = [
-        [
-            str(k),
-            f"`{each.of}`: {combination(each)}",
-            f"must {worded(each.must)}",
-            each.why,
-            worded(each.take),
-        ]
+        [str(k), f"`{each.of}`: {combination(each)}", f"must {worded(each.must)}", each.why, worded(each.take)]
         for k, each in enumerate(REFUSALS, start=1)
     ]
     return "\n".join((

@@ -156,11 +156,7 @@ def results_page() -> str:
     """The text of docs/results.md."""
     parts = [INTRODUCTION]
     for title, every in CHANNELS.items():
-        lines = [
-            f"## {title}\n",
-            "| channel | columns | unit | frame | meaning and sign |",
-            "|---|---|---|---|---|",
-        ]
+        lines = [f"## {title}\n", "| channel | columns | unit | frame | meaning and sign |", "|---|---|---|---|---|"]
         parts.append("\n".join([*lines, *map(_line, every)]) + "\n")
     return "\n".join(parts)
 

@@ -145,10 +145,7 @@ SECTIONS: list[tuple[str, str, Sequence[type[BaseModel]]]] = [
 ]
 
 NAMED = {
-    dict[expressions.ParameterName, expressions.Parameter]: (
-        "numbers, texts with units or expressions by name",
-        "",
-    ),
+    dict[expressions.ParameterName, expressions.Parameter]: ("numbers, texts with units or expressions by name", ""),
     patterns.Entries: ("tables by name", ""),
     points.Point: ("point", "m"),
     points.JointPoint: ("point, or points by link", "m"),

@@ -69,12 +69,7 @@ class Judged:
 def four_bar(speed: float, steps: int, links: Raw, revolutions: float = 1.0, **analysis: Any) -> Raw:
     raw = tomllib.loads((EXAMPLES / "four_bar_beams" / "scene.toml").read_text())
     raw["drive"]["motion"]["speed"] = f"{speed} rpm"
-    raw["analysis"] = {
-        "revolutions": revolutions,
-        "steps_per_revolution": steps,
-        "initial": "quasi-static",
-        **analysis,
-    }
+    raw["analysis"] = {"revolutions": revolutions, "steps_per_revolution": steps, "initial": "quasi-static", **analysis}
     for link in raw["links"].values():
         link.update(links)
     return raw
@@ -121,11 +116,7 @@ def cases() -> Iterator[Case]:
         yield Case(f"{speed} rpm, 2 beam5, 120 steps a turn", four_bar(speed, 120, beams("beam5", 2)), fine)
         rest = {"initial": "rest", "revolutions": 0.5}
         raw = four_bar(speed, 1440, beams("beam5", 1), **rest)
-        yield Case(
-            f"{speed} rpm, 1 beam5, from rest",
-            raw,
-            four_bar(speed, 11520, FINE, frames="co-rotational", **rest),
-        )
+        yield Case(f"{speed} rpm, 1 beam5, from rest", raw, four_bar(speed, 11520, FINE, frames="co-rotational", **rest))
     for model, tail in (("plane", []), ("solid", [1])):
         fine = four_bar(60, 1440, {"model": model, "mesh": {"elements": [16, 2, *tail]}}, 0.5)
         for along in (4, 8):

@@ -43,10 +43,7 @@ def linkage_scene(
 
 def bar(at: np.ndarray) -> dict[str, Any]:
     between = [list(at), list(at + np.array([0.1, 0.0, 0.0]))]
-    return {
-        "material": "steel",
-        "shape": {"kind": "bar", "between": between, "width": 0.01, "thickness": 0.01},
-    }
+    return {"material": "steel", "shape": {"kind": "bar", "between": between, "width": 0.01, "thickness": 0.01}}
 
 
 def joint(kind: str, one: str, other: str, at: Any, axis: Any = None) -> dict[str, Any]:

@@ -133,11 +133,7 @@ def _of_link(model: Model, k: int, block: Block, last: _Before | None) -> tuple[
 
 
 def _damped(
-    damping: Rayleigh,
-    fields: _Fields,
-    of: LinkHistory,
-    pose: tuple[np.ndarray, np.ndarray],
-    last: _Before | None,
+    damping: Rayleigh, fields: _Fields, of: LinkHistory, pose: tuple[np.ndarray, np.ndarray], last: _Before | None
 ) -> np.ndarray:
     """Impulse (T, 6) of damping forces in each step, at the mean of its ends, where they turn with the rigid links."""
     (p, R), link = pose, fields.link

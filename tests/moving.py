@@ -67,13 +67,7 @@ def beam_in_space(a: Sequence[float], b: Sequence[float], along: int = 4, up: An
     """A steel rod of round section."""
     section = {"kind": "round", "diameter": 0.02}
     shape = {"kind": "polyline", "points": [list(a), list(b)], "section": section, "up": list(up)}
-    return {
-        "model": "beam",
-        "beam": "spatial",
-        "material": "steel",
-        "shape": shape,
-        "mesh": {"elements": along},
-    }
+    return {"model": "beam", "beam": "spatial", "material": "steel", "shape": shape, "mesh": {"elements": along}}
 
 
 def cardan(kind: str = "cylindrical", bend: float = 0.4, **analysis: Any) -> dict[str, Any]:
@@ -85,22 +79,11 @@ def cardan(kind: str = "cylindrical", bend: float = 0.4, **analysis: Any) -> dic
     links["arm"] = beam_in_space(end, off, 2)
     joints: dict[str, Any] = {
         "A": {"kind": "revolute", "links": ["ground", "first"], "at": [-0.3, 0, 0], "axis": [1, 0, 0]},
-        "U": {
-            "kind": "universal",
-            "links": ["first", "second"],
-            "at": [0, 0, 0],
-            "axes": [[0, 0, 1], list(n)],
-        },
+        "U": {"kind": "universal", "links": ["first", "second"], "at": [0, 0, 0], "axes": [[0, 0, 1], list(n)]},
         "B": {"kind": kind, "links": ["second", "ground"], "at": end.tolist(), "axis": d.tolist()},
         "W": {"kind": "weld", "links": ["second", "arm"], "at": end.tolist()},
     }
-    steps = {
-        "revolutions": 0.5,
-        "steps_per_revolution": 360,
-        "initial": "quasi-static",
-        "rho_inf": 0.9,
-        **analysis,
-    }
+    steps = {"revolutions": 0.5, "steps_per_revolution": 360, "initial": "quasi-static", "rho_inf": 0.9, **analysis}
     return {"links": links, "joints": joints, "drive": turning("300 rpm"), "analysis": steps}
 
 
@@ -189,13 +172,7 @@ def screwed() -> dict[str, Any]:
         },
         "joints": {
             "A": {"kind": "revolute", "links": ["ground", "spindle"], "at": [0, 0, 0], "axis": [1, 0, 0]},
-            "S": {
-                "kind": "screw",
-                "links": ["nut", "spindle"],
-                "at": [0.2, 0, 0],
-                "axis": [1, 0, 0],
-                "lead": 0.02,
-            },
+            "S": {"kind": "screw", "links": ["nut", "spindle"], "at": [0.2, 0, 0], "axis": [1, 0, 0], "lead": 0.02},
             "G": {"kind": "prismatic", "links": ["nut", "ground"], "at": [0.2, 0.1, 0], "axis": [1, 0, 0]},
         },
         "drive": {"joint": "A", "motion": rising(3.0)},

@@ -21,11 +21,7 @@ IN_SPACE: dict[str, tuple[str, str, str]] = {
     "spherical": ("revolute J universal", "revolute universal J", "universal J prismatic"),
     "planar": ("J universal prismatic", "prismatic universal J", "universal J prismatic"),
     "slot": ("J universal", "universal J", "revolute J prismatic"),
-    "weld": (
-        "J spherical universal revolute",
-        "spherical universal revolute J",
-        "spherical universal J prismatic",
-    ),
+    "weld": ("J spherical universal revolute", "spherical universal revolute J", "spherical universal J prismatic"),
 }
 #: freedoms in the plane: three
 IN_PLANE: dict[str, tuple[str, str, str]] = {
@@ -58,22 +54,10 @@ def partner(kind: str, a: Any, b: Any, up: Any) -> Raw:
         case "plane":
             return bar("plane", a[:2], b[:2], 2)
         case _:
-            shape = {
-                "kind": "bar",
-                "between": [list(a), list(b)],
-                "width": 0.02,
-                "thickness": 0.02,
-                "up": list(up),
-            }
+            shape = {"kind": "bar", "between": [list(a), list(b)], "width": 0.02, "thickness": 0.02, "up": list(up)}
             more = {"reduction": 12} if kind == "reduced" else {}
             model = "rigid" if kind == "rigid" else "solid"
-            return {
-                "model": model,
-                "material": "steel",
-                "shape": shape,
-                "mesh": {"elements": [2, 1, 1]},
-                **more,
-            }
+            return {"model": model, "material": "steel", "shape": shape, "mesh": {"elements": [2, 1, 1]}, **more}
 
 
 def joint(kind: str, links: Sequence[str], at: Any, axis: Any) -> Raw:
@@ -169,13 +153,7 @@ def chain(
         joints[each if each == "J" else f"K{k}"] = made
     slides = driven and kind == "prismatic"
     motion = {"kind": "cycloidal", "travel" if slides else "angle": 0.02 if driven else 0.3, "rise": 0.03}
-    analysis = {
-        "end_time": 0.002,
-        "step": 5e-4,
-        "rho_inf": 0.8,
-        "initial": "quasi-static",
-        "accuracy": "quick",
-    }
+    analysis = {"end_time": 0.002, "step": 5e-4, "rho_inf": 0.8, "initial": "quasi-static", "accuracy": "quick"}
     return {
         "links": links, "joints": joints, "drive": {"joint": "J" if driven else "A", "motion": motion},
         "gravity": vector(flat * [2.0, -9.0, 3.0]), "analysis": analysis,

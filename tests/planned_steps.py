@@ -82,10 +82,7 @@ def cases() -> Iterator[tuple[str, Scene]]:
         yield f"{speed} rpm, beams, rigid-body", four_bar(speed, BEAMS)
         yield f"{speed} rpm, beams, co-rotational", four_bar(speed, BEAMS, frames="co-rotational")
         yield f"{speed} rpm, solids, rigid-body", four_bar(speed, SOLIDS)
-    yield (
-        "600 rpm, beams, co-rotational, from rest",
-        four_bar(600, BEAMS, frames="co-rotational", initial="rest"),
-    )
+    yield ("600 rpm, beams, co-rotational, from rest", four_bar(600, BEAMS, frames="co-rotational", initial="rest"))
 
 
 def main(say: Callable[[str], None] = print) -> None:
@@ -99,10 +96,7 @@ def main(say: Callable[[str], None] = print) -> None:
     ]  # fmt: skip
     for name, scene in cases():
         one = judged(scene)
-        steps, levels = (
-            round(time_grid(one.scene).steps / TURNS),
-            one.scene.analysis.extrapolation_levels or 1,
-        )
+        steps, levels = (round(time_grid(one.scene).steps / TURNS), one.scene.analysis.extrapolation_levels or 1)
         marches = " + ".join(f"{steps * 2**k:,}" for k in range(levels))
         seconds = ", ".join(f"{x:.1f} s" for x in one.seconds)
         lines.append(

@@ -53,13 +53,7 @@ def springs(d: Drawing, moved: set[str]) -> Raw:
         if name in moved or not d.chance(0.25):
             continue
         if made["kind"] in {"revolute", "cylindrical", "screw"}:
-            out[f"about{name}"] = {
-                "kind": "torsion",
-                "joint": name,
-                "stiffness": 3.0,
-                "damping": 0.05,
-                "preload": 0.3,
-            }
+            out[f"about{name}"] = {"kind": "torsion", "joint": name, "stiffness": 3.0, "damping": 0.05, "preload": 0.3}
         if made["kind"] in {"prismatic", "cylindrical"} and ("ground" in made["links"] or d.frames != "rigid-body"):
             out[f"along{name}"] = {"kind": "spring", "joint": name, **law}
     return out
@@ -90,21 +84,9 @@ def limits(d: Drawing, moved: set[str]) -> Raw:
         if name in moved or not d.chance(0.15):
             continue
         if made["kind"] in {"revolute", "cylindrical", "screw"}:
-            out[f"l{name}"] = {
-                "kind": "angle",
-                "joint": name,
-                "lower": -0.005,
-                "upper": 0.01,
-                "stiffness": 40.0,
-            }
+            out[f"l{name}"] = {"kind": "angle", "joint": name, "lower": -0.005, "upper": 0.01, "stiffness": 40.0}
         elif made["kind"] == "prismatic" and ("ground" in made["links"] or d.frames != "rigid-body"):
-            out[f"l{name}"] = {
-                "kind": "travel",
-                "joint": name,
-                "lower": -0.0005,
-                "upper": 0.001,
-                "stiffness": 2e3,
-            }
+            out[f"l{name}"] = {"kind": "travel", "joint": name, "lower": -0.0005, "upper": 0.001, "stiffness": 2e3}
     return out
 
 

@@ -111,11 +111,5 @@ def driven(seed: int, most: int = 8, frames: str = "rigid-body") -> Raw:
     probes = {name: {"link": name, "at": x[1].tolist(), "quantity": "displacement", "frame": "world"}
               for name, x in d.places.items() if d.kinds.get(name, "rigid") != "rigid"}  # fmt: skip
     raw["output"] = {"probes": probes}
-    raw["analysis"] = {
-        "kind": "quasi-static",
-        "end_time": 0.03,
-        "step": 0.015,
-        "accuracy": "quick",
-        "frames": frames,
-    }
+    raw["analysis"] = {"kind": "quasi-static", "end_time": 0.03, "step": 0.015, "accuracy": "quick", "frames": frames}
     return {key: x for key, x in raw.items() if x or key == "links"}

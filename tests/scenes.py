@@ -39,20 +39,12 @@ def arm(link: Mapping[str, Any], motion: Mapping[str, Any] | None, **sections: A
 
 
 def four_bar(
-    lengths: tuple[float, float, float, float],
-    link: Mapping[str, Any],
-    motion: Mapping[str, Any],
-    **sections: Any,
+    lengths: tuple[float, float, float, float], link: Mapping[str, Any], motion: Mapping[str, Any], **sections: Any
 ) -> Raw:
     """Crank, coupler, rocker and frame [m] from A to D, the crank drawn at 60°; `link` with a shape less its ends."""
     crank, coupler, rocker, frame = lengths
     ends = {"crank": ["A", "B"], "coupler": ["B", "C"], "rocker": ["C", "D"]}
-    pairs = {
-        "A": ["ground", "crank"],
-        "B": ["crank", "coupler"],
-        "C": ["coupler", "rocker"],
-        "D": ["rocker", "ground"],
-    }
+    pairs = {"A": ["ground", "crank"], "B": ["crank", "coupler"], "C": ["coupler", "rocker"], "D": ["rocker", "ground"]}
     return {
         "points": {
             "A": [0, 0], "D": [frame, 0],

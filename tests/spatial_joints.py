@@ -43,21 +43,12 @@ def cross(first: str, second: str, at: Any, held: Any) -> Raw:
     n = np.array(held, float) / np.linalg.norm(held)
     a = np.cross(n, [0.2, 0.5, 0.9])
     a /= np.linalg.norm(a)
-    return {
-        "kind": "universal",
-        "links": [first, second],
-        "at": list(at),
-        "axes": [a.tolist(), np.cross(n, a).tolist()],
-    }
+    return {"kind": "universal", "links": [first, second], "at": list(at), "axes": [a.tolist(), np.cross(n, a).tolist()]}
 
 
 def loop(one: Raw, two: Raw, last: Raw) -> Raw:
     """A crank about A, a rod, and a rocker on the ground."""
-    links = {
-        "crank": beam_in_space(HERE, P, 2),
-        "rod": beam_in_space(P, Q, 2),
-        "rocker": beam_in_space(Q, G, 2),
-    }
+    links = {"crank": beam_in_space(HERE, P, 2), "rod": beam_in_space(P, Q, 2), "rocker": beam_in_space(Q, G, 2)}
     return scene(links, {"A": hinge("ground", "crank"), "P": one, "J": two, "G": last})
 
 

@@ -96,7 +96,4 @@ def universal_rssr(psi: float) -> Joints:
     hinged = rssr(psi)
     C, arm = hinged["C1"][3:]
     other = hinged["C2"][4]
-    return {
-        **{name: hinged[name] for name in "ABD"},
-        "C": ("universal", "coupler", "rocker", C, (arm, other)),
-    }
+    return {**{name: hinged[name] for name in "ABD"}, "C": ("universal", "coupler", "rocker", C, (arm, other))}

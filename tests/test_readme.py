@@ -47,12 +47,7 @@ def test_the_scene_and_the_python_of_the_readme_run(
     said = capsys.readouterr().out
     assert "('x', 'y', 'z') m" in said
     assert re.search(r"highest stress \d+\.\d MPa in arm at t = 0\.\d+ s", said)
-    assert {p.name for p in Path("arm-results").iterdir()} >= {
-        "results.h5",
-        "animation.pvd",
-        "plots",
-        "worst.png",
-    }
+    assert {p.name for p in Path("arm-results").iterdir()} >= {"results.h5", "animation.pvd", "plots", "worst.png"}
     whole = scene.replace(scene[scene.index("[analysis]") : scene.index("[output.probes")], accurate)
     assert planned(scene_from(tomllib.loads(whole))).error < 0.02
 
@@ -69,11 +64,7 @@ def test_the_page_on_python_runs(
     assert re.search(r"\d+\.\d MPa in arm at \(.*\) m, t = 0\.\d+ s, drive ", said)
     assert "complete drive_angle rad" in said
     assert "steps" in known["stages"]  # type: ignore[operator]
-    for record, cells in (
-        (Run, r"^\| `Run`.*?\n\n"),
-        (Results, r"^\| `Results`.*?\n\n"),
-        (Peak, r"^`Peak`: .*"),
-    ):
+    for record, cells in ((Run, r"^\| `Run`.*?\n\n"), (Results, r"^\| `Results`.*?\n\n"), (Peak, r"^`Peak`: .*")):
         (text,) = re.findall(cells, page, re.DOTALL | re.MULTILINE)
         assert all(f"`{field.name}`" in text for field in fields(record))
 

@@ -42,11 +42,7 @@ def test_every_page_is_in_a_list_of_contents() -> None:
         page = todo.pop()
         found.add(page)
         todo |= linked(page) - found
-    generated = {
-        DOCS / "reference" / "messages.md",
-        DOCS / "reference" / "command-line.md",
-        *DOCS.glob("gallery/*"),
-    }
+    generated = {DOCS / "reference" / "messages.md", DOCS / "reference" / "command-line.md", *DOCS.glob("gallery/*")}
     pages = {*DOCS.rglob("*.md"), *DOCS.rglob("*.ipynb")} - {DOCS / "README.md"} - generated
     assert sorted(page.relative_to(DOCS).as_posix() for page in pages - found) == []
 

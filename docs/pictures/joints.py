@@ -183,16 +183,10 @@ JOINTS = (
     (_revolute, "released: rotation about axis\nconstrained: 3 displacements, 2 rotations"),
     (_prismatic, "released: travel along axis\nconstrained: 2 displacements, 3 rotations"),
     (_cylindrical, "released: travel along, rotation about axis\nconstrained: 2 displacements, 2 rotations"),
-    (
-        _screw,
-        "released: rotation, which is travel / lead · 2π\nconstrained: 2 displacements, 2 rotations, their ratio",
-    ),
+    (_screw, "released: rotation, which is travel / lead · 2π\nconstrained: 2 displacements, 2 rotations, their ratio"),
     (_spherical, "released: 3 rotations\nconstrained: 3 displacements"),
     (_universal, "released: rotations about both axes\nconstrained: 3 displacements, 1 rotation"),
-    (
-        _planar,
-        "released: 2 displacements across, rotation about axis\nconstrained: 1 displacement, 2 rotations",
-    ),
+    (_planar, "released: 2 displacements across, rotation about axis\nconstrained: 1 displacement, 2 rotations"),
     (_slot, "released: travel of the pin along axis, 3 rotations\nconstrained: 2 displacements"),
     (_weld, "released: nothing\nconstrained: 3 displacements, 3 rotations"),
 )
@@ -204,11 +198,7 @@ def main() -> None:
     for ax, (draw, words) in zip(axes.flat, JOINTS, strict=True):
         draw(Sheet(ax, draw.__name__[1:], words))
     figure.text(
-        0.5,
-        0.985,
-        "blue: the link that the coordinate is of; grey: the other; red: positive",
-        ha="center",
-        fontsize=11,
+        0.5, 0.985, "blue: the link that the coordinate is of; grey: the other; red: positive", ha="center", fontsize=11
     )
     figure.subplots_adjust(0.01, 0.045, 0.96, 0.95, 0.02, 0.24)
     figure.canvas.draw()

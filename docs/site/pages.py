@@ -8,10 +8,7 @@ from docs.site.gallery import write_gallery
 from docs.site.messages import messages
 
 ROOT = Path(__file__).parents[2]
-PAGES: dict[str, Callable[[], str]] = {
-    "reference/command-line.md": command_line,
-    "reference/messages.md": messages,
-}
+PAGES: dict[str, Callable[[], str]] = {"reference/command-line.md": command_line, "reference/messages.md": messages}
 
 
 def changed_text(place: Path, text: str) -> None:

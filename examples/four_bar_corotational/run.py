@@ -21,10 +21,7 @@ def main() -> None:
     peak = np.abs(y).max()
     off = {name: np.abs(stress(each) - y).max() / peak for name, each in (("linear", linear), ("stiffened", stiffened))}
     print(f"peak stress {peak / 1e6:.1f} MPa, exact beams {PEAK / 1e6:.1f} MPa")
-    print(
-        *(f"the {name} equation is off by {100 * error:.0f} % of it at worst" for name, error in off.items()),
-        sep="\n",
-    )
+    print(*(f"the {name} equation is off by {100 * error:.0f} % of it at worst" for name, error in off.items()), sep="\n")
     assert abs(peak / PEAK - 1) < 0.01
     assert 0.35 < off["linear"] < 0.45  # 40 % against exact beams
     assert off["stiffened"] < 0.6 * off["linear"]

@@ -190,8 +190,7 @@ def _analysed(
     errors = step.errors if step.levels > 1 else None
     idle = unstressed(ready.model, peak := highest(results.peaks))
     found = clock.timed(
-        "estimates",
-        lambda: Budget(()) if idle else budget(ready, seen, reduction, _in_memory(results, solvers), errors),
+        "estimates", lambda: Budget(()) if idle else budget(ready, seen, reduction, _in_memory(results, solvers), errors)
     )
     step = replace(step, errors=found.step or step.errors)
     steady, grows = _growing(ready, solvers)

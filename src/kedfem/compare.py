@@ -11,14 +11,7 @@ from kedfem.arrays import Float
 from kedfem.errors import OutputError
 from kedfem.output.plots.comparison import write_comparison
 from kedfem.results import Results, read_results, results_file
-from kedfem.results.differences import (
-    Difference,
-    Over,
-    common_abscissa,
-    differences,
-    differing_keys,
-    in_common,
-)
+from kedfem.results.differences import Difference, Over, common_abscissa, differences, differing_keys, in_common
 
 
 @dataclass(frozen=True, slots=True)

@@ -85,11 +85,7 @@ def _moved(scene: Scene, target: FilePath, watch: Watch) -> Moved:
     clock.timed("table", lambda: write_csv(results, target / TABLE))
     if scene.output.plots:
         clock.timed("plots", lambda: write_plots(results, target / PLOTS, scene.output.plots == "each"))
-    warnings = (
-        *assembly_warning(assembly),
-        *_missing(scene, linked, masses),
-        *_transmission(results, recorded),
-    )
+    warnings = (*assembly_warning(assembly), *_missing(scene, linked, masses), *_transmission(results, recorded))
     add_account(target / "results.h5", warnings, clock.seconds)
     results = replace(results, warnings=warnings, seconds=dict(clock.seconds))
     return Moved(target, results, recorded, clock.seconds, warnings)

@@ -17,15 +17,7 @@ from kedfem.dynamics.stepping.levels import in_balance, level_steps, leveled
 from kedfem.errors import OutputError, SceneError
 from kedfem.links.record import Link
 from kedfem.output.animation import write_collection
-from kedfem.output.static_decks import (
-    ELEMENTS,
-    reactions,
-    resultants,
-    supports,
-    write_case,
-    write_deck,
-    write_resultants,
-)
+from kedfem.output.static_decks import ELEMENTS, reactions, resultants, supports, write_case, write_deck, write_resultants
 from kedfem.results import Results, read_results, ready_folder, results_file
 from kedfem.results.forces.load_cases import LoadCase, Statics, load_case
 from kedfem.results.table import drive_heading

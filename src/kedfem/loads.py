@@ -14,15 +14,7 @@ from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.output.load_files import write_drive_load, write_joint_load, write_polar, write_summary
 from kedfem.results import Results, read_results, ready_folder, results_file
-from kedfem.results.forces.loads import (
-    DriveLoad,
-    JointLoad,
-    drive_loads,
-    drive_summary,
-    joint_loads,
-    last_turns,
-    summary,
-)
+from kedfem.results.forces.loads import DriveLoad, JointLoad, drive_loads, drive_summary, joint_loads, last_turns, summary
 from kedfem.scene import Scene, path_parameter, scene_from
 
 JOINTS, DRIVES = "joints.csv", "drives.csv"

@@ -216,11 +216,7 @@ ARM_LENGTH, ARM_SPEED, ARM_STOPS, ARM_STOPPING = 1.0, 15.0, 0.02, 0.005
 def cycloidal(angle: float, rise: float, t: float) -> tuple[float, float, float]:
     """A rise by x − sin(2πx)/2π, x = t/rise, that stops there."""
     x, w = min(t / rise, 1.0), 2 * np.pi
-    return (
-        angle * (x - np.sin(w * x) / w),
-        angle / rise * (1 - np.cos(w * x)),
-        angle / rise**2 * w * np.sin(w * x),
-    )
+    return (angle * (x - np.sin(w * x) / w), angle / rise * (1 - np.cos(w * x)), angle / rise**2 * w * np.sin(w * x))
 
 
 def stopping(t: float) -> tuple[float, float, float]:

@@ -83,11 +83,7 @@ def four_bar(rpm: float, ratio: float, elements: int, nodes: int = 3, slender: f
     motions, v = rigid(first), np.zeros(beams.size)
     for k, dof in enumerate(beams.dof):
         X, w = beams.q0[dof[:, :2]], motions.omega[k]
-        v[dof[:, 0]], v[dof[:, 1]], v[dof[:, 2]] = (
-            motions.v[k, 0] - w * X[:, 1],
-            motions.v[k, 1] + w * X[:, 0],
-            w,
-        )
+        v[dof[:, 0]], v[dof[:, 1]], v[dof[:, 2]] = (motions.v[k, 0] - w * X[:, 1], motions.v[k, 1] + w * X[:, 0], w)
     return problem, start(problem, beams.q0, v)
 
 

@@ -87,11 +87,7 @@ class Banded:
     def solution(self, Ke: np.ndarray, diagonal: np.ndarray, rhs: np.ndarray) -> np.ndarray:
         """The free part of the solution, (N,) with zeros at what is held."""
         *_, x, failed = lapack.dgbsv(
-            self.width,
-            self.width,
-            np.asfortranarray(self.band(Ke, diagonal)),
-            rhs[self.order],
-            overwrite_ab=1,
+            self.width, self.width, np.asfortranarray(self.band(Ke, diagonal)), rhs[self.order], overwrite_ab=1
         )
         if failed:
             raise NoConvergenceError(f"singular matrix, dgbsv says {failed}")

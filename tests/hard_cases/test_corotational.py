@@ -25,13 +25,7 @@ HINGE = {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}
 def bar(a: list[float], b: list[float], size: tuple[float, float], elements: int) -> dict[str, Any]:
     """A planar beam of elements with five nodes; height in the plane and thickness across it."""
     shape = {"kind": "bar", "between": [a, b], "width": size[0], "thickness": size[1]}
-    return {
-        "material": "m",
-        "model": "beam",
-        "element": "beam5",
-        "shape": shape,
-        "mesh": {"elements": elements},
-    }
+    return {"material": "m", "model": "beam", "element": "beam5", "shape": shape, "mesh": {"elements": elements}}
 
 
 def driven(motion: dict[str, Any], arm: dict[str, Any], material: dict[str, Any], **analysis: Any) -> dict[str, Any]:

@@ -30,12 +30,7 @@ def test_a_slender_beam_keeps_its_frequencies() -> None:
 
 def test_condensed_is_monolithic_on_a_slender_arm_in_space() -> None:
     """1 : 500, swung about an axis askew to its section; long and short steps."""
-    shape = {
-        "kind": "polyline",
-        "points": [[0, 0], [0.5, 0], [0.5, 0.5, 0.2]],
-        "width": 0.002,
-        "thickness": 0.001,
-    }
+    shape = {"kind": "polyline", "points": [[0, 0], [0.5, 0], [0.5, 0.5, 0.2]], "width": 0.002, "thickness": 0.001}
     for step in (1e-4, 1e-2):
         raw = {
             "links": {"arm": {"model": "beam", "material": "steel", "mesh": {"elements": 3}, "shape": shape}},

@@ -28,11 +28,7 @@ def examples(most: int) -> int:
 
 # shrinking is left out: a smaller seed is no simpler mesh
 LAW = settings(
-    max_examples=examples(20),
-    deadline=None,
-    derandomize=True,
-    database=None,
-    phases=[Phase.explicit, Phase.generate],
+    max_examples=examples(20), deadline=None, derandomize=True, database=None, phases=[Phase.explicit, Phase.generate]
 )
 VALID = 0.05  # least scaled Jacobian of a random element: det J > 0 at every node and Gauss point
 # any material serves a law; this one is not close to a special case (ν = 0, ν = 1/2)

@@ -16,10 +16,7 @@ Raw = dict[str, Any]
 L, H, E, P = 1.0, 0.02, 2.1e11, 100.0
 EI = E * H**4 / 12
 CORNERS = [[0, 0, 0], [L, 0, 0], [L, L, 0], [0, L, 0]]
-TURNS = {
-    "in the plane": np.eye(3),
-    "in space": np.array([[0.36, -0.8, 0.48], [0.48, 0.6, 0.64], [-0.8, 0, 0.6]]),
-}
+TURNS = {"in the plane": np.eye(3), "in space": np.array([[0.36, -0.8, 0.48], [0.48, 0.6, 0.64], [-0.8, 0, 0.6]])}
 
 
 def beam(points: Any, turn: np.ndarray) -> Raw:
@@ -37,12 +34,7 @@ def pulled(links: Raw, joints: Raw, turn: np.ndarray, frames: str, load: float) 
     wall = {"kind": "revolute", "links": ["frame", "ground"], "at": list(turn @ [L / 2, 0, 0])}
     wall["axis"] = list(turn @ [0, 0, 1])
     rest = {"kind": "table", "time": [0, 1], "angle": [0, 0]}
-    force = {
-        "kind": "force",
-        "link": next(reversed(links)),
-        "at": top,
-        "vector": list(load * (turn @ [0, 1, 0])),
-    }
+    force = {"kind": "force", "link": next(reversed(links)), "at": top, "vector": list(load * (turn @ [0, 1, 0]))}
     return {
         "materials": {"m": {"youngs_modulus": E, "poisson_ratio": 0.3, "density": 7850.0}},
         "links": links, "joints": {"wall": wall, **joints}, "loads": {"F": force},

@@ -276,13 +276,7 @@ def slow_four_bar(factor: float, follow: bool) -> dict[str, Any]:
             **({"frames": "co-rotational"} if follow else {}),
         },
         {"mesh": {"elements": 3}},
-        materials={
-            "alloy": {
-                "density": 2796,
-                "youngs_modulus": factor * 7.031e10,
-                "shear_modulus": factor * 2.712e10,
-            }
-        },
+        materials={"alloy": {"density": 2796, "youngs_modulus": factor * 7.031e10, "shear_modulus": factor * 2.712e10}},
         drive={"joint": "A", "motion": {"kind": "ramp", "speed": "60 rpm", "time": 0.3}},
         damping={"ratio": 0.3, "frequencies": [20, 200]},
     ).model_dump(mode="json", exclude_unset=True)
@@ -314,12 +308,7 @@ def test_the_same_whichever_way_the_whole_scene_is_turned(kind: str) -> None:
 
 def pendulum(kind: str, R: np.ndarray) -> dict[str, Any]:
     points = [list(R @ x) for x in ([0, 0, 0], [0.3, 0, 0], [0.3, 0.2, 0.1])]
-    hinge = {
-        "kind": "revolute",
-        "links": ["ground", "arm"],
-        "at": points[0],
-        "axis": list(R @ [0.3, 0.4, 1.0]),
-    }
+    hinge = {"kind": "revolute", "links": ["ground", "arm"], "at": points[0], "axis": list(R @ [0.3, 0.4, 1.0])}
     arm = {"material": "m", "model": "beam", "beam": "spatial", "mesh": {"elements": 2},
            "shape": {"kind": "polyline", "points": points, "width": 0.01, "thickness": 0.01}}  # fmt: skip
     if kind == "rigid":

@@ -32,10 +32,7 @@ def bead_on_an_arm(model: str = "rigid", torque: float = 0.0, stiffness: float =
         ends = [{"link": "bead", "at": [START, 0]}, {"link": "ground", "at": [0, 0]}]
         more["springs"] = {"s": {"kind": "spring", "between": ends, "stiffness": stiffness}}
     return {
-        "links": {
-            "bead": bar("beam", (START, -0.02), (START, 0.02), 2),
-            "arm": bar(model, (LOW, 0), (HIGH, 0), 8),
-        },
+        "links": {"bead": bar("beam", (START, -0.02), (START, 0.02), 2), "arm": bar(model, (LOW, 0), (HIGH, 0), 8)},
         "joints": {
             "A": {"kind": "revolute", "links": ["arm", "ground"], "at": [0, 0]},
             "S": {"kind": "slot", "links": ["bead", "arm"], "at": [START, 0], "axis": "x"},

@@ -142,12 +142,7 @@ def test_a_factor_over_the_travel_of_a_drive_is_one_over_time_there() -> None:
     raw, h = driven_slide(), 2e-3
     raw["analysis"] |= {"end_time": 0.1, "step": h, "accuracy": "quick"}
     load = {"kind": "force", "link": "one", "at": [0.3, 0], "vector": [0, 100.0]}
-    along = {
-        "over": "travel",
-        "at": [0.0, "40 mm", 0.1],
-        "value": [0.0, 1.0, -1.0],
-        "interpolation": "smooth",
-    }
+    along = {"over": "travel", "at": [0.0, "40 mm", 0.1], "value": [0.0, 1.0, -1.0], "interpolation": "smooth"}
     ready, blocks = ran({**raw, "loads": {"p": {**load, "factor": along}}})
     t = h / 4 * np.arange(201)
     value = load_factor(Factor(**along), t, path_parameter(ready.scene, t)[0])

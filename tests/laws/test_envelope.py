@@ -41,12 +41,7 @@ def scene(kind: str, frames: str = "rigid-body", **output: Any) -> dict[str, Any
     )  # fmt: skip
     if kind in {"solid", "beam"} and frames == "rigid-body":
         shape = raw["links"]["crank"]["shape"]
-        raw["links"]["crank"] = {
-            "material": "steel",
-            "shape": shape,
-            "model": "rigid",
-            "mesh": {"elements": [1, 1, 1]},
-        }
+        raw["links"]["crank"] = {"material": "steel", "shape": shape, "model": "rigid", "mesh": {"elements": [1, 1, 1]}}
     return raw
 
 
@@ -136,20 +131,9 @@ def test_no_animation_changes_the_highest_stress(tmp_path: Path) -> None:
 
 def angled(outline: list[Any], mesh: dict[str, Any]) -> dict[str, Any]:
     """An L of steel that bends at its inner corner (0.06, 0.02)."""
-    shape = {
-        "kind": "extrusion",
-        "outline": outline,
-        "holes": [{"at": [0, 0], "diameter": 0.012}],
-        "thickness": 0.01,
-    }
+    shape = {"kind": "extrusion", "outline": outline, "holes": [{"at": [0, 0], "diameter": 0.012}], "thickness": 0.01}
     link = {"material": "steel", "shape": shape, "mesh": mesh}
-    force = {
-        "kind": "surface",
-        "link": "arm",
-        "at": [0.07, 0.12, 0.0],
-        "vector": [1e6, 0, 0],
-        "frame": "link",
-    }
+    force = {"kind": "surface", "link": "arm", "at": [0.07, 0.12, 0.0], "vector": [1e6, 0, 0], "frame": "link"}
     return arm(
         link, constant_speed(1e-3), loads={"P": force},
         analysis={"end_time": 1e-3, "step": 5e-4, "initial": "quasi-static"},
@@ -178,12 +162,7 @@ def test_a_peak_at_a_corner_says_so_and_what_is_highest_away_from_it(tmp_path: P
     found = []
     for k, size in enumerate((0.01, 0.004)):
         raw = angled(SHARP, {"size": size})
-        raw["output"] = {
-            "folder": str(tmp_path / str(k)),
-            "plots": False,
-            "picture": False,
-            "animation": False,
-        }
+        raw["output"] = {"folder": str(tmp_path / str(k)), "plots": False, "picture": False, "animation": False}
         found.append(analyse(scene_from(raw)))
     peaks = [run.peak for run in found]
     for run, peak in zip(found, peaks, strict=True):
@@ -200,13 +179,7 @@ def test_a_peak_at_a_corner_says_so_and_what_is_highest_away_from_it(tmp_path: P
 
 
 def test_a_point_force_is_no_place_to_read_a_stress(tmp_path: Path) -> None:
-    force = {
-        "kind": "force",
-        "link": "arm",
-        "at": [0.25, 0.01, 0.01],
-        "vector": [0, -4e3, 0],
-        "frame": "link",
-    }
+    force = {"kind": "force", "link": "arm", "at": [0.25, 0.01, 0.01], "vector": [0, -4e3, 0], "frame": "link"}
     raw = arm(
         bar(mesh={"elements": [12, 2, 2]}), constant_speed(1e-3), loads={"P": force},
         analysis={"end_time": 1e-3, "step": 5e-4, "initial": "quasi-static"},

@@ -158,20 +158,10 @@ def test_a_mechanism_has_no_more_frequencies_than_motions(axis: np.ndarray, tmp_
     """
     m, c, inertia = 1.5, np.array([0.3, 0.1, 0.2]), [0.02, 0.03, 0.025, 0.003, 0.001, -0.002]
     J = float(axis @ (inertia_tensor(inertia) + m * (c @ c * np.eye(3) - np.outer(c, c))) @ axis)
-    raw: dict[str, Any] = {
-        "links": {},
-        "joints": {},
-        "springs": {},
-        "analysis": {"end_time": 1.0, "step": 0.1},
-    }
+    raw: dict[str, Any] = {"links": {}, "joints": {}, "springs": {}, "analysis": {"end_time": 1.0, "step": 0.1}}
     for name, centre, about, slid in (("one", c, 20.0, 4e4), ("two", -c, 30.0, 5e4)):
         raw["links"][name] = {"model": "rigid", "mass": m, "centre": centre.tolist(), "inertia": inertia}
-        raw["joints"][name] = {
-            "kind": "cylindrical",
-            "links": [name, "ground"],
-            "at": [0, 0, 0],
-            "axis": axis.tolist(),
-        }
+        raw["joints"][name] = {"kind": "cylindrical", "links": [name, "ground"], "at": [0, 0, 0], "axis": axis.tolist()}
         raw["springs"][f"about {name}"] = {"kind": "torsion", "joint": name, "stiffness": about}
         raw["springs"][f"along {name}"] = {"kind": "spring", "joint": name, "stiffness": slid}
     found = frequencies(scene_from(raw), Wanted(modes=8, positions=1), tmp_path / "out")

@@ -83,9 +83,7 @@ def test_is_sharp_for_affine_elements(nodes, seed):
 @given(hexahedra(), st.floats(1e-4, 1e4))
 def test_does_not_depend_on_the_unit_of_length(mesh, unit):
     for one, other in zip(
-        determinant_bounds(mesh.points, mesh.cells),
-        determinant_bounds(unit * mesh.points, mesh.cells),
-        strict=True,
+        determinant_bounds(mesh.points, mesh.cells), determinant_bounds(unit * mesh.points, mesh.cells), strict=True
     ):
         assert_allclose(one, other, rtol=1e-9, atol=ROUNDING)
 

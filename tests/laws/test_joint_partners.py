@@ -274,10 +274,7 @@ def without_contraction(kinds: tuple[str, str], frames: str) -> dict[str, Any]:
     raw = arm(("plane", "plane"), frames)
     raw["output"]["probes"] = {"tip": {"link": "one", "at": [0.2, 0.01, 0], "quantity": "displacement", "frame": "world"}}
     raw["materials"] = {"own": {"youngs_modulus": 2.1e11, "poisson_ratio": 0.0, "density": 7850.0}}
-    more = {
-        "solid": {"mesh": {"elements": [16, 2, 1]}, "element": "hex27"},
-        "rigid": {"mesh": {"elements": [1, 1, 1]}},
-    }
+    more = {"solid": {"mesh": {"elements": [16, 2, 1]}, "element": "hex27"}, "rigid": {"mesh": {"elements": [1, 1, 1]}}}
     for link, kind in zip(raw["links"].values(), kinds, strict=True):
         link |= {"model": kind, "material": "own", **more.get(kind, {})}
     return raw

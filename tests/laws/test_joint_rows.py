@@ -60,10 +60,7 @@ def assert_the_same(kind: str, one: Any, other: Any, R: np.ndarray, digits: floa
     size = max((np.abs(state(blocks, k, "g")).max() for k in links), default=0.0)  # all may be rigid
     for k in links:
         # of the functions of a beam in space some are slopes, whose values turn with their own directions
-        g, back = (
-            state(blocks, k, "g"),
-            R[: ready.model.links[k].d, : ready.model.links[k].d],
-        )  # of a plane link two
+        g, back = (state(blocks, k, "g"), R[: ready.model.links[k].d, : ready.model.links[k].d])  # of a plane link two
         assert_allclose(state(again, k, "g") @ back, g, atol=digits * size)
     here, there = channels(*one), channels(*other)
     # what statics determines of rigid links depends on which axes of the world their redundant directions lie along
@@ -72,10 +69,7 @@ def assert_the_same(kind: str, one: Any, other: Any, R: np.ndarray, digits: floa
     hinged = sum(joint.kind != "weld" for joint in ready.scene.joints.values())
     assert len(loads) >= 2 * hinged - 1  # a slider's guide: statics may not show its force
     force = max(np.abs(here[name]).max() for name in loads if name.endswith("force"))
-    for unit, arm in (
-        (("force",), 1.0),
-        (("moment", "torque"), LENGTH),
-    ):  # moments out of a plane are rounding
+    for unit, arm in ((("force",), 1.0), (("moment", "torque"), LENGTH)):  # moments out of a plane are rounding
         these = [name for name in loads if name.endswith(unit)]
         most = max([force * arm, *(np.abs(here[name]).max() for name in these)])
         for name in these:

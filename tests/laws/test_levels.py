@@ -175,10 +175,7 @@ def test_between_time_points_the_finest_level_is_corrected(kind: str, left: floa
     true, own = (over_time(blocks(kind, *march), "u") for march in ((480, 2), (240, 1)))
     for x, exact, alone in zip(over_time(found, "u"), true, own, strict=True):
         size = np.abs(exact).max()
-        error, before = (
-            np.abs(x[1::2] - exact[2::4]).max() / size,
-            np.abs(alone[1::2] - exact[2::4]).max() / size,
-        )
+        error, before = (np.abs(x[1::2] - exact[2::4]).max() / size, np.abs(alone[1::2] - exact[2::4]).max() / size)
         assert error < left * before
         assert error < 1e-3
 

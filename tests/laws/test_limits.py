@@ -64,20 +64,9 @@ class Bounce:
 
 
 def undriven(links: Raw, joint: Raw, limit: Raw, speed: float, end: float, count: int) -> Ran:
-    analysis = {
-        "end_time": end,
-        "step": end / count,
-        "rho_inf": 0.8,
-        "accuracy": "quick",
-        "initial_speeds": {"J": speed},
-    }
+    analysis = {"end_time": end, "step": end / count, "rho_inf": 0.8, "accuracy": "quick", "initial_speeds": {"J": speed}}
     return ran(
-        {
-            "links": links,
-            "joints": {"J": joint},
-            "limits": {"stop": {"joint": "J", **limit}},
-            "analysis": analysis,
-        }
+        {"links": links, "joints": {"J": joint}, "limits": {"stop": {"joint": "J", **limit}}, "analysis": analysis}
     )
 
 
@@ -166,14 +155,7 @@ def test_a_plane_pendulum_bounces_between_both_its_stops_and_loses_nothing_witho
 def test_a_motor_that_pushes_against_a_stop_is_borne_by_it(side: int) -> None:
     """It comes to rest at the limit and F/k beyond."""
     joint = {"kind": "prismatic", "links": ["ground", "block"], "at": [0.02, 0], "axis": "x"}
-    limit = {
-        "kind": "travel",
-        "joint": "J",
-        "lower": "-1 mm",
-        "upper": "1 mm",
-        "stiffness": 1e5,
-        "damping": 150.0,
-    }
+    limit = {"kind": "travel", "joint": "J", "lower": "-1 mm", "upper": "1 mm", "stiffness": 1e5, "damping": 150.0}
     run = ran({
         "links": {"block": bar("beam", (0, 0), (0.04, 0), 1)}, "joints": {"J": joint}, "limits": {"stop": limit},
         "motors": {"m": {"joint": "J", "force": side * 50.0}},
@@ -305,13 +287,7 @@ def test_a_march_that_stops_divide_goes_on_from_a_stored_state_bit_for_bit() -> 
 TURNS = ("revolute", "cylindrical", "screw")
 CELLS = [
     Cell(joint, frames, driven, links)
-    for links in (
-        "planar beams",
-        "plane on the ground",
-        "on the ground",
-        "beams in space",
-        "solid on the ground",
-    )
+    for links in ("planar beams", "plane on the ground", "on the ground", "beams in space", "solid on the ground")
     for joint in ("revolute", "prismatic", "cylindrical", "screw")
     for frames in ("rigid-body", "co-rotational")
     for driven in (True, False)

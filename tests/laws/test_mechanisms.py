@@ -60,11 +60,7 @@ def test_free_bodies_on_a_screw_that_spin_together_stay_where_they_are(turn: lis
 @pytest.mark.parametrize("turn", [[0.0, 0.0, 0.0], [0.7, -1.1, 0.4], [2.0, 0.5, -0.3]])
 def test_speeds_that_nobody_asked_for_are_the_same_in_a_scene_that_is_turned(turn: list[float]) -> None:
     """One joint of a loop has a speed; slides and rotations share what it leaves open by their size, a length."""
-    R, shift, raw = (
-        Rotation.from_rotvec(turn).as_matrix(),
-        np.array([0.3, -0.2, 0.5]),
-        mechanism(2039, most=6),
-    )
+    R, shift, raw = (Rotation.from_rotvec(turn).as_matrix(), np.array([0.3, -0.2, 0.5]), mechanism(2039, most=6))
     one, other = (scene_from(each) for each in (raw, turned(raw, R, shift)))
     (v, omega), (v2, omega2) = (initial_twists(scene, linkage(scene)) for scene in (one, other))
     assert np.abs(omega).max() > 0.5

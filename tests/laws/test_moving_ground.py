@@ -25,8 +25,7 @@ GROUND_MASS = 3.0
 ALONG = np.array([0.05, 0, 0])
 QUIET = {"plots": False, "picture": False, "animation": False}
 EVERY = pytest.mark.parametrize(
-    "axis",
-    [pytest.param(axis, id=name, marks=[pytest.mark.long] if name in "yz" else []) for name, axis in AXES.items()],
+    "axis", [pytest.param(axis, id=name, marks=[pytest.mark.long] if name in "yz" else []) for name, axis in AXES.items()]
 )
 
 
@@ -74,12 +73,7 @@ def travel(link: str, at: Any = (0, 0, 0)) -> Raw:
 def test_a_swinging_ground_moves_a_block_by_its_transmissibility(axis: Vector, tmp_path: Path) -> None:
     """X/Y = (k + i c ω)/(k − m ω² + i c ω) about −m g/k; the drive bears spring, damper and its own mass."""
     f, Y = 4.0, 0.01
-    raw = sprung(
-        axis,
-        {"kind": "harmonic", "travel": Y, "frequency": f, "phase": 0.4},
-        step=1 / (400 * f),
-        kind="steady",
-    )
+    raw = sprung(axis, {"kind": "harmonic", "travel": Y, "frequency": f, "phase": 0.4}, step=1 / (400 * f), kind="steady")
     found = run({**raw, "gravity": -G * axis}, tmp_path, block=travel("block", 0.3 * axis), road=travel("road"))
     w, y = 2 * np.pi * f, Y * np.exp(0.4j)
     x = y * (K + 1j * C * w) / (K - M * w**2 + 1j * C * w)
@@ -185,12 +179,7 @@ def cantilever() -> Raw:
     """Welded at one end, on a ball at a third of its length."""
     line = {"kind": "polyline", "points": [[0, 0, 0], [0.1, 0, 0], [0.3, 0.05, 0.1]]}
     section = {"kind": "rectangle", "width": 0.006, "thickness": 0.004}
-    beam = {
-        "model": "beam",
-        "material": "steel",
-        "shape": {**line, "section": section},
-        "mesh": {"elements": 4},
-    }
+    beam = {"model": "beam", "material": "steel", "shape": {**line, "section": section}, "mesh": {"elements": 4}}
     return {
         "links": {"beam": beam},
         "joints": {

@@ -15,13 +15,7 @@ from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_stress, stress_recovery
 from kedfem.links.solid import elastic_stiffness, gradient_products, pattern, solid_link
-from kedfem.links.surfaces.coupling_surfaces import (
-    face_surface,
-    is_flat,
-    joint_surface,
-    port_weights,
-    surface_weights,
-)
+from kedfem.links.surfaces.coupling_surfaces import face_surface, is_flat, joint_surface, port_weights, surface_weights
 from kedfem.mesh import QuadMesh
 from kedfem.mesh.elements.hexahedra import extruded, rectangle_quads
 from kedfem.mesh.elements.shape_functions import QUAD9, shape_gradients
@@ -42,11 +36,7 @@ from tests.laws.test_hexahedra import ROUNDING
 from tests.laws.test_loads_and_joints import Z, at_one_instant, kinetic_energy, point_acceleration
 
 planar_motions = st.builds(
-    lambda R, p, w, v: Motion(R, p * [1, 1, 0], w * [0, 0, 1], v * [1, 1, 0]),
-    planar_rotations,
-    vectors,
-    vectors,
-    vectors,
+    lambda R, p, w, v: Motion(R, p * [1, 1, 0], w * [0, 0, 1], v * [1, 1, 0]), planar_rotations, vectors, vectors, vectors
 )
 
 

@@ -305,12 +305,7 @@ def test_two_joints_on_one_bore_make_it_stiff_once() -> None:
     raw["joints"]["B"]["coupling"] = "rigid"
     once = energies(model_of(raw))
     raw["links"]["fork"] = raw["links"]["coupler"] | {"shape": {**PLATE, "between": ["B", [0.5, 0.9]]}}
-    raw["joints"]["fork"] = {
-        "kind": "weld",
-        "links": ["coupler", "fork"],
-        "at": "B",
-        "coupling": {"coupler": "rigid"},
-    }
+    raw["joints"]["fork"] = {"kind": "weld", "links": ["coupler", "fork"], "at": "B", "coupling": {"coupler": "rigid"}}
     assert energies(model_of(raw))[:2] == pytest.approx(once[:2], rel=1e-12)
 
 

@@ -163,9 +163,7 @@ def four_bars(speed: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(
-    ("raw", "count"),
-    [(arm("bar"), 6), (four_bars("150 rpm"), 9), (four_bars("400 rpm"), 9)],
-    ids=["arm", "slow", "fast"],
+    ("raw", "count"), [(arm("bar"), 6), (four_bars("150 rpm"), 9), (four_bars("400 rpm"), 9)], ids=["arm", "slow", "fast"]
 )
 def test_the_estimate_is_near_the_error(raw: dict[str, Any], count: int) -> None:
     full = meshed(scene_from(raw))

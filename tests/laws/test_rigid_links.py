@@ -26,10 +26,7 @@ def lifted(step: float, shapeless: bool) -> dict[str, Any]:
         given = {"model": "rigid", "mass": 2.5, "inertia": [8e-3, 4e-4, 8e-3, 0, 0, 0]}
         foot, rod = {**given, "centre": [0.5, -0.3, 0]}, {**given, "centre": [0.5, -0.1, 0]}
     lever = beam_in_space((0, 0, 0), (1, 0, 0), 2)
-    lever["shape"] |= {
-        "points": [[0, 0, 0], [0.5, 0, 0], [1, 0, 0]],
-        "section": {"kind": "round", "diameter": 0.1},
-    }
+    lever["shape"] |= {"points": [[0, 0, 0], [0.5, 0, 0], [1, 0, 0]], "section": {"kind": "round", "diameter": 0.1}}
     if not shapeless:
         lever = bar("beam", (0, 0), (1, 0), 4)
         lever["shape"] |= {"width": 0.1, "thickness": 0.06}

@@ -59,10 +59,7 @@ def test_torsion_of_a_rectangle_is_the_published(ratio: float, J: float, most: f
         assert section.torsion_constant == pytest.approx(J * ratio * 0.01**4, rel=2e-3)
     assert abs(torsion_stress(wide, 0, 0.005)[0]) == pytest.approx(most * 0.01, rel=2e-3)
     assert abs(torsion_stress(upright, 0.005, 0)[1]) == pytest.approx(most * 0.01, rel=2e-3)
-    for corner in (
-        torsion_stress(wide, 0.005 * ratio, 0.005),
-        torsion_stress(wide, 0.005 * ratio, 0.002)[:1],
-    ):
+    for corner in (torsion_stress(wide, 0.005 * ratio, 0.005), torsion_stress(wide, 0.005 * ratio, 0.002)[:1]):
         np.testing.assert_allclose(corner, 0, atol=1e-4)  # of 0.01: nothing crosses the edge
 
 

@@ -105,9 +105,5 @@ def test_a_block_in_balance_stays_there(way: str, guide: str, beam: str) -> None
 @pytest.mark.parametrize("way", TURNS)
 def test_so_does_a_block_in_balance_with_any_guide(way: str, guide: str) -> None:
     for beam in ("none", "on the block", "under the guide"):
-        if (way, guide, beam) != (
-            "y",
-            "spherical",
-            "none",
-        ):  # refused: a pivot of its step is rounding, not positive
+        if (way, guide, beam) != ("y", "spherical", "none"):  # refused: a pivot of its step is rounding, not positive
             assert_stays(guide, beam, way)

@@ -98,10 +98,7 @@ STRAIGHT = [
 @pytest.mark.parametrize(("constants", "curve"), STRAIGHT, ids=["length", "speed of ends", "angle", "speed of turn"])
 def test_a_straight_curve_is_a_spring_or_a_damper(constants: Raw, curve: Raw, frames: str) -> None:
     """In a driven four-bar whose links bend: joint forces, the drive's torque and probes are the same."""
-    ends = [
-        {"link": "coupler", "at": {"between": ["B", "C"], "fraction": 0.5}},
-        {"link": "ground", "at": "D"},
-    ]
+    ends = [{"link": "coupler", "at": {"between": ["B", "C"], "fraction": 0.5}}, {"link": "ground", "at": "D"}]
 
     def found(**law: Any) -> dict[str, np.ndarray]:
         place = {key: ends if key == "between" else constants[key] for key in ("kind", "between", "joint")
@@ -135,10 +132,7 @@ def test_along_a_slide_a_straight_curve_over_its_travel_is_a_spring() -> None:
     ids=["length", "speed", "time"],
 )  # fmt: skip
 def test_both_solvers_find_the_same(law: Raw, frames: str) -> None:
-    ends = [
-        {"link": "coupler", "at": {"between": ["B", "C"], "fraction": 0.5}},
-        {"link": "ground", "at": "D"},
-    ]
+    ends = [{"link": "coupler", "at": {"between": ["B", "C"], "fraction": 0.5}}, {"link": "ground", "at": "D"}]
     springs = {"s": {"kind": "spring", "between": ends, **law}}
     raw = four_bar(frames, steps=720, springs=springs, analysis={"rho_inf": 0.8, "initial": "rest"})
     assert against_oracle(begun(raw, frames=frames), 8) < 1e-7

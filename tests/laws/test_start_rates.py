@@ -42,8 +42,7 @@ def assert_starts(guided: str, way: str, frames: str) -> None:
 
 @pytest.mark.parametrize("frames", FRAMES)
 @pytest.mark.parametrize(
-    "guided",
-    ["planar", *(pytest.param(x, marks=pytest.mark.long) for x in MOUNTED if x not in {"shaft", "planar"})],
+    "guided", ["planar", *(pytest.param(x, marks=pytest.mark.long) for x in MOUNTED if x not in {"shaft", "planar"})]
 )
 @pytest.mark.parametrize("way", TURNS)
 def test_a_damped_mount_starts_with_the_rate_that_it_keeps(way: str, guided: str, frames: str) -> None:

@@ -206,12 +206,7 @@ ROUND = (0.0015, 0.0015)  # so thin that its rotary inertia does not count
 def spun(axis: Any, ratio: float, section: tuple[float, float], **more: Any) -> Raw:
     """A bar that is turned about its own axis at so many times its first frequency of bending."""
     way = np.asarray(AXES[axis])
-    shape = {
-        "kind": "bar",
-        "between": [[0, 0, 0], (0.5 * way).tolist()],
-        "width": section[0],
-        "thickness": section[1],
-    }
+    shape = {"kind": "bar", "between": [[0, 0, 0], (0.5 * way).tolist()], "width": section[0], "thickness": section[1]}
     joint = {"kind": "revolute", "links": ["ground", "shaft"], "at": [0, 0, 0], "axis": way.tolist()}
     return {
         "links": {"shaft": {"model": "beam", "material": "steel", "shape": shape, "mesh": {"elements": 2}}},
@@ -308,11 +303,7 @@ def test_a_shaft_at_its_own_frequency_neither_grows_nor_decays() -> None:
 
 def test_growth_that_levels_in_time_do_not_agree_on_is_not_told() -> None:
     """Stiff modes of a bar that turns by 4° in a step: 44 and 1 in a turn, of a stable shaft."""
-    raw = spun(
-        "oblique",
-        float(0.85 * clamped(spun("oblique", 100.0, (0.012, 0.01)), "oblique")[0][0]),
-        (0.012, 0.01),
-    )
+    raw = spun("oblique", float(0.85 * clamped(spun("oblique", 100.0, (0.012, 0.01)), "oblique")[0][0]), (0.012, 0.01))
     raw["analysis"] = {"steps_per_revolution": 90, "extrapolation_levels": 2}
     of = steady(raw)[2]
     assert max(of.levels) > 10 * min(of.levels)

@@ -130,13 +130,7 @@ def test_a_bar_under_too_much_pressure_buckles() -> None:
     euler = np.pi**2 * E * HEIGHT**4 / 12 / 4 / LENGTH**2
 
     def pressed(share: float) -> Raw:
-        load = {
-            "kind": "force",
-            "link": "arm",
-            "at": [LENGTH, 0, 0],
-            "vector": [-share * euler, 0, 0],
-            "frame": "link",
-        }
+        load = {"kind": "force", "link": "arm", "at": [LENGTH, 0, 0], "vector": [-share * euler, 0, 0], "frame": "link"}
         return arm("spatial beam", 1e-3, loads={"P": load})
 
     _, motion, solver = stiffened(pressed(0.98))

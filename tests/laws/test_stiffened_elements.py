@@ -30,11 +30,7 @@ from tests.verification.stiffening import HEIGHT, LENGTH, RUBBER
 
 EI = RUBBER.youngs_modulus * HEIGHT**4 / 12
 #: kind of link and its direction
-ARMS = [
-    ("planar beam", "z"),
-    ("plane", "z"),
-    *((kind, turn) for kind in ("spatial beam", "solid") for turn in AXES),
-]
+ARMS = [("planar beam", "z"), ("plane", "z"), *((kind, turn) for kind in ("spatial beam", "solid") for turn in AXES)]
 DEAR = [x if x[1] == "oblique" or x[0] == "planar beam" else pytest.param(*x, marks=pytest.mark.long) for x in ARMS]
 PULLS = (1.5, -1.2)  # N L²/EI; a column on its foot buckles at −2.47
 
@@ -145,12 +141,7 @@ def swung(size: float, **analysis: Any) -> Raw:
     links = {name: bar("beam", *(places[end] for end in ends), 4) for name, ends in pairs.items()}
     for link in links.values():
         link["shape"] |= {"width": 0.006, "thickness": 0.006}
-    held = {
-        "A": ("ground", "crank"),
-        "B": ("crank", "coupler"),
-        "C": ("coupler", "rocker"),
-        "D": ("rocker", "ground"),
-    }
+    held = {"A": ("ground", "crank"), "B": ("crank", "coupler"), "C": ("coupler", "rocker"), "D": ("rocker", "ground")}
     joints = {name: {"kind": "revolute", "links": list(held[name]), "at": list(at)} for name, at in places.items()}
     ends = [{"link": "rocker", "at": [0.4, 0.3]}, {"link": "ground", "at": [0.45, 0.9]}]
     springs = {"s": {"kind": "spring", "between": ends, "stiffness": 400.0 * size, "preload": 600.0 * size}}

@@ -26,11 +26,7 @@ def spinning(arm: Raw, step: float) -> Raw:
 
 def four_bar(step: float, sprung: bool = False) -> Raw:
     """A four-bar of thin beams, with a spring that pulls its rocker if asked for."""
-    places = {
-        "crank": [[0, 0], [0.1, 0]],
-        "coupler": [[0.1, 0], [0.3, 0.2]],
-        "rocker": [[0.3, 0.2], [0.3, -0.05]],
-    }
+    places = {"crank": [[0, 0], [0.1, 0]], "coupler": [[0.1, 0], [0.3, 0.2]], "rocker": [[0.3, 0.2], [0.3, -0.05]]}
     links = {name: bar("beam", *ends, 4) for name, ends in places.items()}
     for link in links.values():
         link["shape"]["width"] = 0.008

@@ -33,13 +33,7 @@ EVERY = [
 
 
 def fast(raw: Raw, on: bool = True, speed: float = SPEED) -> Raw:
-    raw["analysis"] |= {
-        "frames": "rigid-body",
-        "stiffening": on,
-        "initial": "rest",
-        "end_time": 3e-3,
-        "step": 2e-4,
-    }
+    raw["analysis"] |= {"frames": "rigid-body", "stiffening": on, "initial": "rest", "end_time": 3e-3, "step": 2e-4}
     raw["analysis"].pop("revolutions", None)
     joint = raw["drive"]["joint"]
     sliding = raw["joints"][joint]["kind"] == "prismatic"
@@ -84,19 +78,14 @@ def test_stresses_of_constrained_joints_turn_with_the_scene(cell: tuple[str, tup
 @pytest.mark.parametrize(
     "cell", [*EVERY, ("revolute", ("planar beam", "planar beam"), False), ("slot", ("plane", "plane"), False)], ids=named
 )  # fmt: skip
-def test_quasi_static_starts_and_positions_solve_the_assembled_equations(
-    cell: tuple[str, tuple[str, str], bool],
-) -> None:
+def test_quasi_static_starts_and_positions_solve_the_assembled_equations(cell: tuple[str, tuple[str, str], bool]) -> None:
     """With what stresses of the rigid-body motion stiffen."""
     kind, partners, driven = cell
     plane = partners[0].startswith("plan")
     raw = fast(chain(kind, partners, driven, plane), speed=10.0 if plane else SPEED)
     del raw["analysis"]["initial"]
     ready = meshed(scene_from({**raw, "analysis": {**raw["analysis"], "initial": "quasi-static"}}))
-    of, motion_at = (
-        steps_of(ready.scene, ready.model).ready,
-        motion_of(ready.scene, ready.linkage, ready.path),
-    )
+    of, motion_at = (steps_of(ready.scene, ready.model).ready, motion_of(ready.scene, ready.linkage, ready.path))
     wanted = assembled_deflection(of, motion_at(np.zeros(1)))
     for found in (quasi_static(of, motion_at), quasi_static_position(of, motion_at, 0.0)):
         assert_allclose(rows(of, found.u[None])[0], wanted, rtol=0, atol=1e-6 * np.abs(wanted).max())

@@ -81,8 +81,7 @@ def test_linear_starts_take_few_solutions(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 @pytest.mark.parametrize(
-    "kind",
-    ["screw", *(pytest.param(x, marks=pytest.mark.long) for x in KINDS if x not in {"bushings", "screw"})],
+    "kind", ["screw", *(pytest.param(x, marks=pytest.mark.long) for x in KINDS if x not in {"bushings", "screw"})]
 )
 def test_quasi_static_starts_solve_the_assembled_equations(kind: str) -> None:
     """Of rigid-body frames, without dampers, which feel rates."""

@@ -51,13 +51,7 @@ def arm(kind: str, R: np.ndarray, elements: int = 2) -> Raw:
 def loads(kind: str, R: np.ndarray) -> dict[str, Raw]:
     """One of each that turns with its link."""
     tip, side = (R @ [0.5, 0, 0]).tolist(), (R @ [0.13, 0.01, 0]).tolist()
-    force = {
-        "kind": "force",
-        "link": "arm",
-        "at": tip,
-        "vector": (R @ [30, 80, 20]).tolist(),
-        "frame": "link",
-    }
+    force = {"kind": "force", "link": "arm", "at": tip, "vector": (R @ [30, 80, 20]).tolist(), "frame": "link"}
     torque = {"kind": "torque", "link": "arm", "at": tip, "vector": (R @ [4, 2, 5]).tolist(), "frame": "link"}
     if kind in {"beam", "plane"}:
         force |= {"at": tip[:2], "vector": [30, 80]}

@@ -85,13 +85,7 @@ def test_edges_are_refused_where_nothing_tells_of_stability(tmp_path: Path) -> N
     def said(width: float = 1e-3, axes: Any = axes, **analysis: Any) -> str:
         scene = {**raw, "analysis": {**raw["analysis"], **analysis}}
         with pytest.raises(SceneError) as found:
-            sweep(
-                Base(scene, tmp_path, "s"),
-                axes,
-                Asked(quick=True, edges=width),
-                tmp_path / "o",
-                executor=Inline(),
-            )
+            sweep(Base(scene, tmp_path, "s"), axes, Asked(quick=True, edges=width), tmp_path / "o", executor=Inline())
         return str(found.value)
 
     assert "--edges: must be a relative width from 1e-09 to below 1, such as 0.001, got 2" in said(2.0, kind="steady")
@@ -216,8 +210,7 @@ def marched_growth(raw: Raw, rpm: float, turns: int) -> float:
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("linkage", "between", "turns"),
-    [(plane_four_bar, (6200, 6400), 160), (plane_slider_crank, (3300, 3600), 40)],
+    ("linkage", "between", "turns"), [(plane_four_bar, (6200, 6400), 160), (plane_slider_crank, (3300, 3600), 40)]
 )
 def test_an_edge_is_the_same_by_reduced_links_full_ones_and_growth_in_a_march(
     linkage: Callable[[bool], Raw], between: tuple[float, float], turns: int

@@ -24,10 +24,7 @@ from tests.rooms.test_dynamics import four_bar
 from tests.rooms.test_mesh_files import box
 from tests.scenes import example
 
-READING, REDUCING = (
-    2.0,
-    20.0,
-)  # seconds of processor time that one may take; what meshes runs in a process of its own
+READING, REDUCING = (2.0, 20.0)  # seconds of processor time that one may take; what meshes runs in a process of its own
 MESHES = ("msh", "unv", "bdf", "med", "mesh", "vtk", "inp", "vtu", "xdmf")
 
 

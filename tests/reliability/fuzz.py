@@ -23,13 +23,7 @@ from tests.rooms.test_bad_scenes import BEAMS, GOOD
 from tests.scenes import EXAMPLES, example
 
 VALIDATION, RUN = 2.0, 60.0  # seconds of processor time that one may take
-QUICK = (
-    "four_bar_beams",
-    "four_bar_corotational",
-    "motor_four_bar",
-    "spinning_bar",
-    "rssr",
-)  # bases of whole runs
+QUICK = ("four_bar_beams", "four_bar_corotational", "motor_four_bar", "spinning_bar", "rssr")  # bases of whole runs
 
 
 def bases() -> dict[str, Raw]:

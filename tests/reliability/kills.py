@@ -254,8 +254,7 @@ def short_of(ground: Ground, what: str, limit: int = 0) -> None:
     running = started(folder, **how)
     if what == "folder removed":
         _wait(
-            lambda: time.monotonic() - began > 0.7 * ground.takes or running.poll() is not None,
-            began := time.monotonic(),
+            lambda: time.monotonic() - began > 0.7 * ground.takes or running.poll() is not None, began := time.monotonic()
         )
         rmtree(results, ignore_errors=True)
     code, said = finished(running)

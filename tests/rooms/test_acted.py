@@ -23,12 +23,7 @@ LINE = {"kind": "spring", "between": [{"link": "coupler", "at": "C"}, {"link": "
 
 def four_bar(frames: str, model: str = "beam", steps: int = 180, **rest: Any) -> dict[str, Any]:
     """A slow four-bar of steel, a quarter of a turn."""
-    analysis = {
-        "revolutions": 0.25,
-        "steps_per_revolution": steps,
-        "frames": frames,
-        "initial": "quasi-static",
-    }
+    analysis = {"revolutions": 0.25, "steps_per_revolution": steps, "frames": frames, "initial": "quasi-static"}
     mesh = {"elements": 2} if model == "beam" else {}
     kind = {"model": "solid", "reduction": "modal"} if model == "reduced" else {"model": model}
     shape = {"kind": "bar", "width": 0.02, "thickness": 0.01}
@@ -71,13 +66,7 @@ def line(load: float) -> dict[str, Any]:
     """A spring with damper and a torsion spring whose forces are all in proportion to a load."""
     return {
         "s": {**LINE, "stiffness": 10 * load, "damping": 0.1 * load, "preload": load},
-        "t": {
-            "kind": "torsion",
-            "joint": "D",
-            "stiffness": 0.1 * load,
-            "damping": 1e-3 * load,
-            "preload": 0.01 * load,
-        },
+        "t": {"kind": "torsion", "joint": "D", "stiffness": 0.1 * load, "damping": 1e-3 * load, "preload": 0.01 * load},
     }
 
 

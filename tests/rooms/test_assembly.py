@@ -240,11 +240,7 @@ def test_it_moves_as_the_four_bar_that_is_drawn_with_these_lengths() -> None:
 def test_slides_may_be_drawn_apart_along_their_axis() -> None:
     joints = slider_crank(0.1, 0.3, 0.8)
     A, B, C = (np.asarray(joints[name][3]) for name in "ABC")
-    links: dict[str, Any] = {
-        "crank": line(A, B),
-        "rod": line(B, C),
-        "slider": {"model": "rigid", "mass": 1.0},
-    }
+    links: dict[str, Any] = {"crank": line(A, B), "rod": line(B, C), "slider": {"model": "rigid", "mass": 1.0}}
     raw = raw_scene(joints, links)
     raw["joints"]["guide"]["at"] = {"slider": list(C), "ground": [0.1, 0.0]}
     closed, assembly = assembled(scene_from(raw))
@@ -301,14 +297,7 @@ def arm(**sections: Any) -> dict[str, Any]:
 def test_everything_on_a_link_goes_with_it(shift: Shift) -> None:
     inertia = (0.02, 0.03, 0.04, 0.001, -0.002, 0.003)
     force = {"kind": "force", "link": "arm", "at": [0.4, 0], "vector": [1.0, 2.0]}
-    body = {
-        "kind": "rigid_body",
-        "link": "arm",
-        "at": [0, 0],
-        "mass": 1.0,
-        "inertia": list(inertia),
-        "centre": [0, 0.01],
-    }
+    body = {"kind": "rigid_body", "link": "arm", "at": [0, 0], "mass": 1.0, "inertia": list(inertia), "centre": [0, 0.01]}
     ends = [{"link": "arm", "at": [0.4, 0]}, {"link": "ground", "at": [0.4, 1]}]
     raw = arm(
         loads={"world": force, "link": {**force, "frame": "link"}},
@@ -344,12 +333,7 @@ def test_everything_on_a_link_goes_with_it(shift: Shift) -> None:
 
 def test_plates_go_with_their_outline_and_holes() -> None:
     outline = [[-0.02, -0.02], [0.4, -0.02], {"via": [0.42, 0.0], "to": [0.4, 0.02]}, [-0.02, 0.02]]
-    plate = {
-        "kind": "extrusion",
-        "outline": outline,
-        "holes": [{"at": [0, 0], "diameter": 0.01}],
-        "thickness": 0.01,
-    }
+    plate = {"kind": "extrusion", "outline": outline, "holes": [{"at": [0, 0], "diameter": 0.01}], "thickness": 0.01}
     raw = arm()
     raw["links"]["arm"] = {"material": "steel", "shape": plate, "mesh": {"size": 0.02}}
     before = scene_from(raw)
@@ -362,13 +346,7 @@ def test_plates_go_with_their_outline_and_holes() -> None:
 
 
 @pytest.mark.parametrize(
-    "keys",
-    [
-        {},
-        {"z": "y"},
-        {"origin": [0.1, 0.2], "towards": [0.1, 0.2, 1.0]},
-        {"towards": [1.0, 0.5, 0.2], "z": "x"},
-    ],
+    "keys", [{}, {"z": "y"}, {"origin": [0.1, 0.2], "towards": [0.1, 0.2, 1.0]}, {"towards": [1.0, 0.5, 0.2], "z": "x"}]
 )
 @pytest.mark.parametrize("shift", [SHIFT, TILT])
 def test_parts_from_cad_are_placed_where_their_link_goes(shift: Shift, keys: dict[str, Any], tmp_path: Path) -> None:
@@ -388,11 +366,7 @@ def test_meshes_from_files_are_placed_where_their_link_goes(tmp_path: Path) -> N
     cube = np.array([[x, y, z] for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))], float)
     meshio.Mesh(0.1 * cube, [("hexahedron", np.arange(8)[None])]).write(tmp_path / "cube.vtu")
     raw = arm()
-    raw["links"]["arm"] = {
-        "material": "steel",
-        "shape": {"kind": "mesh", "file": "cube.vtu"},
-        "element": "hex8",
-    }
+    raw["links"]["arm"] = {"material": "steel", "shape": {"kind": "mesh", "file": "cube.vtu"}, "element": "hex8"}
     before = scene_from(raw, tmp_path)
     one, other = (
         link_mesh("arm", scene.links["arm"], tmp_path) for scene in (before, closed_scene(before, {"arm": TILT}))
@@ -421,11 +395,7 @@ def test_bars_tilt_as_lines_do() -> None:
         raw = apart_rssr()
         P, _, Q = raw["links"]["coupler"]["shape"]["points"]
         size = {"width": 0.02, "thickness": 0.01}
-        raw["links"]["coupler"]["shape"] = {
-            "kind": kind,
-            "between" if kind == "bar" else "points": [P, Q],
-            **size,
-        }
+        raw["links"]["coupler"]["shape"] = {"kind": kind, "between" if kind == "bar" else "points": [P, Q], **size}
         return assembled(scene_from(raw))[0].links["coupler"].shape
 
     bar, line = coupler("bar"), coupler("polyline")

@@ -51,12 +51,7 @@ def audited_too(raw: dict[str, Any]) -> tuple[Balance, dict[str, np.ndarray], Mo
 def example(name: str, steps: int, links: dict[str, Any] | None = None, **analysis: Any) -> dict[str, Any]:
     """A quarter of a turn of an example."""
     raw = scenes.example(name)
-    raw["analysis"] = {
-        "revolutions": 0.25,
-        "steps_per_revolution": steps,
-        "initial": "quasi-static",
-        **analysis,
-    }
+    raw["analysis"] = {"revolutions": 0.25, "steps_per_revolution": steps, "initial": "quasi-static", **analysis}
     for link in raw["links"].values():
         link.update(links or {})
     return raw
@@ -73,11 +68,7 @@ KINDS: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
     "spatial beams": ("four_bar_beams", {"beam": "spatial"}, {}),
     "beams that are followed": ("four_bar_beams", {"mesh": {"elements": 2}}, {"frames": "co-rotational"}),
     "planes": ("four_bar_beams", {"model": "plane"}, {}),
-    "planes that are followed": (
-        "four_bar_beams",
-        {"model": "plane", "segments": 2},
-        {"frames": "co-rotational"},
-    ),
+    "planes that are followed": ("four_bar_beams", {"model": "plane", "segments": 2}, {"frames": "co-rotational"}),
     "reduced planes": ("four_bar_beams", {"model": "plane", "reduction": "modal"}, {}),
     "solids": ("four_bar_solids", {"mesh": {"size": 0.05}}, {}),
     "reduced solids": ("four_bar_solids", {"reduction": "modal"}, {}),
@@ -92,11 +83,7 @@ def test_what_the_steps_leave_over_falls_with_the_square_of_the_step(kind: str) 
     name, links, analysis = KINDS[kind]
     found = [audited_too(example(name, steps, links, **analysis)) for steps in (360, 720)]
     (energy, _, long), (half, _, short) = found
-    for one, other in (
-        (energy.energy, half.energy),
-        (long.linear, short.linear),
-        (long.angular, short.angular),
-    ):
+    for one, other in ((energy.energy, half.energy), (long.linear, short.linear), (long.angular, short.angular)):
         assert 3.7 < one / other < 4.3  # second order: 4
         assert other < 2e-3
     for one, other in ((energy.neglected, half.neglected), (long.turned, short.turned)):

@@ -17,13 +17,7 @@ from kedfem.mesh.session import gmsh_model
 from kedfem.scene import LinkScene
 
 BAR = {"kind": "bar", "between": [[0, 0], [1, 0]], "width": 0.1, "thickness": 0.1}
-PLATE = {
-    "kind": "plate_link",
-    "between": [[0, 0], [0.2, 0]],
-    "width": 0.04,
-    "thickness": 0.01,
-    "bore_diameter": 0.02,
-}
+PLATE = {"kind": "plate_link", "between": [[0, 0], [0.2, 0]], "width": 0.04, "thickness": 0.01, "bore_diameter": 0.02}
 SQUARE = {"kind": "extrusion", "outline": [[0, 0], [1, 0], [1, 1], [0, 1]], "thickness": 0.1}
 CUBE = (HEX8 + 1) / 2
 CORNERS = np.arange(8)[None]

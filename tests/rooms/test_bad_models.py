@@ -114,14 +114,7 @@ def test_body_on_no_coupling_surface() -> None:
 
 def body() -> dict[str, Any]:
     inertia = [1e-3, 1e-3, 1e-3, 0, 0, 0]
-    return {
-        "kind": "rigid_body",
-        "link": "arm",
-        "at": [0.5, 0],
-        "mass": 1,
-        "inertia": inertia,
-        "centre": [0.5, 0],
-    }
+    return {"kind": "rigid_body", "link": "arm", "at": [0.5, 0], "mass": 1, "inertia": inertia, "centre": [0.5, 0]}
 
 
 def test_full_inertia_on_a_flat_face() -> None:

@@ -18,15 +18,9 @@ REFUSED = [
     (bad_cad.binary, r"links.arm.file: must hold STEP, as its ending says, got another text in"),
     (bad_cad.truncated, r"links.arm.file: must be a whole file of STEP, got one that breaks off"),
     (bad_cad.header_only, r"links.arm.file: must be a file that OpenCASCADE can read as STEP, got"),
-    (
-        bad_cad.open_shell,
-        r"links.arm.file: must hold a solid, got faces that do not close \(7 of them, 4 free edges",
-    ),
+    (bad_cad.open_shell, r"links.arm.file: must hold a solid, got faces that do not close \(7 of them, 4 free edges"),
     (bad_cad.wires, r"links.arm.file: must hold a solid, got 1 curves and no faces"),
-    (
-        bad_cad.two_solids,
-        r"links.arm.shape.solid: is required, or a solid called 'arm' like the link, .* left, right",
-    ),
+    (bad_cad.two_solids, r"links.arm.shape.solid: is required, or a solid called 'arm' like the link, .* left, right"),
     (bad_cad.same_names, r"links.arm.shape.solid: is required, .* arm 1, arm 2"),
     (bad_cad.overlapping, r"links.arm.shape.solid: is required, .* first, second"),
     (

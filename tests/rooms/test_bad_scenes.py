@@ -174,12 +174,7 @@ initial_motions = { rod = { at = [1, 0], velocity = [0, 6] } }
 BASES = {"solid": GOOD, "beam": BEAMS, "free": FREE}
 CASES = [
     pytest.param(
-        base,
-        case.get("change", {}),
-        case.get("gone", []),
-        expected,
-        "in_full" in case,
-        id=f"{base}{i}: {expected[0]}",
+        base, case.get("change", {}), case.get("gone", []), expected, "in_full" in case, id=f"{base}{i}: {expected[0]}"
     )
     for base, cases in tomllib.loads((Path(__file__).parent / "bad_scenes.toml").read_text("utf-8")).items()
     for i, case in enumerate(cases)
@@ -307,14 +302,8 @@ def test_a_name_cannot_be_looked_up_outside_a_scene():
         (b"# nothing yet\n", "{path}: must hold at least one key, got an empty file"),
         (b"a = 1\nb = \n", "{path}, line 2: must be valid TOML, got: Invalid value"),
         (b"a = 1\na = 2\n", "{path}, line 2: must be valid TOML, got: Cannot overwrite a value"),
-        (
-            b"[points\nA = 1",
-            "{path}, line 1: must be valid TOML, got: Expected ']' at the end of a table declaration",
-        ),
-        (
-            b'title = "half',
-            "{path}, line 1: must be valid TOML, got: Unterminated string (at end of document)",
-        ),
+        (b"[points\nA = 1", "{path}, line 1: must be valid TOML, got: Expected ']' at the end of a table declaration"),
+        (b'title = "half', "{path}, line 1: must be valid TOML, got: Unterminated string (at end of document)"),
         (b"a = '\xff'", "{path}: must be text in UTF-8, got other bytes at position 5"),
     ],
 )
@@ -345,15 +334,9 @@ x_point = [0.25, 0]
             PLATE.replace("0.25", "0.26"),
             "between: must be as far apart as origin and x_point of the part 0.26 [m], got 0.25",
         ),
-        (
-            PLATE.replace("0.25", "0"),
-            "file: part.toml: x_point: must differ from the origin, got the same point",
-        ),
+        (PLATE.replace("0.25", "0"), "file: part.toml: x_point: must differ from the origin, got the same point"),
         (PLATE.replace("thickness", "thicknes"), "file: part.toml: thickness: is required [m], got nothing"),
-        (
-            PLATE.replace("thickness = 0.01", "thickness = -1"),
-            "file: part.toml: thickness: must be positive [m], got -1",
-        ),
+        (PLATE.replace("thickness = 0.01", "thickness = -1"), "file: part.toml: thickness: must be positive [m], got -1"),
         (PLATE.replace("[0, 0]", '"O"'), "file: part.toml: origin: must name a point, got 'O', known: none"),
         (
             PLATE + "[points]\nP = [1]",
@@ -377,10 +360,7 @@ def test_a_part_that_fits_is_no_fault(tmp_path):
     ("table", "message"),
     [
         ("0, 0\n1; 2\n", "motion.csv, line 2: must be two numbers, time and angle, got '1; 2'"),
-        (
-            "t, phi, omega\n0, 0\n",
-            "motion.csv, line 1: must head two columns, time and angle, got 't, phi, omega'",
-        ),
+        ("t, phi, omega\n0, 0\n", "motion.csv, line 1: must head two columns, time and angle, got 't, phi, omega'"),
         (
             "t [s], phi [mm]\n0, 0\n",
             "motion.csv, line 1: must have units of time and angle, got: the unit 'mm' is of another kind",
@@ -393,23 +373,14 @@ def test_a_part_that_fits_is_no_fault(tmp_path):
             "t in s, phi/deg\n0, 0\n",
             "motion.csv, line 1: must have units of time and angle, got: 'phi/deg'; units stand in brackets, as in [deg]",
         ),
-        (
-            "angle, time\n0, 0\n",
-            "motion.csv, line 1: must head two columns, time and angle, got 'angle, time'",
-        ),
-        (
-            "time, speed\n0, 0\n",
-            "motion.csv, line 1: must head two columns, time and angle, got 'time, speed'",
-        ),
+        ("angle, time\n0, 0\n", "motion.csv, line 1: must head two columns, time and angle, got 'angle, time'"),
+        ("time, speed\n0, 0\n", "motion.csv, line 1: must head two columns, time and angle, got 'time, speed'"),
         ("0, O\n1, 1\n", "motion.csv, line 1: must be two numbers, time and angle, got '0, O'"),
     ],
 )
 def test_a_motion_table_that_cannot_be_read(tmp_path, table, message):
     (tmp_path / "motion.csv").write_text(table)
-    change = {
-        "drive/motion": {"kind": "table", "file": "motion.csv"},
-        "analysis": {"end_time": 1, "step": 0.1},
-    }
+    change = {"drive/motion": {"kind": "table", "file": "motion.csv"}, "analysis": {"end_time": 1, "step": 0.1}}
     assert faults_of(scene_from, changed(GOOD, change), tmp_path) == [f"drive.motion.file: {message}"]
 
 
@@ -421,23 +392,7 @@ def test_a_motion_table_is_in_a_file_or_in_the_scene():
     ]
 
 
-ODD = [
-    None,
-    -1,
-    2.5,
-    "",
-    "x",
-    "crank",
-    "5 °",
-    "9**9**9 m",
-    [],
-    {},
-    True,
-    [[1]],
-    {"kind": ["x"]},
-    10**400,
-    "joints.A",
-]
+ODD = [None, -1, 2.5, "", "x", "crank", "5 °", "9**9**9 m", [], {}, True, [[1]], {"kind": ["x"]}, 10**400, "joints.A"]
 
 
 def paths(table, above=""):

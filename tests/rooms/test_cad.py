@@ -135,8 +135,7 @@ class TestUnits:
         return edited(parts / "lever.step", *changes, name="unit")
 
     @pytest.mark.parametrize(
-        ("unit", "metres"),
-        [(MILLIMETRE, MM), (MILLIMETRE.replace("SI_UNIT(.MILLI.,.METRE.)", METRE), 1), (INCH, 0.0254)],
+        ("unit", "metres"), [(MILLIMETRE, MM), (MILLIMETRE.replace("SI_UNIT(.MILLI.,.METRE.)", METRE), 1), (INCH, 0.0254)]
     )
     def test_of_a_step_file(self, parts, unit, metres):
         path = self.in_unit(parts, unit)
@@ -154,10 +153,7 @@ class TestUnits:
 
     def test_of_an_iges_file_in_metres(self, tmp_path):
         def draw(occ: Any) -> None:
-            block, bore = (
-                occ.addBox(0, 0, 0, 0.06, 0.02, 0.01),
-                occ.addCylinder(0.01, 0.01, 0, 0, 0, 1, 0.004),
-            )
+            block, bore = (occ.addBox(0, 0, 0, 0.06, 0.02, 0.01), occ.addCylinder(0.01, 0.01, 0, 0, 0, 1, 0.004))
             occ.cut([(3, block)], [(3, bore)])
 
         written(tmp_path, "block", draw, ("igs",))
@@ -191,11 +187,7 @@ class TestUnits:
 
     @pytest.mark.parametrize(
         ("ending", "scale", "got"),
-        [
-            ("step", 1e-8, "9.57e-07"),
-            ("igs", 1e-8, "9.57e-07"),
-            ("brep", 20, "1.3e+03"),
-        ],  # 64.8 units and 2e-7 m around
+        [("step", 1e-8, "9.57e-07"), ("igs", 1e-8, "9.57e-07"), ("brep", 20, "1.3e+03")],  # 64.8 units and 2e-7 m around
     )
     def test_that_no_part_can_have(self, parts, ending, scale, got):
         message = refused(parts / f"lever.{ending}", scale=scale)

@@ -108,11 +108,7 @@ class TestSides:
 
         written(tmp_path, "fillets", draw, ("step",))
         solid, mesh = meshed(tmp_path, tmp_path / "fillets.step", 2 * MM)
-        assert {(f.kind, f.inward) for f in solid.faces} == {
-            ("plane", False),
-            ("cylinder", False),
-            ("sphere", False),
-        }
+        assert {(f.kind, f.inward) for f in solid.faces} == {("plane", False), ("cylinder", False), ("sphere", False)}
         assert sum(len(face.sides) for face in mesh.faces) == len(boundary_sides(mesh.cells))
         assert len(mesh.faces) == len(solid.faces) == 26
 

@@ -61,12 +61,7 @@ def planar(kind: str, other: str) -> Raw:
     joints = {
         "A": {"kind": "revolute", "links": ["ground", "a"], "at": [0, 0]},
         "B": {"kind": "revolute", "links": ["a", "b"], "at": [0.1, 0]},
-        "C": {
-            "kind": kind,
-            "links": ["b", "c"],
-            "at": [0.3, 0],
-            **({"axis": "x"} if kind == "prismatic" else {}),
-        },
+        "C": {"kind": kind, "links": ["b", "c"], "at": [0.3, 0], **({"axis": "x"} if kind == "prismatic" else {})},
     }
     return {"links": links, "joints": joints, "drive": turning(), "analysis": {"end_time": 0.1, "step": 1e-3}}
 
@@ -89,10 +84,7 @@ def driven(kind: str) -> Raw:
     return raw
 
 
-BOTH = {
-    "a": {"kind": "torsion", "joint": "S", "stiffness": 1.0},
-    "b": {"kind": "spring", "joint": "A", "stiffness": 1.0},
-}
+BOTH = {"a": {"kind": "torsion", "joint": "S", "stiffness": 1.0}, "b": {"kind": "spring", "joint": "A", "stiffness": 1.0}}
 STOPS = {
     "a": {"kind": "angle", "joint": "S", "upper": 1.0, "stiffness": 1.0},
     "b": {"kind": "travel", "joint": "B", "upper": 1.0, "stiffness": 1.0},
@@ -160,11 +152,7 @@ def test_every_line_of_the_table_refuses_a_scene_in_its_own_words() -> None:
 def test_a_joint_stands_with_frames_as_its_page_says(kind: str, column: str) -> None:
     """Between two beams that move: refused in the words of each line that it meets, and for nothing else."""
     facts, raw = COLUMNS[column], chain(kind, ("beam", "beam"))
-    raw["analysis"] |= {
-        "initial": "rest",
-        "frames": facts["frames"],
-        "stiffening": facts["stiffening"] == "on",
-    }
+    raw["analysis"] |= {"initial": "rest", "frames": facts["frames"], "stiffening": facts["stiffening"] == "on"}
     if facts["drive"] == "none":
         del raw["drive"]
     met = list(refusals("joints", {**JOINTS[kind], **facts}))

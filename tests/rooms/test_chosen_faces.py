@@ -43,13 +43,7 @@ def scene_with(tmp_path: Path, faces: Any, at: Any = (0, 0, 0.005), axis: str = 
         "points": {"B": [0, 0, 0.015]},
         "links": {"part": {"material": "steel", "shape": {"kind": "mesh", "file": "any"}, **link}},
         "joints": {
-            "A": {
-                "kind": "revolute",
-                "links": ["ground", "part"],
-                "at": at,
-                "axis": axis,
-                "faces": {"part": faces},
-            }
+            "A": {"kind": "revolute", "links": ["ground", "part"], "at": at, "axis": axis, "faces": {"part": faces}}
         },
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1}},
         "analysis": {"revolutions": 1},

@@ -315,10 +315,7 @@ def test_new_refuses_a_kind_that_it_does_not_know(run_kedfem: Command) -> None:
 def test_new_leaves_a_file_that_exists(run_kedfem: Command) -> None:
     Path("mine.toml").write_text("precious")
     said = run_kedfem("new", "single-arm", "mine.toml")
-    assert (said.code, said.err) == (
-        USER_ERROR,
-        "error: mine.toml: must be a new file, got one that exists already\n",
-    )
+    assert (said.code, said.err) == (USER_ERROR, "error: mine.toml: must be a new file, got one that exists already\n")
     assert Path("mine.toml").read_text() == "precious"
 
 
@@ -406,10 +403,7 @@ def test_an_interrupted_run_leaves_what_was_computed(arm: Path, number: signal.S
     folder = arm.with_name("arm-results")
     running = process(MAIN, "run", arm.name, folder=arm.parent)
     try:
-        wait_for(
-            lambda: (folder / "animation" / "arm_0050.vtu").exists() and (folder / "results.h5").exists(),
-            running,
-        )
+        wait_for(lambda: (folder / "animation" / "arm_0050.vtu").exists() and (folder / "results.h5").exists(), running)
         running.send_signal(number)
         out, err = running.communicate(timeout=60)
     finally:

@@ -114,10 +114,7 @@ def test_stress_is_judged_by_von_mises_and_rounding_left_out() -> None:
 
 
 def test_keys_that_differ_are_listed_with_their_values() -> None:
-    scenes = [
-        {"drive": {"speed": 1.0, "joint": "A"}, "x": [1]},
-        {"drive": {"speed": 2.0, "joint": "A"}, "y": {}},
-    ]
+    scenes = [{"drive": {"speed": 1.0, "joint": "A"}, "x": [1]}, {"drive": {"speed": 2.0, "joint": "A"}, "y": {}}]
     runs = [Results(np.zeros(1), np.zeros(1), {}, "complete", json.dumps(each)) for each in scenes]
     assert differing_keys(runs) == {"drive.speed": (1.0, 2.0), "x": ([1], None), "y": (None, {})}
 

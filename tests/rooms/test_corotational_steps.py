@@ -115,9 +115,7 @@ SOON = {"screw", "sliding block of plane links", "gears"}
 
 
 @pytest.mark.parametrize("kind", [pytest.param(x, marks=[] if x in SOON else pytest.mark.long) for x in DRIVEN])
-def test_joints_by_constraint_equations_bear_in_stiff_links_what_they_do_in_rigid_body_frames(
-    kind: str,
-) -> None:
+def test_joints_by_constraint_equations_bear_in_stiff_links_what_they_do_in_rigid_body_frames(kind: str) -> None:
     """Joint forces, drives, gears, energies: the rest falls with compliance. Efforts do the work."""
     raw = with_analysis(stiffer(shorter(DRIVEN[kind]()), 100.0), rho_inf=0.8)
     _, wanted, _ = channels(raw)

@@ -18,12 +18,7 @@ from kedfem.links.reduced import reduced, rigid_functions
 from kedfem.links.segments import segmented
 from kedfem.links.solid import solid_link
 from kedfem.links.surfaces.candidates import candidates
-from kedfem.links.surfaces.coupling_surfaces import (
-    CouplingSurface,
-    face_surface,
-    joint_surface,
-    surface_weights,
-)
+from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, face_surface, joint_surface, surface_weights
 from kedfem.links.surfaces.round_surfaces import rounds
 from kedfem.mesh import SolidMesh
 from kedfem.motion.linkage import linkage
@@ -45,13 +40,7 @@ def link_of(shape: dict[str, Any], **mesh: Any) -> Any:
     return bare_links(scene_from(raw))["part"]
 
 
-PLATE = {
-    "kind": "plate_link",
-    "between": [[0, 0], [0.2, 0]],
-    "width": 0.03,
-    "thickness": 0.02,
-    "bore_diameter": 0.01,
-}
+PLATE = {"kind": "plate_link", "between": [[0, 0], [0.2, 0]], "width": 0.03, "thickness": 0.02, "bore_diameter": 0.01}
 
 
 @pytest.mark.parametrize("layers", [1, 2, 3])
@@ -90,11 +79,7 @@ def test_a_body_is_carried_by_its_own_links_hinge() -> None:
     raw = slider_crank("rigid")
     plate = {"kind": "plate_link", "width": 0.02, "thickness": 0.02, "bore_diameter": 0.01}
     for name, ends in (("crank", ["A", "B"]), ("rod", ["B", "C"])):
-        raw["links"][name] = {
-            "material": "steel",
-            "shape": {**plate, "between": ends},
-            "mesh": {"elements_across": 1},
-        }
+        raw["links"][name] = {"material": "steel", "shape": {**plate, "between": ends}, "mesh": {"elements_across": 1}}
     raw["joints"] = {"guide": raw["joints"].pop("guide"), **raw["joints"]}
     raw["bodies"] = {"lump": {"kind": "point_mass", "link": "rod", "at": "C", "mass": 0.5}}
     scene = scene_from(raw)
@@ -164,8 +149,7 @@ def refusal(link: Link, at: Sequence[float], axis: np.ndarray | None = Z, faces:
 
 @pytest.mark.parametrize("nodes", [8, 10, 20, 27])
 @pytest.mark.parametrize(
-    ("z", "radius", "middle"),
-    [(0.005, 0.006, 0.005), (0.012, 0.01, 0.015), (0.025, 0.006, 0.025), (0.034, 0.006, 0.025)],
+    ("z", "radius", "middle"), [(0.005, 0.006, 0.005), (0.012, 0.01, 0.015), (0.025, 0.006, 0.025), (0.034, 0.006, 0.025)]
 )
 def test_a_shaft_is_held_by_the_journal_that_the_joint_is_in_or_next_to(
     nodes: int, z: float, radius: float, middle: float

@@ -55,9 +55,7 @@ def coil_pixels(png: Path) -> int:
 
 
 @pytest.mark.parametrize(
-    "law",
-    [{"stiffness": 5.0}, {"damping": 5.0}, {"stiffness": 5.0, "damping": 5.0}],
-    ids=["k", "c", "k and c"],
+    "law", [{"stiffness": 5.0}, {"damping": 5.0}, {"stiffness": 5.0, "damping": 5.0}], ids=["k", "c", "k and c"]
 )
 def test_shapes_reach_from_end_to_end_and_are_slender(law: dict[str, float]) -> None:
     """However the line between the ends turns, half round too, and however short it was drawn."""

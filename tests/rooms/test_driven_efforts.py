@@ -53,13 +53,7 @@ def four_bar(crank: str, more: dict[str, Any], **analysis: Any) -> dict[str, Any
             "D": ["rocker", "ground"],
         }.items()
     }
-    steps = {
-        "revolutions": 1 / 3,
-        "steps_per_revolution": 36,
-        "initial": "quasi-static",
-        "rho_inf": 1.0,
-        **analysis,
-    }
+    steps = {"revolutions": 1 / 3, "steps_per_revolution": 36, "initial": "quasi-static", "rho_inf": 1.0, **analysis}
     drive = {"joint": "A", "motion": {"kind": "constant_speed", "speed": "1 rpm"}}
     return {"links": links, "joints": joints, "drive": drive, "analysis": steps, **more}
 
@@ -133,13 +127,7 @@ def arm(model: str, elements: Any, **more: Any) -> dict[str, Any]:
             "section": section,
             "up": [0, 1, 0],
         }
-        link = {
-            "model": "beam",
-            "beam": "spatial",
-            "material": "steel",
-            "shape": shape,
-            "mesh": {"elements": elements},
-        }
+        link = {"model": "beam", "beam": "spatial", "material": "steel", "shape": shape, "mesh": {"elements": elements}}
     else:
         link = bar(model, [0, 0], [0.5, 0], **more) | {"mesh": {"elements": elements}}
         link["shape"] |= {"width": 0.004, "thickness": 0.02}
@@ -155,12 +143,7 @@ def arm(model: str, elements: Any, **more: Any) -> dict[str, Any]:
 
 @pytest.mark.parametrize(
     ("model", "elements", "more"),
-    [
-        ("spatial", 2, {}),
-        ("solid", [4, 1, 1], {"segments": 2}),
-        ("plane", [8, 2], {"segments": 4}),
-        ("beam", 2, {}),
-    ],
+    [("spatial", 2, {}), ("solid", [4, 1, 1], {"segments": 2}), ("plane", [8, 2], {"segments": 4}), ("beam", 2, {})],
     ids=["beams in space", "solid", "plane", "planar beams"],
 )
 def test_the_torque_of_co_rotational_frames_does_the_work_of_the_drive(

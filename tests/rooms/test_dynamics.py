@@ -29,13 +29,7 @@ from tests import scenes
 from tests.scenes import arm, bar, constant_speed
 
 BAR = {"width": 0.0254, "thickness": 0.0254}
-PLATE = {
-    "kind": "plate_link",
-    "width": 0.0254,
-    "thickness": 0.0254,
-    "eye_diameter": 0.045,
-    "bore_diameter": 0.02,
-}
+PLATE = {"kind": "plate_link", "width": 0.0254, "thickness": 0.0254, "eye_diameter": 0.045, "bore_diameter": 0.02}
 
 
 def four_bar(kind: str, **analysis: Any) -> dict[str, Any]:
@@ -65,8 +59,7 @@ def run(raw: Mapping[str, Any]) -> tuple[Model, Steps, list[Snapshot]]:
 
 
 @pytest.mark.parametrize(
-    ("kind", "steps", "bound"),
-    [("beam", 720, 1e-8), ("bar", 120, 1e-8), ("plate", 24, 1e-7), ("plane", 120, 1e-7)],
+    ("kind", "steps", "bound"), [("beam", 720, 1e-8), ("bar", 120, 1e-8), ("plate", 24, 1e-7), ("plane", 120, 1e-7)]
 )
 @pytest.mark.parametrize("rho_inf", [1.0, pytest.param(0.8, marks=pytest.mark.long)])
 def test_condensed_is_monolithic_over_a_whole_turn(kind: str, steps: int, bound: float, rho_inf: float) -> None:

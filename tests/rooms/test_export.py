@@ -111,10 +111,7 @@ def test_files_are_read_back_alike(
 def test_nodes_move_by_modes(found: dict[tuple[str, str], ExportedLink]) -> None:
     """A translation of a reduced link moves every node alike, a turn by ω × x."""
     link = found["reduced", "oblique"]
-    for column, wanted in (
-        (1, np.tile([0.0, 1, 0], (len(link.nodes), 1))),
-        (5, np.cross([0, 0, 1], link.nodes)),
-    ):
+    for column, wanted in ((1, np.tile([0.0, 1, 0], (len(link.nodes), 1))), (5, np.cross([0, 0, 1], link.nodes))):
         q = link.rigid[:, column].reshape(-1, 3)
         assert_allclose(link.modes @ q, wanted, atol=1e-9)
     assert link.cells.max() == len(link.nodes) - 1

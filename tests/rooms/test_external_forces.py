@@ -23,13 +23,7 @@ from tests.scenes import constant_speed
 
 L, W, T, E, NU = 0.2, 0.02, 0.01, 2.0e11, 0.3
 BAR = scenes.bar(L, W, T)["shape"]
-PLATE = {
-    "kind": "plate_link",
-    "between": [[0, 0], [L, 0]],
-    "width": 0.04,
-    "thickness": T,
-    "bore_diameter": 0.02,
-}
+PLATE = {"kind": "plate_link", "between": [[0, 0], [L, 0]], "width": 0.04, "thickness": T, "bore_diameter": 0.02}
 KINDS: dict[str, dict[str, Any]] = {
     "solid": {"shape": PLATE, "mesh": {"size": 0.01}},
     "bar": {"shape": BAR, "mesh": {"elements": [8, 1, 1]}},
@@ -132,10 +126,7 @@ def test_a_torque_at_a_joint_is_that_on_its_bore(kind: str) -> None:
 
 def test_a_drive_takes_the_torque_on_the_link_that_it_carries() -> None:
     """Two links: the crank is rigid and goes with the drive."""
-    raw = arm(
-        "rigid",
-        {"t": {"kind": "torque", "link": "arm", "at": [L, 0], "vector": [0, 0, 4.0], "frame": "link"}},
-    )
+    raw = arm("rigid", {"t": {"kind": "torque", "link": "arm", "at": [L, 0], "vector": [0, 0, 4.0], "frame": "link"}})
     raw["links"]["tip"] = {
         "material": "m", "model": "beam",
         "shape": {"kind": "bar", "between": [[L, 0], [2 * L, 0]], "width": W, "thickness": T},
@@ -157,12 +148,7 @@ def ring(what: str, a: float, b: float, at: list[float], pressure: float) -> Lin
     """A ring about the origin and the forces of a pressure on one of its faces."""
     raw = arm("bar", {"p": {"kind": "pressure", "link": "ring", "at": at, "pressure": pressure}})
     outline = [[b, 0], {"via": [0, b], "to": [-b, 0]}, {"via": [0, -b], "to": [b, 0]}]
-    shape = {
-        "kind": "extrusion",
-        "outline": outline,
-        "holes": [{"at": [0, 0], "diameter": 2 * a}],
-        "thickness": T,
-    }
+    shape = {"kind": "extrusion", "outline": outline, "holes": [{"at": [0, 0], "diameter": 2 * a}], "thickness": T}
     kind = {"element": "tet10"} if what == "tet10" else {"model": what}
     raw["links"] = {"ring": {"material": "m", **kind, "shape": shape, "mesh": {"size": 0.012}}}
     raw["joints"]["A"]["links"] = ["ground", "ring"]
@@ -244,13 +230,7 @@ def test_a_force_over_the_angle_is_that_over_time_at_constant_speed() -> None:
     speed, at, value = 20.0, np.array([0.0, 0.4, 0.7, 2.5]), [0.0, 1.0, -1.0, 0.5]
     found = []
     for table in ({"over": "angle", "at": at.tolist()}, {"time": (at / speed).tolist()}):
-        load = {
-            "kind": "force",
-            "link": "arm",
-            "at": [L, 0],
-            "vector": [0, 50.0],
-            "factor": {**table, "value": value},
-        }
+        load = {"kind": "force", "link": "arm", "at": [L, 0], "vector": [0, 50.0], "factor": {**table, "value": value}}
         raw = arm("beam", {"f": load}, speed=speed, revolutions=0.5, steps_per_revolution=200, initial="rest")
         del raw["analysis"]["end_time"], raw["analysis"]["step"]
         ready, _ = prepared(scene_from(raw))

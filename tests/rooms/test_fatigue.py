@@ -35,11 +35,7 @@ def shaft(along: Any, kind: str = "static", **fatigue: Any) -> dict[str, Any]:
     across = np.cross(e, np.eye(3)[np.abs(e).argmin()])
     across /= np.linalg.norm(across)
     tip = (LENGTH * e).tolist()
-    shape = {
-        "kind": "polyline",
-        "points": [[0, 0, 0], tip],
-        "section": {"kind": "round", "diameter": 2 * RADIUS},
-    }
+    shape = {"kind": "polyline", "points": [[0, 0, 0], tip], "section": {"kind": "round", "diameter": 2 * RADIUS}}
     link = {"material": "steel", "model": "beam", "shape": shape, "mesh": {"elements": 4}, "beam": "spatial"}
     force = (FORCE * across + AXIAL * e).tolist()
     return {

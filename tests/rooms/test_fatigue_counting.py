@@ -6,20 +6,8 @@ from numpy.testing import assert_allclose
 
 from kedfem.links.free_surface import surface_axes
 from kedfem.results.fatigue.counting_kernel import counted
-from kedfem.results.fatigue.planes import (
-    disproportion,
-    dominant,
-    findley_stresses,
-    normal_stresses,
-    signed_von_mises,
-)
-from kedfem.results.fatigue.strength import (
-    collective,
-    material_factors,
-    reversed_collective,
-    strength_of,
-    verdict,
-)
+from kedfem.results.fatigue.planes import disproportion, dominant, findley_stresses, normal_stresses, signed_von_mises
+from kedfem.results.fatigue.strength import collective, material_factors, reversed_collective, strength_of, verdict
 from kedfem.scene import FatigueData
 
 ASTM = np.array([-2.0, 1, -3, 5, -1, 3, -4, 4, -2])  # ASTM E1049-85, figure 6
@@ -221,9 +209,6 @@ def test_a_required_life_uses_what_it_needs() -> None:
 @pytest.mark.parametrize("mean", [-3, -1.0000001, -1, -0.5, 0, 1, 2, 5])
 def test_a_utilisation_is_that_of_the_amplitude_with_mean_0(mean: float) -> None:
     """Pulsating compression, R = −∞, too."""
-    curve, h = (
-        strength_of(FatigueData(group="steel", tensile_strength=9e8), 2e11),
-        1e8 * (mean + np.cos(PHASE)),
-    )
+    curve, h = (strength_of(FatigueData(group="steel", tensile_strength=9e8), 2e11), 1e8 * (mean + np.cos(PHASE)))
     equal = damage(h[None] / 1e8, M=curve.M)[0, 1] * 1e8
     assert_allclose(verdict(h, curve, 0.0, 1.5, np.inf).utilisation, 1.5 * equal / curve.endurance, rtol=3e-6)

@@ -260,13 +260,7 @@ def test_several_times_at_once_are_as_one_by_one() -> None:
 # -- on links -----------------------------------------------------------------------------------------------
 
 BAR = bar(1, 0.04, 0.02)["shape"]
-PLATE = {
-    "kind": "plate_link",
-    "between": [[0, 0], [1, 0]],
-    "width": 0.04,
-    "thickness": 0.02,
-    "bore_diameter": 0.02,
-}
+PLATE = {"kind": "plate_link", "between": [[0, 0], [1, 0]], "width": 0.04, "thickness": 0.02, "bore_diameter": 0.02}
 KINDS: dict[str, dict[str, Any]] = {
     "solid": {"shape": PLATE, "mesh": {"size": 0.02}},
     "face": {"shape": BAR, "mesh": {"elements": [8, 2, 1]}},
@@ -359,10 +353,7 @@ def test_a_joint_that_names_the_ground_first_turns_its_link_all_the_same() -> No
 
 
 def test_a_spring_hangs_on_points_of_links_sliders_and_the_ground() -> None:
-    springs = {
-        "tip": spring("arm", [1, 0], [1, 2]),
-        "shoe": spring("shoe", [1.5, 0.1], [3.5, 0.1], free_length=0),
-    }
+    springs = {"tip": spring("arm", [1, 0], [1, 2]), "shoe": spring("shoe", [1.5, 0.1], [3.5, 0.1], free_length=0)}
     raw = arm("beam", springs=springs)
     raw["links"]["shoe"] = {"model": "rigid", "mass": 1}
     raw["joints"]["B"] = {"kind": "revolute", "links": ["arm", "shoe"], "at": [1, 0]}
@@ -370,12 +361,7 @@ def test_a_spring_hangs_on_points_of_links_sliders_and_the_ground() -> None:
     raw["motors"]["push"] = {"joint": "S", "force": 4}
     scene, model = built(raw)
     motor, push, tip, shoe = force_elements(scene, model)
-    assert [x.name for x in (motor, push, tip, shoe)] == [
-        "motors/m",
-        "motors/push",
-        "springs/tip",
-        "springs/shoe",
-    ]
+    assert [x.name for x in (motor, push, tip, shoe)] == ["motors/m", "motors/push", "springs/tip", "springs/shoe"]
     assert (tip.law, shoe.law) == (Spring(10.0, free=2.0), Spring(10.0))
     x = state_of(tip, model, lambda k, X: np.array([[0.0, 0.5, 9.0]] * len(X)))
     np.testing.assert_allclose(found(tip, x)[1][0], 1.5)

@@ -13,17 +13,7 @@ from kedfem.motion.path import path
 from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import Scene, scene_from
 from tests.laws.test_limits import AXES
-from tests.linkages import (
-    JointTable,
-    Z,
-    body,
-    four_bar,
-    linkage_scene,
-    motion_at,
-    place,
-    slider_crank,
-    turned,
-)
+from tests.linkages import JointTable, Z, body, four_bar, linkage_scene, motion_at, place, slider_crank, turned
 
 BAR = four_bar(0.3, 0.9, 0.7, 0.9, 1.0)
 PENDULUM: JointTable = {

@@ -32,12 +32,7 @@ def chain(plane: str = "xy", links: int = 1, model: str = "beam", **analysis: An
         mesh: dict[str, Any] = {"element": "beam5", "mesh": {"elements": 2}}
         if model == "solid":
             shape, mesh = {"kind": "bar", "between": ends}, {"mesh": {"elements": [4, 1, 1]}}
-        return {
-            "model": model,
-            "material": "pom",
-            "shape": {**shape, "width": 0.02, "thickness": 0.01},
-            **mesh,
-        }
+        return {"model": model, "material": "pom", "shape": {**shape, "width": 0.02, "thickness": 0.01}, **mesh}
 
     joints = {
         f"J{k}": {"kind": "revolute", "links": [f"a{k - 1}" if k else "ground", f"a{k}"], "at": at(0.4 * k)}
@@ -120,9 +115,7 @@ def test_differences_that_do_not_fall_promise_nothing() -> None:
     assert halved([1e-4, 1e-5]) == 1.0
 
 
-def test_a_solid_that_moves_freely_has_its_step_chosen_and_keeps_its_mesh(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_solid_that_moves_freely_has_its_step_chosen_and_keeps_its_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(free_step, "FIRST", 100)
     monkeypatch.setattr(free_step, "MOST", 800)
     scene = scene_from(chain(model="solid", end_time=0.05))

@@ -44,11 +44,7 @@ def four_bar(rpm: float, elements: int = 4, **link: Any) -> dict[str, Any]:
     """Three turns of the source's example from rest."""
     raw = scenes.example("four_bar_beams")
     raw["drive"]["motion"]["speed"] = f"{rpm} rpm"
-    raw["analysis"] = {
-        "revolutions": 3,
-        "steps_per_revolution": 360 if rpm >= 300 else 720,
-        "initial": "rest",
-    }
+    raw["analysis"] = {"revolutions": 3, "steps_per_revolution": 360 if rpm >= 300 else 720, "initial": "rest"}
     for x in raw["links"].values():
         x.update({"mesh": {"elements": elements}, **link})
     return raw
@@ -218,11 +214,7 @@ def test_a_rigid_rod_that_slides_in_a_rigid_barrel_on_an_elastic_boom_raises_no_
 
 def lifted_boom(cylinder: dict[str, Any]) -> dict[str, Any]:
     """A boom A–Q–E, lifted by a cylinder P–Q whose rod is pushed out of its barrel; all oblique."""
-    P, A, Q = (
-        np.zeros(2),
-        np.array([-0.3, 0.6]),
-        2 * np.array([np.cos(np.radians(70)), np.sin(np.radians(70))]),
-    )
+    P, A, Q = (np.zeros(2), np.array([-0.3, 0.6]), 2 * np.array([np.cos(np.radians(70)), np.sin(np.radians(70))]))
     E = A + 2 * (Q - A)
     middle = (P + Q) / 2
     axis = (Q - P) / np.linalg.norm(Q - P)
@@ -302,12 +294,7 @@ def against_following(rpm: float, initial: str) -> tuple[float, float, float]:
     """Half a turn of the source's four-bar: largest difference of stress in time and of its peaks, and the estimate."""
     raw, stress, estimate = four_bar(rpm, 2, element="beam5"), {}, {}
     for frames in ("rigid-body", "co-rotational"):
-        raw["analysis"] = {
-            "revolutions": 0.5,
-            "steps_per_revolution": 720,
-            "initial": initial,
-            "frames": frames,
-        }
+        raw["analysis"] = {"revolutions": 0.5, "steps_per_revolution": 720, "initial": initial, "frames": frames}
         ready = meshed(scene_from(raw))
         (probe,) = (x for x in recording(ready.scene, ready.model) if x.channel.name == "probes/rocker_outer/stress")
         found, every = GeometricError(ready.model), []

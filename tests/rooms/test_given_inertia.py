@@ -171,12 +171,7 @@ INERTIA = np.array([[0.02, 0.004, -0.003], [0.004, 0.015, 0.0], [-0.003, 0.0, 0.
 
 def pendulum(R: np.ndarray, **link: Any) -> dict[str, Any]:
     """One hinge about the third axis, weight along the first, a centre that is on neither axis."""
-    made = {
-        "model": "rigid",
-        "mass": MASS,
-        "centre": (R @ CENTRE).tolist(),
-        "inertia": six(R @ INERTIA @ R.T),
-    }
+    made = {"model": "rigid", "mass": MASS, "centre": (R @ CENTRE).tolist(), "inertia": six(R @ INERTIA @ R.T)}
     hinge = {"kind": "revolute", "links": ["ground", "p"], "at": [0, 0, 0], "axis": R[:, 2].tolist()}
     return {
         "links": {"p": {key: x for key, x in (made | link).items() if x is not None}},
@@ -217,9 +212,7 @@ def total(scene: Scene) -> tuple[float, np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize(
-    "inertia",
-    [INERTIA, np.diag([0.02, 0.02, 0.04]), np.diag([1e-4, 1e-4, 1e-4])],
-    ids=["full", "disc", "small"],
+    "inertia", [INERTIA, np.diag([0.02, 0.02, 0.04]), np.diag([1e-4, 1e-4, 1e-4])], ids=["full", "disc", "small"]
 )
 def test_mass_centre_and_inertia_are_those_given(inertia: np.ndarray) -> None:
     """Where the line's share cannot be taken off, as of a flat disc, within 1e-4."""

@@ -18,13 +18,7 @@ from tests.rooms.test_cli import Command, run_kedfem
 from tests.scenes import arm, bar, constant_speed
 
 __all__ = ["run_kedfem"]  # a fixture
-DOWN = {
-    "y": [0, -9.81, 0],
-    "z": [0, 0, -9.81],
-    "oblique": [3.0, -4.0, 2.0],
-    "none": [0, 0, 0],
-    "up": [0, 9.81, 0],
-}
+DOWN = {"y": [0, -9.81, 0], "z": [0, 0, -9.81], "oblique": [3.0, -4.0, 2.0], "none": [0, 0, 0], "up": [0, 9.81, 0]}
 
 
 def scene(gravity: list[float], **output: Any) -> dict[str, Any]:

@@ -54,12 +54,7 @@ def test_what_is_no_machines_is_refused_in_words(change: dict[str, Any], words: 
 
 def test_deep_tables_and_long_chains_of_points_are_refused_in_words(tmp_path: Path) -> None:
     file = tmp_path / "scene.toml"
-    for text in (
-        "x = " + "[" * 100_000,
-        "x = " + "{a = " * 5000,
-        "a." * 100_000 + "b = 1",
-        "[" + "a." * 5000 + "b]",
-    ):
+    for text in ("x = " + "[" * 100_000, "x = " + "{a = " * 5000, "a." * 100_000 + "b = 1", "[" + "a." * 5000 + "b]"):
         file.write_text(text)
         with pytest.raises(SceneError, match="must be nested less than 100 deep"):
             read_scene(file)

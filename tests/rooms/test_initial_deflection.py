@@ -16,10 +16,7 @@ BENDING = {
     **dict.fromkeys(("beam", "solid"), 2.1e11 * 0.02**4 / 12),
     "spatial beam": 2.1e11 * np.pi * 0.02**4 / 64,
 }  # E I [N m²]
-MASS = {
-    **dict.fromkeys(("beam", "solid"), 7850 * 0.02**2),
-    "spatial beam": 7850 * np.pi * 0.02**2 / 4,
-}  # a metre [kg/m]
+MASS = {**dict.fromkeys(("beam", "solid"), 7850 * 0.02**2), "spatial beam": 7850 * np.pi * 0.02**2 / 4}  # a metre [kg/m]
 
 
 def plucked(kind: str, R: np.ndarray, held: str, frames: str) -> Raw:

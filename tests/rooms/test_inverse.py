@@ -9,12 +9,7 @@ from benchmarks.scenes import mechanisms
 from numpy.testing import assert_allclose
 
 from kedfem.accuracy.prepared import meshed, moving
-from kedfem.dynamics.inertias import (
-    Inertias,
-    acting,
-    inertias_of_links,
-    inertias_of_model,
-)
+from kedfem.dynamics.inertias import Inertias, acting, inertias_of_links, inertias_of_model
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.rigid_body import motions
 from kedfem.dynamics.stepping.solvers import steps_of
@@ -159,15 +154,7 @@ def slider_crank_by_hand(t: float) -> Array:
     parts = [
         (m2, J2, aB / 2, 0.0, pin(0, -B / 2) | pin(2, B / 2) | {7: np.array([0, 0, 1.0])}, zero, 0.0),
         (m3, J3, (aB + aC) / 2, b2, pin(2, -rod / 2, -1.0) | pin(4, rod / 2), zero, 0.0),
-        (
-            mp,
-            1.0,
-            aC,
-            0.0,
-            pin(4, zero, -1.0) | {6: np.array([0, 1.0, 0]), 8: np.array([0, 0, 1.0])},
-            zero,
-            0.0,
-        ),
+        (mp, 1.0, aC, 0.0, pin(4, zero, -1.0) | {6: np.array([0, 1.0, 0]), 8: np.array([0, 0, 1.0])}, zero, 0.0),
     ]
     return balance(parts, 9)
 
@@ -232,8 +219,7 @@ def test_power_of_drive_and_loads_is_what_kinetic_energy_grows_by(raw: dict[str,
 
 
 @pytest.mark.parametrize(
-    "raw",
-    [spatial(), mechanisms()["slider-crank"], loaded_four_bar("plate"), loaded_four_bar("beam", "link")],
+    "raw", [spatial(), mechanisms()["slider-crank"], loaded_four_bar("plate"), loaded_four_bar("beam", "link")]
 )
 @pytest.mark.parametrize("carried", [False, True])
 def test_the_drives_torque_is_that_of_virtual_work_on_all_nodes(raw: dict[str, Any], carried: bool) -> None:
@@ -452,10 +438,7 @@ def slide_driven() -> dict[str, Any]:
 
 @pytest.mark.parametrize(
     ("raw", "channels"),
-    [
-        (five_bar(), ("drive/A/rigid_torque", "drive/E/rigid_torque")),
-        (slide_driven(), ("drive/rigid_force",)),
-    ],
+    [(five_bar(), ("drive/A/rigid_torque", "drive/E/rigid_torque")), (slide_driven(), ("drive/rigid_force",))],
 )
 def test_all_drives_together_give_the_power(raw: dict[str, Any], channels: tuple[str, ...]) -> None:
     scene = scene_from(raw)

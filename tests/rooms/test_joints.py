@@ -70,13 +70,7 @@ def test_welded_pieces_are_one_piece(kind: str, tolerance: float) -> None:
 
 def solid_slider_crank(piston: dict[str, Any]) -> dict[str, Any]:
     raw = slider_crank("rigid")
-    plate = {
-        "kind": "plate_link",
-        "width": 0.02,
-        "thickness": 0.02,
-        "eye_diameter": 0.04,
-        "bore_diameter": 0.02,
-    }
+    plate = {"kind": "plate_link", "width": 0.02, "thickness": 0.02, "eye_diameter": 0.04, "bore_diameter": 0.02}
     for name, ends in (("crank", ["A", "B"]), ("rod", ["B", "C"])):
         raw["links"][name] = {
             "material": "steel", "shape": {**plate, "between": ends}, "mesh": {"elements_across": 1},

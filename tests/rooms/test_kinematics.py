@@ -437,10 +437,7 @@ def scene_with_plots() -> Scene:
             "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": "A"}},
             "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 3.0}},
             "analysis": {"revolutions": 1, "steps_per_revolution": 36},
-            "output": {
-                "animation": False,
-                "probes": {"tip": {"link": "arm", "at": "B", "quantity": "stress"}},
-            },
+            "output": {"animation": False, "probes": {"tip": {"link": "arm", "at": "B", "quantity": "stress"}}},
         }
     )
 

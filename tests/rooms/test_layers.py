@@ -310,10 +310,7 @@ class TestCusps:
         """The web's side touches the circle of radius 20 where its normal has the sine (20 - 12) / 90."""
         sine = 8 / 90
         place = f"{0.02 * sine:.6g}, -{0.02 * math.sqrt(1 - sine**2):.6g}, "
-        with (
-            part_in_gmsh(touching_rod) as (gmsh, solid),
-            plan_of_slabs(gmsh, solid, np.array([0.0, 0, 1])) as plan,
-        ):
+        with part_in_gmsh(touching_rod) as (gmsh, solid), plan_of_slabs(gmsh, solid, np.array([0.0, 0, 1])) as plan:
             found = [refusal_of(plan, cusp) for cusp in cusps(plan)]
             assert len(found) == 4
             with pytest.raises(OtherMethodError, match="must meet at angles of at least 6°, got two that touch at"):

@@ -34,11 +34,7 @@ def test_ranks_of_the_parts_of_examples_add_up(path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("topology", "held", "closed"),
-    [
-        ("pendulum, no drive", 105, 0),
-        ("one drive, loops in a row", 126, 1),
-        ("a drive on each four-bar", 126, 7),
-    ],
+    [("pendulum, no drive", 105, 0), ("one drive, loops in a row", 126, 1), ("a drive on each four-bar", 126, 7)],
 )
 def test_ranks_and_loops_of_many_links(topology: str, held: int, closed: int) -> None:
     """Loops in a row share links; four-bars side by side share the ground alone."""

@@ -15,15 +15,7 @@ from kedfem.errors import OutputError
 from kedfem.kinematics import kinematics
 from kedfem.loads import loads
 from kedfem.results import Channel, Results, read_results
-from kedfem.results.forces.loads import (
-    BALL,
-    ROLLER,
-    DriveLoad,
-    drive_summary,
-    equivalent_load,
-    facing,
-    in_axes,
-)
+from kedfem.results.forces.loads import BALL, ROLLER, DriveLoad, drive_summary, equivalent_load, facing, in_axes
 from kedfem.scene import scene_from
 from kedfem.tables import loads_tables
 from tests.reliability.fuzz import short
@@ -121,14 +113,7 @@ def test_a_spinning_bar_is_held_by_its_centrifugal_force(axis: list[float], alon
     turned = np.outer(np.cos(told["drive angle [rad]"]), e1) + np.outer(np.sin(told["drive angle [rad]"]), e2)
     assert_allclose(ground, held * turned, atol=1e-7 * held)
     row, drive = found.joints["A 1"], found.drives["A 1"]
-    names = (
-        "peak",
-        "mean",
-        "rms",
-        "largest bearing load",
-        "equivalent, ball bearing",
-        "equivalent, roller bearing",
-    )
+    names = ("peak", "mean", "rms", "largest bearing load", "equivalent, ball bearing", "equivalent, roller bearing")
     assert_allclose([row[f"{name} [N]"] for name in names], held, rtol=1e-9)
     assert row["largest axial [N]"] < 1e-9 * held
     assert_allclose(told["speed of my bar against ground [rad/s]"], OMEGA, rtol=1e-8)

@@ -21,13 +21,7 @@ def cantilever(held: str, load: dict[str, Any], model: str = "beam", initial: st
         "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
         "loads": {"P": {"kind": "force", "link": "arm", "at": [1.0, 0], "vector": [0, FOLLOWING], **load}},
         "damping": {"beta": 0.02},
-        "analysis": {
-            "end_time": 0.5,
-            "step": 2e-3,
-            "rho_inf": 0.6,
-            "frames": "co-rotational",
-            "initial": initial,
-        },
+        "analysis": {"end_time": 0.5, "step": 2e-3, "rho_inf": 0.6, "frames": "co-rotational", "initial": initial},
     }
     if held == "drive":
         motion = {"kind": "cycloidal", "angle": 1e-9, "rise": 1.0}

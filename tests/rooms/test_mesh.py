@@ -93,11 +93,7 @@ class TestBar:
     def test_is_a_box_along_its_line_with_the_thickness_upwards(self, Q):
         P = np.array([0.5, -0.25, 0.125])
         mesh = meshed(
-            kind="bar",
-            between=[P.tolist(), (P + Q).tolist()],
-            width=0.02,
-            thickness=0.01,
-            mesh={"elements": [3, 2, 1]},
+            kind="bar", between=[P.tolist(), (P + Q).tolist()], width=0.02, thickness=0.01, mesh={"elements": [3, 2, 1]}
         )
         x = np.array(Q) / np.linalg.norm(Q)
         up = [1, 0, 0] if x[2] > 0.9 else [0, 0, 1]  # towards z, or x where it is steep
@@ -272,10 +268,7 @@ class TestExtrusion:
     @pytest.mark.parametrize("size", [0.04, 0.01])
     def test_cusps_are_cut_off_and_told(self, size):
         near = 0.1 * math.sqrt(0.5)
-        touching = {
-            "via": [near, 0.1 - near],
-            "to": [0, 0],
-        }  # a quarter of a circle that ends along the first edge
+        touching = {"via": [near, 0.1 - near], "to": [0, 0]}  # a quarter of a circle that ends along the first edge
         shape = extrusion_shape([[0, 0], [0.2, 0], [0.2, 0.1], [0.1, 0.1], touching], [])
         mesh = meshed(**shape, mesh={"size": size})
         assert mesh.method == "cusps between touching edges cut off, 0.02 % of the area"
@@ -500,11 +493,7 @@ class TestMeshFile:
     def test_is_scaled_and_loses_what_is_no_hexahedron(self, tmp_path):
         mesh = plate(*PLATES[1])
         spare = np.concatenate([[[9.0, 9.0, 9.0]], 1000 * mesh.points])
-        cells = [
-            ("line", [[0, 1]]),
-            (mesh.cell_type, mesh.cells[:9] + 1),
-            (mesh.cell_type, mesh.cells[9:] + 1),
-        ]
+        cells = [("line", [[0, 1]]), (mesh.cell_type, mesh.cells[:9] + 1), (mesh.cell_type, mesh.cells[9:] + 1)]
         meshio.Mesh(spare, cells).write(tmp_path / "arm.vtu")
         again = meshed(tmp_path, kind="mesh", file="arm.vtu", scale=0.001)
         assert_allclose(again.points, mesh.points, rtol=1e-15)

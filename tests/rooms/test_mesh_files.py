@@ -86,13 +86,7 @@ def cut_box(kinds: str, quadratic: bool) -> meshio.Mesh:
         case "pyramids":  # all from the middle; two on the far side divided into tetrahedra
             X = np.vstack([X, [1.5, 0.5, 0.5]])
             m = len(X) - 1
-            cells["pyramid"] = [
-                [a, d, h, e, m],
-                [a, b, c, d, m],
-                [e, h, g, f, m],
-                [a, e, f, b, m],
-                [d, c, g, h, m],
-            ]
+            cells["pyramid"] = [[a, d, h, e, m], [a, b, c, d, m], [e, h, g, f, m], [a, e, f, b, m], [d, c, g, h, m]]
             cells["tetra"] = [[b, f, g, m], [b, g, c, m]]
         case "hexahedra":
             cells["hexahedron"].append([a, b, c, d, e, f, g, h])
@@ -202,12 +196,7 @@ def test_node_sets_and_surfaces_of_abaqus_are_faces(tmp_path: Path) -> None:
     nodes = "\n".join(f"{i}, {x}, {y}, {z}" for i, (x, y, z) in enumerate(points, start=1))
     (tmp_path / "brick.inp").write_text(ABAQUS.format(nodes=nodes))
     faces = {face.name: face for face in mesh_from_file("mesh", tmp_path / "brick.inp", 1.0).faces}
-    assert {name: len(face.sides) for name, face in faces.items()} == {
-        "tip": 1,
-        "top": 2,
-        "wall": 1,
-        "some": 3,
-    }
+    assert {name: len(face.sides) for name, face in faces.items()} == {"tip": 1, "top": 2, "wall": 1, "some": 3}
     assert_allclose(faces["tip"].direction, [1, 0, 0], atol=1e-12)
     assert_allclose(faces["top"].centre, [1, 0.5, 1], atol=1e-12)
     assert_allclose(faces["wall"].direction, [-1, 0, 0], atol=1e-12)

@@ -110,8 +110,7 @@ class TestApart:
 
     def test_what_hangs_is_given_up(self) -> None:
         with pytest.raises(
-            MeshError,
-            match=r"^rod.step: must be a part .* work on, got none within 1 s of processor time; mend or",
+            MeshError, match=r"^rod.step: must be a part .* work on, got none within 1 s of processor time; mend or"
         ):
             apart("rod.step", PART, 1, busy, 60)
 

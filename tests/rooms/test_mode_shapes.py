@@ -62,9 +62,7 @@ def test_the_shape_of_a_free_beam_and_its_stress(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_shapes_of_a_linkage_are_those_of_its_softest_position_and_replace_earlier_ones(
-    tmp_path: Path,
-) -> None:
+def test_shapes_of_a_linkage_are_those_of_its_softest_position_and_replace_earlier_ones(tmp_path: Path) -> None:
     from PIL import Image
 
     scene = scene_from(beams(2), tmp_path)

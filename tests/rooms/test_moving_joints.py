@@ -22,18 +22,7 @@ from kedfem.output.words import clock, moment
 from kedfem.scene import scene_from
 from tests.cells import Cell, scene_of
 from tests.joint_checks import interface_values, row_values, unbalanced
-from tests.moving import (
-    bar,
-    cardan,
-    channels,
-    driven_slide,
-    geared,
-    inverted,
-    ran,
-    screwed,
-    state,
-    two_drives,
-)
+from tests.moving import bar, cardan, channels, driven_slide, geared, inverted, ran, screwed, state, two_drives
 from tests.systems import begun
 
 KINDS = {
@@ -153,10 +142,7 @@ def test_the_first_rates_and_accelerations_keep_rows_closed() -> None:
     raw["links"]["arm"] = bar("beam", (-0.3, 0), (0.8 * along - [0.3, 0]).tolist(), 16)
     raw["joints"]["S"] |= {"at": pin.tolist(), "axis": [*along.tolist(), 0]}
     ready, blocks = ran(raw)
-    first, later = (
-        blocks[0].links,
-        joint_rows(ready.model.rows, blocks[1].motion, ready.model.interface_unknowns),
-    )
+    first, later = (blocks[0].links, joint_rows(ready.model.rows, blocks[1].motion, ready.model.interface_unknowns))
     assert later is not None
     z, z1, z2 = (interface_values(ready.model.joints, [getattr(x, k)[0] for x in first]) for k in "uva")
     t = blocks[1].motion.t[[3, 7]]

@@ -251,10 +251,7 @@ def test_a_frame_is_suggested_where_there_is_reason_to() -> None:
     chain = [AssemblySolid("a", 0.1, (holes(1),)), AssemblySolid("b", 0.3, (pins(1), holes(2))),
              AssemblySolid("c", 0.2, (pins(2),))]  # fmt: skip
     assert grounds(chain) == (False, [["a", "b"], ["b", "c"]])
-    assert grounds([replace(chain[0], name="machine bed"), *chain[1:]]) == (
-        True,
-        [["ground", "b"], ["b", "c"]],
-    )
+    assert grounds([replace(chain[0], name="machine bed"), *chain[1:]]) == (True, [["ground", "b"], ["b", "c"]])
     loop = [replace(chain[0], rounds=(*chain[0].rounds, holes(3))), chain[1],
             replace(chain[2], rounds=(*chain[2].rounds, pins(3)))]  # fmt: skip
     tail = AssemblySolid("tail", 0.9, (pins(4),))

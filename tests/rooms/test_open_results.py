@@ -11,16 +11,7 @@ from numpy.testing import assert_array_equal
 
 from kedfem.analysis import analyse
 from kedfem.errors import OutputError
-from kedfem.results import (
-    Channel,
-    Results,
-    ResultsWriter,
-    on_demand,
-    read_results,
-    table,
-    write_csv,
-    write_parquet,
-)
+from kedfem.results import Channel, Results, ResultsWriter, on_demand, read_results, table, write_csv, write_parquet
 from kedfem.results.additions import add_account
 from kedfem.results.dimensions import cf_units, columns_dimension
 from kedfem.results.records import ANGLE, TRAVEL
@@ -197,11 +188,7 @@ def test_what_is_not_installed_is_said_with_the_command(
     monkeypatch.setitem(sys.modules, missing, None)
     message = rf"{where}: needs {missing}, which is not installed: pip install 'kedfem\[data\]'$"
     raw = example("four_bar_beams") | {"output": {"parquet": True, "folder": str(tmp_path / "none")}}
-    tries = {
-        "xarray": results.to_xarray,
-        "pandas": results.to_pandas,
-        "pyarrow": lambda: analyse(scene_from(raw)),
-    }
+    tries = {"xarray": results.to_xarray, "pandas": results.to_pandas, "pyarrow": lambda: analyse(scene_from(raw))}
     with pytest.raises(OutputError, match=message):
         tries[missing]()
     assert not (tmp_path / "none").exists()

@@ -457,14 +457,7 @@ def test_a_picture_without_stress_is_drawn(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("extents", "normal"),
-    [
-        ((3, 2, 0.1), 2),
-        ((3, 0.1, 2), 1),
-        ((0.1, 3, 2), 0),
-        ((3, 0.1, 0.1), 2),
-        ((0.1, 3, 0.1), 2),
-        ((0.1, 0.1, 3), 1),
-    ],
+    [((3, 2, 0.1), 2), ((3, 0.1, 2), 1), ((0.1, 3, 2), 0), ((3, 0.1, 0.1), 2), ((0.1, 3, 0.1), 2), ((0.1, 0.1, 3), 1)],
 )
 def test_flat_linkages_are_seen_from_their_flat_side(extents: tuple[float, ...], normal: int) -> None:
     direction, up = sight(np.array(extents, float), np.zeros(3))
@@ -502,10 +495,7 @@ def test_beams_are_drawn_with_their_sections(round_: bool, area: float) -> None:
     straight = drawn_beam(replace(rod(), section=(0.5, 0.2, round_)))
     np.testing.assert_allclose(np.ptp(straight.points, axis=0), [8.0, 0.5, 0.2], rtol=1e-6)
     length = np.sqrt(2) * 2 + np.arcsinh(1) * 2  # of y = x (8 − x)/8 from 0 to 8
-    for surface, wanted in (
-        (straight, 8.0),
-        (drawn_beam(replace(arch(), section=(0.5, 0.2, round_))), 2 * length),
-    ):
+    for surface, wanted in ((straight, 8.0), (drawn_beam(replace(arch(), section=(0.5, 0.2, round_))), 2 * length)):
         assert surface.n_open_edges == 0
         assert surface.triangulate().volume == pytest.approx(area * wanted, rel=2e-3)
 

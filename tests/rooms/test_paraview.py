@@ -51,12 +51,7 @@ def test_drives_are_arrows_at_their_joints(tmp_path: Path) -> None:
         (two_drives(), "drive torque [N m]", ["A", "B"]),
         (driven_slide(), "drive force [N]", ["A"]),
     ):
-        output = {
-            "plots": False,
-            "picture": False,
-            "folder": str(tmp_path / array[:9]),
-            "animation": {"frames": 3},
-        }
+        output = {"plots": False, "picture": False, "folder": str(tmp_path / array[:9]), "animation": {"frames": 3}}
         del output["animation"]
         done = analyse(scene_from({**raw, "output": output, "analysis": {**raw["analysis"], "accuracy": "quick"}}))
         _, files = read_collection(done.folder / "animation.pvd")[1]

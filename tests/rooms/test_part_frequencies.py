@@ -69,10 +69,7 @@ def test_the_command_holds_faces_and_leaves_a_table(plate: Path) -> None:
         (["--size", "3 mm"], "--size: must be left out for a mesh file"),
         (["--link", "arm"], "--link: must be combined with a scene"),
         (["--material", "stel"], "--material: must be one of .*steel"),
-        (
-            ["--material", "{ density = -1, youngs_modulus = 1e9, poisson_ratio = 0.3 }"],
-            "--material.density: must be",
-        ),
+        (["--material", "{ density = -1, youngs_modulus = 1e9, poisson_ratio = 0.3 }"], "--material.density: must be"),
         (["--material", "{ density"], "--material: must be a name or a table"),
         (["--hold", "{ cylinder = '8 mm' }"], "--hold: must be a face"),
         (["--hold", "end"], "--hold: must be a face by what it is, got 'end'"),

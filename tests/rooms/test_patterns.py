@@ -15,12 +15,7 @@ from kedfem.scene.read.files import outside
 Raw = dict[str, Any]
 SHAPE = {"kind": "bar", "width": 0.02, "thickness": 0.01}
 BEAM = {"model": "beam", "material": "steel"}
-PRESSURE = {
-    "over": "angle",
-    "at": ["0 deg", "90 deg", "180 deg"],
-    "value": [1.0, 0.5, 0.0],
-    "period": "360 deg",
-}
+PRESSURE = {"over": "angle", "at": ["0 deg", "90 deg", "180 deg"], "value": [1.0, 0.5, 0.0], "period": "360 deg"}
 
 
 def radial(count: int) -> Raw:
@@ -136,11 +131,7 @@ def test_a_shift_moves_points_of_the_pattern_and_leaves_those_of_the_scene() -> 
 
 @pytest.mark.parametrize(
     "link",
-    [
-        {"file": "a.step"},
-        {"shape": {"kind": "cad", "file": "a.step", "towards": [1, 0, 0]}},
-        {"file": "a.msh"},
-    ],
+    [{"file": "a.step"}, {"shape": {"kind": "cad", "file": "a.step", "towards": [1, 0, 0]}}, {"file": "a.msh"}],
     ids=["in short", "towards a point", "a mesh"],
 )
 def test_a_shift_moves_files_that_are_drawn_in_their_place(link: Raw, tmp_path: Path) -> None:

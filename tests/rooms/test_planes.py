@@ -222,13 +222,7 @@ def test_a_guide_across_its_edge_is_refused() -> None:
 
 def test_a_rigid_slider_rides_on_a_plane_rod() -> None:
     """As on a solid rod, and its mass as a point mass on the bore."""
-    plate = {
-        "kind": "plate_link",
-        "width": 0.02,
-        "thickness": 0.006,
-        "eye_diameter": 0.04,
-        "bore_diameter": 0.02,
-    }
+    plate = {"kind": "plate_link", "width": 0.02, "thickness": 0.006, "eye_diameter": 0.04, "bore_diameter": 0.02}
 
     def scene(kind: str, piston: str) -> dict[str, Any]:
         raw = slider_crank(piston)

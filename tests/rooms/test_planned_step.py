@@ -60,9 +60,7 @@ def struck(**analysis: Any) -> Scene:
     return scene_from(raw)
 
 
-def test_vibration_that_short_steps_resolve_is_followed_where_that_costs_seconds(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_vibration_that_short_steps_resolve_is_followed_where_that_costs_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
     """The trials that are usual end before; where steps would be dear they are told, with the longer step taken."""
     scene, error, notes = chosen(struck())
     assert error <= ALLOWED

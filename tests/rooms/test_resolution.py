@@ -8,14 +8,7 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.reduction import prepared
-from kedfem.accuracy.resolution import (
-    StepError,
-    local_error,
-    meetings,
-    resolution,
-    resolution_warnings,
-    step_error,
-)
+from kedfem.accuracy.resolution import StepError, local_error, meetings, resolution, resolution_warnings, step_error
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient

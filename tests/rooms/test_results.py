@@ -264,8 +264,7 @@ def test_a_run_under_way_can_be_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("error", "reason"),
-    [(KeyboardInterrupt(), "KeyboardInterrupt"), (RuntimeError("step 7"), "RuntimeError: step 7")],
+    ("error", "reason"), [(KeyboardInterrupt(), "KeyboardInterrupt"), (RuntimeError("step 7"), "RuntimeError: step 7")]
 )
 def test_a_stopped_run_says_so_and_keeps_its_rows(tmp_path: Path, error: BaseException, reason: str) -> None:
     path = tmp_path / "results.h5"

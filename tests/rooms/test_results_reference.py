@@ -14,15 +14,7 @@ from tests.scenes import example
 
 PAGE = Path(__file__).parents[2] / "docs" / "results.md"
 SOME = ("four_bar_beams", "motor_four_bar")  # of all examples: tests/test_examples.py
-DRIVEN = (
-    "four_bar_beams",
-    "spinning_bar",
-    "rssr",
-    "bennett",
-    "universal_joint_shaft",
-    "quick_return",
-    "five_bar_robot",
-)
+DRIVEN = ("four_bar_beams", "spinning_bar", "rssr", "bennett", "universal_joint_shaft", "quick_return", "five_bar_robot")
 
 
 def test_the_page_is_made_from_the_code() -> None:

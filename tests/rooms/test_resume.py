@@ -40,11 +40,7 @@ CHEAP = {"dense, two levels", "co-rotational"}
 def scene_of(kind: str, folder: Path, analysis: dict[str, Any]) -> Scene:
     raw = linkage(kind)
     raw["analysis"] |= {"step": raw["analysis"]["end_time"] / STEPS, **analysis}
-    raw["output"] = raw["output"] | {
-        "animation": {"frames_per_revolution": 20},
-        "plots": False,
-        "picture": False,
-    }
+    raw["output"] = raw["output"] | {"animation": {"frames_per_revolution": 20}, "plots": False, "picture": False}
     return scene_from(raw, folder)
 
 
@@ -281,13 +277,7 @@ def test_a_damaged_state_is_refused(tmp_path: Path) -> None:
 
 def test_a_state_makes_records_and_nothing_else() -> None:
     """No code of whoever wrote it: names of classes that are not kedfem's own records are refused."""
-    for name in (
-        "os:system",
-        "kedfem.store:clear",
-        "subprocess:Popen",
-        "kedfem.cli:typer",
-        "kedfem.resume:Keeper",
-    ):
+    for name in ("os:system", "kedfem.store:clear", "subprocess:Popen", "kedfem.cli:typer", "kedfem.resume:Keeper"):
         made = Packed(packed({"x": 1}))
         made.content["x"] = {"record": [name, {"folder": "."}]}
         if name == "kedfem.resume:Keeper":
@@ -297,11 +287,7 @@ def test_a_state_makes_records_and_nothing_else() -> None:
 
 
 def test_what_was_packed_comes_back() -> None:
-    said = {
-        "a": [1, 2.5, None, float("inf")],
-        "b": (np.arange(3.0), {"k": np.float64(0.1), 3: "x"}),
-        "c": True,
-    }
+    said = {"a": [1, 2.5, None, float("inf")], "b": (np.arange(3.0), {"k": np.float64(0.1), 3: "x"}), "c": True}
     back = {name: Packed(packed(said)).put_back(name) for name in said}
     assert back["a"] == said["a"]
     assert back["c"] is True

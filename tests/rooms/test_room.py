@@ -41,9 +41,7 @@ def test_five_million_unknowns_are_refused_before_they_are_meshed(monkeypatch: p
     )
 
 
-def test_too_many_unknowns_asked_for_are_refused_before_they_are_made(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_too_many_unknowns_asked_for_are_refused_before_they_are_made(monkeypatch: pytest.MonkeyPatch) -> None:
     """In the search for a mesh of so many no solid is made that does not fit."""
     monkeypatch.setattr(room, "memory", lambda: 2e8)
     swept, most = link.swept_mesh, 60_000  # unknowns
@@ -54,13 +52,7 @@ def test_too_many_unknowns_asked_for_are_refused_before_they_are_made(
         return mesh
 
     monkeypatch.setattr(link, "swept_mesh", never_large)
-    shape = {
-        "kind": "plate_link",
-        "between": [[0, 0], [1, 0]],
-        "width": 0.1,
-        "thickness": 0.02,
-        "bore_diameter": 0.05,
-    }
+    shape = {"kind": "plate_link", "between": [[0, 0], [1, 0]], "width": 0.1, "thickness": 0.02, "bore_diameter": 0.05}
     with pytest.raises(MeshError, match=r"links\.arm: must fit in this machine's memory of 0\.2 GB, got about"):
         build.bare_link(arm(shape=shape, mesh={"unknowns": 400_000}), "arm")
 

@@ -166,8 +166,7 @@ def test_a_stiff_link_of_the_worked_example(link: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("model", "direction"),
-    [("beam", "z"), ("beam", "oblique"), ("plane", "z"), ("solid", "x"), ("solid", "oblique")],
+    ("model", "direction"), [("beam", "z"), ("beam", "oblique"), ("plane", "z"), ("solid", "x"), ("solid", "oblique")]
 )
 def test_a_stiff_link_that_moves_as_a_rigid_one_begins_without_damping(model: str, direction: str) -> None:
     """Joint forces at a quasi-static start are those beside a link a hundred times softer, 1e4 times as stiff as others.
@@ -177,10 +176,7 @@ def test_a_stiff_link_that_moves_as_a_rigid_one_begins_without_damping(model: st
 
     def forces(ratio: float) -> np.ndarray:
         ready = meshed(scene_from(welded(model, direction, ratio)))
-        solver, motion_at = (
-            steps_of(ready.scene, ready.model),
-            motion_of(ready.scene, ready.linkage, ready.path),
-        )
+        solver, motion_at = (steps_of(ready.scene, ready.model), motion_of(ready.scene, ready.linkage, ready.path))
         return solver.start(motion_at, []).port_force
 
     stiff, wanted = forces(1e6), forces(1e4)

@@ -181,9 +181,7 @@ def test_materials_hold_all_moduli():
     assert_allclose(lame + 2.0 * mu / 3.0, 210e9 / (3.0 * 0.4))  # bulk modulus E / 3(1 − 2ν)
     assert mu == steel.shear_modulus
     assert_allclose(
-        Material(density=2796, youngs_modulus=7.031e10, shear_modulus=2.712e10).poisson_ratio,
-        0.29628,
-        atol=1e-5,
+        Material(density=2796, youngs_modulus=7.031e10, shear_modulus=2.712e10).poisson_ratio, 0.29628, atol=1e-5
     )
 
 

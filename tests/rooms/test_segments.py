@@ -41,12 +41,7 @@ def _no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
 def bars(elements: int = 6, kind: str = "plane", **link: Any) -> dict[str, Any]:
     """[KED]'s four-bar (Nath and Ghosh 1980) of bars with co-rotational frames, from rest at 600 rpm."""
     raw = four_bar(
-        "bar",
-        revolutions=0.15,
-        steps_per_revolution=600,
-        rho_inf=0.95,
-        frames="co-rotational",
-        reduction_tolerance=0.02,
+        "bar", revolutions=0.15, steps_per_revolution=600, rho_inf=0.95, frames="co-rotational", reduction_tolerance=0.02
     )
     mesh = {"plane": [elements, 1], "solid": [elements, 1, 1], "beam": elements}[kind]
     for each in raw["links"].values():

@@ -33,11 +33,7 @@ def with_dyad(kind: str, pins: tuple[str, str], feet: tuple[str, str], **analysi
     like = raw["links"]["rocker"]
     for name, ends in (("lever", [pins[0], "E"]), ("swing", ["E", feet[0]])):
         raw["links"][name] = {**like, "shape": {**shape, "between": ends}}
-    pairs = {
-        "pin": (pins[1], "lever", pins[0]),
-        "E": ("lever", "swing", "E"),
-        "foot": (feet[1], "swing", feet[0]),
-    }
+    pairs = {"pin": (pins[1], "lever", pins[0]), "E": ("lever", "swing", "E"), "foot": (feet[1], "swing", feet[0])}
     for name, (a, b, at) in pairs.items():
         raw["joints"][name] = {"kind": "revolute", "links": [a, b], "at": at}
     return raw
@@ -112,12 +108,7 @@ def test_recorded_forces_at_a_ternary_pin_balance_every_link(kind: str) -> None:
 def test_torque_of_a_driven_hub_that_carries_a_pin(kind: str) -> None:
     """A lever and a swing on the crank's two pins: driven slowly, the torque is that of rigid links."""
     raw = with_dyad(
-        kind,
-        ("B", "crank"),
-        ("A", "crank"),
-        revolutions=0.1,
-        steps_per_revolution=240,
-        initial="quasi-static",
+        kind, ("B", "crank"), ("A", "crank"), revolutions=0.1, steps_per_revolution=240, initial="quasi-static"
     )
     raw["drive"]["motion"]["speed"] = "20 rpm"
     raw["gravity"] = [0, -9.81, 0]
@@ -180,12 +171,7 @@ def test_a_beam_piston_with_pin_and_guide_at_one_node_is_a_rigid_slider() -> Non
     elastic, rigid = slider_crank("rigid"), slider_crank("rigid")
     c = float(np.sqrt(0.3**2 - 0.08**2))
     line = {"kind": "bar", "between": [[c, 0], [c + 0.05, 0]], "width": 0.06, "thickness": 0.06}
-    elastic["links"]["piston"] = {
-        "model": "beam",
-        "material": "steel",
-        "shape": line,
-        "mesh": {"elements": 1},
-    }
+    elastic["links"]["piston"] = {"model": "beam", "material": "steel", "shape": line, "mesh": {"elements": 1}}
     density = scene_from(elastic).materials["steel"].density
     rigid["links"]["piston"]["mass"] = density * 0.05 * 0.06**2
     a, b = histories(elastic), histories(rigid)

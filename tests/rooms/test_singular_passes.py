@@ -112,11 +112,6 @@ def test_driven_scenes_and_a_motor_are_not() -> None:
 
 def test_a_run_says_so(tmp_path: Path) -> None:
     raw = falling(0.2, 0.2, 0.2)
-    raw["output"] = {
-        "animation": False,
-        "plots": False,
-        "picture": False,
-        "folder": str(tmp_path / "results"),
-    }
+    raw["output"] = {"animation": False, "plots": False, "picture": False, "folder": str(tmp_path / "results")}
     said = [x for x in analyse(scene_from(raw)).warnings if "singular position" in x]
     assert len(said) == 1

@@ -35,12 +35,7 @@ def test_no_example_and_no_template_is_doubted(path: Path) -> None:
 def test_a_rigid_link_without_a_shape_has_no_material_to_doubt() -> None:
     """However heavy it is: 40 t on a line of 0.3 m made one stiffer than diamond."""
     raw = four_bar()
-    raw["links"]["coupler"] = {
-        "model": "rigid",
-        "mass": 4e4,
-        "centre": [0.2, 0.2],
-        "inertia": [1, 1, 1, 0, 0, 0],
-    }
+    raw["links"]["coupler"] = {"model": "rigid", "mass": 4e4, "centre": [0.2, 0.2], "inertia": [1, 1, 1, 0, 0, 0]}
     line, warnings = seen(scene_from(raw))
     assert "E 210 GPa;" in line
     assert warnings == ()

@@ -57,12 +57,7 @@ def rssr_of_beams(R: np.ndarray | None = None, **analysis: Any) -> dict[str, Any
                 "model": "beam",
                 "material": "aluminium",
                 "mesh": {"elements": 2},
-                "shape": {
-                    "kind": "polyline",
-                    "points": [p.tolist() for p in line],
-                    "up": up,
-                    **sections[name],
-                },
+                "shape": {"kind": "polyline", "points": [p.tolist() for p in line], "up": up, **sections[name]},
             }
             for name, line in lines.items()
         },
@@ -246,10 +241,7 @@ def test_link_axes_turn_with_the_shape(kind: str, tmp_path: Path) -> None:
         shape = SHAPES[kind] | {("z" if kind == "file" else "up"): (R @ up).tolist()}
         shape |= {key: (np.array(shape[key]) @ R.T).tolist() for key in ("points", "towards") if key in shape}
         beam = {} if kind == "file" else {"model": "beam", "beam": "spatial"}
-        raw = {
-            "links": {"a": {"material": "steel", "shape": shape, **beam}},
-            "analysis": {"end_time": 1, "step": 0.1},
-        }
+        raw = {"links": {"a": {"material": "steel", "shape": shape, **beam}}, "analysis": {"end_time": 1, "step": 0.1}}
         scene = scene_from(raw, tmp_path)
         assert_allclose(link_axes(scene.links["a"]), R @ axes, atol=1e-12)
         if beam:

@@ -50,10 +50,7 @@ def loaded(kind: str, axis: str) -> Raw:
         "bent": {"link": "arm", "at": middle, "quantity": "deflection"},
         "stress": {"link": "arm", "at": middle, "quantity": "stress"},
     }
-    return {
-        "loads": {"f": {"kind": "force", "link": "tip", "at": end, "vector": vector}},
-        "output": {"probes": probes},
-    }
+    return {"loads": {"f": {"kind": "force", "link": "tip", "at": end, "vector": vector}}, "output": {"probes": probes}}
 
 
 def at_rest(space: StateSpace) -> np.ndarray:
@@ -119,13 +116,7 @@ def swinging(frame: str = "world") -> Raw:
         },
         "damping": {"alpha": 3.0, "beta": 2e-5},
         "output": {"probes": {kind: {**probe, "quantity": kind} for kind in kinds}},
-        "analysis": {
-            "end_time": 0.06,
-            "step": STEP,
-            "initial": "rest",
-            "accuracy": "quick",
-            "frames": "co-rotational",
-        },
+        "analysis": {"end_time": 0.06, "step": STEP, "initial": "rest", "accuracy": "quick", "frames": "co-rotational"},
     }
 
 
@@ -265,16 +256,8 @@ def test_what_cannot_be_asked(tmp_path: Path) -> None:
     for more, options, said in (
         ({}, {"modes": 0}, r"--modes: must be at least 1, got 0"),
         (undriven, {"at": 0.1}, r"--at: must be 0 without a drive, got 0.1 s"),
-        (
-            undriven,
-            {"free": True},
-            r"--free: must be combined with a drive that lets go, got a scene without one",
-        ),
-        (
-            {"loads": {}, "motors": {}},
-            {},
-            r"--state-space: must have an input, got a scene without loads and motors",
-        ),
+        (undriven, {"free": True}, r"--free: must be combined with a drive that lets go, got a scene without one"),
+        ({"loads": {}, "motors": {}}, {}, r"--state-space: must have an input, got a scene without loads and motors"),
         ({"motors": {}, "output": {}}, {}, r"--state-space: must have an output, got a scene without probes"),
     ):
         with pytest.raises(SceneError, match=said):

@@ -164,13 +164,7 @@ def test_relative_errors_are_of_the_peak_and_interpolate() -> None:
         names[0]: vectors(fine), names[1]: vectors(fine), names[2]: np.full((41, 1), 1e-9), "drive/torque": fine[:, None]
     })  # fmt: skip
     found = run(
-        t,
-        {
-            names[0]: vectors(t, 0.1),
-            names[1]: vectors(t),
-            names[2]: np.ones((11, 1)),
-            "drive/torque": t[:, None],
-        },
+        t, {names[0]: vectors(t, 0.1), names[1]: vectors(t), names[2]: np.ones((11, 1)), "drive/torque": t[:, None]}
     )
     errors = relative_errors(found, reference)
     # √(3² + 4²) = 5 at the end; moments do not count, nor does what is 1e-9 of other forces; a cubic spline is exact

@@ -37,13 +37,7 @@ def arm(**analysis: Any) -> dict[str, Any]:
         parameters={"L": L},
         materials={"steel": material(RHO, 2.1e11)},
         damping={"ratio": 0.02, "frequencies": [50, 500]},
-        analysis={
-            "revolutions": 2,
-            "steps_per_revolution": 120,
-            "rho_inf": 0.6,
-            "initial": "quasi-static",
-            **analysis,
-        },
+        analysis={"revolutions": 2, "steps_per_revolution": 120, "rho_inf": 0.6, "initial": "quasi-static", **analysis},
         gravity=[0, -G, 0],
         output={"plots": False, "picture": False, "animation": False},
     )
@@ -135,27 +129,15 @@ def test_a_latin_hypercube_has_one_point_in_each_slice_and_is_the_same_again() -
 @pytest.mark.parametrize(
     ("over", "samples", "said"),
     [
-        (
-            ["drive.sped=1:2:3"],
-            None,
-            r"--over drive\.sped: must name a key .*did you mean 'drive\.motion\.speed'",
-        ),
+        (["drive.sped=1:2:3"], None, r"--over drive\.sped: must name a key .*did you mean 'drive\.motion\.speed'"),
         (["analysis.revolution=1,2"], None, "did you mean 'analysis.revolutions'"),
         (["joints.links=1,2"], None, "must name a key"),
-        (
-            ["drive.speed"],
-            None,
-            "--over: must be KEY=a list a,b,c or a range from:to:count, got 'drive.speed'",
-        ),
+        (["drive.speed"], None, "--over: must be KEY=a list a,b,c or a range from:to:count, got 'drive.speed'"),
         (["drive.speed=1rpm:2rpm"], None, "must be a list a,b,c or a range"),
         (["drive.speed=1rpm:2rpm:1"], None, "must be a list a,b,c or a range"),
         (["drive.speed=1rpm:fast:3"], None, "must have two ends"),
         (["drive.speed=1rpm:2mm:3"], None, "must be in one unit, got mm and rpm"),
-        (
-            ["drive.speed=60rpm:2 Hz:2"],
-            None,
-            "must be in one unit, got Hz and rpm: speeds and frequencies are not",
-        ),
+        (["drive.speed=60rpm:2 Hz:2"], None, "must be in one unit, got Hz and rpm: speeds and frequencies are not"),
         (["L=1,2", "parameters.L=1,2"], None, "must name each key once"),
         (["L=1:2:3"], 4, "must have two ends"),
         (["L=1:2"], 0, "--samples: must be from 1"),
@@ -327,18 +309,7 @@ def test_a_sweep_that_was_killed_goes_on_without_a_lost_or_doubled_point(tmp_pat
     raw, over = arm(), "drive.speed=100rpm:400rpm:10"
     scene = tmp_path / "arm.toml"
     scene.write_text("\n".join(f"{key} = {inline(value)}" for key, value in raw.items()), encoding="utf-8")
-    command = [
-        sys.executable,
-        "-m",
-        "kedfem",
-        "sweep",
-        str(scene),
-        "--over",
-        over,
-        "--quick",
-        "--workers",
-        "2",
-    ]
+    command = [sys.executable, "-m", "kedfem", "sweep", str(scene), "--over", over, "--quick", "--workers", "2"]
     killed = subprocess.Popen([*command, "--folder", str(tmp_path / "killed")], stderr=subprocess.DEVNULL)
     end = time.monotonic() + 120
     while len(finished_rows(tmp_path / "killed")) < 2 and killed.poll() is None:

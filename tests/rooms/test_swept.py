@@ -206,10 +206,7 @@ def test_frequencies_are_those_of_fine_tetrahedra(name: str, size: float, tmp_pa
 
 @pytest.mark.parametrize(
     ("outline", "wanted"),
-    [
-        (PULLEY, 15_000),
-        *(pytest.param(*each, marks=pytest.mark.long) for each in ((PULLEY, 60_000), (SHAFT, 30_000))),
-    ],
+    [(PULLEY, 15_000), *(pytest.param(*each, marks=pytest.mark.long) for each in ((PULLEY, 60_000), (SHAFT, 30_000)))],
 )
 def test_about_as_many_unknowns_as_asked_for(outline: Outline, wanted: int, tmp_path: Path) -> None:
     drawn(tmp_path, lambda occ: turned(occ, outline))

@@ -94,13 +94,7 @@ class TestMended:
 #: Easy ones of the catalogue, a tiny edge, and a part whose grid of looks met the edge of a hole.
 SOME = ("casting", "ball_seat", "bent_bar", "chamfered_bushing", "hook")
 #: The rest of a representative ten, slower.
-MORE = (
-    "lever_with_rounded_edges",
-    "ribbed_bell_crank",
-    "rod_end_with_thread",
-    "forged_rocker",
-    "i_section_rod",
-)
+MORE = ("lever_with_rounded_edges", "ribbed_bell_crank", "rod_end_with_thread", "forged_rocker", "i_section_rod")
 
 
 @pytest.mark.parametrize("name", [*SOME[:2], *(pytest.param(n, marks=pytest.mark.long) for n in (*SOME[2:], *MORE))])
@@ -121,12 +115,7 @@ def test_hexahedra_at_any_price_are_gmshs_subdivision(tmp_path: Path) -> None:
         occ.synchronize()
         write_step(tmp_path / "ball.step", ["ball"])
     shape = {"kind": "cad", "file": "ball.step"}
-    given = {
-        "shape": shape,
-        "material": "steel",
-        "mesh": {"kind": "hexahedra", "size": "5 mm"},
-        "min_quality": 0.0,
-    }
+    given = {"shape": shape, "material": "steel", "mesh": {"kind": "hexahedra", "size": "5 mm"}, "min_quality": 0.0}
     mesh = part_mesh(link_from(given), tmp_path)
     assert mesh.cell_type == "hexahedron27"
     assert "gmsh's subdivision" in mesh.method

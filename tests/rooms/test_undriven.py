@@ -19,15 +19,7 @@ from kedfem.dynamics.stepping.start import initial_rates
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import as_rows, mass_times
 from kedfem.motion.rigid import resting
-from kedfem.scene import (
-    corotational,
-    corotational_links,
-    link_frames,
-    read_scene,
-    scene_from,
-    time_grid,
-    turn_steps,
-)
+from kedfem.scene import corotational, corotational_links, link_frames, read_scene, scene_from, time_grid, turn_steps
 from kedfem.stepping import frame_steps
 from kedfem.tables import check_tables, moment
 from tests.scenes import arm, bar

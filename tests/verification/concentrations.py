@@ -175,13 +175,7 @@ def shoulder() -> list[Row]:
     """40 to 30 mm, fillets of 5 mm, 4 mm thick."""
     exact = section(turned=False)
     return [
-        Row(
-            "Kt by the chart's fit, of the net section [-]",
-            exact,
-            fit(3.1),
-            0.03,
-            "no mesh: the handbook's number",
-        ),
+        Row("Kt by the chart's fit, of the net section [-]", exact, fit(3.1), 0.03, "no mesh: the handbook's number"),
         *_rows(flat_bar, 2 * SLIM * FLAT, exact),
     ]
 
@@ -210,13 +204,7 @@ def stepped_shaft() -> list[Row]:
     """40 to 30 mm, fillet of 5 mm. The chart's fit is some 9 % below elasticity here, so that it is no reference."""
     exact = section(turned=True)
     return [
-        Row(
-            "Kt by the chart's fit, of the net section [-]",
-            exact,
-            fit(3.4),
-            0.12,
-            "no mesh: the handbook's number",
-        ),
+        Row("Kt by the chart's fit, of the net section [-]", exact, fit(3.4), 0.12, "no mesh: the handbook's number"),
         *_rows(shaft, np.pi * SLIM**2, exact),
     ]
 
@@ -240,10 +228,7 @@ def cross_bore() -> list[Row]:
     """30 mm, a bore of 6 mm, which nothing sweeps: tetrahedra of the usual size, and by the sizes for 2 %."""
     share = CROSS / (2 * SLIM)
     exact = 3 + 0.427 * share + 11.357 * share**2
-    made = (
-        (0.08, meshed(bored_shaft, None)),
-        (0.03, meshed(bored_shaft, None, fillet_angle=np.radians(FINEST_FILLET))),
-    )
+    made = ((0.08, meshed(bored_shaft, None)), (0.03, meshed(bored_shaft, None, fillet_angle=np.radians(FINEST_FILLET))))
     name = "Kt, of the gross section [-]"
     return [Row(name, exact, factor(link, np.pi * SLIM**2), cap, _words(link)) for cap, link in made]
 
@@ -285,10 +270,7 @@ def section(turned: bool, fine: float = 0.2) -> float:
     """Kt of shaft or flat bar from the half section: greatest stress on the fillet over that of the slim end."""
     mesh = _half_section(fine)
     basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTriP2()), intorder=6)
-    lam, mu = (
-        0.3 / (1.3 * 0.4) if turned else 0.3 / (1 - 0.3**2),
-        1 / 2.6,
-    )  # E = 1; plane stress of the flat bar
+    lam, mu = (0.3 / (1.3 * 0.4) if turned else 0.3 / (1 - 0.3**2), 1 / 2.6)  # E = 1; plane stress of the flat bar
 
     @skfem.BilinearForm
     def energy(u, v, w):

@@ -41,13 +41,7 @@ def slender(elements: int, radius: float, nodes: int = 3) -> tuple[dict[str, Any
 def bar(length: float, height: float, thickness: float, elements: int, nodes: int = 3) -> dict[str, Any]:
     """A planar beam along x."""
     shape = {"kind": "bar", "between": [[0, 0], [length, 0]], "width": height, "thickness": thickness}
-    return {
-        "material": "m",
-        "model": "beam",
-        "element": f"beam{nodes}",
-        "shape": shape,
-        "mesh": {"elements": elements},
-    }
+    return {"material": "m", "model": "beam", "element": f"beam{nodes}", "shape": shape, "mesh": {"elements": elements}}
 
 
 def hinge(link: str) -> dict[str, Any]:

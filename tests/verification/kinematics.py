@@ -70,10 +70,7 @@ def angle_of(
     return (drawn + turned(m, i, np.asarray(axis), j), *rates), drive_angle(scene.drive.motion, T)
 
 
-@case(
-    "Four-bar",
-    "R. L. Norton, Design of Machinery: position, velocity and acceleration of the pin-jointed four-bar",
-)
+@case("Four-bar", "R. L. Norton, Design of Machinery: position, velocity and acceleration of the pin-jointed four-bar")
 def planar_four_bar() -> list[Row]:
     """The linkage of the source's example (Nath and Ghosh 1980), drawn at 60°, a full turn by a cycloidal law."""
     a, b, c, d = 0.3048, 0.9144, 0.762, 0.9144
@@ -160,10 +157,7 @@ def universal_joint() -> list[Row]:
     return errors("driven shaft", got, wanted, "3 links, 4 revolutes")
 
 
-@case(
-    "Bennett linkage",
-    "G. T. Bennett, A new mechanism, Engineering 76 (1903): a/sin α = b/sin β, four skew revolutes",
-)
+@case("Bennett linkage", "G. T. Bennett, A new mechanism, Engineering 76 (1903): a/sin α = b/sin β, four skew revolutes")
 def bennett_linkage() -> list[Row]:
     """a = 0.3 m, α = 40°, β = 75°: tan(θ1/2) tan(θ2/2) = sin((β+α)/2) / sin((β−α)/2); a full turn, over-constrained."""
     t1 = 1.0
@@ -195,17 +189,13 @@ def bricard() -> list[Row]:
 
 
 @case(
-    "RSSR",
-    "R. S. Hartenberg, J. Denavit, Kinematic Synthesis of Linkages (1964): constant distance of the ball centres",
+    "RSSR", "R. S. Hartenberg, J. Denavit, Kinematic Synthesis of Linkages (1964): constant distance of the ball centres"
 )
 def spatial_four_bar() -> list[Row]:
     """Crank 0.1 m about z, rocker 0.25 m about x; one ball is a universal joint, so that the coupler cannot spin."""
     drawn = 1.0
     crossed, universal = "4 links, 4 revolutes, a ball", "3 links, 2 revolutes, a ball, a universal joint"
-    return [
-        *_rocker_in_space(rssr(drawn), drawn, crossed),
-        *_rocker_in_space(universal_rssr(drawn), drawn, universal),
-    ]
+    return [*_rocker_in_space(rssr(drawn), drawn, crossed), *_rocker_in_space(universal_rssr(drawn), drawn, universal)]
 
 
 def _rocker_in_space(joints: JointTable, drawn: float, model: str) -> list[Row]:

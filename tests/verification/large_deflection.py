@@ -16,12 +16,7 @@ DATA = Path(__file__).parent / "data"
 
 # Cantilever with a dead tip load, inextensible and without shear: P L²/EI → w/L, shortening u/L.
 # Mattiasson, Int. J. Num. Meth. Eng. 17 (1981), elliptic integrals.
-ELASTICA = {
-    1.0: (0.301721, 0.056433),
-    2.0: (0.493457, 0.160642),
-    5.0: (0.713792, 0.387628),
-    10.0: (0.810609, 0.554996),
-}
+ELASTICA = {1.0: (0.301721, 0.056433), 2.0: (0.493457, 0.160642), 5.0: (0.713792, 0.387628), 10.0: (0.810609, 0.554996)}
 
 # Rotating cantilever clamped on the axis, first frequencies over √(EI/ρAL⁴) for μ = Ω/√(EI/ρAL⁴), L √(A/I) = 70:
 # chordwise, flapwise. Hamza-Cherif and Houmat, ICAS 2004, table 2. With Coriolis forces, without shear, without the

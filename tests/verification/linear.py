@@ -78,14 +78,6 @@ def mean_support(link: Link, *ends: tuple[np.ndarray, list[tuple[int, str]]]) ->
     W, keep = np.concatenate(weights), np.array(components)
     nodes = np.flatnonzero(W.any(axis=0))
     joint = Attachment(
-        nodes,
-        W[:, nodes],
-        3,
-        np.zeros((p, 3)),
-        ("support",) * p,
-        keep,
-        np.zeros(0, int),
-        np.zeros((len(keep), 0)),
-        0,
+        nodes, W[:, nodes], 3, np.zeros((p, 3)), ("support",) * p, keep, np.zeros(0, int), np.zeros((len(keep), 0)), 0
     )
     return shared_nodes([link], [joint])

@@ -50,8 +50,7 @@ def histories(scene: Scene, *names: str) -> tuple[int, list[np.ndarray]]:
 def stress(elements: int, steps_per_revolution: int, revolutions: float = 2.0) -> np.ndarray:
     """σ on the rocker's outer side at 720 points a turn, 3-node beams [MPa]."""
     scene = four_bar(
-        {"revolutions": revolutions, "steps_per_revolution": steps_per_revolution},
-        {"mesh": {"elements": elements}},
+        {"revolutions": revolutions, "steps_per_revolution": steps_per_revolution}, {"mesh": {"elements": elements}}
     )
     return histories(scene, STRESS)[1][0][:: steps_per_revolution // 720, 0] / 1e6
 
@@ -65,15 +64,7 @@ def difference(a: np.ndarray, b: np.ndarray) -> float:
 def coordinates() -> list[Row]:
     """One 3-node beam a link: 27 − 2·2 at the pins B, C − 3 at the driven root − 2 at D."""
     scene = read_scene(SCENE)
-    return [
-        Row(
-            "generalised coordinates",
-            18,
-            elastic_model(scene, linkage(scene)).coordinates,
-            0.0,
-            "1 beam3 a link",
-        )
-    ]
+    return [Row("generalised coordinates", 18, elastic_model(scene, linkage(scene)).coordinates, 0.0, "1 beam3 a link")]
 
 
 @cache
@@ -95,11 +86,7 @@ def elements() -> list[Row]:
     return [Row("difference / peak", 0.0, e, caps[n], f"{n} beam3 a link") for n, e in space_errors().items()]
 
 
-@case(
-    "Source's four-bar: stress curve, steps",
-    "against 11520 steps a turn, 8 elements a link, same start",
-    long=True,
-)
+@case("Source's four-bar: stress curve, steps", "against 11520 steps a turn, 8 elements a link, same start", long=True)
 def steps() -> list[Row]:
     """The same, for the step."""
     caps = {720: 0.05, 1440: 0.0125, 2880: 0.003}

@@ -139,11 +139,7 @@ def four_bar(kind: str, thickness: float) -> list[np.ndarray]:
     return histories(scene_from(raw, SCENE.parent), *CHANNELS.values())[1]
 
 
-@case(
-    "Four-bar of plates: plane against solid",
-    "hex27 on the same quadrilaterals, one layer; 150 rpm",
-    long=True,
-)
+@case("Four-bar of plates: plane against solid", "hex27 on the same quadrilaterals, one layer; 150 rpm", long=True)
 def against_solids() -> list[Row]:
     """Largest difference over a turn, for the example's plates, as thick as wide, and for thinner ones.
 
@@ -151,10 +147,7 @@ def against_solids() -> list[Row]:
     displacements' difference falls about as the square of the thickness.
     """
     out = []
-    for thickness, caps in (
-        (0.0254, (5e-4, 2e-3, 2e-4, 2e-4, 2e-4)),
-        (0.006, (1e-4, 2e-4, 1e-4, 1e-4, 1e-4)),
-    ):
+    for thickness, caps in ((0.0254, (5e-4, 2e-3, 2e-4, 2e-4, 2e-4)), (0.006, (1e-4, 2e-4, 1e-4, 1e-4, 1e-4))):
         pairs = zip(four_bar("plane", thickness), four_bar("solid", thickness), strict=True)
         for name, cap, (flat, solid) in zip(CHANNELS, caps, pairs, strict=True):
             error = difference(flat, solid[:, : flat.shape[1]])

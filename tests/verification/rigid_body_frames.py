@@ -15,11 +15,7 @@ def linear_difference(name: str, rpm: float, ratio: float) -> np.ndarray:
     """Signed difference (T,) of the linear stress from a kept history, of its peak."""
     kept: History = history(name)
     steps_per_revolution = round(60 / rpm / STEP)
-    analysis = {
-        "revolutions": kept.t[-1] * rpm / 60,
-        "steps_per_revolution": steps_per_revolution,
-        "initial": "rest",
-    }
+    analysis = {"revolutions": kept.t[-1] * rpm / 60, "steps_per_revolution": steps_per_revolution, "initial": "rest"}
     drive = {"joint": "A", "motion": {"kind": "constant_speed", "speed": f"{rpm} rpm"}}
     damping = {"ratio": ratio, "frequencies": [20, 200]} if ratio else {}
     scene = four_bar(analysis, {"mesh": {"elements": ELEMENTS}}, drive=drive, damping=damping)

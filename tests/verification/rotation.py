@@ -101,11 +101,7 @@ def turning_bar_scene(
             "joints": {"A": {"kind": "revolute", "links": ["ground", "bar"], "at": "A"}},
             "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": SPEED}},
             "damping": {"alpha": 0.0, "beta": 2e-4},
-            "analysis": {
-                "revolutions": revolutions,
-                "steps_per_revolution": steps_per_revolution,
-                "initial": initial,
-            },
+            "analysis": {"revolutions": revolutions, "steps_per_revolution": steps_per_revolution, "initial": initial},
         }
     )
 
@@ -129,13 +125,7 @@ def turning_bar_by_steps() -> list[Row]:
     text, tip = f"{model((6, 2, 1), link, 'hex20')}, 360 steps a turn", 0.0151572424
     return [
         Row("tip at the quasi-static start [m]", tip, float(g[0, 0]), 1e-6, text),
-        Row(
-            "greatest way from there in four turns / tip",
-            0.0,
-            float(np.abs(g - g[0]).max() / tip),
-            1e-4,
-            text,
-        ),
+        Row("greatest way from there in four turns / tip", 0.0, float(np.abs(g - g[0]).max() / tip), 1e-4, text),
         Row("tip after four turns [m]", tip, float(g[-1, 0]), 1e-5, text),
         Row("tip after four turns, from rest [m]", tip, float(from_rest[-1, 0]), 1e-5, text),
         Row("sideways then / tip", 0.0, float(np.abs(from_rest[-1, 1:]).max() / tip), 1e-5, text),

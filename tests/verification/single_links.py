@@ -126,12 +126,7 @@ def free_timoshenko(near: float, length: float = 10.0) -> float:
     def left(f: float) -> float:
         w2 = (2 * np.pi * f) ** 2
         rates = np.array(
-            [
-                [0, 1, 0, unit / kGA],
-                [0, 0, 1, 0],
-                [0, -rho * I * w2 / unit, 0, -1],
-                [-rho * A * w2 / unit, 0, 0, 0],
-            ]
+            [[0, 1, 0, unit / kGA], [0, 0, 1, 0], [0, -rho * I * w2 / unit, 0, -1], [-rho * A * w2 / unit, 0, 0, 0]]
         )
         return float(np.linalg.det(scipy.linalg.expm(rates * length)[2:, :2]))
 

@@ -30,10 +30,7 @@ class Rod:
         self.X, self.one, _ = functions(axis)
         first = np.append(np.flatnonzero(self.one), len(self.one))
         self.tip = int(first[-2])
-        x, rigidity = (
-            axis.frame[:, [0, 2, 3]],
-            rigidities(section, material.youngs_modulus, material.shear_modulus),
-        )
+        x, rigidity = (axis.frame[:, [0, 2, 3]], rigidities(section, material.youngs_modulus, material.shear_modulus))
         self.elements: list[tuple[np.ndarray, BeamElement]] = []
         for cell in axis.cells:
             stations = np.sort(cell)
@@ -96,12 +93,7 @@ class Rod:
 
 
 def exact_rod(
-    r0: np.ndarray,
-    frame: np.ndarray,
-    bend: np.ndarray,
-    length: float,
-    rigidity: np.ndarray,
-    force: np.ndarray,
+    r0: np.ndarray, frame: np.ndarray, bend: np.ndarray, length: float, rigidity: np.ndarray, force: np.ndarray
 ) -> np.ndarray:
     """Tip of a clamped Cosserat rod under a dead force there, put on in ten shares.
 
@@ -176,10 +168,7 @@ def exact_slanted(load: float, angle: float) -> np.ndarray:
     )
 
 
-@case(
-    "Cantilever strip under a leaning tip load",
-    "Cosserat rod by collocation (tests/verification/space_statics.py)",
-)
+@case("Cantilever strip under a leaning tip load", "Cosserat rod by collocation (tests/verification/space_statics.py)")
 def princeton() -> list[Row]:
     """After the Princeton experiment (Dowell and Traybar 1975), 508 × 12.3 × 3.2 mm: bent both ways and twisted."""
     out = []

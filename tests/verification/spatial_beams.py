@@ -94,10 +94,7 @@ def wanted_modes(length: float, section: Section) -> dict[str, list[float]]:
     return {**bending, "torsion": [torsion, 3 * torsion], "axial": [axial]}
 
 
-@case(
-    "Cantilevers in space",
-    "Timoshenko's equations with the section's κ, solved exactly; Saint-Venant's torsion",
-)
+@case("Cantilevers in space", "Timoshenko's equations with the section's κ, solved exactly; Saint-Venant's torsion")
 def cantilevers() -> list[Row]:
     """A rectangle and a tube, 20 sections long."""
     out = []
@@ -129,16 +126,7 @@ def deep_beam_in_space() -> list[Row]:
     left, right = (number == 0), (number == link.n - 4)
     T = free_map(link, held((left, "xyz"), (number == 2, "z"), (number == 3, "y"), (right, "yz")))
     got = frequencies(link, T, 8, 42.6)
-    names = [
-        "bending 1",
-        "bending 1",
-        "torsion 1",
-        "axial 1",
-        "bending 2",
-        "bending 2",
-        "torsion 2",
-        "bending 3",
-    ]
+    names = ["bending 1", "bending 1", "torsion 1", "axial 1", "bending 2", "bending 2", "torsion 2", "bending 3"]
     targets = [BENDING[0], BENDING[0], TORSION, AXIAL, BENDING[1], BENDING[1], 3 * TORSION, BENDING[2]]
     return [
         Row(f"{n} [Hz]", t, float(g), 1e-3 if "torsion" in n else 5e-5, text_of(link, "40 beam3"))
@@ -249,11 +237,7 @@ def beside_solids() -> list[Row]:
     section = rectangle(height, thickness)
     out = []
     shapes = {
-        "bar": (
-            [[0, 0, 0], [0.5, 0, 0]],
-            (60, 2, 2),
-            box((0.5, height, thickness), (0, -height / 2, -thickness / 2)),
-        ),
+        "bar": ([[0, 0, 0], [0.5, 0, 0]], (60, 2, 2), box((0.5, height, thickness), (0, -height / 2, -thickness / 2))),
         "L": ([[0, 0, 0], [0.5, 0, 0], [0.5, 0.3, 0]], (96, 3, 3), mitred(0.5, 0.3, height, thickness)),
     }
     for name, (points, counts, mapping) in shapes.items():
@@ -263,13 +247,7 @@ def beside_solids() -> list[Row]:
         got = frequencies(beam, free_map(beam, ROOT), 4, 20)
         text = f"8 beam3 a leg; {model(counts, solid)}"
         out += [
-            Row(
-                f"{name}, mode {k + 1} [Hz]",
-                float(w),
-                float(g),
-                0.012 if name == "L" and k == 3 else 0.005,
-                text,
-            )
+            Row(f"{name}, mode {k + 1} [Hz]", float(w), float(g), 0.012 if name == "L" and k == 3 else 0.005, text)
             for k, (w, g) in enumerate(zip(wanted, got, strict=True))
         ]
     return out

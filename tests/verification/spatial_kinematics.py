@@ -46,10 +46,7 @@ def swinging(r: float, d: float, drawn: float, block: bool, model: str) -> list[
     return errors("arm angle", got, in_time(polar(1j * d + z, 1j * z, -z), drive), model)
 
 
-@case(
-    "Quick-return",
-    "closed form of any textbook: the arm points at the crank's pin, tan θ = (d + r sin φ)/(r cos φ)",
-)
+@case("Quick-return", "closed form of any textbook: the arm points at the crank's pin, tan θ = (d + r sin φ)/(r cos φ)")
 def quick_returns() -> list[Row]:
     """Crank 0.1 m, pivots 0.25 m apart: the arm swings (shaper); 0.06 m apart: it turns fully (Whitworth)."""
     return [
@@ -59,10 +56,7 @@ def quick_returns() -> list[Row]:
     ]
 
 
-@case(
-    "Inverted slider-crank",
-    "closed form of any textbook: the rod passes through the block's pivot at all times",
-)
+@case("Inverted slider-crank", "closed form of any textbook: the rod passes through the block's pivot at all times")
 def rod_through_a_block() -> list[Row]:
     """Crank 0.1 m, pivots 0.3 m apart, drawn at 1.2 rad, a full turn by a cycloidal law."""
     r, d, drawn = 0.1, 0.3, 1.2

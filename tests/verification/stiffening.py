@@ -124,10 +124,7 @@ def columns() -> list[Row]:
     return out
 
 
-@case(
-    "Column that twists",
-    "P = GJ A/(I_y + I_z), free warping (Timoshenko, Gere: Theory of Elastic Stability, 5.5)",
-)
+@case("Column that twists", "P = GJ A/(I_y + I_z), free warping (Timoshenko, Gere: Theory of Elastic Stability, 5.5)")
 def twisted_column() -> list[Row]:
     """A flat strip under pressure: work of an axial force on sections that turn evenly along the beam."""
     section = rectangle(0.1, 0.004)
@@ -204,13 +201,7 @@ def unstiffened_cantilever() -> list[Row]:
     link, T, text = thin_beam()
     soft = replace(link, E=0.0)  # no stress, K0 stays
     return [
-        Row(
-            f"μ = {mu}",
-            float(np.sqrt(3.5160153**2 - mu**2)),
-            float(turning_frequencies(soft, T, mu)[0]),
-            2e-3,
-            text,
-        )
+        Row(f"μ = {mu}", float(np.sqrt(3.5160153**2 - mu**2)), float(turning_frequencies(soft, T, mu)[0]), 2e-3, text)
         for mu in (1, 2, 3)
     ]
 
@@ -318,10 +309,7 @@ def whirl_of_link(omega: float, mass: float, polar: float, stiffened: bool = Tru
     return w[np.argsort(np.abs(w))][:4]
 
 
-@case(
-    "Whirl of a disc on an overhung shaft",
-    "Stodola; Green: gyroscopic effect of a thin disc on a massless shaft",
-)
+@case("Whirl of a disc on an overhung shaft", "Stodola; Green: gyroscopic effect of a thin disc on a massless shaft")
 def overhung_disc() -> list[Row]:
     """0.5 kg, I_p = 0.05 kg m² on 1 m; without stress stiffness the disc's moment of momentum is lost as it tilts."""
     out = []

@@ -90,11 +90,7 @@ def test_gears_turn_in_proportion(gear: dict[str, object], ratio: float) -> None
 
 @pytest.mark.parametrize(
     ("gear", "revolutions"),
-    [
-        ({"teeth": [3, 5]}, 5),
-        pytest.param({"teeth": [24, 59]}, 59, marks=pytest.mark.long),
-        ({"ratio": 1.5}, 2),
-    ],
+    [({"teeth": [3, 5]}, 5), pytest.param({"teeth": [24, 59]}, 59, marks=pytest.mark.long), ({"ratio": 1.5}, 2)],
 )
 def test_a_pair_of_gears_repeats_after_as_many_turns_as_its_teeth_ask_for(
     gear: dict[str, object], revolutions: int
@@ -215,10 +211,7 @@ def test_rates_per_drive_add_up() -> None:
     scene = linkage_scene(five_bar(), None, sections=FIVE)
     m = motion_at(scene, T)
     other_way = {"drives": dict(reversed(list(FIVE["drives"].items())))}
-    each = [
-        m,
-        motion_at(linkage_scene(five_bar(), None, sections=other_way), T),
-    ]  # v_phi is of the first drive
+    each = [m, motion_at(linkage_scene(five_bar(), None, sections=other_way), T)]  # v_phi is of the first drive
     rates = [0.9 * (1 - np.cos(2 * np.pi * T)), -0.6 * 140 * T**3 * (1 - T) ** 3]
     total = sum(one.v_phi * rate[:, None, None] for one, rate in zip(each, rates, strict=True))
     assert_allclose(m.v, total, atol=1e-13)
@@ -236,12 +229,7 @@ def arm() -> tuple[Scene, list[np.ndarray]]:
     """A six-axis arm, every joint driven by a law of its own, those between moving links too."""
     links = ["ground", *(f"link{k}" for k in range(1, 7))]
     joints: JointTable = {
-        f"J{k}": (
-            "revolute",
-            *((links[k + 1], links[k]) if k % 2 else (links[k], links[k + 1])),
-            SPOTS[k],
-            AXES[k],
-        )
+        f"J{k}": ("revolute", *((links[k + 1], links[k]) if k % 2 else (links[k], links[k + 1])), SPOTS[k], AXES[k])
         for k in range(6)
     }
     height = [1.1, -0.7, 0.9, 2.0, -1.4, 3.0]

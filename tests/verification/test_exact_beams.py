@@ -7,17 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from tests.exact.beams import (
-    Beams,
-    Rod,
-    internal_force,
-    joined,
-    kinetic_energy,
-    momenta,
-    strain_energy,
-    strains,
-    weight,
-)
+from tests.exact.beams import Beams, Rod, internal_force, joined, kinetic_energy, momenta, strain_energy, strains, weight
 from tests.exact.cases import CASES, at_rest, flying_rod
 from tests.exact.chain import chain_history
 from tests.exact.four_bar import four_bar, outer_stress, pose

@@ -92,8 +92,7 @@ DAILY = {("beam", True, 1.0), ("beam", False, 0.9), ("beam", True, 0.5), ("solid
 
 
 @pytest.mark.parametrize(
-    ("kind", "damped", "rho_inf"),
-    [pytest.param(*x, marks=() if x in DAILY else pytest.mark.long) for x in EVERY],
+    ("kind", "damped", "rho_inf"), [pytest.param(*x, marks=() if x in DAILY else pytest.mark.long) for x in EVERY]
 )
 def test_every_member_is_of_order_two_on_a_turning_link(kind: str, damped: bool, rho_inf: float):
     link, fixed = turning_link(kind)

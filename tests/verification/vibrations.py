@@ -38,10 +38,7 @@ def plate(counts: tuple[int, int, int]) -> Link:
     return mapped_link(counts, box((10, 10, 1)), STEEL)
 
 
-@case(
-    "NAFEMS FV52: plate held along its bottom edges",
-    f"{NAFEMS}, test FV52; 20-node result: V2.03.502 of code_aster",
-)
+@case("NAFEMS FV52: plate held along its bottom edges", f"{NAFEMS}, test FV52; 20-node result: V2.03.502 of code_aster")
 def plate_on_its_edges() -> list[Row]:
     """On the mesh that the test asks for, 4 × 4 × 1.
 
@@ -82,10 +79,7 @@ def plate_on_its_sides_exactly(m: int, n: int) -> float:
     return float(np.sqrt(scipy.linalg.eigvalsh(K, M)[0]) / (2 * np.pi))
 
 
-@case(
-    "FV52's plate, sides held as in plate theory",
-    f"{NAFEMS}, test 21 (same closed form); Srinivas et al. 1970",
-)
+@case("FV52's plate, sides held as in plate theory", f"{NAFEMS}, test 21 (same closed form); Srinivas et al. 1970")
 def plate_on_its_sides() -> list[Row]:
     """u_z and the displacement along the side are zero on the sides: supports for which the target is exact.
 

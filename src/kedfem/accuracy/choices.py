@@ -9,14 +9,7 @@ from kedfem.accuracy.free_step import free_step
 from kedfem.accuracy.geometric import GeometricError
 from kedfem.accuracy.histories import histories, relative_errors, worst
 from kedfem.accuracy.resolution import fewest_steps
-from kedfem.accuracy.step_estimate import (
-    IN_STEP,
-    LEAST_ORDER,
-    StepChoice,
-    StepEstimate,
-    cheapest,
-    single_level,
-)
+from kedfem.accuracy.step_estimate import IN_STEP, LEAST_ORDER, StepChoice, StepEstimate, cheapest, single_level
 from kedfem.accuracy.trials import Trials
 from kedfem.accuracy.variants import TRIAL_STEPS, shortened, with_analysis, with_links, with_steps
 from kedfem.dynamics.stepping.levels import most_levels

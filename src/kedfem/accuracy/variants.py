@@ -5,19 +5,7 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 from kedfem.errors import MotionError
-from kedfem.scene import (
-    Bar,
-    Cad,
-    Extrusion,
-    LinkScene,
-    MeshFile,
-    Part,
-    PlateLink,
-    Ramp,
-    Scene,
-    time_grid,
-    turn_steps,
-)
+from kedfem.scene import Bar, Cad, Extrusion, LinkScene, MeshFile, Part, PlateLink, Ramp, Scene, time_grid, turn_steps
 
 TRIAL_STEPS = 20_000  # of a trial run: longer analyses are judged by their beginning
 TURNS = 2  # of a trial run

@@ -11,13 +11,11 @@ def export(
     scene: ScenePath,
     link: Annotated[str | None, option("The elastic link whose matrices.", "NAME")] = None,
     file: Annotated[
-        Path | None,
-        option("NAME.npz or NAME.mat for the matrices; default: LINK.npz beside the scene.", "FILE"),
+        Path | None, option("NAME.npz or NAME.mat for the matrices; default: LINK.npz beside the scene.", "FILE")
     ] = None,
     motion: Annotated[Path | None, option("NAME.csv for the rigid motion of all links.", "FILE")] = None,
     state_space: Annotated[
-        Path | None,
-        option("NAME.npz or NAME.mat for the mechanism as a linear system at a position.", "FILE"),
+        Path | None, option("NAME.npz or NAME.mat for the mechanism as a linear system at a position.", "FILE")
     ] = None,
     gltf: Annotated[
         Path | None, option("NAME.glb for the links of the scene's run in motion, for 3-D viewers.", "FILE")

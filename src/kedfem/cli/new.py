@@ -17,8 +17,7 @@ KINDS = (
 
 def new(
     kind: Annotated[
-        str | None,
-        typer.Argument(metavar="KIND", help="One of: " + ", ".join(KINDS) + "; left out with --from."),
+        str | None, typer.Argument(metavar="KIND", help="One of: " + ", ".join(KINDS) + "; left out with --from.")
     ] = None,
     path: Annotated[Path | None, typer.Argument(metavar="FILE", help="Default: KIND.toml or ASSEMBLY.toml here.")] = None,
     assembly: Annotated[

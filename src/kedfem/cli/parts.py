@@ -6,19 +6,7 @@ from typing import Annotated
 
 import typer
 
-from kedfem.cli.options import (
-    Across,
-    ElementKind,
-    Scale,
-    Size,
-    Solid,
-    Unknowns,
-    Within,
-    flag,
-    given,
-    goes_to,
-    option,
-)
+from kedfem.cli.options import Across, ElementKind, Scale, Size, Solid, Unknowns, Within, flag, given, goes_to, option
 from kedfem.cli.screen import progress, say, show, warn
 from kedfem.errors import OutputError, SceneError
 
@@ -69,8 +57,7 @@ def mesh(
 
 def frequencies(
     what: Annotated[
-        Path,
-        typer.Argument(metavar="SCENE", help="The scene file (TOML); or a part: a CAD file or a mesh file."),
+        Path, typer.Argument(metavar="SCENE", help="The scene file (TOML); or a part: a CAD file or a mesh file.")
     ],
     context: typer.Context,
     modes: Annotated[int, option("Frequencies at each position, or of the part.")] = 6,
@@ -81,10 +68,7 @@ def frequencies(
     link: Annotated[str | None, option("One link of the scene alone.", "NAME")] = None,
     hold: Annotated[
         list[str] | None,
-        option(
-            "A joint of the link, or a face of the part, that is held; several: given again. Default: free.",
-            "NAME",
-        ),
+        option("A joint of the link, or a face of the part, that is held; several: given again. Default: free.", "NAME"),
     ] = None,
     material: Annotated[str, option("Of a part: one that is built in, or '{ density = … }'.", "NAME")] = "steel",
     solid: Solid = None,

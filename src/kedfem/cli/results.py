@@ -19,10 +19,7 @@ def loads(
     link: Annotated[str | None, option("Load cases of this link instead, for a static analysis of it.", "NAME")] = None,
     at: Annotated[
         list[float] | None,
-        option(
-            "Instant of a load case; several: given again. Default: that of the link's highest stress.",
-            "SECONDS",
-        ),
+        option("Instant of a load case; several: given again. Default: that of the link's highest stress.", "SECONDS"),
     ] = None,
     folder: Annotated[Path | None, goes_to("loads beside the results")] = None,
 ) -> None:
@@ -63,8 +60,7 @@ def _cases(results: Path, link: str, at: list[float], folder: Path | None) -> No
 
 def compare(
     results: Annotated[
-        list[Path],
-        typer.Argument(metavar="RESULTS...", help="results.h5 of each run, or the folders that have them."),
+        list[Path], typer.Argument(metavar="RESULTS...", help="results.h5 of each run, or the folders that have them.")
     ],
     over: Annotated[
         str | None,

@@ -36,17 +36,7 @@ from kedfem.links.surfaces.coupling_surfaces import (
 from kedfem.motion.joint_equations import joint_axis, unit
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
-from kedfem.scene import (
-    Body,
-    Flywheel,
-    ForceLoad,
-    PointMass,
-    RigidBody,
-    Scene,
-    inertia_tensor,
-    moving_grounds,
-    rayleigh,
-)
+from kedfem.scene import Body, Flywheel, ForceLoad, PointMass, RigidBody, Scene, inertia_tensor, moving_grounds, rayleigh
 from kedfem.scene.checks.capabilities import SLIDERS
 
 

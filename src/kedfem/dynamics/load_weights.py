@@ -9,13 +9,7 @@ from kedfem.dynamics.joints.places import on_part
 from kedfem.errors import SceneError
 from kedfem.links.point_rows import point_rows, require_on_axis
 from kedfem.links.record import Link
-from kedfem.links.surfaces.coupling_surfaces import (
-    CouplingSurface,
-    face_surface,
-    is_flat,
-    same_face,
-    surface_weights,
-)
+from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, face_surface, is_flat, same_face, surface_weights
 from kedfem.scene import BodyLoad, ForceLoad, PressureLoad, SurfaceLoad
 
 Vector = Float[np.ndarray, "3"]

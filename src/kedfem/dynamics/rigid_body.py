@@ -54,10 +54,7 @@ def motions(scene: Scene, linkage: Linkage, along: Path, since: int = 0) -> Iter
         if kept and first > round(turn):
             if len(kept) > 1:
                 kept = [joined(kept)]
-            yield (
-                first,
-                replace(kept[0].at((steps - 1) % round(turn)), t=t, phi=drive[0], drives=drive[0][:, None]),
-            )
+            yield (first, replace(kept[0].at((steps - 1) % round(turn)), t=t, phi=drive[0], drives=drive[0][:, None]))
             continue
         motion = rigid_motion(linkage, along, t, drive)
         if returns and first <= turn and grid.steps > turn:

@@ -10,17 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.force_element import (
-    POINT,
-    TURN,
-    End,
-    ForceElement,
-    coordinate,
-    effort,
-    placed,
-    unit_forces,
-    wrench,
-)
+from kedfem.dynamics.force_element import POINT, TURN, End, ForceElement, coordinate, effort, placed, unit_forces, wrench
 from kedfem.dynamics.force_elements import force_elements
 from kedfem.dynamics.model import Model
 from kedfem.links.record import Link

@@ -18,15 +18,7 @@ from kedfem.links.surfaces.coupling_surfaces import rigid_link_surface
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import rigid_motion
-from kedfem.scene import (
-    AngleLimit,
-    Scene,
-    TorsionSpring,
-    path_parameter,
-    pieces,
-    time_grid,
-    without_vibration,
-)
+from kedfem.scene import AngleLimit, Scene, TorsionSpring, path_parameter, pieces, time_grid, without_vibration
 
 LIGHT = 1e-3  # second moment of a planar beam's mass beside inertia of its sections, below which this is spread over it
 COMPACT = 1e-7  # of mass times length²: second moments, below which forces would be off by more than 1e-4

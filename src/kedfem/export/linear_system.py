@@ -82,11 +82,7 @@ class _Element:
 
 
 def state_space(
-    scene: Scene,
-    modes: int = 12,
-    at: float = 0.0,
-    free: bool = False,
-    stage: Callable[[str], None] = lambda name: None,
+    scene: Scene, modes: int = 12, at: float = 0.0, free: bool = False, stage: Callable[[str], None] = lambda name: None
 ) -> tuple[StateSpace, tuple[str, ...]]:
     """The linear system of a scene's mechanism frozen at a position, and warnings; all links unreduced.
 
@@ -160,12 +156,7 @@ def _unit(system: System, name: str, motion: RigidMotion) -> list[Float[np.ndarr
 
 
 def _space(
-    scene: Scene,
-    linkage: Linkage,
-    model: Model,
-    motion: RigidMotion,
-    found: LinearModel,
-    elements: Sequence[_Element],
+    scene: Scene, linkage: Linkage, model: Model, motion: RigidMotion, found: LinearModel, elements: Sequence[_Element]
 ) -> StateSpace:
     """The matrices from modes: y = U δ + V δ' + W δ'' of probes, coordinates and rates of force elements."""
     channels = probe_channels(scene, model, linkage)

@@ -27,14 +27,7 @@ from kedfem.output.shapes import Shape, write_shapes
 from kedfem.output.words import clock, moment
 from kedfem.results import claimed
 from kedfem.results.files import beside
-from kedfem.results.frequencies import (
-    CAMPBELL,
-    FREQUENCIES,
-    OVER_TURN,
-    Summary,
-    write_frequencies,
-    write_summary,
-)
+from kedfem.results.frequencies import CAMPBELL, FREQUENCIES, OVER_TURN, Summary, write_frequencies, write_summary
 from kedfem.results.recorded import drive_channel
 from kedfem.results.table import drive_heading
 from kedfem.scene import Scene, path_parameter, time_grid, turn_steps
@@ -94,10 +87,7 @@ def frequencies_folder(scene: Scene) -> FilePath:
 
 
 def frequencies(
-    scene: Scene,
-    wanted: Wanted,
-    folder: FilePath | None = None,
-    watch: Watch = lambda stage, done, total: None,
+    scene: Scene, wanted: Wanted, folder: FilePath | None = None, watch: Watch = lambda stage, done, total: None
 ) -> Frequencies:
     """Natural frequencies of a scene's linkage over a turn, or over the whole run; all links unreduced.
 

@@ -33,11 +33,7 @@ def flywheel_tensor(surface: CouplingSurface, axis: Float[np.ndarray, "3"], iner
 
 
 def with_body(
-    link: Link,
-    surface: CouplingSurface,
-    mass: float,
-    centre: Float[np.ndarray, "3"],
-    euler: Float[np.ndarray, "3 3"],
+    link: Link, surface: CouplingSurface, mass: float, centre: Float[np.ndarray, "3"], euler: Float[np.ndarray, "3 3"]
 ) -> Link:
     """A link with a rigid body on one of its coupling surfaces: W4ᵀ Γ W4 is added to the scalar mass.
 

@@ -106,10 +106,7 @@ def subdivided_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh
     complaints: list[str] = []
     size = 2 * tetrahedron_size(solid, sizing)
     numbers = _options(size, min(2 * _TURN, np.pi / 3), size / _FINEST, SETTINGS[0])
-    with (
-        gmsh_options(gmsh, numbers | {"Mesh.SubdivisionAlgorithm": 2}),
-        _listening(gmsh, complaints, solid.faces),
-    ):
+    with gmsh_options(gmsh, numbers | {"Mesh.SubdivisionAlgorithm": 2}), _listening(gmsh, complaints, solid.faces):
         gmsh.model.mesh.clear()
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.setOrder(2)
@@ -132,12 +129,7 @@ def tetrahedron_size(solid: Solid, sizing: Sizing) -> float:
 
 
 def _best_of_settings(
-    gmsh: ModuleType,
-    solid: Solid,
-    sizing: Sizing,
-    coarser: float,
-    complaints: list[str],
-    plenty: int = _PLENTY,
+    gmsh: ModuleType, solid: Solid, sizing: Sizing, coarser: float, complaints: list[str], plenty: int = _PLENTY
 ) -> SolidMesh | None:
     """The first mesh that is good enough, or has too many unknowns, else the best."""
     best: tuple[float, SolidMesh] | None = None

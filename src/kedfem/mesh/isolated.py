@@ -26,10 +26,7 @@ PART = (
     "must be a part that gmsh and OpenCASCADE can work on",
     "mend or simplify it in CAD (fillets that are thinner than an element first), or take another mesh.size",
 )
-MESH_FILE = (
-    "must be a mesh file that can be read",
-    "it may be damaged: write it again, or in another format",
-)
+MESH_FILE = ("must be a mesh file that can be read", "it may be damaged: write it again, or in another format")
 
 T = TypeVar("T")
 

@@ -33,10 +33,7 @@ QUADRATIC = 1e-7  # after such a step the next one would be rounding
 ITERATIONS = 12
 SPREAD = 30.0  # how much worse a square set of rows may be conditioned than all rows
 TRIES = 4  # places on a path whose own best rows are tried for all of it
-POINTS, USUAL = (
-    250,
-    12,
-)  # time points solved together, as many as stay in the cache, of linkages of so many bodies
+POINTS, USUAL = (250, 12)  # time points solved together, as many as stay in the cache, of linkages of so many bodies
 
 Rates = tuple[Float[np.ndarray, "T D"], Float[np.ndarray, "T D"]]
 
@@ -117,12 +114,7 @@ def moving(link: Linkage, chosen: Choice, guess: Poses, aim: Target, rates: Rate
 
 
 def settled(
-    link: Linkage,
-    chosen: Choice,
-    guess: Poses,
-    aim: Target,
-    rates: Rates,
-    limits: tuple[float, float] = (EXACT, np.inf),
+    link: Linkage, chosen: Choice, guess: Poses, aim: Target, rates: Rates, limits: tuple[float, float] = (EXACT, np.inf)
 ) -> Moving:
     """The same of all points together, with the factored rows.
 

@@ -5,16 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.motion.constraints import (
-    ANGLE,
-    GAP,
-    ConstraintEquation,
-    coupled,
-    free_rows,
-    joint_rows,
-    travel_row,
-    turn_row,
-)
+from kedfem.motion.constraints import ANGLE, GAP, ConstraintEquation, coupled, free_rows, joint_rows, travel_row, turn_row
 from kedfem.scene import Joint, Scene
 
 GROUND = "ground"

@@ -55,10 +55,7 @@ class Stress:
 
 
 def stress(
-    of: Sequence[Constants],
-    histories: Sequence[LinkHistory],
-    made: Sequence[Callable[[int], Turning]],
-    at: RigidRates,
+    of: Sequence[Constants], histories: Sequence[LinkHistory], made: Sequence[Callable[[int], Turning]], at: RigidRates
 ) -> Stress:
     """Of links that are all planar or all in space.
 

@@ -8,16 +8,7 @@ from kedfem.errors import OutputError
 from kedfem.results import on_demand
 from kedfem.results.additions import read_account, read_fatigue, read_peaks
 from kedfem.results.files import reason
-from kedfem.results.layout import (
-    FORMAT,
-    all_rows,
-    opened,
-    opened_to_read,
-    read_facts,
-    read_text,
-    sealed,
-    series,
-)
+from kedfem.results.layout import FORMAT, all_rows, opened, opened_to_read, read_facts, read_text, sealed, series
 from kedfem.results.records import ANGLE, TIME, TRAVEL, Channel, Results, Status
 
 WANTED = "a results file of kedfem"

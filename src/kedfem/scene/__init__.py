@@ -74,14 +74,4 @@ from kedfem.scene.records.sections import (
     SectionShape,
     TubeSection,
 )
-from kedfem.scene.records.shapes import (
-    Bar,
-    Cad,
-    Extrusion,
-    MeshFile,
-    Part,
-    PartGeometry,
-    PlateLink,
-    Polyline,
-    Shape,
-)
+from kedfem.scene.records.shapes import Bar, Cad, Extrusion, MeshFile, Part, PartGeometry, PlateLink, Polyline, Shape

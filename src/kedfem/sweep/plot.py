@@ -77,10 +77,7 @@ def _write_map(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row], edges:
     title = "By what vibrations are multiplied in a period"
     with figure_saved(path, title + ("; red: unstable bands" if bands else "")) as figure:
         ax = figure.subplots()
-        for some, marker, label in (
-            (growth <= 1 + GROWS, "o", "stable"),
-            (growth > 1 + GROWS, "X", "unstable"),
-        ):
+        for some, marker, label in ((growth <= 1 + GROWS, "o", "stable"), (growth > 1 + GROWS, "X", "unstable")):
             which = np.array(known)[some]
             shown = ax.scatter(
                 x[which], y[which], c=growth[some], marker=marker, s=28, cmap="coolwarm",

@@ -3,15 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from kedfem.accuracy.variants import (
-    Family,
-    families,
-    of_family,
-    refined,
-    with_analysis,
-    with_links,
-    with_steps,
-)
+from kedfem.accuracy.variants import Family, families, of_family, refined, with_analysis, with_links, with_steps
 from kedfem.scene import LinkScene, MeshFile, Scene, scene_from, time_grid
 
 FINENESS, STEPS, TOLERANCES = (1.0, 1.5, 2.0, 3.0), (1, 2, 4), (1e-2, 1e-3, 1e-4)
@@ -82,10 +74,7 @@ def varied(scene: Scene, variant: Variant) -> Scene:
         name: of_family(link, "rigid") if name == fidelity.rigid else _modelled(link, variant)
         for name, link in scene.links.items() if link.shape is not None and link.model != "rigid"
     }  # fmt: skip
-    keys = {
-        "accuracy": "quick",
-        "reduction_tolerance": variant.tolerance or scene.analysis.reduction_tolerance,
-    }
+    keys = {"accuracy": "quick", "reduction_tolerance": variant.tolerance or scene.analysis.reduction_tolerance}
     changed = with_analysis(with_links(scene, links), **keys)
     if variant.steps != 1:
         changed = with_steps(changed, variant.steps * time_grid(scene).steps)

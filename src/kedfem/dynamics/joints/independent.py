@@ -18,10 +18,7 @@ Block = tuple[Int[np.ndarray, " r"], Int[np.ndarray, " c"], Float[np.ndarray, "r
 
 
 def independent(
-    every: Sequence[Attachment],
-    selected: Sequence[sp.csr_array],
-    own: Sequence[int] = (),
-    riding: Sequence[int] = (),
+    every: Sequence[Attachment], selected: Sequence[sp.csr_array], own: Sequence[int] = (), riding: Sequence[int] = ()
 ) -> tuple[list[Attachment], sp.csr_array]:
     """Joints on one coupling surface repeat rows of W: w_d = Σ l w_r. Each is held once, and the rest said of z instead.
 
@@ -107,11 +104,7 @@ def _port_forces(
         parts.append((columns, rows, np.where(np.abs(part) < DEPENDENT, 0.0, part)))  # rounding
     inverse = _assembled(parts, G.T.shape)
     q = L.shape[1]
-    return (
-        inverse[:, :q],
-        inverse[:, q + np.searchsorted(determined, np.asarray(own, int))],
-        _null_space(G, of_G),
-    )
+    return (inverse[:, :q], inverse[:, q + np.searchsorted(determined, np.asarray(own, int))], _null_space(G, of_G))
 
 
 def _null_space(A: sp.csr_array, parts_of: Sequence[Block]) -> sp.csr_array:

@@ -90,9 +90,7 @@ def _plane_points(
 
 
 def _points_off(
-    centre: Float[np.ndarray, "3"],
-    surfaces: dict[str, CouplingSurface],
-    directions: list[Float[np.ndarray, "3"]],
+    centre: Float[np.ndarray, "3"], surfaces: dict[str, CouplingSurface], directions: list[Float[np.ndarray, "3"]]
 ) -> list[Float[np.ndarray, "3"]]:
     """A point off the centre in each direction that all coupling surfaces know, as far as the first coupling surface is
     wide there."""

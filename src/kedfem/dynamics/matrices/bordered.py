@@ -89,7 +89,7 @@ def independent_rows(C: sp.csr_array, compliance: Flat) -> Int[np.ndarray, " q"]
     size = row_sizes(C)
     hard = np.flatnonzero((compliance == 0.0) & (size > DEPENDENT))
     soft = np.flatnonzero(compliance != 0.0)
-    unit = sp.csr_array((C.data / np.where(size > 0, size, 1.0)[_row_of(C)], C.indices, C.indptr), C.shape)[hard]
+    unit = sp.csr_array((C.data / np.where(size > 0, size, 1.0)[row_of(C)], C.indices, C.indptr), C.shape)[hard]
     if len(hard) and not _independent(unit):
         _, upper, order = scipy.linalg.qr(unit.T.toarray(), mode="economic", pivoting=True)
         hard = hard[order[: int((np.abs(np.diag(upper)) > DEPENDENT).sum())]]
@@ -98,10 +98,10 @@ def independent_rows(C: sp.csr_array, compliance: Flat) -> Int[np.ndarray, " q"]
 
 def row_sizes(C: sp.csr_array) -> Flat:
     """Length of each row."""
-    return np.asarray(np.sqrt(np.bincount(_row_of(C), C.data**2, C.shape[0])))
+    return np.asarray(np.sqrt(np.bincount(row_of(C), C.data**2, C.shape[0])))
 
 
-def _row_of(C: sp.csr_array) -> Int[np.ndarray, " e"]:
+def row_of(C: sp.csr_array) -> Int[np.ndarray, " e"]:
     """The row of each entry."""
     return np.repeat(np.arange(C.shape[0]), np.diff(C.indptr))
 

@@ -19,13 +19,7 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_body import Instant
 from kedfem.dynamics.stepping.state import NodalOf
 from kedfem.links.record import Link, mass_times
-from kedfem.links.reduced import (
-    mass_orthonormal,
-    on_functions,
-    rigid_functions,
-    scalar_block,
-    stiffness_blocks,
-)
+from kedfem.links.reduced import mass_orthonormal, on_functions, rigid_functions, scalar_block, stiffness_blocks
 
 LANCZOS = 6  # modes of the linkage per instant (docs/performance/reduction.md)
 INDEPENDENT = 1e-14  # of the largest energy: modes below repeat others

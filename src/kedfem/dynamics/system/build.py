@@ -14,28 +14,11 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.force_elements import law_of, on_hinge
-from kedfem.dynamics.joints.constraint_joints import (
-    ConstraintJoint,
-    bore_axis,
-    in_plane,
-    joint_frame,
-    mounted,
-    ordered,
-)
+from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, bore_axis, in_plane, joint_frame, mounted, ordered
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.system import record
 from kedfem.dynamics.system.ends import corners, end_of, rigid_end, same_end
-from kedfem.dynamics.system.record import (
-    Constraint,
-    Driven,
-    End,
-    Held,
-    Law,
-    Spring,
-    System,
-    Term,
-    rotation_term,
-)
+from kedfem.dynamics.system.record import Constraint, Driven, End, Held, Law, Spring, System, Term, rotation_term
 from kedfem.links.record import Link
 from kedfem.motion.constraints import CONSTRAINED, perpendiculars
 from kedfem.motion.joint_equations import joint_axis

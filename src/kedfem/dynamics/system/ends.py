@@ -51,16 +51,7 @@ def end_of(side: Side, joint: ConstraintJoint) -> End:
     if side.stations is not None:
         line = Line(side.stations, joint.axis, joint.bodies[0], joint.at)
         onto = onto * np.atleast_1d(side.surface[:, :3].any(axis=(0, 1)))[:, None]  # of a planar beam not ψ
-        return End(
-            side.body,
-            record.LINE,
-            side.points[0],
-            np.eye(3),
-            np.ones(3),
-            0,
-            *_selected(onto, side.columns),
-            line,
-        )
+        return End(side.body, record.LINE, side.points[0], np.eye(3), np.ones(3), 0, *_selected(onto, side.columns), line)
     directions, lengths, known = np.eye(3), np.ones(3), p - 1
     arms = side.points[1:] - side.points[0]
     if known:

@@ -102,16 +102,7 @@ def driving(of: Ready, motion: RigidMotion, loads: Loads | None = None) -> Drivi
     weights = np.concatenate([np.zeros((len(motion.t), 0)), *stations], axis=1)
     varied = [getattr(each.law, "factor", None) for each in of.system.constraints]
     springs = stiffness_factors(varied, motion.t, motion.phi)
-    rows = (
-        motion.t,
-        motion.R,
-        motion.p,
-        motion.v,
-        motion.omega,
-        drives,
-        np.concatenate(F, axis=1),
-        amounts(of, motion),
-    )
+    rows = (motion.t, motion.R, motion.p, motion.v, motion.omega, drives, np.concatenate(F, axis=1), amounts(of, motion))
     terms = NO_TERMS if of.stressed is None else of.stressed.over(forcing, motion)
     # other strides would be compiled for anew
     return Driving(*(np.ascontiguousarray(x) for x in (*rows, weights, springs, *terms)))

@@ -21,14 +21,7 @@ from numba.core import types
 from numba.core.datamodel import default_manager
 from numba.core.datamodel.models import OpaqueModel
 from numba.core.typing.templates import AttributeTemplate
-from numba.extending import (
-    NativeValue,
-    infer_getattr,
-    intrinsic,
-    lower_getattr_generic,
-    register_model,
-    unbox,
-)
+from numba.extending import NativeValue, infer_getattr, intrinsic, lower_getattr_generic, register_model, unbox
 from numba.np.arrayobj import populate_array
 
 from kedfem.compiled import compiles_for_all

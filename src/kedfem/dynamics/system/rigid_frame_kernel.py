@@ -1,12 +1,7 @@
 """What a step does with a body that has a rigid-body frame, beginning and end, and the interface's end of a step."""
 
 from kedfem.compiled import inner
-from kedfem.dynamics.system.algebra_kernel import (
-    copied,
-    frame_copied,
-    ports_turned,
-    product,
-)
+from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, ports_turned, product
 from kedfem.dynamics.system.bodies_kernel import right_hand_side, rigid_frame_end
 from kedfem.dynamics.system.constraints_kernel import coordinate
 from kedfem.dynamics.system.ends_kernel import placed
@@ -54,12 +49,7 @@ def ported(bodies, i, trial):  # type: ignore[no-untyped-def]
     """trial.w and trial.force become displacements and forces at a body's interface points, in its frame."""
     first, last, c = bodies.port_at[i], bodies.port_at[i + 1], bodies.column_at[i + 1] - bodies.column_at[i]
     q, at = last - first, bodies.B_at[i]
-    RB, w, dz, columns = (
-        trial.RB,
-        trial.w,
-        trial.dz,
-        bodies.columns[bodies.column_at[i] : bodies.column_at[i + 1]],
-    )
+    RB, w, dz, columns = (trial.RB, trial.w, trial.dz, bodies.columns[bodies.column_at[i] : bodies.column_at[i + 1]])
     for r in range(q):
         for m in range(c):
             w[first + r] += RB[at + r * c + m] * dz[columns[m]]

@@ -11,28 +11,11 @@ import numpy as np
 from kedfem.compiled import compiled, inner
 from kedfem.dynamics.anderson_kernel import mixed
 from kedfem.dynamics.beams_kernel import begun, ended
-from kedfem.dynamics.system.algebra_kernel import (
-    copied,
-    frame_copied,
-    product,
-    turned,
-    turned_back,
-)
-from kedfem.dynamics.system.bodies_kernel import (
-    internal_forces,
-    orientation,
-    own_end,
-    residual,
-)
+from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, product, turned, turned_back
+from kedfem.dynamics.system.bodies_kernel import internal_forces, orientation, own_end, residual
 from kedfem.dynamics.system.corotational_kernel import foresee, newmark
 from kedfem.dynamics.system.ends_kernel import unmoved
-from kedfem.dynamics.system.interface_kernel import (
-    evaluated,
-    gathered,
-    interface_solved,
-    offset,
-    pushed,
-)
+from kedfem.dynamics.system.interface_kernel import evaluated, gathered, interface_solved, offset, pushed
 from kedfem.dynamics.system.products_kernel import displaced, sparse_held
 from kedfem.dynamics.system.record import NOMINAL, RIGID_BODY, STRESSED
 from kedfem.dynamics.system.rigid_frame_kernel import (

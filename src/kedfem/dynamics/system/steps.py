@@ -160,11 +160,7 @@ class Steps:
         return self.handed_on(found, forcing, motion)
 
     def advance(
-        self,
-        state: State | Now,
-        forcing: Sequence[Forcing],
-        motion: RigidMotion,
-        motion_at: Motion | None = None,
+        self, state: State | Now, forcing: Sequence[Forcing], motion: RigidMotion, motion_at: Motion | None = None
     ) -> tuple[list[LinkHistory], Multipliers, State | Now]:
         """All time points of a block, one step after the other, [KED, eq. (20)].
 
@@ -225,11 +221,7 @@ class Steps:
             force = force @ to_ports.T
             if acting is not None:
                 force = force - (acting @ R).reshape(len(R), -1) @ inverse.T
-        g, energy, products = (
-            self.deformation(k, found),
-            found.energy[:, k].copy(),
-            self._products(found, k, v),
-        )
+        g, energy, products = (self.deformation(k, found), found.energy[:, k].copy(), self._products(found, k, v))
         return LinkHistory(u, v, a, g, R, F, force, energy, products)
 
     def deformation(self, k: int, found: History) -> Rows:

@@ -17,10 +17,7 @@ def combined(of, driving, t, out):  # type: ignore[no-untyped-def]
         k = out[of.at[i] : of.at[i + 1]]
         k[:] = 0.0
         for j in range(driving.terms_at[i], driving.terms_at[i + 1]):
-            s, of_j = (
-                driving.factors[t, j],
-                driving.entries[driving.entries_at[j] : driving.entries_at[j + 1]],
-            )
+            s, of_j = (driving.factors[t, j], driving.entries[driving.entries_at[j] : driving.entries_at[j + 1]])
             for m in range(len(k)):
                 k[m] += s * of_j[m]
 

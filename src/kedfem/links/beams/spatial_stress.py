@@ -83,13 +83,7 @@ def _fields(r: float, m: int, det_J: float) -> Float[np.ndarray, "5 m 3"]:
     """Weights of (u', p, q, p', q') on an element's (u, p, q)."""
     N, dN = shape_functions(r, m)
     out = np.zeros((5, m, 3))
-    for field, of, weights in (
-        (T, 0, dN / det_J),
-        (N1, 1, N),
-        (N2, 2, N),
-        (N1_S, 1, dN / det_J),
-        (N2_S, 2, dN / det_J),
-    ):
+    for field, of, weights in ((T, 0, dN / det_J), (N1, 1, N), (N2, 2, N), (N1_S, 1, dN / det_J), (N2_S, 2, dN / det_J)):
         out[field, :, of] = weights
     return out
 

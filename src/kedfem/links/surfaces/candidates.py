@@ -13,14 +13,7 @@ import numpy as np
 from kedfem.arrays import Bool, Float, Int
 from kedfem.links.record import Link, LinkFace
 from kedfem.links.surfaces.round_surfaces import CLOSED
-from kedfem.links.surfaces.surface import (
-    PLANE_TOLERANCE,
-    SMOOTH,
-    boundary,
-    components,
-    neighbours,
-    surface_quadrature,
-)
+from kedfem.links.surfaces.surface import PLANE_TOLERANCE, SMOOTH, boundary, components, neighbours, surface_quadrature
 
 FITS = 0.01  # of the radius: how far corners may be off the cylinder or ball that they are taken for
 FEWEST = 3  # facets that a cylinder or a ball is found from

@@ -11,13 +11,7 @@ from kedfem.errors import MeshError
 from kedfem.links.record import Link
 from kedfem.links.surfaces.facet_selection import named_facets, picked
 from kedfem.links.surfaces.missing import in_its_plane, not_touching
-from kedfem.links.surfaces.surface import (
-    PLANE_TOLERANCE,
-    boundary,
-    flat_face,
-    smooth_face,
-    surface_quadrature,
-)
+from kedfem.links.surfaces.surface import PLANE_TOLERANCE, boundary, flat_face, smooth_face, surface_quadrature
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,11 +65,7 @@ def face_normal(surface: CouplingSurface) -> Float[np.ndarray, "3"]:
 
 
 def joint_surface(
-    link: Link,
-    where: str,
-    point: Float[np.ndarray, "3"],
-    axis: Float[np.ndarray, "3"] | None,
-    faces: Sequence[str] = (),
+    link: Link, where: str, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"] | None, faces: Sequence[str] = ()
 ) -> CouplingSurface:
     """The coupling surface that a link offers to a joint: a beam's node; else a bore or journal about the axis, else the
     face there.

@@ -102,9 +102,7 @@ def _facet_rule(elem: skfem.Element) -> tuple[np.ndarray, np.ndarray]:
     return np.stack(np.meshgrid(r, r, indexing="ij")).reshape(2, -1), np.outer(w, w).ravel()
 
 
-def boundary(
-    link: Link,
-) -> tuple[Int[np.ndarray, " f"], Float[np.ndarray, "f c 3"], Float[np.ndarray, "f 3"]]:
+def boundary(link: Link) -> tuple[Int[np.ndarray, " f"], Float[np.ndarray, "f c 3"], Float[np.ndarray, "f 3"]]:
     """Facets at the surface with their corners and outward unit normals; cuts of a segment are none."""
     mesh = link.basis.mesh
     facets = np.setdiff1d(mesh.boundary_facets(), link.cuts)
@@ -169,11 +167,7 @@ def neighbours(link: Link, facets: Int[np.ndarray, " f"]) -> tuple[Int[np.ndarra
 
 
 def connected(
-    seed: int,
-    first: Int[np.ndarray, " k"],
-    second: Int[np.ndarray, " k"],
-    joined: Bool[np.ndarray, " k"],
-    size: int,
+    seed: int, first: Int[np.ndarray, " k"], second: Int[np.ndarray, " k"], joined: Bool[np.ndarray, " k"], size: int
 ) -> Bool[np.ndarray, " f"]:
     """Which facets can be reached from one of them over the pairs that are joined."""
     label = components(first, second, joined, size)

@@ -146,10 +146,7 @@ def _measure(curve: Curve, local: Float[np.ndarray, " m"]) -> Float[np.ndarray, 
 
 
 def _nodes(
-    plan: Plan,
-    counts: list[int],
-    measures: list[Float[np.ndarray, " m"]],
-    fitting: tuple[Mapping | None, ...],
+    plan: Plan, counts: list[int], measures: list[Float[np.ndarray, " m"]], fitting: tuple[Mapping | None, ...]
 ) -> Division:
     """The nodes; those of free closed curves inside a ring opposite the nodes of its outer loop."""
     ends = sorted({end for curve in plan.curves for end in curve.ends})
@@ -206,10 +203,7 @@ def _opposite(plan: Plan, places: dict[int, Float[np.ndarray, " n"]], region: Re
         towards = towards[::-1]
     # a mean between facing each node and an even division keeps both the angles and the lengths fair
     facing = np.interp(
-        np.maximum.accumulate(turned * (towards - around[0])),
-        turned * (around - around[0]),
-        finer,
-        period=2 * np.pi,
+        np.maximum.accumulate(turned * (towards - around[0])), turned * (around - around[0]), finer, period=2 * np.pi
     )
     facing = np.unwrap(facing * 2 * np.pi / curve.length) * curve.length / (2 * np.pi)
     even = np.arange(count) * curve.length / count

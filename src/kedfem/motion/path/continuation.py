@@ -94,11 +94,7 @@ def _next(link: Linkage, grid: list[Stand], step: float, ahead: int, usual: floa
 
 
 def _settled(
-    link: Linkage,
-    tau: Float[np.ndarray, " T"],
-    guess: Poses,
-    near: Float[np.ndarray, "T A"],
-    before: Stand | None = None,
+    link: Linkage, tau: Float[np.ndarray, " T"], guess: Poses, near: Float[np.ndarray, "T A"], before: Stand | None = None
 ) -> list[Stand]:
     """Grid points next to guesses, up to one that is too far off, converges slowly or lies behind a singular position."""
     rates, jump = link.drives.at(tau)[1:], np.inf if before is None else JUMP

@@ -67,10 +67,7 @@ class Path:
 
 
 def with_points(
-    along: Path,
-    phi: Float[np.ndarray, " T"],
-    shape: Float[np.ndarray, "3 T C"],
-    near: Float[np.ndarray, "T A"],
+    along: Path, phi: Float[np.ndarray, " T"], shape: Float[np.ndarray, "3 T C"], near: Float[np.ndarray, "T A"]
 ) -> tuple[Path, Int[np.ndarray, " G"]]:
     """The path with some further grid points, and numbers of its points among the old ones with these behind."""
     order = np.argsort(np.concatenate([along.phi, phi]))

@@ -46,8 +46,7 @@ def refined(link: Linkage, along: Path) -> Path:
         aim, (R, p) = aimed(link, along, middle), predicted(along, middle)
         got = moving(link, along.rows, (R, p), aim, link.drives.at(middle)[1:])
         apart = np.maximum(
-            np.abs(got.poses[0] - R).max(axis=(1, 2, 3)),
-            np.abs(got.poses[1] - p).max(axis=(1, 2)) / link.size,
+            np.abs(got.poses[0] - R).max(axis=(1, 2, 3)), np.abs(got.poses[1] - p).max(axis=(1, 2)) / link.size
         )
         off = np.isfinite(got.gap) & (apart > enough)
         still = np.append(np.zeros(len(along.phi), bool), (apart > HALVES * enough)[off])

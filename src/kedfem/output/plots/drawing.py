@@ -244,10 +244,7 @@ def _plain(text: str) -> str:
 
 @contextmanager
 def figure_saved(
-    path: Path,
-    title: str,
-    size: tuple[float, float] = SIZE,
-    layout: Literal["constrained"] | None = "constrained",
+    path: Path, title: str, size: tuple[float, float] = SIZE, layout: Literal["constrained"] | None = "constrained"
 ) -> Iterator[Any]:
     """A figure of its own (no global state), written to a PNG when it is drawn."""
     figure = _figure(size, layout)

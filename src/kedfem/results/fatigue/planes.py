@@ -89,10 +89,7 @@ def findley_stresses(
 
 
 def _sheared(
-    few: Float[np.ndarray, "k 6 F"],
-    axes: Float[np.ndarray, "k 3 3"],
-    angle: Float[np.ndarray, " P"],
-    tilt: float,
+    few: Float[np.ndarray, "k 6 F"], axes: Float[np.ndarray, "k 3 3"], angle: Float[np.ndarray, " P"], tilt: float
 ) -> tuple[Float[np.ndarray, "k P 6"], Float[np.ndarray, "k P 6"]]:
     """Rows by which normal stress on planes, and shear in the direction of its largest range, follow from H.
 

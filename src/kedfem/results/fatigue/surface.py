@@ -10,13 +10,7 @@ from kedfem.arrays import Float, Int
 from kedfem.links.free_surface import FreeSurface, free_surface
 from kedfem.links.recovery import StressRecovery
 from kedfem.processes import threads
-from kedfem.results.fatigue.planes import (
-    disproportion,
-    dominant,
-    findley_stresses,
-    normal_stresses,
-    signed_von_mises,
-)
+from kedfem.results.fatigue.planes import disproportion, dominant, findley_stresses, normal_stresses, signed_von_mises
 from kedfem.results.fatigue.strength import Strength
 from kedfem.results.stresses.envelope import Kept
 from kedfem.scene import Fatigue as Asked

@@ -52,11 +52,7 @@ def _row_joint(scene: Scene, model: Model, name: str, forces: Forces) -> list[Re
 
 
 def _channels(
-    joint: str,
-    label: str,
-    wrench: Callable[[Block], tuple[Rows, ...]],
-    determined: Sequence[bool],
-    sign: float = 1.0,
+    joint: str, label: str, wrench: Callable[[Block], tuple[Rows, ...]], determined: Sequence[bool], sign: float = 1.0
 ) -> list[Recorded]:
     """Force and moment of a joint, as far as statics determine them."""
     about = f"moment {label}, about the joint's point of the rigid-body motion"

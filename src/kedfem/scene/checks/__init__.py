@@ -7,13 +7,7 @@ from __future__ import annotations
 
 from kedfem.errors import Fault
 from kedfem.scene.checks.combinations import combination_faults
-from kedfem.scene.checks.drives import (
-    analysis_faults,
-    drive_faults,
-    gear_faults,
-    initial_faults,
-    undriven_faults,
-)
+from kedfem.scene.checks.drives import analysis_faults, drive_faults, gear_faults, initial_faults, undriven_faults
 from kedfem.scene.checks.joints import beam_faults, joint_faults, planar_faults
 from kedfem.scene.checks.links import frame_faults, link_faults
 from kedfem.scene.checks.loads import fatigue_faults, load_faults, spring_faults

@@ -21,10 +21,7 @@ FILES: TypeAdapter[list[str]] = TypeAdapter(list[FileName])
 
 
 def with_includes(
-    raw: Mapping[str, Any],
-    folder: Path,
-    file: Path | None = None,
-    allowed: Callable[[Path], bool] = lambda path: True,
+    raw: Mapping[str, Any], folder: Path, file: Path | None = None, allowed: Callable[[Path], bool] = lambda path: True
 ) -> dict[str, Any]:
     """A raw scene with the tables of the files that it includes.
 

@@ -8,14 +8,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    BeforeValidator,
-    Field,
-    PlainSerializer,
-    TypeAdapter,
-    ValidatorFunctionWrapHandler,
-    WrapValidator,
-)
+from pydantic import BeforeValidator, Field, PlainSerializer, TypeAdapter, ValidatorFunctionWrapHandler, WrapValidator
 
 from kedfem.scene.records.base import Record
 from kedfem.scene.records.units import Angle, Length, Number, PositiveLength, Quantity, fault

@@ -115,6 +115,5 @@ def _too_thick(key: str, wall: float, name: str, limit: float) -> list[Fault]:
 
 
 SectionShape = Annotated[
-    RectangleSection | RoundSection | TubeSection | BoxSection | ISection | ConstantsSection,
-    Field(discriminator="kind"),
+    RectangleSection | RoundSection | TubeSection | BoxSection | ISection | ConstantsSection, Field(discriminator="kind")
 ]

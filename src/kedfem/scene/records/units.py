@@ -223,12 +223,7 @@ class Quantity:
             return "positive"
         if (self.least, self.below, self.most) == (0.0, math.inf, math.inf):
             return "zero or positive"
-        parts = [
-            (self.above, "above"),
-            (self.least, "at least"),
-            (self.below, "below"),
-            (self.most, "at most"),
-        ]
+        parts = [(self.above, "above"), (self.least, "at least"), (self.below, "below"), (self.most, "at most")]
         return " and ".join(f"{word} {bound:g}" for bound, word in parts if math.isfinite(bound))
 
 

@@ -33,11 +33,7 @@ def measured(system: System, term: Term, at: tuple[Any, Any, Column], near: floa
 
 
 def off_line(
-    term: Term,
-    pin: Float[np.ndarray, "3"],
-    by_pin: Float[np.ndarray, "3 k"],
-    end: End,
-    pose: tuple[Any, Any, Column],
+    term: Term, pin: Float[np.ndarray, "3"], by_pin: Float[np.ndarray, "3 k"], end: End, pose: tuple[Any, Any, Column]
 ) -> tuple[float, Column]:
     """How far a pin is off a line along a direction across it, and the gradient by z.
 

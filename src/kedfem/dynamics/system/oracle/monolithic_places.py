@@ -42,10 +42,7 @@ def _on_curve(curve: Curve | None, at: RigidMotion, e: float, rate: float) -> fl
     """Force along the coordinate."""
     if curve is None:
         return 0.0
-    of, x = (
-        curve.force,
-        float(at.t[0]) if curve.over == record.TIME else (rate if curve.over == record.RATE else e),
-    )
+    of, x = (curve.force, float(at.t[0]) if curve.over == record.TIME else (rate if curve.over == record.RATE else e))
     x = of.at[0] + (x - of.at[0]) % of.period if of.period else max(x, of.at[0])
     return float(PPoly(np.array(of.coefficients).T[::-1], [*of.at, max(x, of.at[-1]) + 1.0])(x))
 

@@ -207,8 +207,5 @@ class PeriodMap:
         for k in np.flatnonzero(bodies.dense == 0):
             first, last = int(bodies.at[k]), int(bodies.at[k + 1])
             N = last - first
-            Mu[first:last], Mv[first:last] = (
-                m[3 * first : 3 * first + N],
-                m[3 * first + N : 3 * first + 2 * N],
-            )
+            Mu[first:last], Mv[first:last] = (m[3 * first : 3 * first + N], m[3 * first + N : 3 * first + 2 * N])
         return u, v, Mu, Mv

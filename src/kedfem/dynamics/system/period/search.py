@@ -13,15 +13,7 @@ import numpy as np
 
 from kedfem.arrays import Complex
 from kedfem.dynamics.system.period.coarse import Coarse
-from kedfem.dynamics.system.period.krylov import (
-    Derivative,
-    Solution,
-    Watch,
-    Watched,
-    combined,
-    gmres,
-    scale_of,
-)
+from kedfem.dynamics.system.period.krylov import Derivative, Solution, Watch, Watched, combined, gmres, scale_of
 from kedfem.dynamics.system.period.map import CARRIED, Carried, PeriodMap
 from kedfem.dynamics.system.period.multipliers import multipliers
 from kedfem.dynamics.system.record import ANGLE, COORDINATE, Spring, Stop, curve_of

@@ -59,8 +59,7 @@ def places(motion: RigidMotion, k: int = 0) -> Places:
     """The rigid-body motion at time point k."""
     R = motion.R[k]
     return Places(
-        np.stack([R, cross_matrix(motion.omega[k]) @ R, motion.R2[k]]),
-        np.stack([motion.p[k], motion.v[k], motion.p2[k]]),
+        np.stack([R, cross_matrix(motion.omega[k]) @ R, motion.R2[k]]), np.stack([motion.p[k], motion.v[k], motion.p2[k]])
     )
 
 

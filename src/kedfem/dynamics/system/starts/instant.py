@@ -10,6 +10,7 @@ from scipy.sparse.linalg import splu
 
 from kedfem.arrays import Bool, Float, Int
 from kedfem.dynamics.joints.attachments import interface_matrix
+from kedfem.dynamics.matrices.bordered import row_of
 from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.matrices.substructure import factored
 from kedfem.dynamics.rigid_body import forcings
@@ -80,12 +81,7 @@ class Instant:
     """
 
     def __init__(
-        self,
-        of: Ready,
-        motion_at: Motion,
-        time: float,
-        like: "Instant | None" = None,
-        near: Flat | None = None,
+        self, of: Ready, motion_at: Motion, time: float, like: "Instant | None" = None, near: Flat | None = None
     ) -> None:
         motion = motion_at(np.array([time]))
         self.near = near
@@ -203,7 +199,7 @@ class Instant:
 def sizes(C: sp.csr_array) -> Float[np.ndarray, " r"]:
     """Largest entry of each row."""
     out = np.zeros(C.shape[0])
-    np.maximum.at(out, np.repeat(np.arange(len(out)), np.diff(C.indptr)), np.abs(C.data))
+    np.maximum.at(out, row_of(C), np.abs(C.data))
     return out
 
 
@@ -239,16 +235,8 @@ def always(of: Ready) -> Always:
 
     number = renumbered(of)
     rated = np.array([each.linear and feels_rates(each.law) for each in of.system.constraints], bool)
-    return Always(
-        number,
-        np.argsort(number)[of.constraints.columns],
-        rated,
-        closure(of),
-        still,
-        cache(least),
-        cache(held),
-        cache(partial(mass_body, of)),
-    )
+    columns, mass = np.argsort(number)[of.constraints.columns], partial(mass_body, of)
+    return Always(number, columns, rated, closure(of), still, cache(least), cache(held), cache(mass))
 
 
 def _lowest(of: Ready, still: Still) -> float:
