@@ -120,8 +120,7 @@ def assembled_deflection(of: Ready, at: RigidMotion) -> np.ndarray:
     solver, system, model = Monolithic(of.system, of.scheme), of.system, of.system.model
     K = [rotated_stiffness(x.K0, at.R[0, body, : x.d, : x.d]) for x, body in zip(model.links, model.bodies, strict=True)]
     if system.stiffening is not None:
-        found = system.stiffening.over(forcings(model, at), at)
-        stressed = system.stiffening.stiffness([each.at(0) for each in found])
+        stressed = system.stiffening.stiffness(forcings(model, at), at)
         K = [own + more for own, more in zip(K, stressed, strict=True)]
     turning = []
     for link, body in zip(model.links, model.bodies, strict=True):
