@@ -16,6 +16,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from kedfem.dynamics.system.march import march
 from kedfem.dynamics.system.starts import impacts
+from tests import scenes
 from tests.cells import Cell, scene_of
 from tests.moving import bar, beam_in_space
 from tests.partners import chain
@@ -400,3 +401,20 @@ def test_stops_are_met_as_by_the_oracle_where_the_motion_stiffens_links(kind: st
     assert np.abs(plain - wanted).max() > 1e-5 * peak  # what stiffening changes
     free = begun(raw | {"limits": {}})
     assert np.abs(rows(free.ready, marched(free, 8)[1].u) - wanted).max() > 0.05 * peak
+
+
+def test_a_stop_that_is_met_at_the_end_of_a_step_leaves_the_next_what_it_can_take() -> None:
+    """After 0.998 of a step: the rest of it ended with accelerations 1,000 times as large, h² a / 2 = 0.9 rad, so that
+    iterations of the next steps found a linkage folded the other way, or none; with some processors' kernels."""
+    of = begun(
+        {
+            **scenes.four_bar((0.1, 0.3, 0.25, 0.3), scenes.bar(model="beam"), scenes.constant_speed("300 rpm")),
+            "limits": {"s": {"kind": "angle", "joint": "D", "upper": "5 deg", "stiffness": 2e3, "damping": 0.5}},
+            "damping": {"beta": 1e-6},
+            "analysis": {"revolutions": 3, "steps_per_revolution": 120, "rho_inf": 0.95, "frames": "co-rotational"},
+        }
+    )
+    state, history = march(of.ready, of.state, of.steps(126), of.motion)
+    assert history.e[-2, 0] < np.deg2rad(5.0) < history.e[-1, 0]
+    assert 10.0 < state.e[1, 0] < 11.0
+    assert np.abs(state.e[2]).max() < 2e3  # rad/s², 687; 6.7e5

@@ -13,7 +13,6 @@ from kedfem.dynamics.system.starts.coordinate_rates import coordinates, places
 from kedfem.dynamics.system.starts.deflected import plucked, quasi_static, static
 from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.dynamics.system.starts.instant import Instant
-from kedfem.dynamics.system.starts.linear_equations import LinearEquations, Solved
 from kedfem.dynamics.system.starts.newton_krylov import stands_off
 from kedfem.errors import SolveError
 from tests.laws.test_system import HINGE, KINDS, elements, four_bar
@@ -63,21 +62,6 @@ def test_rates_of_coordinates_are_those_of_their_values(kind: str, frames: str) 
     exact, shown = now.coordinates(z)[:2], ~of.ready.constraints.linear | now.always.rated
     assert_allclose(measured[0], exact[0], atol=1e-13 * np.abs(exact[0]).max())  # what balances take, by compiled code
     assert_allclose(measured[1, shown], exact[1, shown], atol=1e-12 * np.abs(exact[1]).max())
-
-
-def test_linear_starts_take_few_solutions(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of solids, at five instants, each guessed from those before: 24, and 38 where each search left four digits to the
-    next."""
-    count, once = [0], LinearEquations.solved
-
-    def counted(*given: Any, **more: Any) -> Solved:
-        count[0] += 1
-        return once(*given, **more)
-
-    monkeypatch.setattr(LinearEquations, "solved", counted)
-    of = at(four_bar(links={name: bar("solid", *ends, 16) for name, ends in ENDS.items()}), "rigid-body")
-    quasi_static(of.ready, of.motion)
-    assert count[0] <= 30
 
 
 @pytest.mark.parametrize(

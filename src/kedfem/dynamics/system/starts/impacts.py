@@ -19,13 +19,14 @@ from kedfem.dynamics.system.starts.instant import Instant
 from kedfem.dynamics.system.starts.internal_forces import own
 from kedfem.dynamics.system.state import History, State, copied
 
-NEAR = 1e-3  # of a step: a stop that is met so near to its beginning or end is met there
+NEAR = 1e-2  # of a step: a stop that is met so near to its beginning or end is met there; see `divided`
 
 Coordinates = Float[np.ndarray, " r"]
 
 
 def divided(of: Ready, state: State, last: float, between: Motion, halvings: int) -> tuple[State, History]:
-    """One step in which a stop with damping is met, in two parts.
+    """One step in which a stop with damping is met, in two parts; shorter ones would end with accelerations that predict
+    nothing of the next step.
 
     Parameters
     ----------

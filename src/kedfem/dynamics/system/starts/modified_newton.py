@@ -69,11 +69,11 @@ def _iterated(
     """
     of, mixing, bodies, settled, last = now.of, Mixing(), TurningBodies(now, spins), False, np.inf
     linear, slow, start, first = of.c.single, 0, u, 0.0
-    exact = now.slow or linear
+    exact = now.slow or (linear and any(bodies.sparse))
     frames, balance = bodies.still.frames(), None
     for n in range(ITERATIONS):
         sure = exact or rounding == FREE  # its small changes are not those of mass in the matrices
-        exact = exact or (settled and not sure)
+        exact = exact or (linear and n >= DIRECT) or (settled and not sure)
         f, R = bodies.still.forces(now.motion.R[0], u, now.amounts)
         r = now.F - f + more(u, f) - bodies.inertia(u) - now.stress(u)
         try:
@@ -81,7 +81,7 @@ def _iterated(
                 balance = LinearEquations(of, bodies.held(R), R, _asked(now, u, z1))
             else:  # of a linear system they differ in what constraints are open by
                 balance.asked = _asked(now, u, z1)
-            change = bodies.change(balance, r, exact, CONVERGED * float(np.linalg.norm(u)) if linear else 0.0)
+            change = bodies.change(balance, r, exact)
         except (SolveError, np.linalg.LinAlgError):
             break
         if not np.isfinite(change).all():

@@ -10,8 +10,7 @@ from kedfem.dynamics.system.starts.internal_forces import own
 from kedfem.dynamics.system.starts.linear_equations import HeldBody, LinearEquations, held_body
 
 KRYLOV = 60
-LEFT = 1e-4  # of a residual, by GMRES: iterations of the deflection go on
-FEWEST = 1e-8  # the same where the system is linear, so that few go on: rounding may leave as much
+LEFT = 1e-4  # of a residual, by GMRES: iterations of the deflection go on, and rounding may leave 1e-8
 CONVERGED = 1e-10  # change of an iteration, of the deflection
 
 Spins = Float[np.ndarray, "L 3 3"]
@@ -39,7 +38,7 @@ class TurningBodies:
             self._made.append(held_body(A, self.now.of.parts[k].W))
         return self._made
 
-    def change(self, balance: LinearEquations, r: Flat, exact: bool = False, small: float = 0.0) -> Flat:
+    def change(self, balance: LinearEquations, r: Flat, exact: bool = False) -> Flat:
         """What a residual asks for: GMRES puts in the inertia of turning of sparse bodies, and takes out their mass.
 
         It puts in the stiffness that stresses of the rigid-body motion give, too.
@@ -47,19 +46,16 @@ class TurningBodies:
         Parameters
         ----------
         exact : whether it takes out the mass of dense bodies too
-        small : a change that is rounding, which nothing is put into; as much may be left of one
         """
         direct = balance.solved(r).x
-        none_left = not any(self.sparse) and not exact and self.now.of.stressed is None
-        if none_left or np.linalg.norm(direct) <= small:
+        if not any(self.sparse) and not exact and self.now.of.stressed is None:
             return direct
 
         def applied(x: Flat) -> Flat:
             return np.asarray(x + balance.solved(self.left_out(x, exact), alone=True).x)
 
-        left = FEWEST if self.now.of.c.single else LEFT
         whole = LinearOperator((len(r),) * 2, applied, dtype=float)
-        return np.asarray(gmres(whole, direct, rtol=left, atol=small, restart=KRYLOV, maxiter=4)[0])
+        return np.asarray(gmres(whole, direct, rtol=LEFT, restart=KRYLOV, maxiter=4)[0])
 
     def inertia(self, u: Flat) -> Flat:
         """M ([α]× + [ω]×²) u of all bodies."""
