@@ -70,7 +70,7 @@ def test_the_map_of_a_spring_that_stiffens_and_softens_over_speed_and_damping(tm
     assert (tmp_path / "out" / "sweep.png").stat().st_size > 1e4
     with (tmp_path / "out" / "edges.csv").open() as file:
         table = list(csv.reader(file))
-    assert table[0] == ["parameters.c", "drive.motion.speed [rad/s]", "half width", "unstable"]
+    assert table[0] == ["parameters.c", "drive.motion.speed [rad/s]", "half width [rad/s]", "unstable"]
     assert [row[3] for row in table[1:]] == ["above", "below"]
     assert [float(row[1]) for row in table[1:]] == pytest.approx([each.at for each in done.edges], rel=1e-8)
     again = swept(raw, tmp_path, *over, edges=2e-2)
