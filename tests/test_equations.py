@@ -127,11 +127,14 @@ def test_other_lists_of_equations_are_refused(text: str) -> None:
 
 
 def members(node: ast.ClassDef) -> set[str]:
-    """Fields, methods and attributes of `self` of a class."""
+    """Fields, methods and attributes of `self` of a class; of a named tuple the names that it lists."""
     fields = {x.target.id for x in node.body if isinstance(x, ast.AnnAssign) and isinstance(x.target, ast.Name)}
     methods = {x.name for x in node.body if isinstance(x, ast.FunctionDef)}
     own = {x.attr for x in ast.walk(node) if isinstance(x, ast.Attribute) and isinstance(x.ctx, ast.Store)}
-    return fields | methods | own
+    listed = {
+        name for base in node.bases if isinstance(base, ast.Call) for name in ast.literal_eval(base.args[1]).split()
+    }
+    return fields | methods | own | listed
 
 
 def code_names() -> set[str]:
