@@ -206,11 +206,15 @@ class TestKept:
     def test_a_mesh_is_made_once(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setenv("KEDFEM_CACHE", str(tmp_path))
         first = made()
-        monkeypatch.setattr(methods, "apart", None)
+
+        def meshes(*_: object) -> None:
+            raise RuntimeError("meshed")
+
+        monkeypatch.setattr(methods, "apart", meshes)
         again = made()
         assert np.array_equal(again.points, first.points)
         assert again.method == first.method
-        with pytest.raises(TypeError):
+        with pytest.raises(RuntimeError, match="meshed"):
             made(mesh={"size": 0.01})
 
     def test_a_damaged_entry_is_made_again(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
