@@ -50,15 +50,15 @@ class Bordered:
     """
 
     def __init__(self, H: Any, C: sp.csr_array, compliance: Flat) -> None:
-        self.kept, self.count, k = independent_rows(C, compliance), len(compliance), C.shape[1]
-        size, soft = row_sizes(C)[self.kept], compliance[self.kept]
-        usual = np.abs(H.diagonal()).mean() if k else 1.0
+        self.kept, self.count = independent_rows(C, compliance), len(compliance)
+        rows = C[self.kept]
+        usual = np.abs(H.diagonal()).mean() if rows.shape[1] else 1.0
+        size = row_sizes(rows)
         self.scale = usual / np.where(size > 0, size, 1.0)  # so that both parts are about as large
-        H, rows, own = sp.coo_array(H), sp.coo_array(C[self.kept]), k + np.flatnonzero(soft)
-        (i, j), (row, column), value = H.coords, rows.coords, self.scale[rows.coords[0]] * rows.data
-        entries = np.concatenate([H.data, -value, value, (self.scale**2 * soft)[own - k]])
-        places = np.concatenate([i, column, k + row, own]), np.concatenate([j, k + row, column, own])
-        self.matrix = sp.csc_array(sp.coo_array((entries, places), (k + len(soft),) * 2))
+        rows = sp.diags_array(self.scale) @ rows
+        diagonal = sp.diags_array(self.scale**2 * compliance[self.kept])
+        # otherwise laid out, other digits are left beside stiff links: a rigid arm's start was not found
+        self.matrix = sp.csc_array(sp.block_array([[H, -rows.T], [rows, diagonal]]))
         if not self.matrix.shape[0]:
             return
         try:
