@@ -63,7 +63,7 @@ def all_compiled() -> Path:
     Numba keeps code for one installation, and while its files' times stay: of another, or after an upgrade that left the
     kernels alone, nothing that it kept is used.
     """
-    stamps = [f"{kernel_folder(ROOT).name} {numba.__version__} {sys.version}"]
+    stamps = [f"{(_FOLDER or kernel_folder(ROOT)).name} {numba.__version__} {sys.version}"]
     for kernel in sorted(ROOT.rglob("*kernel.py")):
         stat = kernel.stat()
         stamps.append(f"{kernel} {stat.st_mtime_ns} {stat.st_size}")

@@ -169,12 +169,8 @@ class Instant:
 
     def measured(self, z: Flat, z1: Flat | None = None) -> tuple[sp.csr_array, Float[np.ndarray, "2 r"]]:
         """Gradients of all coordinates by z, and these with their rates as in `coordinates`, as steps have them."""
-        of, always, known = self.of, self.always, np.zeros(self.of.system.unknowns)
-        known[always.number] = z
-        near = np.zeros(len(of.constraints.kind)) if self.near is None else _nearby(self)
-        data, e, rate = always.still.measured(self.motion, self._stations, near, known)
-        C = sp.csr_array((data, always.columns, of.constraints.column_at), (len(e), len(z)))
-        e = np.where(of.constraints.linear, C @ z, e)
+        always, (C, e, rate) = self.always, self._as_in_steps(z)
+        e = np.where(self.of.constraints.linear, C @ z, e)
         out = self._less_drives(np.stack([e, rate if z1 is None else rate + C @ z1]))
         if always.rated.any():
             full = self.coordinates(np.stack([z, 0 * z if z1 is None else z1, 0 * z]))
@@ -183,7 +179,15 @@ class Instant:
 
     def gradients(self, z: Flat) -> sp.csr_array:
         """Of all coordinates by z."""
-        return self.measured(z)[0]
+        return self._as_in_steps(z)[0]
+
+    def _as_in_steps(self, z: Flat) -> tuple[sp.csr_array, Float[np.ndarray, " r"], Float[np.ndarray, " r"]]:
+        """The same with values and rates as in `Still.measured`."""
+        of, always, known = self.of, self.always, np.zeros(self.of.system.unknowns)
+        known[always.number] = z
+        near = np.zeros(len(of.constraints.kind)) if self.near is None else _nearby(self)
+        data, e, rate = always.still.measured(self.motion, self._stations, near, known)
+        return sp.csr_array((data, always.columns, of.constraints.column_at), (len(e), len(z))), e, rate
 
     def forces(self, e: Float[np.ndarray, "_ r"]) -> Float[np.ndarray, "r 3"]:
         """Of all laws: force along the coordinate, and how it falls with it and its rate; zero of constraints."""
