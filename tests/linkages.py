@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from kedfem.motion.linkage import linkage
-from kedfem.motion.path import path
+from kedfem.motion.batch import moving
+from kedfem.motion.linkage import Linkage, linkage
+from kedfem.motion.path import Path, aimed, path, predicted
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.scene import Scene, path_parameter, scene_from
 
@@ -68,6 +69,15 @@ def motion_at(scene: Scene, t: np.ndarray) -> RigidMotion:
     drive = path_parameter(scene, t)
     link = linkage(scene)
     return rigid_motion(link, path(link, min(drive[0].min(), 0.0), max(drive[0].max(), 0.0)), t, drive)
+
+
+def drive_rates(link: Linkage, along: Path, tau: np.ndarray, drive: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Rates of all bodies at places of a path per unit rate of one drive: v of what is drawn at the origin, and ω."""
+    q = np.zeros((len(tau), len(link.drives)))
+    q[:, drive] = 1.0
+    got = moving(link, along.rows, predicted(along, tau), aimed(link, along, tau), (q, 0 * q))
+    v, omega = got.first
+    return v - np.cross(omega, got.poses[0] @ link.centre), omega
 
 
 def body(scene: Scene, name: str) -> int:

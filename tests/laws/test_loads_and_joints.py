@@ -54,8 +54,7 @@ def at_one_instant(motion: Motion, alpha: np.ndarray, p2: np.ndarray) -> RigidMo
     zero = np.zeros(1)
     R, p, omega = both(motion.R), both(motion.p), both(motion.omega)
     none = np.zeros((len(zero), 0))
-    still = np.zeros_like(omega)
-    return RigidMotion(zero, zero, R, p, omega, both(alpha), both(motion.v), both(R2), both(p2), none, still, still)
+    return RigidMotion(zero, zero, R, p, omega, both(alpha), both(motion.v), both(R2), both(p2), none)
 
 
 def point_acceleration(motion: Motion, alpha: np.ndarray, p2: np.ndarray, X: np.ndarray) -> np.ndarray:

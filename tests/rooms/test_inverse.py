@@ -23,7 +23,7 @@ from kedfem.results.forces.rigid import RigidForces, determined, rigid_forces
 from kedfem.results.recording import recording
 from kedfem.scene import Scene, drive_angle, path_parameter, scene_from, time_grid
 
-from ..linkages import linkage_scene
+from ..linkages import drive_rates, linkage_scene
 from ..rigid_energy import kinetic_energy, load_power
 from .test_dynamics import four_bar
 
@@ -233,16 +233,17 @@ def test_the_drives_torque_is_that_of_virtual_work_on_all_nodes(raw: dict[str, A
     masses = inertias_of_model(ready.scene, ready.linkage, model)
     found = rigid_forces(ready.scene, ready.linkage, masses, ready.path).rows(motion)
     work = np.zeros(len(motion.t))
+    v, omega = drive_rates(ready.linkage, ready.path, motion.phi)
     every = [*zip(model.links, model.bodies, model.loads, strict=True),
              *((x.link, x.body, x.loads) for x in model.prescribed)]  # fmt: skip
     for link, body, loads in every:  # −Σ F · ∂R0/∂φ, with the sliders' mass on the nodes that carry it
         F = applied(link, loads, motion, body)
         f = in_space(link, F)
         x = np.einsum("tij,nj->tni", motion.R[:, body], link.X)
-        rate = link.one[:, None] * motion.v_phi[:, None, body] + np.cross(motion.omega_phi[:, None, body], x)
+        rate = link.one[:, None] * v[:, None, body] + np.cross(omega[:, None, body], x)
         work -= np.einsum("tni,tni->t", f, rate)
         if link.kind == "beam":
-            work -= motion.omega_phi[:, body, 2] * (F[:, :, 2] @ link.one)
+            work -= omega[:, body, 2] * (F[:, :, 2] @ link.one)
     torque = found["drive/rigid_torque"][:, 0]
     assert (len(model.prescribed) == 1) == carried
     assert_allclose(torque, work, rtol=0, atol=1e-11 * np.abs(work).max())

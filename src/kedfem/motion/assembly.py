@@ -123,7 +123,7 @@ def least_change(rows: Rows, centres: Float[np.ndarray, "n 3"], size: float) -> 
         if step <= ROUNDING / 100:
             break
     x = np.where(np.abs(x) < ROUNDING, 0.0, x)
-    f = features(rows, _poses(x, centres, size), np.zeros((1, len(rows.angles))))
+    f = features(rows, _poses(x, centres, size))
     return x, np.asarray(np.abs(residuals(rows, f, np.zeros((1, 0)))[0] * scale))
 
 
@@ -132,7 +132,7 @@ def _linearised(
 ) -> tuple[Float[np.ndarray, "m k"], Float[np.ndarray, " m"]]:
     """Derivatives of scaled rows by displacements and rotation vectors, and their values."""
     poses = _poses(x, centres, size)
-    f = features(rows, poses, np.zeros((1, len(rows.angles))))
+    f = features(rows, poses)
     J = jacobian(rows, f, len(x) + 1, size)[0].reshape(rows.count, len(x), 6)
     turning = _turning(x[:, 3:])  # ω = T θ', and v = d' − ω × R c
     arms = cross_matrix((poses[0][0, 1:] @ centres[..., None])[..., 0] / size)

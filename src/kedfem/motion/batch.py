@@ -89,7 +89,6 @@ class Moving:
 
     poses : R (T, B, 3, 3), p (T, B, 3)
     first, second : twists (v, ω) and their time derivatives, each a pair of (T, B, 3)
-    partial : (T, B, 3) each: twists per unit of the first drive
     gap : (T,) largest gap left, in units of size; infinite where Newton has not settled
     steps : (T,) each: of points that were solved together the Newton steps, in units of size and radians
     factor : of these, rows at the poses
@@ -98,7 +97,6 @@ class Moving:
     poses: Poses
     first: Twists
     second: Twists
-    partial: Twists
     gap: Float[np.ndarray, " T"]
     steps: Sequence[Float[np.ndarray, " T"]] = ()
     factor: Factor | BlockFactor | None = None
@@ -122,9 +120,8 @@ def settled(
     """
     rows, poses, steps = chosen.rows, guess, []
     scale = rows.scale(link.size)[: rows.count]
-    rhs = np.empty((len(aim), rows.count, 3))
+    rhs = np.empty((len(aim), rows.count, 2))
     rhs[..., 1] = driven_rows(rows, rates[0]) * scale
-    rhs[..., 2] = (rows.drive == 0) * scale
     step = before = np.full(len(aim), np.inf)
     for _ in range(ITERATIONS):
         f, gaps = _gaps(link, chosen, poses, aim)
@@ -136,7 +133,7 @@ def settled(
             if len(aim) > 1:
                 return _in_parts(link, chosen, poses, aim, rates, 1)
             none = np.zeros_like(poses[1]), np.zeros_like(poses[1])
-            return Moving(poses, none, none, none, np.full(1, np.inf))
+            return Moving(poses, none, none, np.full(1, np.inf))
         change = twists(link, x[..., 0])
         before, step = step, stride(link, change)
         steps.append(step)
@@ -150,7 +147,7 @@ def settled(
     if chosen.rest is not None:
         gaps = np.concatenate([gaps, _gaps(link, chosen.rest, poses, aim)[1]], axis=1)
     gap = np.where(step <= SETTLED, np.abs(gaps).max(axis=1, initial=0.0), np.inf)
-    return Moving(poses, first, second, twists(link, x[..., 2]), gap, steps, factor)
+    return Moving(poses, first, second, gap, steps, factor)
 
 
 def _gaps(link: Linkage, chosen: Choice, poses: Poses, aim: Target) -> tuple[Features, Float[np.ndarray, "T m"]]:
@@ -175,4 +172,4 @@ def _joined(parts: list[Moving]) -> Moving:
         return np.concatenate(one), np.concatenate(other)
 
     gap = np.concatenate([x.gap for x in parts])
-    return Moving(pair("poses"), pair("first"), pair("second"), pair("partial"), gap)
+    return Moving(pair("poses"), pair("first"), pair("second"), gap)

@@ -10,10 +10,9 @@ from kedfem.arrays import Float
 from kedfem.errors import MotionError
 from kedfem.motion.constraints import ANGLE, cross
 from kedfem.motion.joint_equations import joint_axis, joint_free_rows, moving_pair
-from kedfem.motion.linkage import Linkage, drawn_jacobian, resting_poses
+from kedfem.motion.linkage import Linkage, drawn_jacobian, resting_jacobian
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.released_motions import RANK_TOLERANCE
-from kedfem.motion.values import features, jacobian
 from kedfem.scene import Scene
 
 TURNING = {"revolute", "screw"}  # joints whose speed is a rotation, of the others it is along the axis
@@ -91,8 +90,7 @@ def _allowed(linkage: Linkage) -> Float[np.ndarray, "k f"]:
     held = len(linkage.joints) - (linkage.mobility if linkage.drive else 0)
     if not held:
         return np.eye(6 * (bodies - 1))
-    f = features(linkage.rows, resting_poses(1, bodies), np.zeros((1, len(linkage.rows.angles))))
-    J = jacobian(linkage.rows, f, bodies, linkage.size)[0]
+    J = resting_jacobian(linkage.rows, bodies, linkage.size)
     return np.asarray(scipy.linalg.null_space(J[:held], rcond=RANK_TOLERANCE))
 
 

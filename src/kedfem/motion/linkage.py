@@ -47,7 +47,6 @@ class Linkage:
     size : characteristic length, makes rows and columns comparable [m]
     centre : of the joints; poses are those of points drawn there, so that the scene may lie far from the origin [m]
     drives : what is driven
-    start : poses (1, B, ...) that the path starts from
     mobility : free motions that the drives leave; as many rows, the last ones, hold these
     blocks : how rows are solved entry by entry, of linkages of many bodies
     """
@@ -58,7 +57,6 @@ class Linkage:
     size: float
     centre: Float[np.ndarray, "3"]
     drives: Drives
-    start: Poses
     mobility: int = 0
     blocks: Blocks | None = None
 
@@ -72,7 +70,7 @@ class Linkage:
         """Joints whose rows repeat what others already hold in the reference position, by rank-revealing QR of Jᵀ."""
         if not self.joints:
             return ()
-        J = _jacobian(self.rows, len(self.bodies), self.size)
+        J = resting_jacobian(self.rows, len(self.bodies), self.size)
         _, r, pivot = scipy.linalg.qr(J.T, pivoting=True, mode="economic")
         rank = int((np.abs(np.diag(r)) > RANK_TOLERANCE * abs(r[0, 0])).sum())
         return tuple(sorted({self.joints[k] for k in pivot[rank:]}))
@@ -100,19 +98,16 @@ def linkage(scene: Scene) -> Linkage:
     several = blocks(every, len(bodies), size) if driven and len(bodies) > MANY else None
     free = 0
     if not driven:
-        rest = resting_poses(1, len(bodies))
-        free = 6 * (len(bodies) - 1) - sum(
-            x.rank(rest, size) for x in parts(every, [row.joint for row in rows], len(bodies))
-        )
+        rest, names = resting_poses(1, len(bodies)), [row.joint for row in rows]
+        free = 6 * (len(bodies) - 1) - sum(x.rank(rest, size) for x in parts(every, names, len(bodies)))
     elif several is None or not _well_driven(every, several, size):
         drawn = drawn_linkage(scene, rows)
         free = _check_mobility(scene, drawn)
         rows = rows + _holding(scene, drawn.J, bodies, size, free)
         every = stacked(rows)
         several = several and blocks(every, len(bodies), size)
-    names = tuple(row.joint for row in rows)
-    start = resting_poses(1, len(bodies))
-    return Linkage(bodies, every, names, size, scene_centre(scene), driven, start, free, several)
+    joints = tuple(row.joint for row in rows)
+    return Linkage(bodies, every, joints, size, scene_centre(scene), driven, free, several)
 
 
 def _well_driven(rows: Rows, plan: Blocks, size: float) -> bool:
@@ -120,8 +115,7 @@ def _well_driven(rows: Rows, plan: Blocks, size: float) -> bool:
 
     J has the rank of its columns, and its least squares leave nothing of the rates at which one drive moves.
     """
-    f = features(rows, resting_poses(1, plan.count + 1), np.zeros((1, len(rows.angles))))
-    values = plan.values(rows, f, size)
+    values = plan.values(rows, features(rows, resting_poses(1, plan.count + 1)), size)
     greatest, least = plan.extremes(values)[0]
     if least <= RANK_TOLERANCE * greatest:
         return False
@@ -157,9 +151,8 @@ def looser_rows(scene: Scene, drawn: Drawn) -> Looser:
     """Rows that joints would have if they were of a kind that holds less; driven joints are left as they are."""
     bodies = (GROUND, *drawn.links)
     out = {}
-    for name, joint in sorted(
-        scene.joints.items(), key=lambda each: GROUND in each[1].links
-    ):  # bearings stay, if they can
+    every = sorted(scene.joints.items(), key=lambda each: GROUND in each[1].links)  # bearings stay, if they can
+    for name, joint in every:
         for kind in LOOSER.get(joint.kind, ()) if name not in scene.driven_joints else ():
             rows = rows_of(scene, name, bodies, drawn.centre, kind)
             out[name, kind] = drawn_jacobian(rows, len(bodies), drawn.size)
@@ -179,12 +172,12 @@ def scene_size(scene: Scene) -> float:
 
 def drawn_jacobian(rows: list[ConstraintEquation], bodies: int, size: float) -> Float[np.ndarray, "m k"]:
     """Row derivatives in the reference position, lengths divided by `size`."""
-    return _jacobian(stacked(rows), bodies, size)
+    return resting_jacobian(stacked(rows), bodies, size)
 
 
-def _jacobian(rows: Rows, bodies: int, size: float) -> Float[np.ndarray, "m k"]:
-    f = features(rows, resting_poses(1, bodies), np.zeros((1, len(rows.angles))))
-    return np.asarray(jacobian(rows, f, bodies, size)[0])
+def resting_jacobian(rows: Rows, bodies: int, size: float) -> Float[np.ndarray, "m k"]:
+    """The same of rows that are arrays already."""
+    return np.asarray(jacobian(rows, features(rows, resting_poses(1, bodies)), bodies, size)[0])
 
 
 def _check_mobility(scene: Scene, drawn: Drawn) -> int:

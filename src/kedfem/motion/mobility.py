@@ -48,7 +48,7 @@ def mobility(scene: Scene, link: Linkage, along: Path) -> Mobility:
     if plane := plane_scene(scene):
         looser = {key: _in_plane(rows) for key, rows in looser.items()}
         drawn = planar(drawn)
-    joined = np.array([name != PLANE for name in drawn.rows], bool) & ~drawn.driven
+    joined = ~drawn.of(PLANE) & ~drawn.driven
     count, loops = redundancy(drawn), len(scene.joints) - len(scene.links)
     return Mobility(
         freedom=drawn.J.shape[1] - rank(drawn.J[~drawn.driven]), drives=int(drawn.driven.sum()),

@@ -44,8 +44,7 @@ class Part:
     def jacobian(self, poses: Poses, size: float) -> Float[np.ndarray, "T m k"]:
         """Scaled derivatives of its constraints at poses of all the linkage's bodies, as `values.jacobian` has them."""
         mine = poses[0][:, self.bodies], poses[1][:, self.bodies]
-        near = np.zeros((len(mine[0]), len(self.rows.angles)))
-        return jacobian(self.rows, features(self.rows, mine, near), len(self.bodies), size)
+        return jacobian(self.rows, features(self.rows, mine), len(self.bodies), size)
 
 
 def parts(rows: Rows, joints: Sequence[str], bodies: int) -> Iterator[Part]:

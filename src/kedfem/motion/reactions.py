@@ -48,11 +48,6 @@ class Reactions:
         out[1][:, rows] = own[..., 3:] - cross(arm, own[..., :3])
         return out
 
-    def effort(self, drive: int) -> Float[np.ndarray, "T m 1"]:
-        """Torque of a drive on a hinge, or force of that on a slide, from scaled λ: its row is the joint's coordinate."""
-        out = _effort(self.linkage, drive)
-        return np.broadcast_to(out[:, None], (*self.Q.shape[:2], 1))
-
     def responses(self, A: Float[np.ndarray, "T m c"]) -> Float[np.ndarray, "T c k"]:
         """What is A λ of forces and moments on all bodies but the ground, with the least λ that balances them.
 
@@ -94,11 +89,6 @@ class BlockReactions:
             out[:, :, row] += own[:, :, k]
         return out
 
-    def effort(self, drive: int) -> Float[np.ndarray, "T m 1"]:
-        """Torque of a drive on a hinge, or force of that on a slide, from scaled λ: its row is the joint's coordinate."""
-        out = _effort(self.linkage, drive)
-        return np.broadcast_to(out[:, None], (len(self.values), len(out), 1))
-
     def multipliers(self, wrench: Float[np.ndarray, "T b 6"]) -> Float[np.ndarray, "T m"]:
         """The least scaled λ that balance forces and moments on all bodies but the ground."""
         return self.blocks.least_norm(self.values, -self.column * wrench)
@@ -130,7 +120,8 @@ class BlockReactions:
         return blocks.row[here], np.stack([force, own[..., 3:] - cross(arm, force)])
 
 
-def _effort(linkage: Linkage, drive: int) -> Float[np.ndarray, " m"]:
+def effort(linkage: Linkage, drive: int) -> Float[np.ndarray, " m"]:
+    """Torque of a drive on a hinge, or force of that on a slide, from scaled λ: its row is the joint's coordinate."""
     rows = linkage.rows
     return np.where(rows.drive == drive, rows.scale(linkage.size)[: rows.count], 0.0)
 
@@ -144,7 +135,7 @@ def reactions(linkage: Linkage, motion: RigidMotion) -> Reactions | BlockReactio
     """How all joints and drives bear on the bodies at the times of a motion."""
     bodies, c = len(linkage.bodies), linkage.centre
     poses = (motion.R, motion.p + motion.R @ c - c)
-    f = features(linkage.rows, poses, np.zeros((len(motion.t), len(linkage.rows.angles))))
+    f = features(linkage.rows, poses)
     each = np.repeat([linkage.size, 1.0], 3)
     if linkage.blocks is not None:
         values = linkage.blocks.values(linkage.rows, f, linkage.size)

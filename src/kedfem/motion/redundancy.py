@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kedfem.arrays import Float
+from kedfem.motion.joint_equations import unit
 from kedfem.motion.released_motions import Drawn, directions, listed, null_space, of_joints, rank, span
-from kedfem.scene import Joint
 
 LOOSER = {
     "revolute": ("spherical", "cylindrical"), "prismatic": ("cylindrical",), "universal": ("spherical",),
@@ -47,7 +47,7 @@ def redundant(drawn: Drawn) -> list[Redundant]:
 
 def wrenches(drawn: Drawn, joint: str, stress: Float[np.ndarray, "m r"]) -> Float[np.ndarray, "6 r"]:
     """Forces and moments (per size) at a joint's point on one of its links, of self-stresses; the drive left out."""
-    mine = np.array([name == joint for name in drawn.rows]) & ~drawn.driven
+    mine = drawn.of(joint) & ~drawn.driven
     link = next(name for name in drawn.joints[joint].links if name in drawn.links)
     force, moment = (drawn.J[mine, drawn.block(link)].T @ stress[mine]).reshape(2, 3, -1)
     return np.concatenate([force, moment - np.cross(drawn.place(joint), force.T).T])
@@ -55,10 +55,10 @@ def wrenches(drawn: Drawn, joint: str, stress: Float[np.ndarray, "m r"]) -> Floa
 
 def _words(drawn: Drawn, name: str, stress: Float[np.ndarray, "m r"]) -> str:
     if name not in drawn.joints:  # a coupling: one number alone
-        mine = np.array([each == name for each in drawn.rows])
-        return "the coupling itself" if np.abs(stress[mine]).max(initial=0.0) > 1e-6 else ""
+        return "the coupling itself" if np.abs(stress[drawn.of(name)]).max(initial=0.0) > 1e-6 else ""
     force, moment = wrenches(drawn, name, stress).reshape(2, 3, -1)
-    axis = _axis(drawn.joints[name])
+    joint = drawn.joints[name]
+    axis = None if joint.axis is None else unit(joint.axis)
     parts = []
     for what, where, vectors in (("force", "along", span(force)), ("moment", "about", span(moment))):
         if d := vectors.shape[1]:
@@ -66,16 +66,12 @@ def _words(drawn: Drawn, name: str, stress: Float[np.ndarray, "m r"]) -> str:
     return ", ".join(parts)
 
 
-def _axis(joint: Joint) -> Float[np.ndarray, "3"] | None:
-    return None if joint.axis is None else np.asarray(joint.axis) / np.linalg.norm(joint.axis)
-
-
 # -- remedies -----------------------------------------------------------------------------------------------
 
 
 def changed(drawn: Drawn, joint: str, rows: Float[np.ndarray, "m k"]) -> Drawn:
     """The linkage with other rows for one joint; its drive stays."""
-    kept = np.array([name != joint for name in drawn.rows], bool) | drawn.driven
+    kept = ~drawn.of(joint) | drawn.driven
     J = np.concatenate([rows, drawn.J[kept]])
     names = (joint,) * len(rows) + tuple(np.array(drawn.rows)[kept].tolist())
     driven = np.concatenate([np.zeros(len(rows), bool), drawn.driven[kept]])

@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 import scipy.linalg
 
-from kedfem.arrays import Float
+from kedfem.arrays import Bool, Float
 from kedfem.motion.constraints import cross
 from kedfem.scene import Joint
 
@@ -41,6 +41,10 @@ class Drawn:
     def place(self, joint: str) -> Float[np.ndarray, "3"]:
         """A joint's point, from the centre, in units of size."""
         return np.asarray((np.asarray(self.joints[joint].at) - self.centre) / self.size)
+
+    def of(self, name: str) -> Bool[np.ndarray, " m"]:
+        """Which rows are those of a joint or coupling."""
+        return np.array([row == name for row in self.rows], bool)
 
     def block(self, link: str) -> slice:
         """Columns of a link."""

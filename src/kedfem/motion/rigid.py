@@ -25,8 +25,6 @@ class RigidMotion:
     v : (T, B, 3) p' [m/s]
     R2, p2 : (T, B, 3, 3), (T, B, 3): R'' and p'' [1/s², m/s²]
     drives : (T, D) turn or travel of each drive [rad or m]; phi is the first of them
-    omega_phi, v_phi : (T, B, 3) rotation and displacement of the origin per turn or travel of the first drive; zero
-        without one [- and m, of a slide 1/m and -]
     """
 
     t: Float[np.ndarray, " T"]
@@ -39,8 +37,6 @@ class RigidMotion:
     R2: Float[np.ndarray, "T B 3 3"]
     p2: Float[np.ndarray, "T B 3"]
     drives: Float[np.ndarray, "T D"]
-    omega_phi: Float[np.ndarray, "T B 3"]
-    v_phi: Float[np.ndarray, "T B 3"]
 
     def position(self, body: int, X: Float[np.ndarray, "3"]) -> Float[np.ndarray, "T 3"]:
         """Of a body's point that is at X in the reference position [m]."""
@@ -72,9 +68,9 @@ def joined(parts: Sequence["RigidMotion"]) -> "RigidMotion":
 def resting(bodies: int, t: Float[np.ndarray, " T"]) -> RigidMotion:
     """Rigid-body motion of a linkage that nothing drives: all rest in the reference position, at given times (T,) [s]."""
     R = np.broadcast_to(np.eye(3), (len(t), bodies, 3, 3)).copy()
-    p, omega, alpha, v, p2, *rates = np.zeros((7, len(t), bodies, 3))
+    p, omega, alpha, v, p2 = np.zeros((5, len(t), bodies, 3))
     phi, none = np.zeros(len(t)), np.zeros((len(t), 0))
-    return RigidMotion(t, phi, R, p, omega, alpha, v, np.zeros_like(R), p2, none, *rates)
+    return RigidMotion(t, phi, R, p, omega, alpha, v, np.zeros_like(R), p2, none)
 
 
 Along = tuple[Float[np.ndarray, " T"], Float[np.ndarray, " T"], Float[np.ndarray, " T"]]
@@ -113,11 +109,9 @@ def rigid_motion(link: Linkage, along: Path, t: Float[np.ndarray, " T"], drive: 
 
 def _about_origin(link: Linkage, t: Float[np.ndarray, " T"], q: np.ndarray, got: Moving) -> RigidMotion:
     """Bodies turn about the linkage's centre c in their poses: a point drawn at X is at p + c + R (X − c)."""
-    (R, p), (v, omega), (v2, alpha), (v_q, omega_q) = got.poses, got.first, got.second, got.partial
+    (R, p), (v, omega), (v2, alpha) = got.poses, got.first, got.second
     W, c = cross_matrix(omega), link.centre
     R2 = (cross_matrix(alpha) + W @ W) @ R
     c_now = R @ c
-    return RigidMotion(
-        t, q[:, 0], R, p + c - c_now, omega, alpha, v - cross(omega, c_now), R2, v2 - R2 @ c,
-        q, omega_q, v_q - cross(omega_q, c_now),
-    )  # fmt: skip
+    v_origin = v - cross(omega, c_now)
+    return RigidMotion(t, q[:, 0], R, p + c - c_now, omega, alpha, v_origin, R2, v2 - R2 @ c, q)

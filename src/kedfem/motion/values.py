@@ -44,8 +44,9 @@ class Features:
         return self.rate.imag
 
 
-def features(rows: Rows, poses: Poses, near: Float[np.ndarray, "T A"]) -> Features:
-    """Evaluate elementary rows; `near` holds the turn of each angle row to within half a turn [rad]."""
+def features(rows: Rows, poses: Poses, near: Float[np.ndarray, "T A"] | None = None) -> Features:
+    """Evaluate elementary rows; `near` holds the turn of each angle row to within half a turn [rad], 0 if not given."""
+    near = np.zeros((len(poses[1]), len(rows.angles))) if near is None else near
     R, p = np.ascontiguousarray(poses[0].transpose(3, 2, 1, 0)), np.ascontiguousarray(poses[1].T)
     turned = R[0].take(rows.body, axis=1) * rows.vector[:, 0, None]
     for c in (1, 2):

@@ -12,7 +12,7 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.errors import MotionError
 from kedfem.motion.batch import Choice, Moving, settled
-from kedfem.motion.linkage import Linkage
+from kedfem.motion.linkage import Linkage, resting_poses
 from kedfem.motion.messages import stopped
 from kedfem.motion.newton import OPEN, SETTLED, TINY, agree, cross_matrix, orthonormal, target
 from kedfem.motion.values import Poses, features, turning
@@ -50,11 +50,11 @@ class Stand:
 
 def started(link: Linkage) -> Stand:
     """The grid point at the reference position."""
-    f = features(link.rows, link.start, np.zeros((1, len(link.rows.angles))))
-    near = f.value[link.rows.angles].T
-    found = _settled(link, np.zeros(1), link.start, near)
+    rest = resting_poses(1, len(link.bodies))
+    near = features(link.rows, rest).value[link.rows.angles].T
+    found = _settled(link, np.zeros(1), rest, near)
     if not found:
-        raise MotionError(stopped(link, link.start, 0.0, target(link, np.zeros(1), near)))
+        raise MotionError(stopped(link, rest, 0.0, target(link, np.zeros(1), near)))
     return found[0]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.motion.batch import Choice, Moving
 from kedfem.motion.constraints import ANGLE
-from kedfem.motion.linkage import Linkage
+from kedfem.motion.linkage import Linkage, resting_poses
 from kedfem.motion.newton import OPEN
 from kedfem.motion.path.continuation import ROUNDING, Stand, continued, quintics, shapes, split, started
 from kedfem.motion.path.record import Path
@@ -33,9 +33,9 @@ def path(link: Linkage, low: float, high: float) -> Path:
         Naming the joint and the place where the linkage locks or cannot be assembled.
     """
     if link.drive is None:
-        R, p = link.start
-        none = np.zeros_like(p), np.zeros_like(p)
-        shape = shapes(Moving((R, p), none, none, none, np.zeros(1)))
+        rest = resting_poses(1, len(link.bodies))
+        none = np.zeros_like(rest[1]), np.zeros_like(rest[1])
+        shape = shapes(Moving(rest, none, none, np.zeros(1)))
         return _through(link, np.zeros(1), shape, np.zeros((1, len(link.rows.angles))), np.inf)
     period = link.drives.period()
     low, high = _on_periods(low, period), _on_periods(high, period)

@@ -15,7 +15,7 @@ from kedfem.motion.constraints import cross
 from kedfem.motion.joint_equations import moving_pair
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path, path
-from kedfem.motion.reactions import BlockReactions, Reactions, reactions
+from kedfem.motion.reactions import BlockReactions, Reactions, effort, reactions
 from kedfem.motion.released_motions import components
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.recorded import Rows, drive_effort
@@ -102,7 +102,7 @@ class RigidForces:
                 yield borne[each.which] @ each.project.T
             else:
                 drive = self.linkage.drives.joints.index(each.joint)
-                yield np.einsum("tmc,tm->tc", found.effort(drive), multipliers)
+                yield (multipliers @ effort(self.linkage, drive))[:, None]
 
     def _responses(self, motion: RigidMotion, step: int | None) -> Responses:
         """All channels from forces and moments; where poses return, those of the first turn again."""
@@ -128,7 +128,8 @@ class RigidForces:
         """A channel from scaled λ."""
         if each.which < 2:
             return np.asarray(found.on(each.joint, each.body, each.at)[each.which] @ each.project.T)
-        return found.effort(self.linkage.drives.joints.index(each.joint))
+        of_rows = effort(self.linkage, self.linkage.drives.joints.index(each.joint))
+        return np.broadcast_to(of_rows[:, None], (*found.Q.shape[:2], 1))
 
 
 def rigid_forces(scene: Scene, linkage: Linkage, inertias: Inertias, along: Path | None = None) -> RigidForces:
@@ -220,4 +221,4 @@ def _on_grid(linkage: Linkage, along: Path) -> RigidMotion:
     p = along.p[which] + c - R @ c
     zero, still = np.zeros_like(p), np.zeros_like(R)
     t, none = np.zeros(T), np.zeros((T, 0))
-    return RigidMotion(t, along.phi[which], R, p, zero, zero, zero, still, zero, none, zero, zero)
+    return RigidMotion(t, along.phi[which], R, p, zero, zero, zero, still, zero, none)
