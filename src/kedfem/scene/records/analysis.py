@@ -122,7 +122,8 @@ class Analysis(Record):
     """velocities of links at the start, by name of the link"""
     initial_deflection: dict[str, InitialForce] = Field(default_factory=dict)
     """forces that have deflected the mechanism and are let go at the start, by name: without a drive from static balance,
-    with one beside the deflection of `initial = "quasi-static"`"""
+    with one beside the deflection of `initial = "quasi-static"`; limits bear what presses against them, and may be all
+    that holds it"""
     accuracy: Annotated[float | Literal["quick"], BeforeValidator(accuracy_or_quick)] = 0.01
     """relative error to aim at in probes, joint forces and the drive's torque: what the scene leaves open is chosen for
     it by short trial runs: frames, elements, mesh sizes, segments, modes, step and levels in time, and models

@@ -19,9 +19,10 @@ from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.starts.accelerations import accelerations, own_spin
 from kedfem.dynamics.system.starts.initial_states import as_coordinates, begun
-from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, feels_rates, turned
+from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
 from kedfem.dynamics.system.starts.internal_forces import drawn, own, rows, turned_rate
-from kedfem.dynamics.system.starts.modified_newton import FREE, NoBalanceError, equilibrium
+from kedfem.dynamics.system.starts.laws import feels_rates
+from kedfem.dynamics.system.starts.modified_newton import FREE, ROUNDING, NoBalanceError, equilibrium, unpropped
 from kedfem.dynamics.system.starts.turning_bodies import CONVERGED, Spins
 from kedfem.dynamics.system.state import State
 from kedfem.errors import MotionError, SolveError
@@ -136,7 +137,7 @@ def _in_increments(now: Instant, pull: Flat) -> Flat:
         tried = min(1.0, share + part)
         part_loaded.F, part_loaded.amounts = tried * now.F, tried * now.amounts
         try:
-            u = equilibrium(part_loaded, u, _constant(tried * pull), None, None)
+            u = unpropped(part_loaded, u, _constant(tried * pull), None, None, ROUNDING)
         except NoBalanceError:
             part /= 2
             if part < LEAST:

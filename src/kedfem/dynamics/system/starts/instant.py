@@ -18,23 +18,11 @@ from kedfem.dynamics.system.ends import left_line, line_of
 from kedfem.dynamics.system.forces.turning_loads import turned as turned_load
 from kedfem.dynamics.system.forces.turning_loads import turning
 from kedfem.dynamics.system.march import Ready, driving
-from kedfem.dynamics.system.record import (
-    ANGLE,
-    COORDINATE,
-    RATE,
-    TIME,
-    Curve,
-    Driven,
-    Held,
-    Law,
-    Spring,
-    Stop,
-    curve_of,
-    law_at,
-)
+from kedfem.dynamics.system.record import ANGLE, Driven, Held, law_at
 from kedfem.dynamics.system.sparse import SparsePart, softening
 from kedfem.dynamics.system.starts.coordinate_rates import angles, coordinates, pins, places, travels
 from kedfem.dynamics.system.starts.internal_forces import Inside, Still, inside, own, rows
+from kedfem.dynamics.system.starts.laws import Props, exerted, feels_rates
 from kedfem.dynamics.system.starts.linear_equations import HeldBody, mass_body, sparse_body
 from kedfem.errors import SolveError
 from kedfem.motion.newton import cross_matrix
@@ -90,6 +78,7 @@ class Instant:
         self.F, self.amounts, self.at = along.F[0], along.amounts[0], places(motion)
         self._stations = along.stations[0]
         self.slow = False  # whether the mass that makes matrices of bodies definite slows iterations
+        self.props: Props | None = None
         self.R, self.omega = motion.R[0][of.bodies.motion], motion.omega[0][of.bodies.motion]
         self.travels = travels(of.system, self.at)
         self.always: Always = always(of) if like is None else like.always
@@ -192,7 +181,7 @@ class Instant:
     def forces(self, e: Float[np.ndarray, "_ r"]) -> Float[np.ndarray, "r 3"]:
         """Of all laws: force along the coordinate, and how it falls with it and its rate; zero of constraints."""
         laws = [law_at(each.law, self.motion.t, self.motion.phi) for each in self.of.system.constraints]
-        return np.array([push(law, self.time, e[0, n], e[1, n]) for n, law in enumerate(laws)]).reshape(-1, 3)
+        return exerted(laws, self.time, e, self.props)
 
     def hard(self, C: sp.csr_array) -> Bool[np.ndarray, " r"]:
         """Which are constraints that say something of z."""
@@ -205,25 +194,6 @@ def sizes(C: sp.csr_array) -> Float[np.ndarray, " r"]:
     out = np.zeros(C.shape[0])
     np.maximum.at(out, row_of(C), np.abs(C.data))
     return out
-
-
-def push(law: Law, t: float, e: float, rate: float) -> tuple[float, float, float]:
-    """Force of a law along its coordinate, and how it falls with the coordinate and with its rate."""
-    match law:
-        case Spring(stiffness=k, damping=c, free=free):
-            beside = (0.0, 0.0, 0.0) if law.curve is None else push(law.curve, t, e, rate)
-            return beside[0] - k * (e - free) - c * rate, beside[1] + k, beside[2] + c
-        case Curve(over=over, force=force_at):
-            x = {TIME: t, RATE: rate, COORDINATE: e}[over]
-            value, slope = (float(found[0]) for found in force_at(np.array([x])))
-            falls = {TIME: (0.0, 0.0), RATE: (0.0, -slope), COORDINATE: (-slope, 0.0)}[over]
-            return value, *falls
-        case Stop(lower=lower, upper=upper, stiffness=k, damping=c):
-            beyond = max(e - upper, 0.0) + min(e - lower, 0.0)
-            force = -k * beyond - c * rate
-            return (force, k, c) if force * beyond < 0 else (0.0, 0.0, 0.0)
-        case _:
-            return 0.0, 0.0, 0.0
 
 
 def always(of: Ready) -> Always:
@@ -287,9 +257,3 @@ def _nearby(now: Instant) -> Flat:
         near[place] = now.motion.drives[0, drive] if drive >= 0 else near[place]
         place += len(each.terms)
     return near
-
-
-def feels_rates(law: Law) -> bool:
-    """Whether a law's force depends on a rate."""
-    curve = curve_of(law)
-    return (isinstance(law, Spring | Stop) and law.damping != 0) or (curve is not None and curve.over == RATE)

@@ -10,6 +10,7 @@ from kedfem.dynamics.matrices.bordered import Asked
 from kedfem.dynamics.system.starts.instant import Flat, Instant
 from kedfem.dynamics.system.starts.linear_equations import LinearEquations
 from kedfem.dynamics.system.starts.newton_krylov import Equilibrium, solution, stands_off
+from kedfem.dynamics.system.starts.props import has_stops, without_props
 from kedfem.dynamics.system.starts.turning_bodies import CONVERGED, Spins, TurningBodies
 from kedfem.errors import SolveError
 
@@ -46,7 +47,24 @@ def equilibrium(
     now: Instant, u: Flat, more: Callable[[Flat, Flat], Flat], spins: Spins | None,
     z1: Flat | None, rounding: float = ROUNDING,
 ) -> Flat:  # fmt: skip
-    """The deflection at which all forces balance and joints are closed; see `_iterated`."""
+    """The deflection at which all forces balance and joints are closed."""
+    frames = now.always.still.frames()
+    try:
+        return unpropped(now, u, more, spins, z1, rounding)
+    except NoBalanceError:
+        if rounding == FREE or not has_stops(now):
+            raise
+        now.always.still.seek_from(frames)
+        found = without_props(now, u, z1, lambda propped, near: unpropped(propped, near, more, spins, z1, rounding))
+        if found is None:
+            raise
+    return found
+
+
+def unpropped(
+    now: Instant, u: Flat, more: Callable[[Flat, Flat], Flat], spins: Spins | None, z1: Flat | None, rounding: float
+) -> Flat:
+    """The same as a search finds it by itself, where bodies are not held by stops alone; see `_iterated`."""
     found = _iterated(now, u, more, spins, z1, rounding)
     if not now.of.c.single and (off := stands_off(now, found, z1)):
         raise NoBalanceError(off)

@@ -1,0 +1,95 @@
+"""Balances in which nothing but stops holds links: an arm on a hinge that a force presses against one.
+
+A search that begins apart from them has no stiffness to go by. Springs on what stops limit hold links first, near where
+the search begins, and are loosened until stops bear what they bore; the balance that is found is one without them.
+"""
+
+from collections.abc import Callable
+from copy import copy
+
+import numpy as np
+
+from kedfem.arrays import Bool
+from kedfem.dynamics.system.record import Stop
+from kedfem.dynamics.system.starts.instant import Flat, Instant, turned
+from kedfem.dynamics.system.starts.internal_forces import own, rows
+from kedfem.dynamics.system.starts.laws import Props
+from kedfem.errors import SolveError
+from kedfem.links.reduced import reach
+
+STIFFER, STIFFENED = 1e2, 4  # props than the stops, so many times, until a balance is found
+LOOSER, LEAST_LOOSER = 0.1, 0.7  # from one balance to the next, and where that is far too
+STILL = 1e-2  # of how far limited coordinates have gone: changes from one to the next below which props bear nothing
+LAST = 1e-12  # of a stop's stiffness: the loosest
+FAR = 1e4  # of the largest link: displacements of what no stop holds
+
+Sought = Callable[[Instant, Flat], Flat]
+
+
+def has_stops(now: Instant) -> bool:
+    """Whether a system has stops, which may hold bodies."""
+    return any(isinstance(each.law, Stop) for each in now.of.system.constraints)
+
+
+def without_props(now: Instant, u: Flat, z1: Flat | None, sought: Sought) -> Flat | None:
+    """A balance that is found from ones with props; None if none is.
+
+    Parameters
+    ----------
+    u : deflection from which the search begins
+    z1 : rates of the interface unknowns
+    sought : a balance at an instant, from a guess
+    """
+    laws, still = [each.law for each in now.of.system.constraints], now.always.still
+    stiffness = np.array([each.stiffness if isinstance(each, Stop) else 0.0 for each in laws])
+    links = now.of.system.model.links
+    far = FAR * max(map(reach, links))
+    about, bearing = limited(now, u, z1)
+    near, frames, at, e = now.near, still.frames(), u, about
+
+    def found(factor: float) -> Flat | None:
+        still.seek_from(frames)
+        propped = copy(now)
+        propped.near, propped.props = near, Props(factor * stiffness, about) if factor else None
+        try:
+            return sought(propped, at)
+        except SolveError:
+            return None
+
+    factor, looser, first = 1.0, LOOSER, True
+    while factor > LAST:
+        nearer = found(factor)
+        if nearer is None:
+            if first and factor >= STIFFER**STIFFENED:
+                return None
+            if first:
+                factor *= STIFFER
+                continue
+            factor, looser = factor / looser, np.sqrt(looser)
+            if looser > LEAST_LOOSER:
+                return None
+            factor *= looser
+            continue
+        at, frames, first = nearer, still.frames(), False
+        counted = copy(now)
+        counted.near = near
+        near = turned(counted, counted.interface(at))
+        before, borne = e, bearing
+        e, bearing = limited(counted, at, z1)
+        if (bearing & ~borne).any() or np.abs(e - before).max() < STILL * np.abs(e - about).max():
+            alone = found(0.0)
+            if alone is not None:
+                now.near = near
+                return alone
+        if max(float(np.abs(rows(now.of, k, at[own(now.of, k)])).max()) for k in range(len(links))) > far:
+            return None
+        looser = max(LOOSER, looser**2)
+        factor *= looser
+    return None
+
+
+def limited(now: Instant, u: Flat, z1: Flat | None) -> tuple[Flat, Bool[np.ndarray, " r"]]:
+    """Coordinates that stops limit at a deflection, zero in the place of others, and which stops push."""
+    stops = np.array([isinstance(each.law, Stop) for each in now.of.system.constraints], bool)
+    e = now.measured(now.interface(u), z1)[1]
+    return np.where(stops, e[0], 0.0), np.asarray(stops & (now.forces(e)[:, 0] != 0.0))
