@@ -18,6 +18,7 @@ from kedfem.links.record import Link
 BESIDE = 1e-6  # of the link's size: nodes so far off a line are on it
 SPARE = 2  # stations beyond the travel of the slider, where the link has them
 FEWEST, MOST = 4, 48
+FAR = 10  # of a rigid link without a shape: its stations reach so many of its lengths beyond where it is held
 # relative: what rounding must not decide, as of elements as long as stations are apart, or at a cut
 SAME = 1e-6
 KNOWN = 1e-3  # of the ball: a spread below cannot determine a gradient
@@ -67,19 +68,20 @@ class Stations:
 def stations(
     parts: Mapping[str, Link],
     where: str,
-    origin: Float[np.ndarray, "3"],
-    axis: Float[np.ndarray, "3"],
+    line: Directed,
     travel: tuple[float, float],
     whole: bool = False,
+    endless: bool = False,
 ) -> Stations:
     """Stations for a slider on a line of a link; each of one that bends can move without the others.
 
     Parameters
     ----------
     parts : the link's segments by their keys, or it alone
-    origin, axis : of the line, in the reference position; axis a unit vector
+    line : origin and axis of the line, in the reference position; axis a unit vector
     travel : least and greatest place of the slider along the line [m]
     whole : whether they reach along all of the link, as its bending and the slider's own motion may carry this anywhere
+    endless : whether a rigid link has no ends, as it is given by numbers
 
     Raises
     ------
@@ -88,7 +90,10 @@ def stations(
     """
     full = {key: link if link.full is None or link.Q is None else link.full for key, link in parts.items()}
     meshed = next(iter(full.values())).meshed
-    found = (_in_balls if meshed else _at_nodes)(full, where, (origin, axis), travel, whole)
+    if not meshed and all(link.rigid for link in parts.values()):
+        found = _between_nodes(full, where, line, travel, endless)
+    else:
+        found = (_in_balls if meshed else _at_nodes)(full, where, line, travel, whole)
     weights = list(found.weights)
     for key, link in parts.items():
         here = [k for k, each in enumerate(found.keys) if each == key]
@@ -121,14 +126,7 @@ def _at_nodes(
     parts: Mapping[str, Link], where: str, line: Directed, travel: tuple[float, float], whole: bool
 ) -> Stations:
     """Of a beam: its nodes on the line, of one that is cut up those of all segments."""
-    found: list[tuple[float, str, int]] = []
-    for key, link in parts.items():
-        along, off = _along(link.X, *line)
-        on = np.flatnonzero((link.one != 0) & (off <= BESIDE * link.size))
-        found += [(float(along[n]), key, int(n)) for n in on]
-    found.sort()
-    name, size = next(iter(parts.values())).name, max(link.size for link in parts.values())
-    found = [x for k, x in enumerate(found) if k == 0 or x[0] - found[k - 1][0] > BESIDE * size]
+    found, name, size = _nodes(parts, line), next(iter(parts.values())).name, _size(parts)
     if len(found) < FEWEST:
         raise MeshError(
             f"{where}: its line must run along the axis of beam '{name}' over {FEWEST} nodes at least, got "
@@ -142,6 +140,43 @@ def _at_nodes(
     weights = tuple(np.eye(1, parts[key].n, n)[0] for key, n in on_link)
     X = np.array([parts[key].X[n] for key, n in on_link])
     return Stations(s[kept], X, weights, tuple(key for key, _ in on_link))
+
+
+def _between_nodes(
+    parts: Mapping[str, Link], where: str, line: Directed, travel: tuple[float, float], endless: bool
+) -> Stations:
+    """Of a rigid line: any places, as displacements of two of its nodes give those between them and beyond."""
+    found, name, size = _nodes(parts, line), next(iter(parts.values())).name, _size(parts)
+    if len(found) < 2:
+        wanted = f"the line of a slot must run along the axis of the rigid line '{name}'"
+        raise MeshError(f"{where}: {wanted}, got {len(found)} of its nodes there: draw it along the line")
+    (first, key, one), (last, other, two) = found[0], found[-1]
+    if endless:
+        reach = (min(first, travel[0]) - FAR * size, max(last, travel[1]) + FAR * size)
+    else:
+        reach = (first, last)
+        _check_travel(where, name, reach, travel, BESIDE * size)
+    s, axis = np.linspace(*reach, FEWEST), line[1]
+    share = (s - first) / (last - first)
+    ends = np.eye(1, parts[key].n, one)[0], np.eye(1, parts[other].n, two)[0]
+    weights = tuple((1.0 - part) * ends[0] + part * ends[1] for part in share)
+    return Stations(s, parts[key].X[one] + np.outer(s - first, axis), weights, (key,) * FEWEST)
+
+
+def _nodes(parts: Mapping[str, Link], line: Directed) -> list[tuple[float, str, int]]:
+    """Nodes of a beam on a line: places along it [m], increasing, and those of which segment they are."""
+    found: list[tuple[float, str, int]] = []
+    for key, link in parts.items():
+        along, off = _along(link.X, *line)
+        on = np.flatnonzero((link.one != 0) & (off <= BESIDE * link.size))
+        found += [(float(along[n]), key, int(n)) for n in on]
+    found.sort()
+    return [x for k, x in enumerate(found) if k == 0 or x[0] - found[k - 1][0] > BESIDE * _size(parts)]
+
+
+def _size(parts: Mapping[str, Link]) -> float:
+    """Of the largest segment [m]."""
+    return max(link.size for link in parts.values())
 
 
 def _in_balls(

@@ -58,6 +58,14 @@ def mobility(scene: Scene, link: Linkage, along: Path) -> Mobility:
     )  # fmt: skip
 
 
+def free_motion_count(scene: Scene, link: Linkage) -> int:
+    """Free motions that the drives leave; of a plane scene in its plane alone, and all others if it has none there."""
+    if not link.mobility or not plane_scene(scene):
+        return link.mobility
+    drawn = planar(drawn_linkage(scene))
+    return drawn.J.shape[1] - rank(drawn.J) or link.mobility
+
+
 def planar(drawn: Drawn) -> Drawn:
     """A linkage whose links the xy plane holds: of each joint and drive what is left of its rows there."""
     keys = list(zip(drawn.rows, drawn.driven.tolist(), strict=True))

@@ -30,6 +30,7 @@ from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import Limit, LineSpring, Motor, Scene, Spring, corotational_links
+from kedfem.scene.records.materials import LINE
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +153,8 @@ def _side(scene: Scene, name: str, on: str, links: dict[str, Link], layout: Link
         line = layout.slots[name]
         if not isinstance(line, Stations):
             whole = not corotational_links(scene).isdisjoint(joint.links)
-            line = stations(parts, where, at, joint_axis(joint), line, whole)
+            endless = str(scene.links[on].material).startswith(LINE)
+            line = stations(parts, where, (at, joint_axis(joint)), line, whole, endless)
         points, known = station_ports(line, next(iter(parts.values())))
         return Side(layout.bodies[on], points, known, line, line.keys, line.weights)
     key, surface = part_surface(scene, name, links, on)

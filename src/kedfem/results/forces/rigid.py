@@ -71,7 +71,7 @@ class RigidForces:
         ----------
         step : number of the first time step, where the motion is a part of the scene's own; in order
         """
-        if motion is not self._motion:
+        if self.every and motion is not self._motion:
             force, moment = acting(self.inertias, motion)
             centre = motion.p + motion.R @ self.inertias.centre
             for end, f, m in self.force_elements.wrenches(motion) if self.force_elements else ():

@@ -14,7 +14,7 @@ from kedfem.arrays import Float
 from kedfem.scene.records.base import plain
 from kedfem.scene.records.loads import RigidBody, inertia_faults, inertia_tensor, moments_of_inertia
 from kedfem.scene.records.materials import LINE
-from kedfem.scene.records.points import XYZ, Apart, JointPoint
+from kedfem.scene.records.points import XYZ, Apart, Axis, JointPoint
 
 LIGHT = 1e-4  # of the mass: that of the line, whose own modes are made as stiff as they are heavy (1e-9: forces 10 % off)
 SLENDER = 0.05  # of the line's extent: its width
@@ -23,6 +23,7 @@ NOTHING = 1e-9  # of the extent: points that near are one
 
 Tables = dict[str, Any]
 _JOINT_POINT: TypeAdapter[XYZ] = TypeAdapter(JointPoint)
+_AXIS: TypeAdapter[XYZ] = TypeAdapter(Axis)
 
 
 def with_rigid_bodies(raw: Mapping[str, Any]) -> Tables:
@@ -51,9 +52,12 @@ def _carry(out: Tables, name: str, body: RigidBody) -> None:
     """Give a link of a raw scene the line through its points, and the body on it."""
     if not all(isinstance(out.get(section, {}), Mapping) for section in ("bodies", "materials", "links")):
         return
-    points = [*_different([body.centre, *_held(out, name)])]
+    held, slots = [body.centre, *_held(out, name)], [*_slots(out, name)]
+    radius = math.sqrt(max(sum(body.inertia[:3]) / (2 * body.mass), 0.0)) or 1.0
+    reach = max(math.dist(P, Q) for P in held for Q in held) or radius
+    along = [_beyond(P, axis, reach) for P, axis in slots]  # a second point of each line, beside where its pin is drawn
+    points = [*_different([*held, *along])]
     if len(points) == 1:
-        radius = math.sqrt(max(sum(body.inertia[:3]) / (2 * body.mass), 0.0)) or 1.0
         points.append((points[0][0] + radius, *points[0][1:]))
     width = SLENDER * max(math.dist(P, Q) for P, Q in combinations(points, 2))
     volume = width**2 * sum(math.dist(P, Q) for P, Q in pairwise(points))
@@ -101,13 +105,36 @@ def _held(raw: Mapping[str, Any], name: str) -> Iterator[XYZ]:
     ends = [x for spring in _tables(raw.get("springs")) for x in _list(spring.get("between"))]
     springs = [x.get("at") for x in ends if isinstance(x, Mapping) and x.get("link") == name]
     for at in (*joints, *springs):
+        if point := _point(at, name):
+            yield point
+
+
+def _slots(raw: Mapping[str, Any], name: str) -> Iterator[tuple[XYZ, XYZ]]:
+    """Point and direction of the lines of a link along which pins slide, as far as they are good."""
+    for joint in _tables(raw.get("joints")):
+        if joint.get("kind") != "slot" or _list(joint.get("links"))[1:] != [name]:
+            continue
         try:
-            found = _JOINT_POINT.validate_python(at)
+            axis = _AXIS.validate_python(joint.get("axis"))
         except ValidationError:
             continue
-        point = found.points.get(name, found) if isinstance(found, Apart) else found
-        if all(map(math.isfinite, point)):
-            yield point
+        if (point := _point(joint.get("at"), name)) and all(map(math.isfinite, axis)):
+            yield point, axis
+
+
+def _point(at: Any, name: str) -> XYZ | None:
+    """A joint's point on a link; None if it has a fault."""
+    try:
+        found = _JOINT_POINT.validate_python(at)
+    except ValidationError:
+        return None
+    point = found.points.get(name, found) if isinstance(found, Apart) else found
+    return point if all(map(math.isfinite, point)) else None
+
+
+def _beyond(point: XYZ, axis: XYZ, reach: float) -> XYZ:
+    x, y, z = (p + reach * e for p, e in zip(point, axis, strict=True))
+    return (x, y, z)
 
 
 def _list(value: Any) -> list[Any]:

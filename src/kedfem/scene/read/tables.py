@@ -12,8 +12,9 @@ from kedfem.scene.checks.hints import models, replaced
 from kedfem.scene.read.files import file_text
 from kedfem.scene.records.curves import Curve
 from kedfem.scene.records.drives import Table
-from kedfem.scene.records.units import USUAL, si_number
+from kedfem.scene.records.units import NUMBER, USUAL, si_number
 
+NO_UNIT = {"-", "–", "—", "−", "1", ""}  # how headings write that a column has no unit
 NAMES = {"time", "speed", "angle", "travel", "length", "torque", "force", "factor"}  # of columns
 
 
@@ -65,8 +66,15 @@ def _heading_factors(path: Path, row: list[str], names: tuple[str, str], si: tup
 
 def _factor(cell: str, of: str) -> float:
     """The SI unit per unit of a column; 1 where its heading gives none."""
-    if unit := re.search(r"\[(.*)\]|\((.*)\)", cell):
-        return si_number(f"1 {unit[1] or unit[2]}", of)
+    if found := re.search(r"\[(.*)\]|\((.*)\)", cell):
+        unit = (found[1] or found[2] or "").strip()
+        if unit in NO_UNIT:
+            if of != "1":
+                raise ValueError(f"{cell.strip()!r}, which has no unit; wanted is one of the kind of {of}")
+            return 1.0
+        if not NUMBER.fullmatch(f"1 {unit}"):
+            raise ValueError(f"{unit!r} is not a unit; wanted is one of the kind of {of}")
+        return si_number(f"1 {unit}", of)
     last = re.split(r"[\s_]", cell.strip())[-1]
     for word in (last, last.partition("/")[2]):  # n_rpm, n/rpm
         if len(word) > 1 and _is_unit(word, of):
