@@ -6,12 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
 
 from kedfem.analysis import analyse
 from kedfem.errors import OutputError
 from kedfem.report import write_gltf
 from kedfem.report.animated import animated
-from kedfem.report.gltf import normals
+from kedfem.report.gltf import _moves, normals
+from kedfem.report.surfaces import Placement, Surface
 from kedfem.results import read_results
 from kedfem.scene import scene_from
 from tests.rooms.test_cli import Command, run_kedfem
@@ -145,3 +147,22 @@ def test_a_run_without_frames_is_shown_as_drawn(tmp_path: Path) -> None:
     found = write_gltf(folder, tmp_path / "a.glb")
     assert found.frames == 0
     assert found.links == ("arm",)
+
+
+@pytest.mark.parametrize("length", [0.02, 0.1, 0.5])
+@pytest.mark.parametrize("axis", [[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0], [0.4, -0.7, 0.5]])
+def test_a_spring_stretches_along_its_line_however_short_it_is(axis: list[float], length: float) -> None:
+    """Coils of 0.1 m diameter at 1, 0.8 and 1.5 times their length, turned and shifted in frames."""
+    e = np.array(axis) / np.linalg.norm(axis)
+    across = np.linalg.svd(e[None])[2][1:]
+    turn, along = np.linspace(0, 12 * np.pi, 400), np.linspace(0, length, 400)
+    ring = 0.05 * (np.outer(np.cos(turn), across[0]) + np.outer(np.sin(turn), across[1]))
+    every = [ring + np.outer(part * along, e) for part in (1.0, 1.0, 0.8, 1.5)]
+    R = Rotation.from_rotvec([[0, 0, 0], [0.3, 0.2, -1.0], [2.0, 0, 0.4]]).as_matrix()
+    p = np.array([[0, 0, 0], [1.0, 2.0, 3.0], [-1.0, 0, 0.5]])
+    placed = [Placement(*each) for each in zip(p, R, strict=True)]
+    spring = Surface("s", np.zeros((0, 3), int), every, [], placed, spring=True)
+    moves = _moves(spring)
+    for k in range(3):
+        found = moves.p[k] + (moves.scale[k] * moves.own) @ moves.R[k].T
+        assert_allclose(found, p[k] + every[k + 1] @ R[k].T, atol=1e-9)

@@ -5,7 +5,7 @@ upwards and lengths in metres: a mechanism under gravity is turned so that this 
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from kedfem.report.viewer import EXTRA, scale
 from kedfem.results import read_results, replacing, results_file
 from kedfem.results.files import of_extra
 
+STRETCHED = 1e-4  # of a spring's size: less is the rounding of frames
 GREY = (0.6, 0.6, 0.6)
 ENDING = ".glb"
 KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
@@ -193,13 +194,24 @@ def _moves(surface: Surface) -> _Moves:
     R = np.array([placed.R for placed in surface.placements]).reshape(count, 3, 3)
     if not surface.spring:
         return _Moves(X, p, R, np.ones((count, 3)))
-    axes = np.linalg.svd(X - X.mean(axis=0), full_matrices=False)[2][[1, 2, 0]].T
+    axes = np.linalg.svd(_along(surface.points)[None])[2][[1, 2, 0]].T
     axes[:, 0] *= np.linalg.det(axes)
     lengths = [float(np.ptp(points @ axes[:, 2])) for points in surface.points]
     scale = np.ones((count, 3))
     scale[:, 2] = np.array(lengths[1:]) / lengths[0]
     centres = np.array([points.mean(axis=0) for points in surface.points[1:]]).reshape(count, 3)
     return _Moves((X - X.mean(axis=0)) @ axes, p + np.einsum("fij,fj->fi", R, centres), R @ axes, scale)
+
+
+def _along(every: Sequence[Float[np.ndarray, "n 3"]]) -> Float[np.ndarray, "3"]:
+    """The direction in which a spring stretches; the longest of one that does not, whichever is as good then.
+
+    A short coil about a thick rod is longer across.
+    """
+    X, *later = (points - points.mean(axis=0) for points in every)
+    stretched = max((points - X for points in later), key=lambda x: float(np.abs(x).max(initial=0.0)), default=X)
+    long = np.abs(stretched).max(initial=0.0) > STRETCHED * np.abs(X).max(initial=0.0)
+    return np.asarray(np.linalg.svd(stretched if long else X, full_matrices=False)[2][0])
 
 
 def normals(X: Float[np.ndarray, "n 3"], triangles: Int[np.ndarray, "t 3"]) -> Float[np.ndarray, "n 3"]:
