@@ -115,13 +115,7 @@ def static(
     now = Instant(of, motion_at, time, like, None if near is None else near.turned)
     none = np.zeros(int(of.bodies.at[-1]))
     pull = none if forces is None else as_work(of, forces)
-    try:
-        u = equilibrium(now, none if near is None else near.u, _constant(pull), None, None)
-    except NoBalanceError:
-        if of.c.single:
-            raise
-        u = _in_increments(now, pull)
-    return begun(now, u, none)
+    return begun(now, _balance(now, none if near is None else near.u, pull, None), none)
 
 
 def _constant(forces: Flat) -> Callable[[Flat, Flat], Flat]:
@@ -129,15 +123,30 @@ def _constant(forces: Flat) -> Callable[[Flat, Flat], Flat]:
     return lambda u, f: forces
 
 
-def _in_increments(now: Instant, pull: Flat) -> Flat:
-    """The deflection under loads that grow from nothing, in parts as large as their balance can be found for."""
+def _balance(now: Instant, guess: Flat, pull: Flat, spins: Spins | None) -> Flat:
+    """The deflection at which all forces balance, in increments where it is too far from a guess."""
+    try:
+        return equilibrium(now, guess, _constant(pull), spins, None)
+    except NoBalanceError:
+        if now.of.c.single:
+            raise
+        return _in_increments(now, pull, spins)
+
+
+def _in_increments(now: Instant, pull: Flat, spins: Spins | None) -> Flat:
+    """The deflection under loads that grow from nothing, in parts as large as their balance can be found for.
+
+    So grows with what springs pull in the reference position.
+    """
     part_loaded, u = copy(now), np.zeros_like(pull)
+    drawn_apart = now.forces(now.measured(now.interface(u))[1])[:, 0]
     share, part = 0.0, 0.25
     while share < 1.0:
         tried = min(1.0, share + part)
         part_loaded.F, part_loaded.amounts = tried * now.F, tried * now.amounts
+        part_loaded.relief = (1.0 - tried) * drawn_apart
         try:
-            u = unpropped(part_loaded, u, _constant(tried * pull), None, None, ROUNDING)
+            u = unpropped(part_loaded, u, _constant(tried * pull), spins, None, ROUNDING)
         except NoBalanceError:
             part /= 2
             if part < LEAST:
@@ -204,7 +213,10 @@ def _differenced(first: Instant, motion_at: Motion, h: float) -> tuple[Moved, fl
                     now.near = turned(instants[k - 1], instants[k - 1].interface(u[k - 1]))
                 now.slow = now.slow or instants[k - 1].slow
                 z1 = now.interface(v[k]) if again else None
-                u[k] = equilibrium(now, guess, _constant(np.zeros_like(guess)), _spins(now), z1)
+                if again or k:
+                    u[k] = equilibrium(now, guess, _constant(np.zeros_like(guess)), _spins(now), z1)
+                else:
+                    u[k] = _balance(now, guess, np.zeros_like(guess), _spins(now))
         except SolveError:
             if again < 2:  # rounding has not grown yet
                 raise

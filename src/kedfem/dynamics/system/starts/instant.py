@@ -66,13 +66,15 @@ class Instant:
     ----------
     like : another of the same system: what does not depend on time is taken from there
     near : (terms,) angles of all terms to within half a turn, as of a state shortly before; none: near zero
+
+    `relief`, (r,) or nothing, is taken from the forces along all coordinates.
     """
 
     def __init__(
         self, of: Ready, motion_at: Motion, time: float, like: "Instant | None" = None, near: Flat | None = None
     ) -> None:
         motion = motion_at(np.array([time]))
-        self.near = near
+        self.near, self.relief = near, np.zeros(())
         self.of, self.time, self.motion = of, time, motion
         along = driving(replace(of, stressed=None), motion)  # `stress` has these as forces
         self.F, self.amounts, self.at = along.F[0], along.amounts[0], places(motion)
@@ -181,7 +183,9 @@ class Instant:
     def forces(self, e: Float[np.ndarray, "_ r"]) -> Float[np.ndarray, "r 3"]:
         """Of all laws: force along the coordinate, and how it falls with it and its rate; zero of constraints."""
         laws = [law_at(each.law, self.motion.t, self.motion.phi) for each in self.of.system.constraints]
-        return exerted(laws, self.time, e, self.props)
+        found = exerted(laws, self.time, e, self.props)
+        found[:, 0] -= self.relief
+        return found
 
     def hard(self, C: sp.csr_array) -> Bool[np.ndarray, " r"]:
         """Which are constraints that say something of z."""

@@ -214,7 +214,11 @@ class Equilibrium:
             strain = strain - B @ (B.T @ strain)
             strain = rows(of, k, strain)
             shape = (before - np.outer(link.one, share @ before)) @ R + strain - np.outer(link.one, share @ strain)
-            placed = np.outer(link.one, share @ after) + shape @ turned.T
+            middle = share @ after
+            if link.kind == "beam":  # ψ turns as the frame does: the linear change has the tangent of that angle
+                Q = R.T @ turned
+                middle[2] = share @ before[:, 2] + np.arctan2(Q[1, 0], Q[0, 0]) + share @ strain[:, 2]
+            placed = np.outer(link.one, middle) + shape @ turned.T
             u[here] += coordinates(link, of.parts[k], placed - after).ravel()
         return np.asarray(u)
 
