@@ -121,6 +121,8 @@ def counted(reference: Histories) -> dict[str, float]:
     }  # fmt: skip
     least = {unit: NOTHING * value for unit, value in units.items()}
     least["N m"] = max(least.get("N m", 0.0), FAINT * reference.size * units.get("N", 0.0))
+    if reference.size:  # of rotors in balance
+        least["N"] = max(least.get("N", 0.0), NOTHING * units.get("N m", 0.0) / reference.size)
     return {name: size for name, (unit, size) in sizes.items() if size > least[unit]}
 
 
