@@ -12,10 +12,10 @@ from kedfem.errors import MeshError
 from kedfem.mesh import mesh_quality
 from kedfem.mesh.cad.sides import boundary_sides
 from kedfem.mesh.elements.bounds import valid_everywhere
+from kedfem.mesh.elements.mixed import EDGES_OF
 from kedfem.mesh.elements.shape_functions import HEX20, HEX27
 from kedfem.mesh.elements.tetrahedra import FORMS
 from kedfem.mesh.files import read
-from kedfem.mesh.files.mixed import EDGES_OF
 from kedfem.mesh.files.raw import read_mesh
 from kedfem.mesh.files.read import mesh_from_file
 from kedfem.mesh.session import gmsh_model

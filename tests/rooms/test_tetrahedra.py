@@ -1,6 +1,7 @@
 """Tetrahedra: hexahedra divided into them, gmsh's own of any solid, folded ones mended, files of them."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -21,9 +22,9 @@ from kedfem.mesh.cad.model import CadKeys, solid_model
 from kedfem.mesh.cad.sides import owned_sides
 from kedfem.mesh.cad.solids import OtherMethodError, Sizing
 from kedfem.mesh.elements.bounds import valid_everywhere
-from kedfem.mesh.elements.hexahedra import extruded, quadratic, rectangle_quads
+from kedfem.mesh.elements.hexahedra import extruded, quadratic, rectangle_quads, without_spare_nodes
 from kedfem.mesh.elements.shape_functions import TET10
-from kedfem.mesh.elements.tetrahedra import FORMS, straightened, tetrahedral, unfolded
+from kedfem.mesh.elements.tetrahedra import FORMS, tetrahedral, unfolded
 from kedfem.mesh.files.read import mesh_from_file
 from kedfem.mesh.session import gmsh_model
 from kedfem.mesh.swept.blends import swept_without_blends
@@ -66,9 +67,10 @@ class TestDivided:
 
     def test_tetrahedra_stay_in_every_form(self) -> None:
         mesh = tetrahedral(extruded(*rectangle_quads(1.0, 1.0, 1, 1), 1.0, 1))
+        straight = without_spare_nodes(replace(mesh, cells=mesh.cells[:, :4]))
         for form in FORMS.values():
             assert form(mesh) is mesh
-            assert_allclose(form(straightened(mesh)).points[: len(mesh.points)].sum(), mesh.points.sum())
+            assert_allclose(form(straight).points[: len(mesh.points)].sum(), mesh.points.sum())
 
     def test_scaled_jacobian_of_a_regular_one_is_1(self) -> None:
         corners = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]])[[0, 1, 3, 2]]

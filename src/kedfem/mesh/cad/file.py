@@ -226,19 +226,13 @@ def _free_edges(gmsh: ModuleType, faces: list[int]) -> list[int]:
 
 def _closed_solids(gmsh: ModuleType) -> list[int]:
     """Solids made of the groups of faces that hang together and are closed."""
-    occ, solids = gmsh.model.occ, []
-    for group in _shells(gmsh):
+    occ, faces, solids = gmsh.model.occ, _faces(gmsh), []
+    for shell in touching([boundary(gmsh, 2, face) for face in faces]):
+        group = [faces[i] for i in shell]
         if not _free_edges(gmsh, group):
             solids.append(occ.addVolume([occ.addSurfaceLoop(group, sewing=False)]))
     occ.synchronize()
     return solids
-
-
-def _shells(gmsh: ModuleType) -> list[list[int]]:
-    """Faces in groups that share edges."""
-    faces = _faces(gmsh)
-    groups = touching([boundary(gmsh, 2, face) for face in faces])
-    return [[faces[i] for i in group] for group in groups]
 
 
 def _refusal(gmsh: ModuleType, file: CadFile) -> MeshError:

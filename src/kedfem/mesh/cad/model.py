@@ -87,7 +87,12 @@ def _solid(gmsh: ModuleType, file: CadFile, tag: int, name: str, body: Body | No
     box = np.array(gmsh.model.getBoundingBox(3, tag))
     extent = float(np.linalg.norm(box[3:] - box[:3]))
     volume = float(gmsh.model.occ.getMass(3, tag))
-    _check_solid(file, name, extent, volume)
+    check_size(file, repr(name), extent)
+    if volume <= 1e-9 * extent**3:
+        raise MeshError(
+            f"{file.where}: must hold a solid of positive volume [m³], got {volume:.3g} for {name!r} in "
+            f"{file.path}; its faces may be turned inwards or lie on each other: mend the part in CAD"
+        )
     faces = sorted(boundary(gmsh, 3, tag))
     named = {face: text for face, text in zip(faces, body.faces, strict=True) if text} if body else {}
     known = cad_faces(gmsh, file.where, tag, extent, named)
@@ -99,16 +104,6 @@ def _solid(gmsh: ModuleType, file: CadFile, tag: int, name: str, body: Body | No
         )
     low, high = solid_box(gmsh, known)
     return Solid(tag, name, volume, low, high, known)
-
-
-def _check_solid(file: CadFile, name: str, extent: float, volume: float) -> None:
-    """Refuse a size that no part has, and a solid without volume or turned inside out."""
-    check_size(file, repr(name), extent)
-    if volume <= 1e-9 * extent**3:
-        raise MeshError(
-            f"{file.where}: must hold a solid of positive volume [m³], got {volume:.3g} for {name!r} in "
-            f"{file.path}; its faces may be turned inwards or lie on each other: mend the part in CAD"
-        )
 
 
 def _choice(key: str, file: CadFile, names: list[str], link: str, wanted: str | None) -> int:

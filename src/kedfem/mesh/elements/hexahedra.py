@@ -96,16 +96,21 @@ def extruded(points: Float[np.ndarray, "n 2"], quads: Int[np.ndarray, "e 9"], th
 
     Nodes level by level from below.
     """
-    heights = np.linspace(-thickness / 2, thickness / 2, 2 * layers + 1)
+    return in_layers(points, np.linspace(-thickness / 2, thickness / 2, 2 * layers + 1), quads)
+
+
+def in_layers(
+    points: Float[np.ndarray, "n 2"], heights: Float[np.ndarray, " v"], quads: Int[np.ndarray, "e 9"]
+) -> SolidMesh:
+    """`stacked` with all cells in every layer."""
+    layers = len(heights) // 2
     return stacked(points, heights, np.tile(quads, (layers, 1)), np.repeat(np.arange(layers), len(quads)))
 
 
 def stacked(
-    points: Float[np.ndarray, "n 2"],
-    heights: Float[np.ndarray, " v"],
-    quads: Int[np.ndarray, "e 9"],
+    points: Float[np.ndarray, "n 2"], heights: Float[np.ndarray, " v"], quads: Int[np.ndarray, "e 9"],
     layer: Int[np.ndarray, " e"],
-) -> SolidMesh:
+) -> SolidMesh:  # fmt: skip
     """hex27 elements on plane quad9 cells, each in a layer between heights; nodes level by level, maybe unused ones.
 
     Parameters

@@ -6,17 +6,15 @@ from dataclasses import replace
 import numpy as np
 
 from kedfem.arrays import Bool, Float, Int
-from kedfem.mesh.cad.sides import SIDE_NODES, owned_sides
+from kedfem.mesh.cad.sides import boundary_sides
 from kedfem.mesh.elements.bounds import valid_everywhere
 from kedfem.mesh.elements.hexahedra import SolidMesh, linear, quadratic, serendipity, without_spare_nodes
+from kedfem.mesh.elements.mixed import tetrahedra, triangles
 from kedfem.mesh.elements.quality import scaled_jacobian
-from kedfem.mesh.elements.shape_functions import EDGES, HEX8, HEX27, TET10, node_numbers
+from kedfem.mesh.elements.shape_functions import EDGES, TET10
 
 # how far edges of bad elements are straightened, those of folded ones in the end wholly
 _BLENDS = (0.4, 0.7, 1.0)
-#: Of two corners of a hexahedron the node of hex27 between them.
-_BETWEEN = np.array([node_numbers(HEX27, (HEX8 + corner) // 2) for corner in HEX8])
-_HALVES = ((0, 1, 2), (0, 2, 3))  # corners of a four-sided side, from its first, in two triangles
 
 
 def unfolded(
@@ -53,28 +51,13 @@ def tetrahedral(mesh: SolidMesh) -> SolidMesh:
 
     Sides are divided from the corner with the least number, as the neighbour's are.
     """
-    if mesh.tetrahedra:
-        return mesh if mesh.cells.shape[1] == len(TET10) else _with_middles(mesh)
-    full = quadratic(mesh)
-    corners = full.cells[:, :8]
-    first = corners.argmin(axis=1)
-    local = []
-    for side in SIDE_NODES[:, :4]:
-        opposite = np.flatnonzero((side != first[:, None]).all(axis=1))
-        triangles = _triangles(corners[opposite][:, side])  # (e, 2, 3), places in the side
-        apex = np.broadcast_to(first[opposite, None, None], (len(opposite), 2, 1))
-        local.append((np.repeat(opposite, 2), np.concatenate([apex, side[triangles]], axis=2).reshape(-1, 4)))
-    owner, four = np.concatenate([o for o, _ in local]), np.concatenate([f for _, f in local])
-    order = np.argsort(owner, kind="stable")
-    owner, four = owner[order], four[order]
-    ten = np.concatenate([four, *(_BETWEEN[four[:, i], four[:, j]][:, None] for i, j in EDGES)], axis=1)
-    faces = tuple(replace(face, sides=_split(corners, face.sides)) for face in full.faces)
-    return without_spare_nodes(replace(full, cells=full.cells[owner[:, None], ten], faces=faces))
-
-
-def straightened(mesh: SolidMesh) -> SolidMesh:
-    """Tetrahedra of 4 nodes with the corners of those of 10."""
-    return without_spare_nodes(replace(mesh, cells=mesh.cells[:, :4]))
+    if mesh.cells.shape[1] == len(TET10):
+        return mesh
+    corners = 4 if mesh.tetrahedra else 8
+    points, cells = tetrahedra(mesh.points, {corners: [mesh.cells]})
+    divided = (replace(face, sides=_split(mesh.cells[:, :8], face.sides)) for face in mesh.faces)
+    faces = mesh.faces if mesh.tetrahedra else tuple(divided)
+    return without_spare_nodes(replace(mesh, points=points, cells=cells, faces=faces))
 
 
 def edge_middles(points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e k"]) -> Float[np.ndarray, "e 6 3"]:
@@ -82,25 +65,12 @@ def edge_middles(points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e k"]
     return np.asarray(points[cells[:, EDGES]].mean(axis=2))
 
 
-def _with_middles(mesh: SolidMesh) -> SolidMesh:
-    ends = np.sort(mesh.cells[:, EDGES], axis=2).reshape(-1, 2)
-    edges, number = np.unique(ends, axis=0, return_inverse=True)
-    cells = np.column_stack([mesh.cells, len(mesh.points) + number.reshape(-1, len(EDGES))])
-    return replace(mesh, points=np.concatenate([mesh.points, mesh.points[edges].mean(axis=1)]), cells=cells)
-
-
-def _triangles(quads: Int[np.ndarray, "e 4"]) -> Int[np.ndarray, "e 2 3"]:
-    """Places of the corners of the two triangles of each four-sided side."""
-    return np.asarray((quads.argmin(axis=1)[:, None, None] + np.array(_HALVES)) % 4)
-
-
 def _split(corners: Int[np.ndarray, "e 8"], sides: Int[np.ndarray, "f 4"]) -> Int[np.ndarray, "g 3"]:
     """The triangles of some sides on the outside of hexahedra."""
-    outer, _ = owned_sides(corners)
+    outer = boundary_sides(corners)
     wanted = {tuple(side) for side in np.sort(sides, axis=1).tolist()}
     found = np.array([tuple(side) in wanted for side in np.sort(outer, axis=1).tolist()], dtype=bool)
-    quads = outer[found]
-    return np.take_along_axis(quads[:, None], _triangles(quads), axis=2).reshape(-1, 3)
+    return triangles(outer[found])
 
 
 def _hexahedra(form: Callable[[SolidMesh], SolidMesh]) -> Callable[[SolidMesh], SolidMesh]:

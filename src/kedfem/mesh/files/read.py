@@ -13,7 +13,7 @@ from kedfem.errors import MeshError
 from kedfem.mesh.cad.forms import Sample, fitted_form
 from kedfem.mesh.cad.sides import boundary_sides, side_corners, side_normals
 from kedfem.mesh.elements.hexahedra import CELL_TYPES, Face, SolidMesh, without_spare_nodes
-from kedfem.mesh.files.mixed import one_kind, triangles
+from kedfem.mesh.elements.mixed import one_kind, triangles
 from kedfem.mesh.files.raw import CORNERS, RawMesh, read_mesh
 from kedfem.mesh.isolated import MESH_FILE, READING, apart
 from kedfem.scene.records.shapes import MESH_ENDINGS

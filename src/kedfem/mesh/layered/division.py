@@ -150,7 +150,10 @@ def _nodes(
 ) -> Division:
     """The nodes; those of free closed curves inside a ring opposite the nodes of its outer loop."""
     ends = sorted({end for curve in plan.curves for end in curve.ends})
-    places = {i: _lengths(curve, counts[i], measures[i]) for i, curve in enumerate(plan.curves)}
+    places = {  # the same share of the measure between each two
+        i: np.interp(np.linspace(0, measure[-1], count + 1), measure, curve.lengths)
+        for i, (curve, count, measure) in enumerate(zip(plan.curves, counts, measures, strict=True))
+    }
     for region, mapping in _from_outside(plan, fitting):
         inner = region.loops[1][0][0]
         if mapping.kind == "ring" and len(region.loops[1]) == 1 and plan.curves[inner].free:
@@ -170,11 +173,6 @@ def _nodes(
 def _wrapped(curve: Curve, lengths: Float[np.ndarray, " s"]) -> Float[np.ndarray, "s 2"]:
     """Points of a curve, which may be run through beyond its end if it is closed."""
     return curve.places(lengths % curve.length if curve.free else lengths)
-
-
-def _lengths(curve: Curve, count: int, measure: Float[np.ndarray, " m"]) -> Float[np.ndarray, " n"]:
-    """Lengths of arc of the nodes: the same share of the measure between each two."""
-    return np.asarray(np.interp(np.linspace(0, measure[-1], count + 1), measure, curve.lengths))
 
 
 def _from_outside(plan: Plan, fitting: tuple[Mapping | None, ...]) -> list[tuple[Region, Mapping]]:

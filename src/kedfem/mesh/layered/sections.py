@@ -53,17 +53,12 @@ def plan_of_slabs(gmsh: ModuleType, solid: Solid, direction: Float[np.ndarray, "
     heights = _slab_heights(gmsh, solid, axes[2])
     with gmsh_copy(gmsh, 1 / extent) as other:
         with reporting(solid, f"its layers must have sections across {axes[2].round(6).tolist()}"):
-            plan = _cut_plan(other, axes, extent, heights)
+            [(_, tag)] = other.model.getEntities(3)
+            middles = (heights[1:] + heights[:-1]) / 2
+            faces = [_slab_section(other, int(tag), axes, height) for height in middles]
+            plan = laid_over(other, faces, axes, extent, heights)
         check_volume(solid, plan)
         yield plan
-
-
-def _cut_plan(gmsh: ModuleType, axes: Float[np.ndarray, "3 3"], extent: float, heights: Float[np.ndarray, " h"]) -> Plan:
-    """The plan of the only solid in gmsh's model, which is of unit extent."""
-    [(_, solid)] = gmsh.model.getEntities(3)
-    middles = (heights[1:] + heights[:-1]) / 2
-    faces = [_slab_section(gmsh, int(solid), axes, height) for height in middles]
-    return laid_over(gmsh, faces, axes, extent, heights)
 
 
 def plan_axes(direction: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:

@@ -1,6 +1,7 @@
 """Parts that could be swept but for small rounds, chamfers and grooves: swept without these, which are reported."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from types import ModuleType
 
 import numpy as np
@@ -44,7 +45,7 @@ def swept_without_blends(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> Soli
     count = "1 blend" if len(faces) == 1 else f"{len(faces)} blends"
     names = ", ".join(face.name for face in faces[:6]) + (", …" if len(faces) > 6 else "")
     words = f"left out: {count} below {1e3 * small:.3g} mm ({names}), {change:+.2g} % of the volume"
-    return SolidMesh(mesh.points, mesh.cells, mesh.faces, f"{mesh.method}; {words}")
+    return replace(mesh, method=f"{mesh.method}; {words}")
 
 
 def _width(gmsh: ModuleType, face: CadFace) -> float:

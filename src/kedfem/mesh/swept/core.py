@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from kedfem.arrays import Float, Int
-from kedfem.mesh.elements.hexahedra import SolidMesh, stacked
+from kedfem.mesh.elements.hexahedra import SolidMesh, in_layers
 from kedfem.mesh.layered.mapping import Mapping, Rim, mapped
 from kedfem.mesh.layered.partition import Curve, Plan, Region
 from kedfem.mesh.planar.areas import quadratic_quads
@@ -15,7 +15,6 @@ NEAR = 1e-7  # of the solid's size: that near to the axis is on it, that near to
 _SHARE = 0.6  # of the least radius of anything off the axis: the core's own
 _HALVINGS = 50
 
-Curves = dict[int, Curve]
 Ending = Callable[[Float[np.ndarray, " n"]], Float[np.ndarray, " n"]]
 
 
@@ -71,9 +70,8 @@ def core_mesh(plan: Plan, region: Region, radius: float, stations: Float[np.ndar
     """
     points, quads = disc(around)
     low, high = _ends(plan, region)
-    layers = len(stations) // 2
     shares = (stations - stations[0]) / (stations[-1] - stations[0])
-    mesh = stacked(points, shares, np.tile(quads, (layers, 1)), np.repeat(np.arange(layers), len(quads)))
+    mesh = in_layers(points, shares, quads)
     radii, back = np.unique(np.round(np.linalg.norm(points, axis=1), 12), return_inverse=True)
     first, last = (np.tile(end(radius * radii)[back], len(shares)) for end in (low, high))
     share = mesh.points[:, 2]

@@ -10,7 +10,7 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.mesh.cad.looks import OFF, Frame, Looks, common_axes, looks
 from kedfem.mesh.cad.solids import CadFace, OtherMethodError, Sizing, Solid
-from kedfem.mesh.elements.hexahedra import SolidMesh, stacked, without_spare_nodes
+from kedfem.mesh.elements.hexahedra import SolidMesh, in_layers, without_spare_nodes
 from kedfem.mesh.layered.division import plan_size
 from kedfem.mesh.layered.partition import Plan
 from kedfem.mesh.layered.plan_mesh import plan_mesh
@@ -84,9 +84,8 @@ def path_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
         counts = [_count(leg, size * solid.extent, sizing) for leg in legs]
         frames = [legs[0].start, *(leg.at(k / (2 * n)) for leg, n in zip(legs, counts, strict=True)
                                    for k in range(1, 2 * n + 1))]  # fmt: skip
-        layers, each = sum(counts), len(flat.cells)
-        mesh = stacked(flat.points, np.arange(2 * layers + 1.0), np.tile(flat.cells, (layers, 1)),
-                       np.repeat(np.arange(layers), each))  # fmt: skip
+        layers = sum(counts)
+        mesh = in_layers(flat.points, np.arange(2 * layers + 1.0), flat.cells)
         placed = [frame.origin + solid.extent * flat.points @ frame.axes[:2] for frame in frames]
         points = np.concatenate(placed)
         words = f"{flat.kind} carried along {_in_words(legs)} in {layers} elements"

@@ -7,11 +7,11 @@ from types import ModuleType
 
 import numpy as np
 
-from kedfem.arrays import Bool, Float
+from kedfem.arrays import Float
 from kedfem.mesh.cad.looks import Axis, Frame, Looks, common_axes, looks
 from kedfem.mesh.cad.solids import OtherMethodError, Sizing, Solid
 from kedfem.mesh.cad.words import direction_in_words, face_in_words
-from kedfem.mesh.elements.hexahedra import SolidMesh, stacked, without_spare_nodes
+from kedfem.mesh.elements.hexahedra import SolidMesh, in_layers, without_spare_nodes
 from kedfem.mesh.layered.cusps import without_spare_curves
 from kedfem.mesh.layered.division import plan_size
 from kedfem.mesh.layered.partition import Plan, Region
@@ -163,9 +163,7 @@ def _elements_around(meridian: _Meridian, sizing: Sizing) -> int:
 def _turned(flat: PlanMesh, around: int) -> SolidMesh:
     """The section's cells swept through a turn: x along the axis, y and z across it, by the solid's extent."""
     count = len(flat.points)
-    levels = np.arange(2 * around + 1.0)
-    quads = np.tile(flat.cells, (around, 1))
-    mesh = stacked(flat.points, levels, quads, np.repeat(np.arange(around), len(flat.cells)))
+    mesh = in_layers(flat.points, np.arange(2 * around + 1.0), flat.cells)
     cells = mesh.cells % (2 * around * count)
     x, r, level = mesh.points.T
     angle = level * np.pi / around
@@ -188,13 +186,8 @@ def _with_core(mesh: SolidMesh, flat: PlanMesh, meridian: _Meridian, region: Reg
     number = np.empty(len(core.points), dtype=np.int64)
     number[shared] = nearest[shared]
     number[~shared] = len(mesh.points) + np.arange((~shared).sum())
-    _check_shared(shared, core, meridian, int(nodes.sum()) * 2 * around)
-    points = np.concatenate([mesh.points, core.points[~shared]])
-    return SolidMesh(points, np.concatenate([mesh.cells, number[core.cells]]))
-
-
-def _check_shared(shared: Bool[np.ndarray, " n"], core: SolidMesh, meridian: _Meridian, wanted: int) -> None:
-    """Refuse a core that does not fit what is around it."""
-    outer = np.linalg.norm(core.points[:, 1:], axis=1) > meridian.radius - NEAR
+    wanted, outer = int(nodes.sum()) * 2 * around, np.linalg.norm(core.points[:, 1:], axis=1) > meridian.radius - NEAR
     if shared.sum() != wanted or not np.array_equal(shared, outer):
         raise OtherMethodError(f"the core must share {wanted} nodes, got {shared.sum()}")
+    points = np.concatenate([mesh.points, core.points[~shared]])
+    return SolidMesh(points, np.concatenate([mesh.cells, number[core.cells]]))

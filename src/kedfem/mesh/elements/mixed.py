@@ -55,14 +55,19 @@ def one_kind(
     """
     if set(blocks) == {8}:
         corners = np.concatenate([cells[:, :8] for cells in blocks[8]])
-        pairs, middles = _middles(points, blocks)
-        edges = np.array(EDGES_OF[8])
-        return _with_middles(points, corners, corners[:, edges], pairs, middles)
+        return _with_middles(points, blocks, corners, corners[:, np.array(EDGES_OF[8])])
+    return tetrahedra(points, blocks)
+
+
+def tetrahedra(
+    points: Float[np.ndarray, "n 3"], blocks: Mapping[int, list[Cells]]
+) -> tuple[Float[np.ndarray, "m 3"], Int[np.ndarray, "t 10"]]:
+    """All cells as tetrahedra of 10 nodes; parameters, nodes and errors are those of `one_kind`."""
     every = ((count, cells) for count, each in blocks.items() for cells in each)
     fours = np.concatenate([_tetrahedra(cells[:, :count], count) for count, cells in every])
-    _check_fit(fours, blocks)
-    pairs, middles = _middles(points, blocks)
-    return _with_middles(points, fours, fours[:, EDGES], pairs, middles)
+    if len(blocks) > 1:
+        _check_fit(fours, blocks)
+    return _with_middles(points, blocks, fours, fours[:, EDGES])
 
 
 def triangles(quads: Int[np.ndarray, "q 4"]) -> Int[np.ndarray, "t 3"]:
@@ -123,14 +128,10 @@ def _middles(
 
 
 def _with_middles(
-    points: Float[np.ndarray, "n 3"],
-    corners: Cells,
-    ends: Int[np.ndarray, "e j 2"],
-    pairs: Int[np.ndarray, "p 2"],
-    middles: Float[np.ndarray, "p 3"],
+    points: Float[np.ndarray, "n 3"], blocks: Mapping[int, list[Cells]], corners: Cells, ends: Int[np.ndarray, "e j 2"]
 ) -> tuple[Float[np.ndarray, "m 3"], Int[np.ndarray, "e q"]]:
     """Cells with a node in the middle of each edge, all middles after the other nodes."""
-    n = len(points)
+    n, (pairs, middles) = len(points), _middles(points, blocks)
     keys = pairs[:, 0] * n + pairs[:, 1]
     wanted = np.sort(ends, axis=2)
     number = np.searchsorted(keys, wanted[..., 0] * n + wanted[..., 1])
