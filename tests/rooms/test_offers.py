@@ -8,11 +8,11 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
-from kedfem.links.surfaces.part_candidates import axis_in_words, offers
+from kedfem.links.surfaces.part_candidates import offers
 from kedfem.mesh import SolidMesh
 from kedfem.mesh.cad.model import CadKeys, solid_model
 from kedfem.mesh.cad.solids import CadFace
-from kedfem.mesh.cad.words import face_form, face_in_words, with_faces_in_words
+from kedfem.mesh.cad.words import direction_in_words, face_form, face_in_words, with_faces_in_words
 from kedfem.scene import Cad
 
 from ..turned import ball_on_neck, turned
@@ -40,7 +40,7 @@ def test_what_a_joint_finds_is_told_of_each_coupling_surface() -> None:
     assert [each.number for each in found.values()] == [1, 2, 3]
     assert [found[name].finds for name in ("wide bore", "bore")] == ["it", "it"]
     assert found["rim"].finds == f"{found['bore'].number} instead"
-    assert axis_in_words(found["bore"].face) == "z"
+    assert direction_in_words(found["bore"].face.direction) == "z"
 
 
 def test_both_lugs_of_a_clevis_are_found_from_either() -> None:

@@ -10,8 +10,9 @@ from kedfem.accuracy.sizes import Sizes
 from kedfem.arrays import Float
 from kedfem.dynamics.model import Model, mesh_methods, segments
 from kedfem.links.record import Link
-from kedfem.links.surfaces.part_candidates import Offer, axis_in_words
+from kedfem.links.surfaces.part_candidates import Offer
 from kedfem.mesh import QuadMesh, SolidMesh, mesh_quality
+from kedfem.mesh.cad.words import direction_in_words
 from kedfem.mesh.places import in_mm
 from kedfem.motion.assembly import Assembly
 from kedfem.motion.dead_point import DeadPoint
@@ -179,7 +180,7 @@ def _surfaces(found: Sequence[Offer]) -> Table:
     table = listed("What joints can sit on", columns, caption=caption)
     for each in found:
         diameter = "" if np.isnan(each.face.radius) else f"{2e3 * each.face.radius:.4g}"
-        axis = "" if np.isnan(each.face.direction).any() else axis_in_words(each.face)
+        axis = "" if np.isnan(each.face.direction).any() else direction_in_words(each.face.direction)
         at = _shown(1e3 * each.at, 1 if each.kind == "plane" else 2)
         table.add_row(str(each.number), Text(each.face.name), each.kind, diameter, at, axis, each.finds)
     return table

@@ -167,8 +167,7 @@ def beam_link(name: str, points: Float[np.ndarray, "p 3"], section: Section, mat
     X, cells = beam_mesh(points, elements, nodes)
     rigidity = planar_rigidities(section, material)
     gram = assembled([element_mass(X[c, :2]) for c in cells], cells, len(X))
-    dofs = (3 * cells[:, :, None] + np.arange(3)).reshape(len(cells), -1)
-    K0 = assembled([element_stiffness(X[c, :2], rigidity) for c in cells], dofs, 3 * len(X))
+    K0 = assembled([element_stiffness(X[c, :2], rigidity) for c in cells], dofs(cells), 3 * len(X))
     translation = material.density * section.area * gram
     rotation = material.density * section.second_moment * gram
     mass: Mass = (translation, translation, rotation)
@@ -200,11 +199,16 @@ def section_axes(x: Float[np.ndarray, "3"], up: Float[np.ndarray, "3"]) -> Float
     return np.stack([x, y, np.cross(x, y)])
 
 
-def assembled(blocks: list[np.ndarray], dofs: Int[np.ndarray, "e k"], size: int) -> sp.csr_array:
+def dofs(numbers: Int[np.ndarray, "e m"]) -> Int[np.ndarray, "e k"]:
+    """The three of each function of an element, one after the other."""
+    return (3 * numbers[:, :, None] + np.arange(3)).reshape(len(numbers), 3 * numbers.shape[1])
+
+
+def assembled(blocks: list[np.ndarray], at: Int[np.ndarray, "e k"], size: int) -> sp.csr_array:
     """The sum of element matrices, each at its dofs."""
     if not blocks:
         return sp.csr_array((size, size))
-    rows = np.repeat(dofs, dofs.shape[1], axis=1).ravel()
-    columns = np.tile(dofs, (1, dofs.shape[1])).ravel()
+    rows = np.repeat(at, at.shape[1], axis=1).ravel()
+    columns = np.tile(at, (1, at.shape[1])).ravel()
     entries = np.concatenate([b.ravel() for b in blocks]), (rows, columns)
     return sp.csr_array(sp.coo_array(entries, shape=(size, size)))

@@ -10,7 +10,7 @@ from kedfem.links.beams.beam_axis import Axis, smooth_axis, straight_axis
 from kedfem.links.beams.section import scene_section
 from kedfem.links.beams.spatial_beam import spatial_beam_link
 from kedfem.links.record import Link
-from kedfem.scene import Bar, Joint, LinkScene, PointMass, Polyline, RectangleSection, Scene, SectionShape
+from kedfem.scene import Bar, LinkScene, PointMass, Polyline, RectangleSection, Scene, SectionShape
 
 SAME = 1e-6  # of a segment's length: what is so near is at one place
 
@@ -56,7 +56,8 @@ def beam_points(scene: Scene, name: str, spatial: bool) -> Float[np.ndarray, "p 
     points = np.array(shape.between if isinstance(shape, Bar) else getattr(shape, "points", ()))
     if getattr(shape, "smooth", False):
         return points
-    held = [x.on(name) for x in scene.joints.values() if name in x.links and not _is_slot_of(x, name)]
+    joints = (x for x in scene.joints.values() if name in x.links)
+    held = [x.on(name) for x in joints if x.kind != "slot" or name != x.links[1]]  # a pin is anywhere along its slot
     light = [x.at for x in scene.bodies.values() if x.link == name and isinstance(x, PointMass)]
     heavy = [x.at for x in scene.bodies.values() if x.link == name and not isinstance(x, PointMass)]
     elements = link.mesh.elements if isinstance(link.mesh.elements, int) else 1
@@ -80,8 +81,3 @@ def beam_points(scene: Scene, name: str, spatial: bool) -> Float[np.ndarray, "p 
 def beam_nodes(link: LinkScene) -> int:
     """Nodes of each element of a beam: the number in its name."""
     return int(str(link.element).removeprefix("beam"))
-
-
-def _is_slot_of(joint: Joint, name: str) -> bool:
-    """Whether a beam has the slot of a joint, whose pin is anywhere along it."""
-    return joint.kind == "slot" and name == joint.links[1]

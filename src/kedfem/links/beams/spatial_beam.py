@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from kedfem.arrays import Float, Int
-from kedfem.links.beams.beam import assembled, cell_type, parent_nodes, parent_weights, shape_functions
+from kedfem.links.beams.beam import assembled, cell_type, dofs, parent_nodes, parent_weights, shape_functions
 from kedfem.links.beams.beam_axis import Axis, chord_axes
 from kedfem.links.beams.section import Section
 from kedfem.links.record import Link, mass_constants, read_only
@@ -18,6 +18,7 @@ from kedfem.scene import Material
 HUB_STIFFNESS = 100.0  # of E A L: a corner gives EI/(100 E A L²) of what the beam does
 HUB_INERTIA = 1e-3  # of a cube's, along the axis: a hub needs some there, where the section has none
 STRAIGHT = 1e-9  # of tangents: rounding
+T, N1, N2, N1_S, N2_S = range(5)  # the fields x', n1, n2, n1', n2'
 
 
 def space_strains(x: Float[np.ndarray, "m 3 3"], r: float) -> tuple[Float[np.ndarray, "6 m 3 3"], float]:
@@ -39,40 +40,48 @@ def space_strains(x: Float[np.ndarray, "m 3 3"], r: float) -> tuple[Float[np.nda
     -------
     (6, m, 3, 3) by strain, node, function (u, p, q) and component; det J [m]
     """
+    weights, det_J = fields(x, r)
+    e = np.einsum("amf,mfc->ac", weights, x)
+    return np.einsum("iab,ac,bmf->imfc", metric(e), e, weights), det_J
+
+
+def fields(x: Float[np.ndarray, "m 3 3"], r: float) -> tuple[Float[np.ndarray, "5 m 3"], float]:
+    """Weights of (u', p, q, p', q') on an element's (u, p, q), and det J."""
     N, dN = shape_functions(r, len(x))
     det_J = float(np.linalg.norm(dN @ x[:, 0]))
-    D = dN / det_J
-    t, n1, n2 = D @ x[:, 0], N @ x[:, 1], N @ x[:, 2]
-    n1_s, n2_s = D @ x[:, 1], D @ x[:, 2]
-    rows = np.zeros((6, len(x), 3, 3))
-    rows[0, :, 0] = np.outer(D, t)
-    rows[1, :, 0], rows[1, :, 1] = np.outer(D, n1), np.outer(N, t)
-    rows[2, :, 0], rows[2, :, 2] = np.outer(D, n2), np.outer(N, t)
-    rows[3, :, 0], rows[3, :, 1] = np.outer(D, n1_s), np.outer(D, t)
-    a, b, c = _within(N, n1, n2)
-    rows[3] -= (n1_s @ t) * (rows[0] + a) + (n1_s @ n2) * rows[2] + (n2_s @ t) * b
-    rows[4, :, 0], rows[4, :, 2] = np.outer(D, n2_s), np.outer(D, t)
-    rows[4] -= (n2_s @ t) * (rows[0] + c) + (n2_s @ n1) * rows[1] + (n1_s @ t) * b
-    rows[5, :, 1] = (np.outer(D, n2) - np.outer(N, n2_s)) / 2
-    rows[5, :, 2] = (np.outer(N, n1_s) - np.outer(D, n1)) / 2
-    rows[5] -= (n1_s @ n2) * (a + c)
-    return rows, det_J
+    out = np.zeros((5, len(x), 3))
+    for field, of, weights in ((T, 0, dN / det_J), (N1, 1, N), (N2, 2, N), (N1_S, 1, dN / det_J), (N2_S, 2, dN / det_J)):
+        out[field, :, of] = weights
+    return out, det_J
 
 
-def _within(
-    N: Float[np.ndarray, " m"], n1: Float[np.ndarray, "3"], n2: Float[np.ndarray, "3"]
-) -> Float[np.ndarray, "3 m 3 3"]:
-    """Strains within the section, n1·p, ½ (n1·q + n2·p) and n2·q: rows by strain, node, function and component."""
-    rows = np.zeros((3, len(N), 3, 3))
-    rows[0, :, 1] = np.outer(N, n1)
-    rows[1, :, 1], rows[1, :, 2] = np.outer(N, n2) / 2, np.outer(N, n1) / 2
-    rows[2, :, 2] = np.outer(N, n2)
-    return rows
+def metric(e: Float[np.ndarray, "5 3"]) -> Float[np.ndarray, "6 5 5"]:
+    """Coefficients c of the strains (ε, γ1, γ2, κ1, κ2, τ) in the scalar products of the undeformed fields e."""
+    t, n1, n2, n1_s, n2_s = e
+    a, b, c, stretch, shear_1, shear_2, bend_1, bend_2, twist_1, twist_2 = (
+        _product(*pair)
+        for pair in ((N1, N1), (N1, N2), (N2, N2), (T, T), (T, N1), (T, N2), (T, N1_S), (T, N2_S),
+                     (N2, N1_S), (N1, N2_S))
+    )  # fmt: skip
+    b = b / 2
+    kappa_1 = bend_1 - (n1_s @ t) * (stretch + a) - (n1_s @ n2) * shear_2 - (n2_s @ t) * b
+    kappa_2 = bend_2 - (n2_s @ t) * (stretch + c) - (n2_s @ n1) * shear_1 - (n1_s @ t) * b
+    tau = (twist_1 - twist_2) / 2 - (n1_s @ n2) * (a + c)
+    return np.stack([stretch, shear_1, shear_2, kappa_1, kappa_2, tau])
+
+
+def _product(a: int, b: int) -> Float[np.ndarray, "5 5"]:
+    """c of the scalar product e_a · e_b; of e_a · e_a half of that, as a strain has it."""
+    c = np.zeros((5, 5))
+    c[a, b] = c[b, a] = 1.0
+    return c
 
 
 def section_strains(x: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3 3"]:
     """Strains within the section at a node, n1·p, ½ (n1·q + n2·p) and n2·q: rows by strain, function and component."""
-    return np.asarray(_within(np.ones(1), x[1], x[2])[:, 0])
+    rows = np.zeros((3, 3, 3))
+    rows[0, 1], rows[1, 1], rows[1, 2], rows[2, 2] = x[1], x[2] / 2, x[1] / 2, x[2]
+    return rows
 
 
 def rigidities(section: Section, E: float, G: float) -> Float[np.ndarray, "6"]:
@@ -130,9 +139,9 @@ def spatial_beam_link(
     X, one, triples = functions(axis)
     x, cells, n = axis.frame[:, [0, 2, 3]], axis.cells, len(X)
     rigidity = rigidities(section, material.youngs_modulus, material.shear_modulus)
-    by_station = _dofs(cells, 3)
+    by_station = dofs(cells)
     m = assembled([material.density * space_mass(x[c], section) for c in cells], by_station, 3 * len(x))
-    K = assembled([space_stiffness(x[c], rigidity) for c in cells], _dofs(by_station, 3), 9 * len(x))
+    K = assembled([space_stiffness(x[c], rigidity) for c in cells], dofs(by_station), 9 * len(x))
     vectors = sp.csr_array(sp.kron(triples, sp.eye_array(3)))
     cube = np.sqrt(section.area) * min(section.second_moment, section.second_moment_z)
     hubs = hub_functions(one)
@@ -201,17 +210,13 @@ def hub_stiffness(X: Float[np.ndarray, "n 3"], hubs: Int[np.ndarray, "h 3"], k: 
             row[j] += X[hub[i]] / (2 if i == j else np.sqrt(2))
         B = rows.reshape(6, 9)
         blocks.append(k * B.T @ B)
-    return assembled(blocks, _dofs(hubs, 3), 3 * len(X))
+    return assembled(blocks, dofs(hubs), 3 * len(X))
 
 
 def length_of(stations: Float[np.ndarray, "s 3"], cells: Int[np.ndarray, "e m"]) -> float:
     """Length of an axis by the chords of its elements [m]."""
     ends = stations[cells[:, :2]]
     return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
-
-
-def _dofs(numbers: Int[np.ndarray, "e m"], per: int) -> Int[np.ndarray, "e k"]:
-    return (per * numbers[:, :, None] + np.arange(per)).reshape(len(numbers), per * numbers.shape[1])
 
 
 def _diagonal(at: Int[np.ndarray, " k"], value: float, n: int) -> sp.csr_array:

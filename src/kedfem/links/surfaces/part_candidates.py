@@ -104,12 +104,3 @@ def _found(link: Link, kind: str, each: LinkFace, listed: Sequence[LinkFace]) ->
         return ()
     shares = (np.isin(other.facets, facets).mean() for other in listed)
     return tuple(number for number, share in enumerate(shares, start=1) if share > MOSTLY)
-
-
-def axis_in_words(face: Face) -> str:
-    """A face's axis or normal: a letter where it is along one, else its components."""
-    for axis, name in zip(np.eye(3), "xyz", strict=True):
-        along = float(face.direction @ axis)
-        if abs(along) > 1 - 1e-9:
-            return name if along > 0 or face.kind == "cylinder" else f"-{name}"
-    return "({:g}, {:g}, {:g})".format(*(np.round(face.direction, 3) + 0.0))
