@@ -14,7 +14,7 @@ from kedfem.analysis import Run, analyse
 from kedfem.errors import OutputError, SceneError
 from kedfem.links.free_surface import free_surface
 from kedfem.links.recovery import stress_recovery
-from kedfem.report.fatigue_facts import fatigue_table
+from kedfem.report.facts import fatigue_table
 from kedfem.results import Fatigue, FatigueSpot, read_results
 from kedfem.scene import scene_from
 from tests.laws.test_corotational import segments

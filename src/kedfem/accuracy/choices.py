@@ -11,7 +11,7 @@ from kedfem.accuracy.histories import histories, relative_errors, worst
 from kedfem.accuracy.resolution import fewest_steps
 from kedfem.accuracy.step_estimate import IN_STEP, LEAST_ORDER, StepChoice, StepEstimate, cheapest, single_level
 from kedfem.accuracy.trials import Trials
-from kedfem.accuracy.variants import TRIAL_STEPS, shortened, with_analysis, with_links, with_steps
+from kedfem.accuracy.variants import TRIAL_STEPS, shortened, states_step, with_analysis, with_links, with_steps
 from kedfem.dynamics.stepping.levels import most_levels
 from kedfem.errors import KedfemError
 from kedfem.scene import LinkScene, Scene, scene_from, time_grid, turn_steps, without_vibration
@@ -44,8 +44,7 @@ def open_frames(scene: Scene) -> bool:
 
 def open_step(scene: Scene) -> bool:
     """Whether it leaves its step open; positions that are found each by itself have none."""
-    stated = scene.analysis.step is not None or scene.analysis.steps_per_revolution is not None
-    return not stated and not without_vibration(scene)
+    return not states_step(scene) and not without_vibration(scene)
 
 
 def open_beams(scene: Scene) -> list[str]:

@@ -29,7 +29,7 @@ from kedfem.accuracy.reduction import Reduction, first_reduced
 from kedfem.accuracy.resolution import StepError, fewest_steps, step_error
 from kedfem.accuracy.rounding import Rounding
 from kedfem.accuracy.step_estimate import SINGLE, single_errors
-from kedfem.accuracy.variants import with_analysis
+from kedfem.accuracy.variants import states_step, with_analysis
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.matrices.dense import SMALL
 from kedfem.dynamics.model import Model
@@ -125,15 +125,13 @@ def budget(
     kinds = wanted(ready)
     small = companion(ready)
     limits = list(_limits(ready, found))
-    shares: list[Share | None] = [
-        reduction_share(reduction), frames_share(seen.geometric, kinds), seen.rounding.share(kinds),
-    ]  # fmt: skip
+    modes = Share("reduction", by_kind(reduction.estimate)) if reduction and reduction.estimate else None
+    shares = [modes, frames_share(seen.geometric, kinds), seen.rounding.share(kinds)]
     if small is None:
         local = dict.fromkeys(kinds, SINGLE * seen.running.total)
         if "displacement" in local:
             local["displacement"] += seen.given.relative
-        alone = Share("step", local, "local errors of its steps: no run beside one so large")
-        marched = alone if step is None else _step_share(step)
+        marched = Share("step", local if step is None else by_kind(step))
         shares += [marched if seen.steps else None, plain_mesh_share(eta, kinds)]
         return Budget(joined(shares), tuple(limits), eta)
     own = ran is not None and small.model is ready.model and len(ran.time) > 1
@@ -147,18 +145,13 @@ def budget(
         shares[1:] = [frames_share(seen.geometric, here), seen.rounding.share(here)]
         if seen.steps:
             known = known or step_errors(small, base)
-            shares.append(_step_share({n: error for n, error in known.items() if n in sizes}))
-        elif open_positions(ready.scene):
+            shares.append(Share("step", by_kind({n: error for n, error in known.items() if n in sizes})))
+        elif not states_step(ready.scene):  # stated positions are wanted there
             shares.append(positions_share(base, sizes))
         shares.append(mesh_share(small, base, eta))
     except KedfemError as fault:
         limits.append(f"step and mesh: a run beside this one failed ({str(fault).splitlines()[0]})")
     return Budget(joined(shares), tuple(limits), eta, known)
-
-
-def open_positions(scene: Scene) -> bool:
-    """Whether a scene of positions leaves open how many there are: those that it states are wanted there."""
-    return scene.analysis.step is None and scene.analysis.steps_per_revolution is None
 
 
 def wanted(ready: Prepared) -> tuple[str, ...]:
@@ -184,9 +177,8 @@ def frames_share(geometric: GeometricError, kinds: Sequence[str]) -> Share | Non
         return None
     warned = geometric_warning(geometric)
     remedy = warned[0].rsplit("; ", 1)[-1] if warned else ""
-    how = bent(geometric)
     errors = {kind: geometric.estimate if kind == "stress" else geometric.worst for kind in kinds}
-    return Share("frames", errors, how, f"{how}; {remedy}" if remedy else "")
+    return Share("frames", errors, f"{bent(geometric)}; {remedy}" if remedy else "")
 
 
 def step_errors(ready: Prepared, base: Histories) -> dict[str, float]:
@@ -209,17 +201,6 @@ def step_errors(ready: Prepared, base: Histories) -> dict[str, float]:
 def in_steps(scene: Scene, h: float, steps: int) -> Scene:
     """The scene in so many steps of h."""
     return with_analysis(scene, end_time=h * steps, revolutions=None, step=h, steps_per_revolution=None)
-
-
-def _step_share(errors: Mapping[str, float]) -> Share:
-    return Share("step", by_kind(errors), "longer steps, or levels in time")
-
-
-def reduction_share(reduction: Reduction | None) -> Share | None:
-    """What reduced links cost."""
-    if reduction is None or not reduction.estimate:
-        return None
-    return Share("reduction", by_kind(reduction.estimate), "richer modes")
 
 
 def _limits(ready: Prepared, found: Mapping[int, Indicator]) -> list[str]:

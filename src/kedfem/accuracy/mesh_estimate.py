@@ -22,18 +22,12 @@ SOFT = 2.0  # times η²: few elements a link, averaged with few neighbours, hid
 LOCAL = 0.05  # of η: stress at a point, of its peak, beside what the compliance does
 
 
-def finer_beams(scene: Scene, factor: float = 2.0) -> Scene | None:
-    """The scene with twice the elements in all elastic beams; None without any."""
-    beams = {name: link for name, link in scene.links.items() if link.category == "beam"}
-    beams = {name: link for name, link in beams.items() if link.shape is not None}
-    return with_links(scene, {name: refined(link, factor) for name, link in beams.items()}) if beams else None
-
-
 def mesh_errors(small: Prepared, base: Histories, eta: Mapping[str, float]) -> dict[str, float]:
     """Channel → error of all meshes: beams with twice the elements, other links softer by 2 η²."""
-    scene = finer_beams(small.scene)
-    model = small.model
-    if scene is not None:
+    model, every = small.model, small.scene.links.items()
+    beams = {name: refined(link, 2.0) for name, link in every if link.category == "beam" and link.shape is not None}
+    if beams:
+        scene = with_links(small.scene, beams)
         links = {link.name: link.full or link for link in model.links}
         if any(link.meshed for link in links.values()):
             return _separate(small, base, scene, eta)
@@ -82,7 +76,7 @@ def plain_mesh_share(eta: Mapping[str, float], kinds: tuple[str, ...]) -> Share 
         return None
     worst = max(eta.values())
     errors = {kind: SOFT * worst**2 + (LOCAL * worst if kind == "stress" else 0.0) for kind in kinds}
-    return Share("mesh", errors, "recovered stress against that of elements")
+    return Share("mesh", errors)
 
 
 def mesh_share(small: Prepared, base: Histories, eta: Mapping[str, float]) -> Share:
@@ -90,4 +84,4 @@ def mesh_share(small: Prepared, base: Histories, eta: Mapping[str, float]) -> Sh
     errors = by_kind(mesh_errors(small, base, eta))
     if eta and "stress" in errors:
         errors["stress"] += LOCAL * max(eta.values())
-    return Share("mesh", errors, "recovered stress against that of elements; beams of twice the elements")
+    return Share("mesh", errors)

@@ -8,7 +8,6 @@ simpler links by putting them in. What the scene states stays; what it leaves op
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 from kedfem.accuracy.choices import (
     beams_only,
@@ -137,14 +136,13 @@ def planned(scene: Scene, stage: Stage = lambda name: None) -> Plan:
     if asked == "quick":
         raise ValueError("the scene asks for no accuracy")
     search = Trials(asked, stage)
-    made = partial(_planned, search, scene)
+
+    def made() -> Plan:
+        plan = _chosen(search, scene)
+        return replace(plan, links=search.links_of(plan.scene))
+
     plan: Plan = kept("plan", key(scene), made, lambda plan: replace(plan, links={}), itself)
     return replace(plan, scene=with_models(scene, plan.scene))  # kept ones are of a scene with other outputs
-
-
-def _planned(search: Trials, scene: Scene) -> Plan:
-    plan = _chosen(search, scene)
-    return replace(plan, links=search.links_of(plan.scene))
 
 
 def _chosen(search: Trials, scene: Scene) -> Plan:

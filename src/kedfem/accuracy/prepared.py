@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from kedfem.arrays import Float, Int
+from kedfem.arrays import Float
 from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_body import drive_range
@@ -42,7 +42,6 @@ from kedfem.store import contents
 BESIDE = ("title", "fatigue", "output")
 """Sections of a scene on which no plan and no reduced model depends, probes of the output apart."""
 INSTANTS = 16  # where the linkage is examined before the first run
-MOMENTS = 16  # of a run where its residual is taken
 
 T = TypeVar("T")
 
@@ -136,11 +135,6 @@ def last_of(name: str, made: Callable[[], T]) -> T:
     return found
 
 
-def as_alike(scene: Scene, model: Model) -> Prepared:
-    """A scene prepared with the model of another that is `alike`."""
-    return Prepared(scene, *moving(scene), damped_as(scene, model))
-
-
 def damped_as(scene: Scene, model: Model) -> Model:
     """A model with the damping of a scene."""
     return replace(model, damping=Rayleigh(*rayleigh(scene.damping)))
@@ -164,9 +158,3 @@ def _loaded(full: Prepared, t: Float[np.ndarray, " T"]) -> Float[np.ndarray, " l
     phi = drive_angle(full.scene.motion, t)[0]
     factors = [np.abs(load.factor(t, phi)) for loads in full.model.loads for load in loads]
     return np.array([t[f.argmax()] for f in factors if np.ptp(f) > 0.0])
-
-
-def residual_moments(full: Prepared) -> set[int]:
-    """Steps of a run at which its residual is taken, evenly over it."""
-    steps: Int[np.ndarray, " k"] = np.linspace(1, time_grid(full.scene).steps, MOMENTS).astype(int)
-    return set(steps.tolist())

@@ -19,16 +19,7 @@ from functools import partial
 import numpy as np
 
 from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
-from kedfem.accuracy.prepared import (
-    Prepared,
-    as_alike,
-    damped_as,
-    key,
-    last_of,
-    meshed,
-    residual_moments,
-    training_motion,
-)
+from kedfem.accuracy.prepared import Prepared, damped_as, key, last_of, meshed, moving, training_motion
 from kedfem.accuracy.variants import shortened, with_analysis
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Snapshot
@@ -45,12 +36,13 @@ from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.mobility import free_motion_count
 from kedfem.motion.path import Path
-from kedfem.scene import Scene, without_vibration
+from kedfem.scene import Scene, time_grid, without_vibration
 from kedfem.store import kept
 
 Stage = Callable[[str], None]
 
 ROUNDS = 4  # of enriching
+MOMENTS = 16  # of a run where its residual is taken, evenly over it
 CLOSER = 0.5  # a round's share of the last one's tolerance, of segments
 ADDED = 8  # modes that a round adds to a link, at most
 MINUTE = 60  # unknowns of a link that cannot gain from a reduction
@@ -102,7 +94,8 @@ def prepared(
     if not ends:
         return (found := found_for(scene)).ready, found
     found = last_of(" ".join(map(key, ends)), lambda: found_for(*ends))
-    found = replace(found, ready=as_alike(scene, found.ready.model))
+    ready = Prepared(scene, *moving(scene), damped_as(scene, found.ready.model))
+    found = replace(found, ready=ready)
     return found.ready, found
 
 
@@ -223,7 +216,8 @@ def _settled(
     first : modes to begin with, for a share of the tolerance
     fixed : names of links whose number of modes is given
     """
-    moments, Q = residual_moments(full), first(1.0)
+    moments = set(np.linspace(1, time_grid(full.scene).steps, MOMENTS).astype(int).tolist())
+    Q = first(1.0)
     small, run = _run(full, Q, moments)
     for k in range(ROUNDS + 1):
         more = _enriched(full, parts, small, run.kept)

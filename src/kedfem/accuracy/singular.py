@@ -68,7 +68,7 @@ class SingularPasses:
         for k, body in enumerate(model.bodies):
             self._of.setdefault(body, k)  # of several segments the first
         if not len(linkage.drives) and set(self._of) == set(range(1, len(linkage.bodies))):
-            rest = resting_poses(1, len(linkage.bodies))
+            rest = resting_poses(len(linkage.bodies))
             found = parts(linkage.rows, linkage.joints, len(linkage.bodies))
             every = ((part, part.rank(rest, linkage.size)) for part in found if part.closed)
             self.loops = [Leverage(part, rank) for part, rank in every if rank < part.freedoms]

@@ -98,7 +98,8 @@ def state_space(
     stage("mesh and matrices")
     linkage, along = moving(scene)
     loose, elements = _let_go(scene) if free else (scene, ())
-    elements = (*_motors(scene), *elements)
+    motors = (_Element(x, f"motors/{x}", motor.torque is not None) for x, motor in scene.motors.items())
+    elements = (*motors, *elements)
     system = system_of(loose, linkage, along)
     t = np.array([at])
     motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
@@ -130,10 +131,6 @@ def _require(scene: Scene, modes: int, at: float, free: bool) -> None:
     if not (free or scene.output.probes or scene.motors):
         got = "got a scene without probes and motors: add [output.probes.NAME]"
         raise SceneError(f"--state-space: must have an output, {got}")
-
-
-def _motors(scene: Scene) -> tuple[_Element, ...]:
-    return tuple(_Element(x, f"motors/{x}", motor.torque is not None) for x, motor in scene.motors.items())
 
 
 def _let_go(scene: Scene) -> tuple[Scene, tuple[_Element, ...]]:

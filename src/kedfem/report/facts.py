@@ -1,18 +1,45 @@
 """What a report shows in tables, from results and the scene that they are of."""
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from kedfem.accuracy.error_budget import OF_SOURCE, TOGETHER, UNKNOWN, percent
 from kedfem.output.words import number_in, place_of, with_prefix
-from kedfem.report.fatigue_facts import life_of
-from kedfem.report.records import Fact, Rows, Table
-from kedfem.results import Peak, Results
+from kedfem.results import Fatigue, Peak, Results
 from kedfem.results.frequencies import Summary
 
 STEADY = "steady "  # what notes of a steady motion begin with
+ENDLESS = 1e15  # revolutions, hours: as good as for ever
+SPOTS = 3  # places of the highest damage of each link
+
+Rows = list[tuple[str, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table of the page.
+
+    title, head : what it shows; names of its columns, empty of a table of names and values
+    rows : texts; the first of each is a name
+    note : below it
+    """
+
+    title: str
+    head: tuple[str, ...]
+    rows: Rows
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """A number of the first look: its name, the number in words, more about it."""
+
+    name: str
+    value: str
+    more: str = ""
 
 
 def facts(results: Results, highest: Peak | None, moment: Callable[[float, float], str]) -> list[Fact]:
@@ -208,3 +235,41 @@ def named_table(title: str, items: Iterable[tuple[str, str | float]]) -> Table:
     """Names and values."""
     rows: Rows = [(key, x if isinstance(x, str) else f"{x:.4g}") for key, x in items]
     return Table(title, (), rows)
+
+
+def life_of(damage: float, found: Fatigue) -> str:
+    """Life in turns of the drive, or periods, and hours, by the damage in a period."""
+    turns, what = (found.revolutions, "revolutions") if found.revolutions else (1.0, "periods")
+    hours = found.period / 3600
+    return "endless" if damage * ENDLESS < turns else f"{turns / damage:.3g} {what}, {hours / damage:.3g} h"
+
+
+def fatigue_notes(found: Fatigue) -> list[str]:
+    """What a reader of the table has to know, in words."""
+    turns = f", {found.revolutions:.6g} revolutions" if found.revolutions else ""
+    lines = [f"Period {with_prefix(found.period, 's')}{turns}; stresses repeat to {percent(found.repeats)}."]
+    lines += [f"DOUBTFUL: {found.doubt}."] if found.doubt else []
+    lines += [f"{name}: {words}." for name, words in found.strengths.items()]
+    if left := found.left_out_words:
+        lines.append(f"Left out near corners, point forces and joints: {left} points.")
+    empty = [name for name, spots in found.spots.items() if not spots]
+    lines += [f"No point of {', '.join(empty)} is left to look at."] if empty else []
+    lines += [f"No data of {', '.join(found.without)}."] if found.without else []
+    return lines
+
+
+def fatigue_table(found: Fatigue) -> Table:
+    """Life and utilisation at the places of the highest damage."""
+    head = (
+        "link", "life", "utilisation", "amplitude", "mean", "criterion", "not proportional", "reference position", "near",
+    )  # fmt: skip
+    rows: Rows = [
+        (
+            name if rank == 0 else "", life_of(spot.damage, found), percent(spot.utilisation),
+            with_prefix(spot.amplitude, "Pa"), with_prefix(spot.mean, "Pa"), spot.criterion,
+            percent(spot.disproportion), place_of(spot.place), spot.near,
+        )
+        for name, spots in found.spots.items()
+        for rank, spot in enumerate(spots[:SPOTS])
+    ]  # fmt: skip
+    return Table("Fatigue: life and utilisation", head, rows, " ".join(fatigue_notes(found)))

@@ -17,8 +17,10 @@ from kedfem.output.words import with_prefix
 from kedfem.report.animated import Animated, animated
 from kedfem.report.curves import Curve, cursor_places, curve_groups, polar_curves
 from kedfem.report.facts import (
+    Table,
     budget_table,
     facts,
+    fatigue_table,
     frequencies_table,
     joints_table,
     links_table,
@@ -28,8 +30,6 @@ from kedfem.report.facts import (
     peaks_table,
     steady_table,
 )
-from kedfem.report.fatigue_facts import fatigue_table
-from kedfem.report.records import Table
 from kedfem.report.viewer import EXTRA, Mark, gradient, viewer
 from kedfem.results import Peak, Results, read_results, replacing, results_file
 from kedfem.results.files import beside, of_extra
@@ -146,7 +146,7 @@ def _moment(scene: Mapping[str, Any], results: Results, time: float, angle: floa
 def _moving(
     scene: Mapping[str, Any], results: Results, folder: Path, highest: Peak | None, missing: list[str]
 ) -> dict[str, Any] | None:
-    """The viewer, what each frame is in words, where the cursor stands in it, the frame that is shown first."""
+    """The viewer, what each frame is, where the cursor is in it, the first that is shown, numbers at the colour bar."""
     animation = scene.get("output", {}).get("animation") or {}
     scale = float(animation.get("deformation_scale", 1.0))
     gravity = tuple(scene.get("gravity") or (0.0, 0.0, 0.0))
@@ -171,13 +171,8 @@ def _moving(
         "cursor": cursor_places(results, shown.times),
         "first": first,
         "scale": f"{scale:g}" if any(each.stressed for each in shown.surfaces) else "",
-        "top": None if highest is None else _scale_of(highest.stress),
+        "top": highest and [*(with_prefix(highest.stress * part, "Pa") for part in (1.0, 0.75, 0.5, 0.25)), "0"],
     }
-
-
-def _scale_of(highest: float) -> list[str]:
-    """Numbers at the colour bar, from its upper end."""
-    return [with_prefix(highest * part, "Pa") for part in (1.0, 0.75, 0.5, 0.25)] + ["0"]
 
 
 def _frames(scene: Mapping[str, Any], results: Results, shown: Animated, highest: Peak | None) -> Sequence[str]:

@@ -88,7 +88,8 @@ def sweep(
     if asked.workers is not None and asked.workers < 1:
         raise SceneError(f"--workers: must be at least 1, got {asked.workers}")
     if asked.quick:
-        base = _quick(base)
+        analysis = {**base.raw.get("analysis", {}), "accuracy": "quick"}
+        base = replace(base, raw={**base.raw, "analysis": analysis})
     scene = scene_from(base.raw, base.folder, stem=base.stem)  # its own faults are not those of points
     if asked.edges is not None:
         refuse_without_growth(scene, axes[0], asked.edges)
@@ -164,11 +165,6 @@ class _Points:
             else:
                 out[k] = name, replace(job, folder=own)
         return out
-
-
-def _quick(base: Base) -> Base:
-    analysis = {**base.raw.get("analysis", {}), "accuracy": "quick"}
-    return Base({**base.raw, "analysis": analysis}, base.folder, base.stem)
 
 
 def _points(axes: Sequence[Axis]) -> Iterator[dict[Any, Any]]:

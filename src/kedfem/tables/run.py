@@ -15,8 +15,7 @@ from kedfem.analysis import Run
 from kedfem.arrays import Float
 from kedfem.output.plots.groups import ALONE, SIGNED
 from kedfem.output.words import clock, moment, place_of, with_prefix
-from kedfem.report.facts import peak_rows
-from kedfem.report.fatigue_facts import ENDLESS, fatigue_notes
+from kedfem.report.facts import ENDLESS, fatigue_notes, peak_rows
 from kedfem.results import Channel, Fatigue, Peak
 from kedfem.results.balance import Balance
 from kedfem.results.records import rounding

@@ -53,7 +53,7 @@ def write_study_plot(study: Study, path: Path, machine: str) -> None:
     for marker, name in zip(cycle(MARKERS), names, strict=False):
         points = [_point(row, least) for row in ran if row.variant.fidelity.name == name]
         axes.plot(*zip(*points, strict=True), marker, label=name, markersize=7, alpha=0.75)
-    front = _front(ran, least)
+    front = sorted(((_point(row, least), row) for row in ran if row.front), key=lambda pair: pair[0])
     axes.plot(*zip(*(point for point, _ in front), strict=True), color="0.2", linewidth=1.0, zorder=1)
     axes.set(xscale="log", yscale="log")
     _name_points(axes, front)
@@ -79,10 +79,6 @@ def _point(row: Measured, least: float) -> tuple[float, float]:
     if row.seconds is None:
         raise ValueError(f"{row.variant.name} was not run")
     return row.seconds.whole, max(row.error, least)
-
-
-def _front(ran: Sequence[Measured], least: float) -> list[tuple[tuple[float, float], Measured]]:
-    return sorted(((_point(row, least), row) for row in ran if row.front), key=lambda pair: pair[0])
 
 
 def _name_points(axes: Any, front: Sequence[tuple[tuple[float, float], Measured]]) -> None:
