@@ -18,7 +18,7 @@ EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*/scene.toml"))
 def ranks(scene: Scene) -> tuple[int, int, int]:
     """Of all constraints at once, summed over the parts, and the number of parts with closed loops."""
     of = linkage(scene)
-    rest = resting_poses(1, len(of.bodies))
+    rest = resting_poses(len(of.bodies))
     f = features(of.rows, rest, np.zeros((1, len(of.rows.angles))))
     whole = rank(jacobian(of.rows, f, len(of.bodies), of.size)[0])
     found = list(parts(of.rows, of.joints, len(of.bodies)))

@@ -43,20 +43,13 @@ def rows_of(
         one, other = (unit(each) for each in joint.axes)
         axis = (one, other) if bodies.index(joint.links[0]) == i else (other, one)
     rows = joint_rows(kind or joint.kind, name, i, j, np.asarray(joint.at) - centre, axis)
-    if joint.open:
-        rows = [_reaching(row, joint, bodies, centre) for row in rows]
+    if joint.open:  # gaps are between its links' own points
+        ends = {k: np.asarray(joint.on(bodies[k])) - centre for k in (i, j)}
+        rows = [replace(row, a=ends[row.i], a_j=ends[row.j]) if row.kind == GAP else row for row in rows]
     if joint.lead is not None:
         travel, turn = (coordinate_row(scene, name, bodies, turns) for turns in (False, True))
         rows.append(coupled(travel, (-joint.lead / (2 * np.pi), turn)))
     return rows
-
-
-def _reaching(row: ConstraintEquation, joint: Joint, bodies: tuple[str, ...], centre: np.ndarray) -> ConstraintEquation:
-    """A row of a joint whose links are drawn apart: gaps are between their own points."""
-    if row.kind != GAP:
-        return row
-    one, other = (np.asarray(joint.on(bodies[body])) - centre for body in (row.i, row.j))
-    return replace(row, a=one, a_j=other)
 
 
 def moving_pair(joint: Joint) -> tuple[str, str]:
@@ -81,11 +74,6 @@ def gear_row(scene: Scene, name: str, bodies: tuple[str, ...]) -> ConstraintEqua
     if second.kind == ANGLE and abs(gear.transmission) > 1:
         return coupled(first, (-1 / gear.transmission, second))
     return coupled(second, (-gear.transmission, first))
-
-
-def drive_row(scene: Scene, name: str, bodies: tuple[str, ...], number: int) -> ConstraintEquation:
-    """The drive of a joint: its turn or travel has the drive's value."""
-    return replace(coordinate_row(scene, name, bodies), drive=number)
 
 
 def joint_free_rows(scene: Scene, name: str, bodies: tuple[str, ...]) -> list[ConstraintEquation]:

@@ -4,7 +4,7 @@ With co-rotational frames motions may be left free. In the rigid-body motion the
 reference position while the drive moves the rest; without a drive it rests.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
@@ -18,7 +18,6 @@ from kedfem.motion.drives import Drives, drives
 from kedfem.motion.joint_equations import (
     GROUND,
     coordinate_row,
-    drive_row,
     gear_row,
     joint_free_rows,
     joint_points,
@@ -98,7 +97,7 @@ def linkage(scene: Scene) -> Linkage:
     several = blocks(every, len(bodies), size) if driven and len(bodies) > MANY else None
     free = 0
     if not driven:
-        rest, names = resting_poses(1, len(bodies)), [row.joint for row in rows]
+        rest, names = resting_poses(len(bodies)), [row.joint for row in rows]
         free = 6 * (len(bodies) - 1) - sum(x.rank(rest, size) for x in parts(every, names, len(bodies)))
     elif several is None or not _well_driven(every, several, size):
         drawn = drawn_linkage(scene, rows)
@@ -115,7 +114,7 @@ def _well_driven(rows: Rows, plan: Blocks, size: float) -> bool:
 
     J has the rank of its columns, and its least squares leave nothing of the rates at which one drive moves.
     """
-    values = plan.values(rows, features(rows, resting_poses(1, plan.count + 1)), size)
+    values = plan.values(rows, features(rows, resting_poses(plan.count + 1)), size)
     greatest, least = plan.extremes(values)[0]
     if least <= RANK_TOLERANCE * greatest:
         return False
@@ -128,7 +127,7 @@ def _well_driven(rows: Rows, plan: Blocks, size: float) -> bool:
 def _all_rows(scene: Scene) -> tuple[list[ConstraintEquation], Drives]:
     """All rows of joints, couplings and drives, and these."""
     driven, bodies = drives(scene, scene_size(scene)), (GROUND, *scene.links)
-    driving = [drive_row(scene, name, bodies, k) for k, name in enumerate(driven.joints)]
+    driving = [replace(coordinate_row(scene, name, bodies), drive=k) for k, name in enumerate(driven.joints)]
     return passive_rows(scene) + driving, driven
 
 
@@ -159,9 +158,9 @@ def looser_rows(scene: Scene, drawn: Drawn) -> Looser:
     return out
 
 
-def resting_poses(times: int, bodies: int) -> Poses:
-    """All bodies in the reference position."""
-    return np.tile(np.eye(3), (times, bodies, 1, 1)), np.zeros((times, bodies, 3))
+def resting_poses(bodies: int) -> Poses:
+    """All bodies in the reference position, at one time point."""
+    return np.tile(np.eye(3), (1, bodies, 1, 1)), np.zeros((1, bodies, 3))
 
 
 def scene_size(scene: Scene) -> float:
@@ -177,7 +176,7 @@ def drawn_jacobian(rows: list[ConstraintEquation], bodies: int, size: float) -> 
 
 def resting_jacobian(rows: Rows, bodies: int, size: float) -> Float[np.ndarray, "m k"]:
     """The same of rows that are arrays already."""
-    return np.asarray(jacobian(rows, features(rows, resting_poses(1, bodies)), bodies, size)[0])
+    return np.asarray(jacobian(rows, features(rows, resting_poses(bodies)), bodies, size)[0])
 
 
 def _check_mobility(scene: Scene, drawn: Drawn) -> int:

@@ -102,7 +102,8 @@ def remedy(drawn: Drawn, looser: Looser) -> str:
     """How to do without redundant rows, in words."""
     done, left = without_redundancy(drawn, looser)
     if not done:
-        spare = [name for name in _undriven(drawn) if "." in name and _implied(drawn, name)]
+        couplings = [name for name in _undriven(drawn) if "." in name]
+        spare = [name for name in couplings if rank(changed(drawn, name, drawn.J[:0]).J) == rank(drawn.J)]
         return f"leave out {listed(spare, 'or')}" if spare else "none by another kind of one joint"
     words = "make " + listed([f"joint {joint} {kind}" for joint, kind in done])
     return f"{words}; {left} would be left" if left else words
@@ -118,11 +119,6 @@ def would_move(drawn: Drawn, looser: Looser) -> str:
         return " or ".join(f"if {of_joints(names, 'or')} were {kind}" for kind, names in kinds.items())
     fewer = [name for name in _undriven(drawn) if _moves(changed(drawn, name, drawn.J[:0]))]
     return f"without {of_joints(fewer, 'or')}" if fewer else ""
-
-
-def _implied(drawn: Drawn, coupling: str) -> bool:
-    """Whether all else implies a coupling."""
-    return rank(changed(drawn, coupling, drawn.J[:0]).J) == rank(drawn.J)
 
 
 def _undriven(drawn: Drawn) -> Iterator[str]:

@@ -50,7 +50,7 @@ class Stand:
 
 def started(link: Linkage) -> Stand:
     """The grid point at the reference position."""
-    rest = resting_poses(1, len(link.bodies))
+    rest = resting_poses(len(link.bodies))
     near = features(link.rows, rest).value[link.rows.angles].T
     found = _settled(link, np.zeros(1), rest, near)
     if not found:

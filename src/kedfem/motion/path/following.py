@@ -33,7 +33,7 @@ def path(link: Linkage, low: float, high: float) -> Path:
         Naming the joint and the place where the linkage locks or cannot be assembled.
     """
     if link.drive is None:
-        rest = resting_poses(1, len(link.bodies))
+        rest = resting_poses(len(link.bodies))
         none = np.zeros_like(rest[1]), np.zeros_like(rest[1])
         shape = shapes(Moving(rest, none, none, np.zeros(1)))
         return _through(link, np.zeros(1), shape, np.zeros((1, len(link.rows.angles))), np.inf)
