@@ -114,7 +114,7 @@ def local_error(scheme: Scheme) -> float:
 
 @dataclass
 class StepError:
-    """What local errors of the steps so far add up to, in the norm of the mass.
+    """The largest local error of the steps so far, in the norm of the mass, and what local errors add up to.
 
     Vibration adds them up, step by step, for as long as damping at its frequency lets it: what is left of earlier errors
     falls by exp(−h (α + β ω²)/2) in a step, ω² = |δ''|/|δ|.
@@ -123,18 +123,20 @@ class StepError:
     model: Model
     constant: float
     h: float
+    change: float = 0.0
     peak: float = 0.0
     grown: float = 0.0
     _swing: float = field(default=0.0, repr=False)
     _left: float = field(default=0.0, repr=False)
     _last: Float[np.ndarray, " k"] | None = field(default=None, repr=False)
-    REMEMBERED: ClassVar = ("peak", "grown", "_swing", "_left", "_last")
+    REMEMBERED: ClassVar = ("change", "peak", "grown", "_swing", "_left", "_last")
 
     def add(self, block: Block) -> None:
         """Look at the steps of a block."""
         a = self._weighted(block, "a")
         before = a[:1] if self._last is None else self._last[None]
         change = np.linalg.norm(np.diff(np.concatenate([before, a]), axis=0), axis=1)
+        self.change = max(self.change, float(change.max(initial=0.0)))
         self.peak = max(self.peak, largest_row(self._weighted(block, "u")))
         self._swing = max(self._swing, largest_row(a))
         rate = self.model.damping.alpha
@@ -145,6 +147,11 @@ class StepError:
             self._left = kept * self._left + float(x)
             self.grown = max(self.grown, self._left)
         self._last = a[-1]
+
+    @property
+    def relative(self) -> float:
+        """Of the largest displacement."""
+        return self.constant * self.change / self.peak if self.peak else 0.0
 
     @property
     def total(self) -> float:

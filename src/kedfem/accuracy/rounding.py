@@ -139,9 +139,9 @@ class Rounding:
         if not self.relative > REPORTED:
             return None
         link = self.model.links[int(self.forces.argmax())].name
-        why = f"link {link} is so stiff beside its neighbours that its numbers do not tell rigid motion from strain"
-        remedy = f'{why}; take model = "rigid" for it, or its true stiffness and larger elements'
-        return Share("rounding", dict.fromkeys(kinds, self.relative), remedy)
+        how = f"link {link} is so stiff beside its neighbours that its numbers do not tell rigid motion from strain"
+        remedy = f'{how}; take model = "rigid" for it, or its true stiffness and larger elements'
+        return Share("rounding", dict.fromkeys(kinds, self.relative), how, remedy)
 
 
 def unstressed(model: Model, peak: Peak | None) -> bool:
