@@ -68,14 +68,14 @@ as *where: what was wanted, what was got*.
   the frame.
 * **Materials** that are built in: {materials}.
 * **Plane links** know no third dimension. A scene with any lies in one plane z = constant, with hinges along z and
-  forces in the plane; solids may share it, joined to them by hinges and welds, where they stay upright.
+  forces in the plane; solids and beams in space may share it, joined to them by hinges, welds and slides, where they stay
+  upright.
 * **Beams** are planar where they can be: if all that touches the beam is in one plane z = constant, all hinges of the
   scene are along z, all forces, gravity and slides in xy, and the beam is welded to nothing but such beams and plane
   links. Else they are beams in space; `beam = "planar"` or `"spatial"` settles it. Beams, plane links and solids go
   together: a hinge joins any two.
 * **Welds** join beams, solids and rigid links in any pair; a beam welded to a solid or to a beam in space is one in space
-  itself. A plane link slides on plane links, planar beams and rigid links; solids and beams in space it takes by hinges
-  and welds.
+  itself.
 * **Without a drive** the mechanism moves by itself: under `motors`, `springs`, gravity and other loads, from
   `analysis.initial_speeds`. Frames are co-rotational then, `analysis.end_time` and `step` are required, and links need
   not be held by joints. Torques, angles and speeds of a joint are those of its first link that is not the ground against

@@ -43,8 +43,6 @@ def refusal(kind: str, partners: tuple[str, str], driven: bool, plane: bool) -> 
         return r"links\.[\w ]+\.shape: is required for a rigid link that is neither a slider"
     if bare and partners[1] != "ground" and (driven or kind not in SHARED):
         return rf"joints\.J\.links: must join links with a shape by a {kind} joint .* a rigid slider"
-    if kind == "prismatic" and {"plane", "solid"}.issubset(partners):
-        return r"joints\.J\.kind: must be revolute, spherical or a weld between a plane link and a solid"
     return None
 
 
@@ -161,21 +159,6 @@ def test_a_planar_beam_and_a_rigid_bar_are_welded_either_way_round() -> None:
     carried = chain("weld", ("rigid", "planar beam"), plane=True)
     carried["links"]["link 1"]["beam"] = "planar"
     assert not spatial_beams(scene_from(carried))
-
-
-@pytest.mark.parametrize("other", ["solid", "beam"])
-def test_a_plane_link_does_not_slide_on_one_in_space(other: str) -> None:
-    raw = chain("prismatic", ("plane", "planar beam"), plane=True)
-    (link,) = (raw["links"][name] for name in raw["joints"]["J"]["links"] if raw["links"][name]["model"] == "beam")
-    if other == "solid":
-        link |= {"model": "solid", "mesh": {"elements": [4, 1, 1]}}
-        link.pop("beam", None)
-    else:
-        link["beam"] = "spatial"
-    with pytest.raises(
-        KedfemError, match="must be revolute, spherical or a weld between a plane link and a solid or beam in"
-    ):
-        ran(raw)
 
 
 @pytest.mark.parametrize("kind", ["revolute", "prismatic", "weld"])

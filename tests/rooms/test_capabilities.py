@@ -123,7 +123,7 @@ SCENES: list[Raw] = [
          analysis={**inverted()["analysis"], "stiffening": True,
                    "initial_speeds": {"B": 1.0}, "initial_motions": {"arm": {**AT, "velocity": [0, 1]}},
                    "initial": "rest", "initial_deflection": {"d": {**AT, "link": "arm", "force": [0, 1]}}}),
-    bushed(), shafted(), driven("spherical"), planar("weld", "solid"), planar("prismatic", "solid"),
+    bushed(), shafted(), driven("spherical"), planar("weld", "solid"),
     planar("weld", "rigid"),
     bare(kind="torque", at=[1, 0], vector=[0, 0, 1]), bare(kind="body", force_density=[0, 1]),
     bare(kind="surface", at=[1, 0], axis="x", force=[0, 1]), bare(kind="pressure", at=[1, 0], axis="x", pressure=5),

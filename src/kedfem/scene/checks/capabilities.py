@@ -23,7 +23,6 @@ SLID = ("prismatic", "cylindrical")  # and one travel along the same axis
 DRIVEN = ("revolute", "prismatic")  # kinds with one motion alone, which a drive prescribes
 CONSTRAINED = "constraint equations"  # how a joint is enforced that moves with both of its links
 SHARED = "shared points"  # and one that holds points of its links together for good
-MIXED = "plane link and one in space"  # what a joint joins
 
 
 def others(*kinds: str) -> tuple[str, ...]:
@@ -77,9 +76,6 @@ REFUSALS = (
         "{where}.bushing.rotational_stiffness", "be given for a joint that constrains rotations",
         "there is none that it could resist", "a {kind} joint, which leaves all free",
         "leave it out, or take another kind of joint"),
-    Refusal("joints", {"joint": ("prismatic",), "partners": (MIXED,)}, "{where}.kind",
-        "be revolute, spherical or a weld between a plane link and a solid or beam in space",
-        "a plane link constrains no rotation out of its plane", "'{kind}' of {names}", "give both the same model"),
     Refusal("drives", {"joint": others(*DRIVEN)}, "{where}.joint", "name a revolute or prismatic joint",
         "a drive prescribes the one motion of a joint", "{name!r}, which is {kind}",
         "drive a hinge or a slide beside it, or take a motor"),

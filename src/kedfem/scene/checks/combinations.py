@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from kedfem.errors import Fault, Where
-from kedfem.scene.checks.capabilities import CONSTRAINED, MIXED, SHARED, Facts, refusals
+from kedfem.scene.checks.capabilities import CONSTRAINED, SHARED, Facts, refusals
 from kedfem.scene.checks.parts import Entry, Parts, category, link_names
 from kedfem.scene.questions.modelling import default_frames, enforced_by_equations
 from kedfem.scene.questions.planes import spatial_beams
 from kedfem.scene.records.joints import Bushing
-from kedfem.scene.records.wording import NOUNS, shown
+from kedfem.scene.records.wording import shown
 
 Told = tuple[str, Facts, Where, Mapping[str, str]]
 """Section, factors, place and words of a part of a scene."""
@@ -45,15 +45,14 @@ def common_facts(parts: Parts) -> dict[str, str]:
 
 
 def joints(parts: Parts) -> Iterator[Told]:
-    """Good joints: how each is enforced, and what it joins."""
+    """Good joints: how each is enforced."""
     moving = {name for name in parts.good.joints if enforced_by_equations(parts.good, name)}
     slots = (joint for joint in parts.joints.values() if joint.word("kind") == "slot")
-    asked = any(category(x) == "plane" for x in parts.links.values()) or any(x.has("bushing") for x in slots)
-    spatial = spatial_beams(parts.good) if asked else frozenset[str]()
+    spatial = spatial_beams(parts.good) if any(x.has("bushing") for x in slots) else frozenset[str]()
     for joint in parts.joints.values():
         kind, held = str(joint.word("kind")), [parts.links[x] for x in link_names(joint) if x in parts.links]
-        facts = {"joint": kind, "partners": partners(held, spatial)}
-        words = {"kind": kind, "key": "kind", "names": named(held)}
+        facts = {"joint": kind}
+        words = {"kind": kind, "key": "kind"}
         if joint.record is None:
             yield "joints", facts, joint.where, words
             continue
@@ -73,17 +72,6 @@ def joints(parts: Parts) -> Iterator[Told]:
 def unlike_across(bushing: Bushing) -> bool:
     """Whether a bushing gives way across its axis in one direction more than in another."""
     return any(each is not None and each[0] != each[1] for each in (bushing.stiffness, bushing.damping))
-
-
-def partners(held: list[Entry], spatial: frozenset[str]) -> str:
-    """What a joint joins, as far as the table asks for it; some beams are in space."""
-    plane = any(category(link) == "plane" for link in held)
-    return MIXED if plane and any(category(link) == "solid" or link.name in spatial for link in held) else ""
-
-
-def named(held: list[Entry]) -> str:
-    """Links with what they are."""
-    return " and ".join(f"{link.name!r}, a {NOUNS.get(category(link), 'rigid link')}" for link in held)
 
 
 def on_joint(parts: Parts, name: str | None) -> tuple[dict[str, str], dict[str, str]]:
