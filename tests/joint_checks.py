@@ -10,11 +10,14 @@ from scipy.interpolate import CubicSpline
 from kedfem.accuracy.prepared import Prepared
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.attachments import Attachment, interface_matrix
+from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
 from kedfem.dynamics.joints.constraint_matrices import joint_rows
 from kedfem.dynamics.joints.ports import port_values, turned_ports, turned_vectors
 from kedfem.dynamics.stepping.scheme import generalised_alpha
+from kedfem.dynamics.system.record import TURN
 from kedfem.links.record import Link, in_space
 from kedfem.motion.joint_equations import joint_axis, unit
+from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import GROUND, Joint, time_grid
 from tests.moving import channels, state
 
@@ -211,6 +214,17 @@ def row_values(ready: Prepared, block: Block) -> tuple[np.ndarray, np.ndarray, n
     pushed = np.concatenate(p, axis=1) @ B
     mu = np.linalg.pinv(C.transpose(0, 2, 1), rcond=1e-9) @ pushed[..., None]
     return C, np.concatenate(w, axis=1) @ np.linalg.pinv(B).T, mu[..., 0]
+
+
+def directions(joint: ConstraintJoint, motion: RigidMotion) -> np.ndarray:
+    """What constraints of a joint are along and about (2, T, r, 3): fixed in link j, about a cross across both its axes."""
+    i, j = joint.bodies
+    out = np.array(joint.along)[:, None] @ motion.R[:, j].transpose(0, 2, 1)
+    for n, each in enumerate(joint.constraints):
+        for term in each.terms:
+            if term.kind == TURN:
+                out[1, :, n] = np.cross(motion.R[:, i] @ term.a, motion.R[:, j] @ term.b)
+    return out
 
 
 def _of_nodes(link: Link, at: Bodies, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

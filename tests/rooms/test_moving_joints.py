@@ -11,7 +11,7 @@ from kedfem.accuracy.reduction import prepared
 from kedfem.accuracy.variants import with_analysis
 from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.joints.constraint_matrices import directions, joint_rows
+from kedfem.dynamics.joints.constraint_matrices import joint_rows
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.forces.exerted import effort, wrench
@@ -21,7 +21,7 @@ from kedfem.motion.linkage import linkage
 from kedfem.output.words import clock, moment
 from kedfem.scene import scene_from
 from tests.cells import Cell, scene_of
-from tests.joint_checks import interface_values, row_values, unbalanced
+from tests.joint_checks import directions, interface_values, row_values, unbalanced
 from tests.linkages import drive_rates
 from tests.moving import bar, cardan, channels, driven_slide, geared, inverted, ran, screwed, state, two_drives
 from tests.systems import begun
@@ -160,14 +160,14 @@ def test_multipliers_of_the_system_are_what_bears_the_port_forces(kind: str) -> 
         mu, first, forces = row_values(ready, block)[2], 0, supports(block)
         near = 1e-8 * max(np.abs(mu).max(), 1.0)
         for row in ready.model.rows:
-            own, along = mu[:, first : first + len(row.gap)], directions(row, block.motion)
-            first += len(row.gap)
+            own = mu[:, first : first + len(row.constraints)]
+            first += len(row.constraints)
             if row.plus:
                 assert_allclose(effort(forces, row.name), own[:, 0], rtol=0, atol=near)
                 continue
             force, moment, point = wrench(forces, row)
-            assert_allclose(point, along[0], rtol=0, atol=1e-12)
-            for got, n in ((force, along[1]), (moment, along[2])):
+            assert_allclose(point, block.motion.position(row.bodies[0], row.at), rtol=0, atol=1e-12)
+            for got, n in zip((force, moment), directions(row, block.motion), strict=True):
                 wanted = np.einsum("tr,trk->tk", own, n)
                 assert_allclose(got, wanted, rtol=0, atol=near)
             if row.name in ready.scene.driven_joints:

@@ -186,7 +186,8 @@ def slides(model: Model) -> list[tuple[str, int]]:
     for row in model.rows:
         if row.sides[1] is not None:
             planar = model.links[model.bodies.index(row.bodies[1])].planar
-            across = np.linalg.matrix_rank(row.gap[~row.turn.any(axis=1)])
+            gap, turn = row.along
+            across = np.linalg.matrix_rank(gap[~turn.any(axis=1)])
             found += [(row.name, row.bodies[1])] if 0 < across < (2 if planar else 3) else []
     return found
 

@@ -13,6 +13,7 @@ from kedfem.dynamics.joints.places import on_part
 from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.dynamics.stepping.step_limit import StepLimit
+from kedfem.dynamics.system.record import Driven, Held
 from kedfem.links.record import Link
 
 T = TypeVar("T")
@@ -93,7 +94,7 @@ class Model:
     def coordinates(self) -> int:
         """Generalised coordinates once the joints share theirs."""
         held = sum(len(joint.keep) for joint in self.joints)
-        rows = sum(int(np.isinf(x.stiffness).sum()) for x in self.rows)  # springs constrain nothing
+        rows = sum(isinstance(each.law, Held | Driven) for row in self.rows for each in row.constraints)
         return self.unknowns - held + self.interface_unknowns - rows
 
 

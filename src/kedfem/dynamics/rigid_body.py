@@ -85,12 +85,11 @@ class Instant:
 
 def instants(model: Model, motion: RigidMotion) -> list[Instant]:
     """The linkage at each time point."""
-    forcing, out = forcings(model, motion), []
-    for k in range(len(motion.t)):
-        rows = joint_rows(model.rows, motion.part(k, k + 1), model.interface_unknowns)
-        tie = None if rows is None else static_tie(rows, 0)
-        out.append(Instant([each.part(k, k + 1) for each in forcing], tie))
-    return out
+    forcing, rows = forcings(model, motion), joint_rows(model.rows, motion, model.interface_unknowns)
+    return [
+        Instant([each.part(k, k + 1) for each in forcing], None if rows is None else static_tie(rows, k))
+        for k in range(len(motion.t))
+    ]
 
 
 def drive_range(scene: Scene) -> tuple[float, float]:

@@ -65,6 +65,13 @@ def joined(parts: Sequence["RigidMotion"]) -> "RigidMotion":
     return RigidMotion(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
 
 
+def seen_from(motion: RigidMotion, bodies: tuple[int, int], at: Float[np.ndarray, "3"]) -> Float[np.ndarray, "T 3"]:
+    """Where a point of body i is in the frame of body j, from where both are drawn (T, 3) [m]."""
+    i, j = bodies
+    point = motion.p[:, i] + motion.R[:, i] @ at
+    return np.asarray(((point - motion.p[:, j])[:, None] @ motion.R[:, j])[:, 0] - at)
+
+
 def resting(bodies: int, t: Float[np.ndarray, " T"]) -> RigidMotion:
     """Rigid-body motion of a linkage that nothing drives: all rest in the reference position, at given times (T,) [s]."""
     R = np.broadcast_to(np.eye(3), (len(t), bodies, 3, 3)).copy()

@@ -2,9 +2,8 @@
 good.
 
 What slides or turns relative to both its links cannot be said of fixed points by constant weights. Such a joint's links
-have port points of their own, fixed in them, whose displacements are interface unknowns; rows over them say what the
-joint holds. A coupling surface is seen as a rigid piece: the mean displacement u₀ of its surface and its mean rotation θ,
-both linear in the port points, so that the point of the coupling surface's frame at X moves by u₀ + θ × (X − X₀).
+have port points of their own, fixed in them, whose displacements are interface unknowns; the terms of a system say over
+them what the joint constrains.
 """
 
 from collections.abc import Iterator, Sequence
@@ -13,17 +12,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from kedfem.arrays import Bool, Float, Int
+from kedfem.dynamics.system import record
+from kedfem.dynamics.system.record import Constraint, Driven, Held, Law, Spring, Term, rotation_term
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
 from kedfem.links.stations import Stations
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface
 from kedfem.motion.constraints import CONSTRAINED, perpendiculars
-from kedfem.motion.joint_equations import unit
-from kedfem.motion.newton import cross_matrix
+from kedfem.motion.joint_equations import joint_axis, unit
 from kedfem.scene import GROUND, Joint, Scene, enforced_by_equations, moving_grounds
 
 Ports = Float[np.ndarray, "p 3"]
-NO_ROWS = np.zeros((0, 3))
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +31,7 @@ class Side:
 
     body : number in the linkage
     points : (p, 3) its ports in the reference position, the first at X₀ of the coupling surface [m]
-    surface : (p, 6, d) u₀ and θ from the displacements at its ports
+    components : d of displacements there; turns : whether the last is ψ of a planar beam
     stations : of the link along which a slot's pin slides; its ports are these
     keys, weights : of each port the link, or segment of one, and (n,) weights on it; none once z is known
     slider, axis : name of a rigid slider, which rides on another link and has no ports, and along which it slides
@@ -41,7 +40,8 @@ class Side:
 
     body: int
     points: Ports
-    surface: Float[np.ndarray, "p 6 d"]
+    components: int = 3
+    turns: bool = False
     stations: Stations | None = None
     keys: tuple[str, ...] = ()
     weights: Float[np.ndarray, "p n"] | Sequence[Float[np.ndarray, " _"]] = ()
@@ -53,17 +53,14 @@ class Side:
 
 @dataclass(frozen=True, slots=True)
 class ConstraintJoint:
-    """A joint enforced by constraint equations: row r is gap_r · (u_i − u_j) + turn_r · (θ_i − θ_j) at the joint's point
-    of link i.
+    """A joint enforced by constraint equations.
 
     name, at : of the joint, (3,) [m] in the reference position
     bodies : numbers of links i and j in the linkage; directions are fixed in j
     sides : what it has on both, None where a link has no unknowns (the ground, what the drive carries)
     axis : (3,) of the joint, in the reference position
-    gap, turn : (r, 3) directions in the reference position [-, m]
-    stiffness : (r,) of rows that are springs, infinite of those that hold [N/m, N m]
-    cross : of a universal joint the axes in i and in j: the last row turns about the normal of both
-    plus : rows of other joints that these are combined with, each with its coefficient: gears
+    constraints : what it constrains, and laws beside; ends of their terms are 0 and 1, its sides
+    plus : other joints whose constraints these are combined with, each with its coefficient: gears
     """
 
     name: str
@@ -71,10 +68,7 @@ class ConstraintJoint:
     bodies: tuple[int, int]
     sides: tuple[Side | None, Side | None]
     axis: Float[np.ndarray, "3"] = field(default_factory=lambda: np.eye(3)[2])
-    gap: Float[np.ndarray, "r 3"] = field(default_factory=lambda: NO_ROWS)
-    turn: Float[np.ndarray, "r 3"] = field(default_factory=lambda: NO_ROWS)
-    stiffness: Float[np.ndarray, " r"] = field(default_factory=lambda: NO_ROWS[:, 0])
-    cross: tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]] | None = None
+    constraints: tuple[Constraint, ...] = ()
     plus: "tuple[tuple[float, ConstraintJoint], ...]" = ()
 
     @property
@@ -82,6 +76,23 @@ class ConstraintJoint:
         """Those that it has, and of joints that it is combined with."""
         for joint in (self, *(other for _, other in self.plus)):
             yield from (side for side in joint.sides if side is not None)
+
+    @property
+    def along(self) -> tuple[Float[np.ndarray, "r 3"], Float[np.ndarray, "r 3"]]:
+        """Directions along and about which its own constraints are, in the reference position [-, m]."""
+        out = np.zeros((2, len(self.constraints), 3))
+        for n, each in enumerate(self.constraints):
+            for term in each.terms:
+                gap, turn = direction(term)
+                out[:, n] += gap, turn
+        return out[0], out[1]
+
+
+def direction(term: Term) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+    """Direction along, and about, which a term is in the reference position, with its factor."""
+    n = np.cross(term.a, term.b) if term.kind == record.TURN else term.b
+    none = np.zeros(3)
+    return (term.factor * n, none) if term.kind == record.GAP else (none, term.factor * n)
 
 
 def needs_rows(scene: Scene, name: str) -> bool:
@@ -106,21 +117,44 @@ def bore_axis(joint: Joint, link: str) -> Float[np.ndarray, "3"] | None:
     return unit(joint.axis)
 
 
-def held_rows(joint: Joint, driven: bool) -> tuple[Float[np.ndarray, "r 3"], Float[np.ndarray, "r 3"], list[int]]:
-    """Directions of what a joint holds, in the reference position: gap and turn of each row, and the axis of its frame
-    that this is along or about, −1 of a screw's thread. That of a universal joint's cross is left open."""
-    frame, (gaps, turns) = joint_frame(joint), CONSTRAINED[joint.kind]
-    gaps += "z" * (driven and joint.kind == "prismatic")
-    turns += "z" * (driven and joint.kind == "revolute")
-    axes = ["xyz".index(axis) for axis in gaps + turns]
-    gap, turn = np.zeros((2, len(axes), 3))
-    gap[: len(gaps)], turn[len(gaps) :] = frame[axes[: len(gaps)]], frame[axes[len(gaps) :]]
-    if joint.kind in {"universal", "screw"}:
-        thread = joint.kind == "screw"
-        gap = np.vstack([gap, thread * frame[2]])
-        turn = np.vstack([turn, -thread * (joint.lead or 0.0) / (2 * np.pi) * frame[2]])
-        axes.append(-1 if thread else 2)
-    return gap, turn, axes
+def constrained(scene: Scene, name: str) -> tuple[Constraint, ...]:
+    """What a joint constrains, each with its law: held, a bushing's spring, the drive's motion or its shaft."""
+    joint, at, frame = scene.joints[name], np.asarray(scene.joints[name].at), joint_frame(scene.joints[name])
+    (gaps, turns), found = CONSTRAINED[joint.kind], list[tuple[Law, tuple[Term, ...]]]()
+    for n in map("xyz".index, gaps):
+        found.append((bushing(joint, n, turning=False), (Term(record.GAP, 0, 1, at, at, frame[n]),)))
+    if joint.kind == "universal":
+        one, other = (np.asarray(bore_axis(joint, link)) for link in ordered(joint))
+        found.append((bushing(joint, 2, turning=True), (Term(record.TURN, 0, 1, one, one, other),)))
+    for n in map("xyz".index, turns):
+        law = bushing(joint, n, turning=True)
+        found.append((law, (rotation_term(0, 1, frame, n, law, tilt=len(turns) < 3),)))
+    if joint.kind == "screw":  # its thread, a constraint of two terms
+        lead = -(joint.lead or 0.0) / (2 * np.pi)
+        found.append((Held(), (coordinate(joint, turns=False), coordinate(joint, lead, turns=True))))
+    if (drive := scene.driven_joints.get(name)) is not None:
+        number, shaft = list(scene.driven_joints).index(name), drive.shaft_stiffness
+        law = Driven(number) if shaft is None else Spring(shaft, drive.shaft_damping, drive=number)
+        found.append((law, (coordinate(joint),)))
+    return tuple(Constraint(name, terms, law, linear=True) for law, terms in found)
+
+
+def coordinate(joint: Joint, factor: float = 1.0, turns: bool | None = None) -> Term:
+    """Turn or travel of a joint; if not said which, the turn of all but slides."""
+    axis, at = joint_axis(joint), np.asarray(joint.at)
+    if joint.kind != "prismatic" if turns is None else turns:
+        across = perpendiculars(axis)[0]
+        return Term(record.ANGLE, 0, 1, across, across, axis, factor)
+    return Term(record.GAP, 0, 1, at, at, axis, factor)
+
+
+def bushing(joint: Joint, axis: int, turning: bool) -> Law:
+    """The law of a constraint along or about an axis of its joint's frame: held, or a bushing's spring."""
+    of = joint.bushing
+    stiffness = None if of is None else (of.rotational_stiffness if turning else of.stiffness)
+    if of is None or stiffness is None:
+        return Held()
+    return Spring(stiffness[axis], (of.rotational_damping if turning else of.damping)[axis])
 
 
 def joint_frame(joint: Joint) -> Float[np.ndarray, "3 3"]:
@@ -131,88 +165,24 @@ def joint_frame(joint: Joint) -> Float[np.ndarray, "3 3"]:
     return np.stack([*perpendiculars(axis), axis])
 
 
-def mounted(joint: Joint, axis: int, turning: bool) -> tuple[float, float] | None:
-    """Stiffness and damping of a joint's bushing along, or about, an axis of its frame; None where it holds."""
-    of = joint.bushing
-    stiffness = None if of is None else (of.rotational_stiffness if turning else of.stiffness)
-    if of is None or stiffness is None:
-        return None
-    return stiffness[axis], (of.rotational_damping if turning else of.damping)[axis]
+def in_plane(gap: Float[np.ndarray, "*r 3"], turn: Float[np.ndarray, "*r 3"]) -> Bool[np.ndarray, "*r"]:
+    """Which directions say something of links that move in a plane z = constant."""
+    return np.asarray((np.abs(gap[..., :2]).max(axis=-1) > 1e-9) | (np.abs(turn[..., 2]) > 1e-9))
 
 
-def stiffnesses(scene: Scene, name: str, gap: Float[np.ndarray, "r 3"], axes: list[int]) -> Float[np.ndarray, " r"]:
-    """Stiffness of a joint's rows: of its bushing, its drive's shaft; infinite where they hold."""
-    joint, drive, out = scene.joints[name], scene.driven_joints.get(name), np.full(len(axes), np.inf)
-    for r, (axis, turning) in enumerate(zip(axes, (not row.any() for row in gap), strict=True)):
-        if drive is not None and axis == 2 and turning == (joint.kind != "prismatic"):
-            # what the drive prescribes is none of the bushing's
-            out[r] = np.inf if drive.shaft_stiffness is None else drive.shaft_stiffness
-        elif axis >= 0 and (found := mounted(joint, axis, turning)) is not None:
-            out[r] = found[0]
-    return out
-
-
-def in_plane(gap: Float[np.ndarray, "r 3"], turn: Float[np.ndarray, "r 3"]) -> Bool[np.ndarray, " r"]:
-    """Which rows say something of links that move in a plane z = constant."""
-    return np.asarray((np.abs(gap[:, :2]).max(axis=1) > 1e-9) | (np.abs(turn[:, 2]) > 1e-9))
-
-
-def surface_ports(surface: CouplingSurface, link: Link, where: str) -> tuple[Ports, Float[np.ndarray, "p 6 d"]]:
-    """Port points of a coupling surface: its middle, and one off it in each direction that it knows; u₀ and θ from them.
-
-    With ∂_k u the rate of change along direction e_k,
-
-        θ = ½ Σ e_k × ∂_k u                                                  a coupling surface that knows all three,
-        θ = e_1 (n · ∂_2 u) − e_2 (n · ∂_1 u) + ½ n (e_2 · ∂_1 u − e_1 · ∂_2 u)    a flat one with normal n,
-
-    each the turn of the coupling surface where it moves rigidly.
+def surface_ports(surface: CouplingSurface, link: Link, where: str) -> Ports:
+    """Port points of a coupling surface: its middle, and one off it in each direction that it knows.
 
     Raises
     ------
     MeshError
         If the coupling surface is a point or a line that does not know its turn.
     """
-    d = link.d
     if link.kind == "beam":
-        one = np.zeros((1, 6, 3))
-        one[0, [0, 1, 5], [0, 1, 2]] = 1.0
-        return surface.origin[None], one
+        return surface.origin[None]
     known = [k for k in range(link.d) if surface.spread[k] > 0]
-    turning = _turning(link, [surface.directions[k] for k in known])
-    if turning is None:
+    if len(known) < link.d - 1:
         raise MeshError(
             f"{where}: must sit on a bore or a face of link '{link.name}', got a coupling surface that knows no turn"
         )
-    points = [surface.origin]
-    out = np.zeros((1 + len(known), 6, d))
-    out[0, :d] = np.eye(d)
-    for p, k in enumerate(known, start=1):
-        length = 2 * surface.spread[k]
-        points.append(surface.origin + length * surface.directions[k])
-        theta = turning[p - 1][:, :d] / length
-        out[p, 3:] += theta
-        out[0, 3:] -= theta
-    return np.array(points), out
-
-
-def _turning(link: Link, directions: list[np.ndarray]) -> list[Float[np.ndarray, "3 3"]] | None:
-    """θ = Σ turning_k ∂_k u."""
-    if link.d == 2:
-        z = np.array([0.0, 0.0, 1.0])
-        share = 1.0 if len(directions) == 1 else 0.5
-        return [share * np.outer(z, np.cross(z, e)) for e in directions] or None
-    if len(directions) == 3:
-        return [0.5 * cross_matrix(e) for e in directions]
-    if len(directions) < 2:
-        return None
-    e1, e2 = directions
-    n = np.cross(e1, e2)
-    return [-np.outer(e2, n) + 0.5 * np.outer(n, e2), np.outer(e1, n) - 0.5 * np.outer(n, e1)]
-
-
-def station_ports(found: Stations, link: Link) -> tuple[Ports, Float[np.ndarray, "p 6 d"]]:
-    """Port points of a line on which a pin slides; u₀ at each."""
-    out = np.zeros((len(found.s), 6, link.d))
-    k = np.arange(2 if link.planar else 3)
-    out[:, k, k] = 1.0
-    return found.points, out
+    return np.array([surface.origin, *(surface.origin + 2 * surface.spread[k] * surface.directions[k] for k in known)])

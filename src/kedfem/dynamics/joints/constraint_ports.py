@@ -8,19 +8,17 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.joints.constraint_joints import (
-    NO_ROWS,
     ConstraintJoint,
     Side,
-    bore_axis,
-    held_rows,
+    constrained,
+    coordinate,
+    direction,
     in_plane,
     ordered,
-    station_ports,
-    stiffnesses,
     surface_ports,
 )
-from kedfem.dynamics.joints.constraint_matrices import seen_from
 from kedfem.dynamics.joints.places import on_part, part_surface, slider_axis
+from kedfem.dynamics.system.record import Constraint, Held
 from kedfem.links.point_rows import point_rows, require_on_axis
 from kedfem.links.record import Link
 from kedfem.links.stations import Stations, stations
@@ -28,7 +26,7 @@ from kedfem.links.surfaces.coupling_surfaces import port_weights, rigid_link_sur
 from kedfem.motion.joint_equations import joint_axis
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
-from kedfem.motion.rigid import rigid_motion
+from kedfem.motion.rigid import rigid_motion, seen_from
 from kedfem.scene import Limit, LineSpring, Motor, Scene, Spring, corotational_links
 from kedfem.scene.records.materials import LINE
 
@@ -45,28 +43,26 @@ class LinkageLayout:
 
 
 FINER = 8  # looks between two points of a path, for how far pins go along slots
-ONLY_U = np.concatenate([np.eye(3), np.zeros((3, 3))])[None]
-Held = tuple[Float[np.ndarray, "r 3"], Float[np.ndarray, "r 3"]]
 
 
 def gear_joint(scene: Scene, name: str, links: dict[str, Link], layout: LinkageLayout) -> ConstraintJoint:
-    """The row of a pair of gears: motion of the second joint less its transmission times that of the first."""
-    gear, zero, found = scene.gears[name], np.zeros((1, 3)), []
-    for each in gear.joints:
-        axis = joint_axis(scene.joints[each])[None]
-        slides = scene.joints[each].kind == "prismatic"
-        found.append(row_joint(scene, each, links, layout, (axis, zero) if slides else (zero, axis)))
-    return replace(found[1], name=f"gears.{name}", plus=((-gear.transmission, found[0]),))
+    """The constraint of a pair of gears: motion of the second joint less its transmission times that of the first."""
+    gear, key = scene.gears[name], f"gears.{name}"
+    first, second = (
+        row_joint(scene, each, links, layout, (Constraint(key, (coordinate(scene.joints[each]),), Held(), linear=True),))
+        for each in gear.joints
+    )
+    return replace(second, name=key, plus=((-gear.transmission, first),))
 
 
 def row_joint(
-    scene: Scene, name: str, links: dict[str, Link], layout: LinkageLayout, only: Held | None = None
+    scene: Scene, name: str, links: dict[str, Link], layout: LinkageLayout, only: tuple[Constraint, ...] | None = None
 ) -> ConstraintJoint:
     """A joint enforced by constraint equations, still without the interface unknowns.
 
     Parameters
     ----------
-    only : directions of other rows than those of what the joint holds, and all hard
+    only : constraints in place of what the joint has
 
     Raises
     ------
@@ -76,19 +72,12 @@ def row_joint(
     joint = scene.joints[name]
     i, j = ordered(joint)
     first, second = (_side(scene, name, on, links, layout) for on in (i, j))
-    gap, turn, along = (*only, []) if only else held_rows(joint, name in scene.driven_joints)
-    axes = None
-    if joint.axes is not None and only is None:
-        a, b = (np.asarray(bore_axis(joint, link)) for link in (i, j))
-        axes, turn[-1] = (a, b), np.cross(a, b)
     here = [link for link in links.values() if link.name in (i, j)]
     planar = bool(here) and all(link.planar for link in here)  # a slider on the ground is of no plane
-    kept = in_plane(gap, turn) if planar else np.ones(len(gap), bool)
-    stiffness = np.full(len(gap), np.inf) if only else stiffnesses(scene, name, gap, along)
-    return ConstraintJoint(
-        name, np.asarray(joint.at), (layout.bodies[i], layout.bodies[j]), (first, second), joint_axis(joint), gap[kept],
-        turn[kept], stiffness[kept], axes,
-    )  # fmt: skip
+    every = constrained(scene, name) if only is None else only
+    kept = tuple(each for each in every if not planar or any(in_plane(*direction(term)) for term in each.terms))
+    bodies = layout.bodies[i], layout.bodies[j]
+    return ConstraintJoint(name, np.asarray(joint.at), bodies, (first, second), joint_axis(joint), kept)
 
 
 def element_joint(
@@ -96,7 +85,7 @@ def element_joint(
 ) -> ConstraintJoint:
     """The two sides of a spring, motor or limit, as a joint without rows: on those of its joint, or at two points."""
     if not isinstance(element, LineSpring) or element.between is None:
-        return replace(row_joint(scene, str(element.joint), links, layout, (NO_ROWS, NO_ROWS)), name=name)
+        return replace(row_joint(scene, str(element.joint), links, layout, ()), name=name)
     one, other = (
         _point_side(f"{name}.between[{k}].at", scene, end.link, np.asarray(end.at), links, layout)
         for k, end in enumerate(element.between)
@@ -116,14 +105,14 @@ def rigid_points(link: Link, key: str, layout: LinkageLayout) -> ConstraintJoint
     surface, length = rigid_link_surface(link, centre), link.size / 2
     points = centre + length * np.concatenate([np.zeros((1, 3)), np.eye(3)])
     weights = surface.fit[0] + length * np.concatenate([np.zeros((1, link.n)), surface.fit[1:]])
-    side = Side(layout.bodies[link.name], points, np.repeat(ONLY_U, 4, axis=0), keys=(key,) * 4, weights=weights)
+    side = Side(layout.bodies[link.name], points, keys=(key,) * 4, weights=weights)
     return ConstraintJoint(f"rigid.{key}", centre, (side.body, 0), (side, None))
 
 
 def _slider_side(scene: Scene, on: str, at: Float[np.ndarray, "3"], layout: LinkageLayout) -> Side | None:
     """A point of a rigid slider; None on what is none."""
     axis = slider_axis(scene, on) if on in scene.links else None
-    return None if axis is None else Side(layout.bodies[on], at[None], ONLY_U, slider=on, axis=axis)
+    return None if axis is None else Side(layout.bodies[on], at[None], slider=on, axis=axis)
 
 
 def _point_side(
@@ -135,10 +124,8 @@ def _point_side(
     key, rows = on_part(links, on, at, lambda link: point_rows(link, where, at))
     link = links[key]
     require_on_axis(link, where, at, rows.X)
-    known = ONLY_U[:, :, : link.d].copy()
-    if link.kind == "beam":
-        known[0, [2, 5], 2] = 0.0, 1.0  # (u, v, ψ)
-    return Side(layout.bodies[on], rows.X[None], known, keys=(key,), weights=rows.value[None])
+    turns = link.kind == "beam"
+    return Side(layout.bodies[on], rows.X[None], link.d, turns, keys=(key,), weights=rows.value[None])
 
 
 def _side(scene: Scene, name: str, on: str, links: dict[str, Link], layout: LinkageLayout) -> Side | None:
@@ -155,12 +142,12 @@ def _side(scene: Scene, name: str, on: str, links: dict[str, Link], layout: Link
             whole = not corotational_links(scene).isdisjoint(joint.links)
             endless = str(scene.links[on].material).startswith(LINE)
             line = stations(parts, where, (at, joint_axis(joint)), line, whole, endless)
-        points, known = station_ports(line, next(iter(parts.values())))
-        return Side(layout.bodies[on], points, known, line, line.keys, line.weights)
+        part = next(iter(parts.values()))
+        return Side(layout.bodies[on], line.points, part.d, part.kind == "beam", line, line.keys, line.weights)
     key, surface = part_surface(scene, name, links, on)
-    points, known = surface_ports(surface, links[key], where)
-    weights = port_weights(surface, points)
-    return Side(layout.bodies[on], points, known, keys=(key,) * len(points), weights=weights)
+    points, part = surface_ports(surface, links[key], where), links[key]
+    keys, weights = (key,) * len(points), port_weights(surface, points)
+    return Side(layout.bodies[on], points, part.d, part.kind == "beam", keys=keys, weights=weights)
 
 
 def slot_travels(scene: Scene, linkage: Linkage, along: Path | None = None) -> dict[str, tuple[float, float]]:

@@ -107,7 +107,7 @@ def joined(
     sides = [(row.name, side) for row in rows for side in row.all_sides]
     columns: dict[int, list[int]] = {}  # of each side's own unknowns: all components of its ports; a slider's own travel
     for name, side in sides:
-        d = side.surface.shape[2]
+        d = side.components
         columns[id(side)] = [first_of[side.slider]] if side.slider else [*range(unknowns, unknowns + d * len(side.keys))]
         for key, weights, point in zip(side.keys, side.weights, side.points if side.keys else (), strict=True):
             ports[key].append(_Port(weights, point, name, range(d), unknowns, np.eye(d)))
@@ -155,7 +155,7 @@ def _on(row: ConstraintJoint, columns: Mapping[int, list[int]], Z: sp.csr_array)
 def _seeing(side: Side, Z: sp.csr_array) -> Side:
     """A side whose ports know the interface unknowns, from its own unknowns: a slider's along its axis."""
     columns, onto = used_columns(Z if side.axis is None else sp.csr_array(side.axis[:, None]) @ Z)
-    onto = onto.reshape(*side.surface.shape[::2], len(columns))
+    onto = onto.reshape(len(side.points), side.components, len(columns))
     return replace(side, onto=onto, columns=columns, weights=())
 
 

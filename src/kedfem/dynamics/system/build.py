@@ -1,10 +1,10 @@
 """From a scene and its elastic model to a system: what each joint constrains and releases, force elements on coordinates.
 
-One table says what a kind of joint constrains (`motion.constraints.CONSTRAINED`); bushings, gears, drives, springs,
-motors and limits are laws on the same coordinates.
+What a kind of joint constrains stands with the joint (`joints.constraint_joints.constrained`); gears, springs, motors and
+limits are laws on the same coordinates.
 """
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any
@@ -14,14 +14,12 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.force_elements import law_of, on_hinge
-from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, bore_axis, in_plane, joint_frame, mounted, ordered
+from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, coordinate, ordered
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.system import record
-from kedfem.dynamics.system.ends import corners, end_of, rigid_end, same_end
-from kedfem.dynamics.system.record import Constraint, Driven, End, Held, Law, Spring, System, Term, rotation_term
+from kedfem.dynamics.system.ends import corners, end_on, rigid_end, same_end
+from kedfem.dynamics.system.record import Constraint, End, Held, Law, System, Term
 from kedfem.links.record import Link
-from kedfem.motion.constraints import CONSTRAINED, perpendiculars
-from kedfem.motion.joint_equations import joint_axis
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.scene import Scene
@@ -76,19 +74,19 @@ class _Builder:
 
     def joint(self, joint: ConstraintJoint) -> None:
         """What a joint constrains, a pair of gears couples, a spring, motor or limit acts on."""
-        scene, (kind, _, name) = self.scene, joint.name.rpartition(".")
+        kind, _, name = joint.name.rpartition(".")
         if kind == "rigid":
             self.bars(joint)
-        elif kind == "gears":
-            factor, first = joint.plus[0]
-            of = scene.gears[name].joints
-            terms = self.coordinate(of[1], joint, 1.0), self.coordinate(of[0], first, factor)
-            self.add(joint.name, terms, Held(), joint, first)
         elif kind in ELEMENTS:
-            self.element(joint, getattr(scene, kind)[name])
-        else:
-            for term, law in self.constrained(joint):
-                self.add(joint.name, (term,), law, joint)
+            self.element(joint, getattr(self.scene, kind)[name])
+        for n, each in enumerate(joint.constraints):
+            others = ((share, other, other.constraints[n].terms) for share, other in joint.plus)
+            terms = [
+                self.numbered(replace(term, factor=share * term.factor), of, of.at)
+                for share, of, every in ((1.0, joint, each.terms), *others)
+                for term in every
+            ]
+            self.add(joint.name, terms, each.law, joint, *(other for _, other in joint.plus))
 
     def bars(self, joint: ConstraintJoint) -> None:
         """A rigid link: all distances between four of its points are in the reference position."""
@@ -100,7 +98,7 @@ class _Builder:
         for i, j in combinations(range(len(ends)), 2):
             a, b = side.points[i], side.points[j]
             long = Term(record.DISTANCE, ends[i], ends[j], a, b, zero)
-            self.add(joint.name, (long, Term(record.DISTANCE, ground, ground, a, b, zero, -1.0)), Held(), joint)
+            self.add(joint.name, [long, Term(record.DISTANCE, ground, ground, a, b, zero, -1.0)], Held(), joint)
 
     def between_prescribed(self, known: set[str]) -> None:
         """Springs, motors and limits between the ground and what drives carry: no unknowns, but hubs bear them."""
@@ -121,68 +119,27 @@ class _Builder:
             a, a_j = (self.ends[n].origin for n in (i, j))
             term = Term(record.DISTANCE, i, j, a, a_j, np.zeros(3))
         else:
-            term = self.coordinate(str(element.joint), joint, 1.0, on_hinge(element))
+            made = self.scene.joints[str(element.joint)]
+            term = self.numbered(coordinate(made, turns=on_hinge(element)), joint, np.asarray(made.at))
         self.constraints.append(Constraint(joint.name, (term,), law_of(element), linear=False))
 
-    def add(self, name: str, terms: tuple[Term, ...], law: Law, *joints: ConstraintJoint) -> None:
-        """A constraint, linear where the frames of all its links are rigid-body ones."""
-        numbers = {n for joint in joints for n in joint.bodies}
-        self.constraints.append(Constraint(name, terms, law, linear=not numbers & self.own))
+    def add(self, name: str, terms: Sequence[Term], law: Law, *joints: ConstraintJoint) -> None:
+        """A constraint, linear where the frames of all its links are rigid-body ones; else pins are where both are."""
+        linear = not {n for joint in joints for n in joint.bodies} & self.own
+        if not linear:
+            terms = [
+                replace(x, kind=record.OFFSET) if x.kind == record.GAP and self.ends[x.j].form == record.LINE else x
+                for x in terms
+            ]
+        self.constraints.append(Constraint(name, tuple(terms), law, linear))
 
-    def coordinate(self, name: str, joint: ConstraintJoint, factor: float, turns: bool | None = None) -> Term:
-        """Turn or travel of a joint; if not said which, the turn of all but slides."""
-        axis, at = joint_axis(self.scene.joints[name]), np.asarray(self.scene.joints[name].at)
-        i, j = self.end(joint, 0, at), self.end(joint, 1, at)
-        if self.scene.joints[name].kind != "prismatic" if turns is None else turns:
-            across = perpendiculars(axis)[0]
-            return Term(record.ANGLE, i, j, across, across, axis, factor)
-        return Term(record.GAP, i, j, at, at, axis, factor)
-
-    def constrained(self, joint: ConstraintJoint) -> Iterator[tuple[Term, Law]]:
-        """What a joint constrains, each with its law: held, a bushing's spring, the drive's motion or its shaft."""
-        made, frame = self.scene.joints[joint.name], joint_frame(self.scene.joints[joint.name])
-        at = np.asarray(made.at)
-        i, j = self.end(joint, 0, at), self.end(joint, 1, at)
-        gaps, turns = CONSTRAINED[made.kind]
-        slides = self.ends[j].form == record.LINE and bool(set(joint.bodies) & self.own)
-        for axis in gaps:
-            n = "xyz".index(axis)
-            if self.determines(joint, frame[n], np.zeros(3)):
-                kind = record.OFFSET if slides else record.GAP
-                yield Term(kind, i, j, at, at, frame[n]), self.bushing(joint.name, n, turning=False)
-        if made.kind == "universal":
-            one, other = (np.asarray(bore_axis(made, link)) for link in ordered(made))
-            yield Term(record.TURN, i, j, one, one, other), self.bushing(joint.name, 2, turning=True)
-        for axis in turns:
-            n = "xyz".index(axis)
-            if self.determines(joint, np.zeros(3), frame[n]):
-                law = self.bushing(joint.name, n, turning=True)
-                yield rotation_term(i, j, frame, n, law, tilt=len(turns) < 3), law
-        if made.kind == "screw":  # its thread, a constraint of two terms
-            along, across = frame[2], frame[0]
-            turn = Term(record.ANGLE, i, j, across, across, along, -(made.lead or 0.0) / (2 * np.pi))
-            self.add(joint.name, (Term(record.GAP, i, j, at, at, along), turn), Held(), joint)
-        if (drive := self.scene.driven_joints.get(joint.name)) is not None:
-            number = list(self.scene.driven_joints).index(joint.name)
-            term = self.coordinate(joint.name, joint, 1.0)
-            shaft, damping = drive.shaft_stiffness, drive.shaft_damping
-            yield term, Driven(number) if shaft is None else Spring(shaft, damping, drive=number)
-
-    def determines(self, joint: ConstraintJoint, gap: Vector, turn: Vector) -> bool:
-        """Whether a direction says something of a joint's links: of planar ones only what is in their plane."""
-        here = [x for x, n in zip(self.model.links, self.model.bodies, strict=True) if n in joint.bodies]
-        return not all(link.planar for link in here) or bool(in_plane(gap[None], turn[None])[0])
-
-    def bushing(self, name: str, axis: int, turning: bool) -> Law:
-        """The law of a constraint along or about an axis of its joint."""
-        found = mounted(self.scene.joints[name], axis, turning)
-        return Held() if found is None else Spring(*found)
+    def numbered(self, term: Term, joint: ConstraintJoint, at: Vector) -> Term:
+        """A term between both ends of a joint."""
+        return replace(term, i=self.end(joint, term.i, at), j=self.end(joint, term.j, at))
 
     def end(self, joint: ConstraintJoint, side: int, at: Vector) -> int:
         """The number of an end of a joint: what it has on one of its links."""
-        found = joint.sides[side]
-        end = rigid_end(joint.bodies[side], at) if found is None else end_of(found, joint)
-        return self._numbered(end)
+        return self._numbered(end_on(joint, side, at))
 
     def _numbered(self, end: End) -> int:
         """The number of an end; of one that is there already its own."""

@@ -4,10 +4,9 @@ import numpy as np
 
 from kedfem.arrays import Float, Int
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side
-from kedfem.dynamics.joints.constraint_matrices import seen_from
 from kedfem.dynamics.system import record
 from kedfem.dynamics.system.record import End, Line, System
-from kedfem.motion.rigid import RigidMotion
+from kedfem.motion.rigid import RigidMotion, seen_from
 
 NOTHING = 1e-12  # entries of a selection that are rounding
 Vector = Float[np.ndarray, "3"]
@@ -50,7 +49,7 @@ def end_of(side: Side, joint: ConstraintJoint) -> End:
     p, d, _ = onto.shape
     if side.stations is not None:
         line = Line(side.stations, joint.axis, joint.bodies[0], joint.at)
-        onto = onto * np.atleast_1d(side.surface[:, :3].any(axis=(0, 1)))[:, None]  # of a planar beam not ψ
+        onto = onto * np.array([1, 1, not side.turns][:d])[:, None]  # of a planar beam not ψ
         return End(side.body, record.LINE, side.points[0], np.eye(3), np.ones(3), 0, *_selected(onto, side.columns), line)
     directions, lengths, known = np.eye(3), np.ones(3), p - 1
     arms = side.points[1:] - side.points[0]
@@ -64,6 +63,12 @@ def end_of(side: Side, joint: ConstraintJoint) -> End:
             directions[2] = np.cross(directions[0], directions[1])
     form, moved = _form(side, d, known), _selected(onto, side.columns)
     return End(side.body, form, side.points[0], directions, lengths, known, *moved)
+
+
+def end_on(joint: ConstraintJoint, side: int, at: Vector) -> End:
+    """What a joint has on one of its links; a point of it where that has no unknowns."""
+    found = joint.sides[side]
+    return rigid_end(joint.bodies[side], at) if found is None else end_of(found, joint)
 
 
 def line_of(end: End) -> Line:
@@ -94,4 +99,4 @@ def _form(side: Side, d: int, known: int) -> int:
     """What an end knows of its orientation."""
     if known:
         return record.PLANAR if d == 2 else {2: record.FACE, 3: record.SOLID}[known]
-    return record.PLANAR_BEAM if side.axis is None and d == 3 and side.surface[0, 5].any() else record.POINT
+    return record.PLANAR_BEAM if side.turns else record.POINT

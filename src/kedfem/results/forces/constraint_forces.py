@@ -57,8 +57,8 @@ class ConstraintForces:
         loose = np.abs(null[here]).max(axis=1, initial=0.0) > 1e3 * DEPENDENT
         planar = {body for link, body in zip(self.model.links, self.model.bodies, strict=True) if link.planar}
         if planar.intersection(joint.bodies):
-            loose &= C[here].any(axis=1) | in_plane(joint.gap, joint.turn)
-        force, moment = joint.gap.any(axis=1), joint.turn.any(axis=1)
+            loose &= C[here].any(axis=1) | in_plane(*joint.along)
+        force, moment = (along.any(axis=1) for along in joint.along)
         return not bool((loose & force).any()), not bool((loose & moment).any())
 
     def shared(self, name: str) -> list[str]:
@@ -76,8 +76,8 @@ def of_joint(joints: Sequence[ConstraintJoint], name: str) -> tuple[ConstraintJo
     first = 0
     for joint in joints:
         if joint.name == name:
-            return joint, slice(first, first + len(joint.gap))
-        first += len(joint.gap)
+            return joint, slice(first, first + len(joint.constraints))
+        first += len(joint.constraints)
     raise KeyError(name)
 
 

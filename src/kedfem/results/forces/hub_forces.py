@@ -82,7 +82,7 @@ def _geared(scene: Scene, model: Model, prescribed: PrescribedBody, block: Block
             i, j = joint.bodies
             sign = share * ((prescribed.body == i) - (prescribed.body == j))
             along = sign * pushed * (block.motion.R[:, j] @ joint.axis)
-            if joint.gap.any():  # a rack's push goes through the point of link i
+            if joint.along[0].any():  # a rack's push goes through the point of link i
                 place = block.motion.position(i, joint.at)
                 force, moment = force + along, moment + cross(place - about, along)
             else:

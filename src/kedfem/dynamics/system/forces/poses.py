@@ -80,20 +80,38 @@ def point_forces(
     end: End, motion: RigidMotion, z: Float[np.ndarray, "T k"] | None, force: Vectors, moment: Vectors
 ) -> Float[np.ndarray, "T p d"]:
     """Forces at an end's interface points that do what a force and a moment on it do: q_k of `ends_kernel`."""
-    p, d, _ = end.onto.shape
-    y = np.zeros((len(force), p, d))
+    if z is None or end.line is not None:
+        return forces_in_place(end, motion, force[:, None], moment[:, None])[:, 0]
+    u = np.einsum("pdc,tc->tpd", end.onto, z[:, end.columns])
+    return _on_points(end, motion.R[:, end.body], u, force, moment)
+
+
+def forces_in_place(
+    end: End, motion: RigidMotion, force: Float[np.ndarray, "T r 3"], moment: Float[np.ndarray, "T r 3"]
+) -> Float[np.ndarray, "T r p d"]:
+    """The same of several forces and moments on an end that is where the rigid-body motion has it."""
+    (p, d, _), R = end.onto.shape, motion.R[:, end.body]
+    if end.line is not None:
+        return np.asarray(force[:, :, None, :d] * line_weights(end, motion)[:, None, :, None])
+    one, none, units = np.tile(np.eye(3), (6, 1, 1)), np.zeros((6, p, d)), np.eye(6)
+    units = _on_points(end, one, none, units[:, :3], units[:, 3:])
+    own = np.concatenate([force @ R, moment @ R], axis=2) @ units.reshape(6, -1)
+    return np.asarray((own.reshape(len(R), -1, d) @ R[:, :d, :d].transpose(0, 2, 1)).reshape(*force.shape[:2], p, d))
+
+
+def _on_points(
+    end: End, R: Float[np.ndarray, "T 3 3"], u: Float[np.ndarray, "T p d"], force: Vectors, moment: Vectors
+) -> Float[np.ndarray, "T p d"]:
+    """The same of a surface or point, from the orientation of its body and the displacements of its points."""
+    y, d = np.zeros_like(u), u.shape[2]
     flat = 2 if end.form == record.PLANAR_BEAM else d
     y[:, 0, :flat] = force[:, :flat]
-    if end.line is not None:
-        return np.asarray(np.einsum("tp,td->tpd", line_weights(end, motion), y[:, 0]))
     if end.form == record.PLANAR_BEAM:
         y[:, 0, 2] = moment[:, 2]
     if end.form in (record.POINT, record.PLANAR_BEAM):
         return y
-    R = motion.R[:, end.body]
-    u = np.zeros_like(y) if z is None else np.einsum("pdc,tc->tpd", end.onto, z[:, end.columns])
     D = _directions(end, R, u)
-    Q = R if z is None else _rotations(D, end)
+    Q = _rotations(D, end)
     U = Q.transpose(0, 2, 1) @ D.transpose(0, 2, 1) @ end.directions
     G = np.trace(U, axis1=1, axis2=2)[:, None, None] * np.eye(3) - U
     turn = np.linalg.solve(G, (Q.transpose(0, 2, 1) @ moment[:, :, None]))[:, :, 0]

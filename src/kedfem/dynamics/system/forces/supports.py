@@ -12,7 +12,7 @@ from kedfem.arrays import Float
 from kedfem.dynamics.history import Block, Multipliers
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
 from kedfem.dynamics.system.ends import corners, end_of, same_end
-from kedfem.dynamics.system.forces.lines import OffLine, off_line
+from kedfem.dynamics.system.forces.lines import off_line
 from kedfem.dynamics.system.forces.poses import Vectors, point_forces, poses, turning
 from kedfem.dynamics.system.record import DISTANCE, GAP, OFFSET, Constraint, End, Term
 from kedfem.motion.constraints import cross
@@ -47,22 +47,9 @@ class Supports:
         return None if each.linear else self.of.z
 
     def exerted(self, each: Constraint, term: Term) -> list[Pushed]:
-        """Both ends of a term with their places, and force and moment there of a unit multiplier."""
-        ends = [self.of.system.ends[n] for n in (term.i, term.j)]
-        if term.kind == OFFSET:
-            of, (x, Q) = self._off_line(each, term), poses(ends[0], self.motion, self.z(each))
-            moment = cross(Q @ (term.a - ends[0].origin), of.force)
-            return [(ends[0], x, of.force, moment), (ends[1], of.c, -of.force, cross(of.tangent, of.slope))]
-        (x_i, Q_i), (x_j, Q_j) = (poses(end, self.motion, self.z(each)) for end in ends)
-        if term.kind in (GAP, DISTANCE):
-            a_i, a_j = Q_i @ (term.a - ends[0].origin), Q_j @ (term.a_j - ends[1].origin)
-            gap = x_i + a_i - x_j - a_j
-            size = np.linalg.norm(gap, axis=1)[:, None]  # zero where ends meet: no direction, as in the steps
-            n = Q_j @ term.b if term.kind == GAP else gap / np.where(size > 0, size, 1.0)
-            reach = a_j + gap if term.kind == GAP else a_j
-            return [(ends[0], x_i, n, cross(a_i, n)), (ends[1], x_j, -n, cross(n, reach))]
-        turn = turning(term, Q_i, Q_j)
-        return [(ends[0], x_i, 0 * x_i, turn), (ends[1], x_j, 0 * x_j, -turn)]
+        """As the function, of a term of a constraint."""
+        ends = self.of.system.ends[term.i], self.of.system.ends[term.j]
+        return exerted(term, ends, self.motion, self.z(each))
 
     def pushes(self, name: str) -> Iterator[tuple[Constraint, Term, list[Pushed]]]:
         """What constraints and laws of a name exert, term by term, on both ends."""
@@ -70,11 +57,6 @@ class Supports:
             for term in each.terms if each.name == name else ():
                 m = term.factor * self.of.multiplier[:, n, None]
                 yield each, term, [(end, x, m * f, m * t) for end, x, f, t in self.exerted(each, term)]
-
-    def _off_line(self, each: Constraint, term: Term) -> OffLine:
-        """A pin beside its line, which a term is about."""
-        end = self.of.system.ends[term.j]
-        return off_line(term.b, self.point(each, term.i, term.a), end, self.motion, self.of.z)
 
     def point(self, each: Constraint, n: int, at: Float[np.ndarray, "3"]) -> Vectors:
         """Where a point of the body of end n, in the reference position, is as a constraint sees it."""
@@ -111,11 +93,35 @@ class Supports:
                     if not same_end(other, end):
                         continue
                     if term.kind == OFFSET and end.line is not None:
-                        on = self._off_line(each, term).at_stations(end.line.stations)
+                        pin = self.point(each, term.i, term.a)
+                        on = off_line(term.b, pin, end, self.motion, self.of.z).at_stations(end.line.stations)
                         y += m * on[:, :, : end.onto.shape[1]]
                     else:
                         y += m * point_forces(end, self.motion, self.z(each), f, t)
         return y
+
+
+def exerted(term: Term, ends: tuple[End, End], motion: RigidMotion, z: Float[np.ndarray, "T k"] | None) -> list[Pushed]:
+    """Both ends of a term with their places, and force and moment there of a unit multiplier.
+
+    Parameters
+    ----------
+    z : interface unknowns, that an OFFSET needs; without them ends are where the rigid-body motion shows
+    """
+    (x_i, Q_i), (x_j, Q_j) = (poses(end, motion, z) for end in ends)
+    if term.kind not in (GAP, DISTANCE, OFFSET):
+        turn = turning(term, Q_i, Q_j)
+        return [(ends[0], x_i, 0 * x_i, turn), (ends[1], x_j, 0 * x_j, -turn)]
+    a_i = Q_i @ (term.a - ends[0].origin)
+    if term.kind == OFFSET and z is not None:
+        of = off_line(term.b, x_i + a_i, ends[1], motion, z)
+        return [(ends[0], x_i, of.force, cross(a_i, of.force)), (ends[1], of.c, -of.force, cross(of.tangent, of.slope))]
+    a_j = Q_j @ (term.a_j - ends[1].origin)
+    gap = x_i + a_i - x_j - a_j
+    size = np.linalg.norm(gap, axis=1)[:, None]  # zero where ends meet: no direction, as in the steps
+    n = gap / np.where(size > 0, size, 1.0) if term.kind == DISTANCE else Q_j @ term.b
+    reach = a_j if term.kind == DISTANCE else a_j + gap
+    return [(ends[0], x_i, n, cross(a_i, n)), (ends[1], x_j, -n, cross(n, reach))]
 
 
 def supports(block: Block) -> Supports:
