@@ -217,7 +217,7 @@ def row_values(ready: Prepared, block: Block) -> tuple[np.ndarray, np.ndarray, n
 
 
 def directions(joint: ConstraintJoint, motion: RigidMotion) -> np.ndarray:
-    """What constraints of a joint are along and about (2, T, r, 3): fixed in link j, about a cross across both its axes."""
+    """What constraints of a joint are along and about (2, T, r, 3): fixed in j, but about a cross."""
     i, j = joint.bodies
     out = np.array(joint.along)[:, None] @ motion.R[:, j].transpose(0, 2, 1)
     for n, each in enumerate(joint.constraints):

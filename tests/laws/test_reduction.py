@@ -17,7 +17,7 @@ from kedfem.dynamics.modes.bases import bases
 from kedfem.dynamics.modes.reduction import Basis, static_parts
 from kedfem.dynamics.modes.residual import residual_deflections
 from kedfem.dynamics.reduced_model import reduced_model
-from kedfem.dynamics.rigid_body import instants
+from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import snapshots
 from kedfem.links.reduced import rigid, rigid_modes
@@ -57,7 +57,7 @@ def arm(kind: str, **analysis: Any) -> dict[str, Any]:
 
 
 def found_bases(full: Prepared) -> list[Basis]:
-    made = bases(full.model, instants(full.model, training_motion(full)), static_parts(full.model))
+    made = bases(full.model, training_motion(full), static_parts(full.model))
     return [basis for basis in made if basis is not None]
 
 
@@ -114,9 +114,9 @@ def test_a_reduced_link_is_too_stiff_and_less_so_with_more_functions(kind: str) 
 
 
 def static_work(model: Model, full: Prepared) -> float:
-    instant = instants(model, training_motion(full))[-1]
-    F = [now.F[0] @ now.R[0] for now in instant.at]
-    u = closed(static_parts(model), [now.R[0] for now in instant.at], None).coupled(F)[0]
+    last = [each.part(-1, len(each.R)) for each in forcings(model, training_motion(full))]
+    F = [each.F @ each.R for each in last]
+    u = closed(static_parts(model), [each.R for each in last]).deflections(F)
     return sum(float(np.vdot(x, f)) for x, f in zip(u, F, strict=True))
 
 

@@ -18,7 +18,6 @@ from kedfem.dynamics.model import Model, segments
 from kedfem.dynamics.modes.bases import bases
 from kedfem.dynamics.modes.reduction import energy_sorted, excited, port_functions, static_parts
 from kedfem.dynamics.reduced_model import restored_model, stored_model
-from kedfem.dynamics.rigid_body import instants
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import snapshots, transient
 from kedfem.errors import MeshError, SceneError
@@ -95,11 +94,11 @@ def test_reduced_links_need_a_motion_that_the_drive_prescribes() -> None:
 def test_functions_go_by_what_their_loss_costs() -> None:
     """As many functions sorted by their own energy leave out far more of the deflections' energy."""
     full = ready(bars(segments=3, kind="solid"))
-    parts, moments = static_parts(full.model), instants(full.model, training_motion(full))
-    found = bases(full.model, moments, parts)
+    parts, motion = static_parts(full.model), training_motion(full)
+    found = bases(full.model, motion, parts)
     for k in (1, 4, 7):  # between two cuts
         link = full.model.links[k]
-        seen = excited(full.model, parts, moments)[k]
+        seen = excited(full.model, parts, motion)[k]
         old = energy_sorted(link, port_functions(link, full.model.joints[k], parts[k]), seen)
         assert found[k] is not None
         few = left_out(link, found[k].first(12), seen)

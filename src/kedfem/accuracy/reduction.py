@@ -30,7 +30,6 @@ from kedfem.dynamics.modes.bases import bases, reduced_at
 from kedfem.dynamics.modes.reduction import Basis, enriched, static_parts
 from kedfem.dynamics.modes.residual import residual_deflections
 from kedfem.dynamics.reduced_model import reduced_model, restored_model, stored_model
-from kedfem.dynamics.rigid_body import instants
 from kedfem.errors import SceneError
 from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
@@ -145,7 +144,7 @@ def reduced(
     needed &= reducible(full.model)
     if not needed:
         return Reduction(full, {}, tolerance)
-    found = bases(full.model, instants(full.model, training_motion(full)), parts, needed)
+    found = bases(full.model, training_motion(full), parts, needed)
     given = counts or {}
 
     def first(share: float) -> Functions:

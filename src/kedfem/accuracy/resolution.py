@@ -13,7 +13,6 @@ from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.reduction import frozen_frequencies, static_parts
-from kedfem.dynamics.rigid_body import instants
 from kedfem.dynamics.stepping.scheme import Scheme, borne_rotation, generalised_alpha
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import rigid_motion
@@ -79,7 +78,7 @@ def resolution(ready: Prepared) -> Resolution | None:
     motion = rigid_motion(ready.linkage, ready.path, t, phi)
     try:
         parts = static_parts(ready.model)
-        lowest = frozen_frequencies(ready.model, parts, instants(ready.model, motion))
+        lowest = frozen_frequencies(ready.model, parts, motion)
     except SolveError:  # nothing holds a link
         return None
     excited = [k for k, found in enumerate(lowest) if len(found)]

@@ -1,16 +1,13 @@
 """The rigid-body motion of a model over time: blocks of it, loads along it, what starts and estimates ask of instants."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Forcing
-from kedfem.dynamics.joints.constraint_matrices import joint_rows
 from kedfem.dynamics.loads import applied
-from kedfem.dynamics.matrices.bordered import Asked
-from kedfem.dynamics.matrices.interface import static_tie
 from kedfem.dynamics.model import Model
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
@@ -73,23 +70,6 @@ def forcing_of(model: Model, motion: RigidMotion, loads: Sequence[Float[np.ndarr
     """The same where P − M R0'' is known."""
     every = zip(model.links, model.bodies, loads, strict=True)
     return [Forcing(motion.R[:, body, : link.d, : link.d], F) for link, body, F in every]
-
-
-@dataclass(frozen=True, slots=True)
-class Instant:
-    """A linkage frozen at one time: what acts on each link; tie: of joints enforced by constraint equations."""
-
-    at: Sequence[Forcing]
-    tie: Asked | None = None
-
-
-def instants(model: Model, motion: RigidMotion) -> list[Instant]:
-    """The linkage at each time point."""
-    forcing, rows = forcings(model, motion), joint_rows(model.rows, motion, model.interface_unknowns)
-    return [
-        Instant([each.part(k, k + 1) for each in forcing], None if rows is None else static_tie(rows, k))
-        for k in range(len(motion.t))
-    ]
 
 
 def drive_range(scene: Scene) -> tuple[float, float]:

@@ -17,11 +17,10 @@ from kedfem.arrays import Float, Int
 from kedfem.dynamics.history import Forcing
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
-from kedfem.dynamics.joints.constraint_matrices import JointRows, joint_rows
+from kedfem.dynamics.joints.constraint_matrices import joint_rows
 from kedfem.dynamics.joints.ports import Rotation, port_columns
 from kedfem.dynamics.loads import Pattern
-from kedfem.dynamics.matrices.closed import turned_interface
-from kedfem.dynamics.matrices.interface import solver, static_tie
+from kedfem.dynamics.matrices.closed import closed
 from kedfem.dynamics.matrices.substructure import Substructure, factored, mass_matrix
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_elements import RigidElements, unit_loads_on, with_elements
@@ -83,9 +82,8 @@ class Stiffening:
     def over(self, forcing: Sequence[Forcing], motion: RigidMotion) -> list[Forcing]:
         """The same over the times of a motion with the factors s_i of the stress modes."""
         rows = joint_rows(self.joints, motion, self.parts[0].attachment.unknowns)
-        R = [each.R for each in forcing]
         loads = [F @ each.R for F, each in zip(self._loads(forcing, motion), forcing, strict=True)]
-        forces = port_forces(self.parts, R, loads, rows)
+        forces = closed(self.parts, [each.R for each in forcing], rows).forces(loads)
         return [
             replace(each, stress=_factors(modes, part, load, force))
             for each, modes, part, load, force in zip(forcing, self.modes, self.parts, loads, forces, strict=True)
@@ -195,43 +193,13 @@ def free_states(link: Link, part: Substructure, F: Float[np.ndarray, "k u"]) -> 
     return np.asarray(y + held @ np.linalg.lstsq(D, m, rcond=BALANCED)[0])
 
 
-def port_forces(
-    parts: Sequence[Substructure],
-    R: Sequence[Float[np.ndarray, "T d d"]],
-    loads: Sequence[Float[np.ndarray, "T n d"]],
-    rows: JointRows | None = None,
-) -> list[Float[np.ndarray, "T _"]]:
-    """`Closed.coupled` for many times at once, port forces only: λ of all links, link frame.
-
-    Parameters
-    ----------
-    rows : constraint equations, springs of bushings among them, on the interface unknowns
-    """
-    v = [x.reshape(len(x), -1) @ part.Y for x, part in zip(loads, parts, strict=True)]
-    RB = [turned_interface(part, each) for part, each in zip(parts, R, strict=True)]
-    held, k = [part.attachment.columns for part in parts], parts[0].attachment.unknowns
-    if k:
-        H, f = np.zeros((len(v[0]), k, k)), np.zeros((len(v[0]), k))
-        for part, b, x, c in zip(parts, RB, v, held, strict=True):
-            SRB = part.S @ b
-            H[:, c[:, None], c] += b.transpose(0, 2, 1) @ SRB
-            f[:, c] += np.einsum("tck,tc->tk", SRB, x)
-        if rows is None:
-            z = np.linalg.solve(H, f[..., None])
-        else:
-            each = enumerate(zip(H, f, strict=True))
-            z = np.stack([solver(H_t, static_tie(rows, t))(f_t)[0] for t, (H_t, f_t) in each])[..., None]
-        v = [x - (b @ z[:, c])[..., 0] for x, b, c in zip(v, RB, held, strict=True)]
-    return [(-x @ part.S)[:, : len(part.attachment.keep)] for x, part in zip(v, parts, strict=True)]
-
-
 def _factors(
     modes: StressModes, part: Substructure, load: Float[np.ndarray, "T n d"], force: Float[np.ndarray, "T q"]
 ) -> Float[np.ndarray, "T m"]:
-    """s_i = g_i · (load + Wᵀ λ)."""
+    """s_i = g_i · (load + Wᵀ λ), λ the first of all forces."""
     flat = modes.states.reshape(len(modes.states), -1)
     at_ports = flat @ port_columns(part.attachment, modes.states.shape[1])
-    s = np.asarray(load.reshape(len(load), -1) @ flat.T + force @ at_ports.T)
+    s = np.asarray(load.reshape(len(load), -1) @ flat.T + force[:, : at_ports.shape[1]] @ at_ports.T)
     share = np.abs(s).max(axis=0) * np.linalg.norm(modes.k, axis=1)
     s[:, share < NEGLIGIBLE * share.max(initial=0.0)] = 0.0
     return s

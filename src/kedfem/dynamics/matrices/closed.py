@@ -7,58 +7,47 @@ import numpy as np
 import scipy.sparse as sp
 
 from kedfem.arrays import Float, Int
-from kedfem.dynamics.joints.ports import Rotation
-from kedfem.dynamics.matrices.bordered import Asked
-from kedfem.dynamics.matrices.interface import MANY, solver
+from kedfem.dynamics.joints.constraint_matrices import JointRows
+from kedfem.dynamics.matrices.interface import MANY, solver, static_tie
 from kedfem.dynamics.matrices.substructure import Substructure
-from kedfem.dynamics.stepping.state import NodalOf
+from kedfem.errors import SolveError
+
+Loads = Sequence[Float[np.ndarray, "T n_ d_"]]
 
 
 @dataclass(frozen=True, slots=True)
 class Closed:
-    """A linkage with its joints closed where its links have some orientations, for any loads.
+    """A linkage with its joints closed where its links have some orientations at T times, for any loads.
 
-    held : interface unknowns that each link has a share in; RB : Rᵀ B of these
-    interface : z and the rows' forces from what links exert on z; None without interface unknowns
+    RB : per link Rᵀ B of the interface unknowns that it has a share in
+    interface : z from what links exert on it
     """
 
     parts: Sequence[Substructure]
-    held: Sequence[Int[np.ndarray, " c"]]
-    RB: Sequence[Float[np.ndarray, "p c"]]
-    unknowns: int
-    interface: Callable[[Float[np.ndarray, " k"]], tuple[Float[np.ndarray, " k"], Float[np.ndarray, " r"]]] | None
+    RB: Sequence[Float[np.ndarray, "T _ _"]]
+    interface: Callable[[Float[np.ndarray, "T k"]], Float[np.ndarray, "T k"]]
 
-    def coupled(self, rhs: Sequence[NodalOf]) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]]]:
-        """g (n, d) of all links and λ (q,) on them at their ports, link frames, from right-hand sides (n, d) there."""
-        return self.answer([part.solve(r) for part, r in zip(self.parts, rhs, strict=True)])
+    def forces(self, loads: Loads) -> list[Float[np.ndarray, "T _"]]:
+        """[λ; μ] on all links at their ports and anchors, link frames, from loads there."""
+        v = [x.reshape(len(x), -1) @ part.Y for x, part in zip(loads, self.parts, strict=True)]
+        each = [(part, b, part.attachment.columns, x) for part, b, x in zip(self.parts, self.RB, v, strict=True)]
+        z = np.zeros((len(v[0]), self.parts[0].attachment.unknowns))
+        for part, b, c, x in each:  # Σ Bᵀ (R S Rᵀ) B z = Σ Bᵀ R S v
+            z[:, c] += np.einsum("tck,tc->tk", part.S @ b, x)
+        z = self.interface(z)
+        return [((b @ z[:, c, None])[..., 0] - x) @ part.S for part, b, c, x in each]
 
-    def answer(self, y: Sequence[NodalOf]) -> tuple[list[NodalOf], list[Float[np.ndarray, " _"]]]:
-        """The same from y = Ã⁻¹ r."""
-        v = [part.seen(x) for part, x in zip(self.parts, y, strict=True)]
-        each = list(zip(self.parts, self.RB, self.held, v, strict=True))
-        z = np.zeros(self.unknowns)
-        if self.interface is not None:
-            # Σ Bᵀ (R S Rᵀ) B z = Σ Bᵀ R S v
-            for part, b, c, x in each:
-                z[c] += b.T @ (part.S @ x)
-            z, _ = self.interface(z)
-        forces = [part.S @ (b @ z[c] - x) for part, b, c, x in each]
-        g = [x + (part.Y @ force).reshape(x.shape) for part, x, force in zip(self.parts, y, forces, strict=True)]
-        return g, [force[: len(part.attachment.keep)] for part, force in zip(self.parts, forces, strict=True)]
+    def deflections(self, loads: Loads) -> Loads:
+        """g of all links; all times go together."""
+        every = zip(self.parts, loads, self.forces(loads), strict=True)
+        return [
+            (part.solve_many(x.reshape(len(x), -1).T) + part.Y @ force.T).T.reshape(x.shape) for part, x, force in every
+        ]
 
 
-def coupled_all(parts: Sequence[Substructure], cases: Sequence[tuple[Closed, Sequence[NodalOf]]]) -> list[list[NodalOf]]:
-    """g of several linkages with closed joints and their rhs, as of `coupled`: each link's solves go together."""
-    if not cases:
-        return []
-    answers = [part.solve_many(np.stack([rhs[k].ravel() for _, rhs in cases], axis=1)) for k, part in enumerate(parts)]
-    return [
-        case.answer([X[:, k].reshape(r.shape) for X, r in zip(answers, rhs, strict=True)])[0]
-        for k, (case, rhs) in enumerate(cases)
-    ]
-
-
-def closed(parts: Sequence[Substructure], R: Sequence[Rotation], tie: Asked | None) -> Closed:
+def closed(
+    parts: Sequence[Substructure], R: Sequence[Float[np.ndarray, "T _ _"]], rows: JointRows | None = None
+) -> Closed:
     """A linkage with its joints closed: A g = r + Wᵀ λ, R W g = B z, and joint forces in balance, Σ Bᵀ R λ = 0.
 
     The mechanism of [KED, eq. (19)]: joints make shared points move together.
@@ -66,27 +55,41 @@ def closed(parts: Sequence[Substructure], R: Sequence[Rotation], tie: Asked | No
     Parameters
     ----------
     R : per link, link to world
-    tie : what joints enforced by constraint equations ask of z; then Σ Bᵀ R λ is what these exert
+    rows : constraint equations, springs of bushings among them, on z; then Σ Bᵀ R λ is what these exert
+
+    Raises
+    ------
+    SolveError
+        If something is free to move.
     """
-    held = [part.attachment.columns for part in parts]
-    RB = [turned_interface(part, each[None])[0] for part, each in zip(parts, R, strict=True)]
-    k = parts[0].attachment.unknowns
-    H = [b.T @ part.S @ b for part, b in zip(parts, RB, strict=True)]
-    return Closed(parts, held, RB, k, solver(_common(held, H, k), tie) if k else None)
+    RB = [turned_interface(part, each) for part, each in zip(parts, R, strict=True)]
+    held, k = [part.attachment.columns for part in parts], parts[0].attachment.unknowns
+    own = [b.transpose(0, 2, 1) @ (part.S @ b) for part, b in zip(parts, RB, strict=True)]
+    if not k:
+        return Closed(parts, RB, lambda f: f)
+    if rows is None and k <= MANY:
+        H = np.zeros((len(RB[0]), k, k))
+        for c, x in zip(held, own, strict=True):
+            H[:, c[:, None], c] += x
+        try:
+            np.linalg.cholesky(H)
+        except np.linalg.LinAlgError as error:
+            raise SolveError(f"joints: the joints' common system must be definite, got {error}") from error
+        return Closed(parts, RB, lambda f: np.linalg.solve(H, f[..., None])[..., 0])
+    solvers = [
+        solver(_common(held, [x[t] for x in own], k), None if rows is None else static_tie(rows, t))
+        for t in range(len(RB[0]))
+    ]
+    return Closed(parts, RB, lambda f: np.stack([solved(x)[0] for solved, x in zip(solvers, f, strict=True)]))
 
 
 def _common(
     held: Sequence[Int[np.ndarray, " c"]], own: Sequence[Float[np.ndarray, "c c"]], k: int
 ) -> Float[np.ndarray, "k k"] | sp.csr_array:
     """The links' matrices on the interface unknowns that each has a share in, added up; sparse where there are many."""
-    if k > MANY:
-        columns = [np.broadcast_to(c, (len(c), len(c))) for c in held]
-        at = [np.concatenate([x.ravel() for x in each]) for each in ([c.T for c in columns], columns)]
-        return sp.csr_array(sp.coo_array((np.concatenate([x.ravel() for x in own]), at), (k, k)))
-    H = np.zeros((k, k))
-    for c, x in zip(held, own, strict=True):
-        H[np.ix_(c, c)] += x
-    return H
+    at = [np.concatenate([x.ravel() for x in each]) for each in zip(*(np.meshgrid(c, c) for c in held), strict=True)]
+    H = sp.csr_array(sp.coo_array((np.concatenate([x.T.ravel() for x in own]), at), (k, k)))
+    return H if k > MANY else H.toarray()
 
 
 def turned_interface(part: Substructure, R: Float[np.ndarray, "T d d"]) -> Float[np.ndarray, "T c k"]:

@@ -7,7 +7,6 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.reduction import Basis, energy_sorted, excited, port_functions, static_parts
 from kedfem.dynamics.modes.segment_modes import segment_basis
 from kedfem.dynamics.reduced_model import reduced_model
-from kedfem.dynamics.rigid_body import Instant, instants
 from kedfem.dynamics.stepping.state import NodalOf
 from kedfem.links.record import Link
 from kedfem.motion.rigid import RigidMotion
@@ -21,13 +20,13 @@ def reduced_at(model: Model, motion: RigidMotion, only: Collection[str], count: 
     only : names of these links
     count : of modes that a link takes of its basis
     """
-    found = bases(model, instants(model, motion), static_parts(model), only)
+    found = bases(model, motion, static_parts(model), only)
     every = zip(model.links, found, strict=True)
     return reduced_model(model, [None if x is None else x.first(count(link, x)) for link, x in every])
 
 
 def bases(
-    model: Model, moments: Sequence[Instant], parts: Sequence[Substructure],
+    model: Model, motion: RigidMotion, parts: Sequence[Substructure],
     only: Collection[str] | None = None,
 ) -> list[Basis | None]:  # fmt: skip
     """A basis for every link of a model, from instants spread over the analysis; None for links that need none.
@@ -40,7 +39,7 @@ def bases(
     parts : `static_parts` of the model
     only : names of the links that need one; all if not given
     """
-    deflections = excited(model, parts, moments)
+    deflections = excited(model, parts, motion)
     return [
         _basis(model, k, part, found) if only is None or model.links[k].name in only else None
         for k, (part, found) in enumerate(zip(parts, deflections, strict=True))

@@ -13,13 +13,15 @@ import scipy.sparse as sp
 
 from kedfem.arrays import Float
 from kedfem.dynamics.joints.attachments import Attachment
-from kedfem.dynamics.matrices.closed import closed, coupled_all
+from kedfem.dynamics.joints.constraint_matrices import joint_rows
+from kedfem.dynamics.matrices.closed import closed
 from kedfem.dynamics.matrices.substructure import Substructure, factored
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.rigid_body import Instant
+from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.stepping.state import NodalOf
 from kedfem.links.record import Link, mass_times
 from kedfem.links.reduced import mass_orthonormal, on_functions, rigid_functions, scalar_block, stiffness_blocks
+from kedfem.motion.rigid import RigidMotion
 
 LANCZOS = 6  # modes of the linkage per instant (docs/performance/reduction.md)
 INDEPENDENT = 1e-14  # of the largest energy: modes below repeat others
@@ -56,11 +58,11 @@ def static_parts(model: Model) -> list[Substructure]:
 
 
 def excited(
-    model: Model, parts: Sequence[Substructure], instants: Sequence[Instant], levels: int = LANCZOS
+    model: Model, parts: Sequence[Substructure], motion: RigidMotion, levels: int = LANCZOS
 ) -> list[list[NodalOf]]:
-    """Static deflections at instants, and their shares in the modes of the frozen linkage that they excite; per link."""
+    """Static deflections at the times of a motion, with their shares in modes of the frozen linkage; per link."""
     out: list[list[NodalOf]] = [[] for _ in model.links]
-    for krylov in _krylov(model, parts, instants, levels):
+    for krylov in _krylov(model, parts, motion, levels):
         for kept, x in zip(out, krylov.static, strict=True):
             kept.append(x)
         _, Z = np.linalg.eigh(krylov.T)
@@ -72,14 +74,14 @@ def excited(
 
 
 def frozen_frequencies(
-    model: Model, parts: Sequence[Substructure], instants: Sequence[Instant], levels: int = LANCZOS
+    model: Model, parts: Sequence[Substructure], motion: RigidMotion, levels: int = LANCZOS
 ) -> list[Float[np.ndarray, " f"]]:
     """Lowest circular frequencies of the linkage standing still, drive held, among modes that its loads excite [rad/s].
 
     1/ω² are Ritz values of K⁻¹ M: the first is good, those after it less and less. None where nothing is loaded.
     """
     out = []
-    for krylov in _krylov(model, parts, instants, levels):
+    for krylov in _krylov(model, parts, motion, levels):
         values = np.linalg.eigvalsh(krylov.T)[::-1]
         out.append(np.asarray(1 / np.sqrt(values[values > REPEATED * values[:1]])))
     return out
@@ -123,22 +125,27 @@ class _Krylov:
             self._T[level, k] = self._T[k, level] = _dot(M_b, x)
 
 
-def _krylov(model: Model, parts: Sequence[Substructure], instants: Sequence[Instant], levels: int) -> list[_Krylov]:
-    """Of the linkage frozen at some instants, from its static deflection under P − M R0'' there, link frames.
+def _krylov(model: Model, parts: Sequence[Substructure], motion: RigidMotion, levels: int) -> list[_Krylov]:
+    """Of the linkage frozen at the times of a motion, from its static deflection under P − M R0'' there, link frames.
 
-    All instants go level by level, so that their solves go together.
+    All times go level by level, so that their solves go together.
     """
-
-    frozen = [closed(parts, [now.R[0] for now in instant.at], instant.tie) for instant in instants]
-    loads = [[now.F[0] @ now.R[0] for now in instant.at] for instant in instants]
-    static = coupled_all(parts, list(zip(frozen, loads, strict=True)))
-    found = [_Krylov(model, x, levels) for x in static]
-    growing = list(zip(frozen, found, strict=True))
+    forcing = forcings(model, motion)
+    frozen = closed(parts, [x.R for x in forcing], joint_rows(model.rows, motion, model.interface_unknowns))
+    static = frozen.deflections([x.F @ x.R for x in forcing])
+    found = [_Krylov(model, [x[t] for x in static], levels) for t in range(len(motion.t))]
+    growing = np.ones(len(found), bool)
     for _ in range(levels):
-        growing = [(at, each) for at, each in growing if each.grows()]
-        new = coupled_all(parts, [(at, each.images[-1]) for at, each in growing])
-        for (_, each), x in zip(growing, new, strict=True):
-            each.add(x)
+        growing &= [grows and each.grows() for grows, each in zip(growing, found, strict=True)]
+        if not growing.any():
+            break
+        loads = [np.zeros_like(x) for x in static]
+        for t in np.flatnonzero(growing):
+            for load, image in zip(loads, found[t].images[-1], strict=True):
+                load[t] = image
+        new = frozen.deflections(loads)
+        for t in np.flatnonzero(growing):
+            found[t].add([x[t] for x in new])
     return found
 
 

@@ -8,15 +8,14 @@ from kedfem.arrays import Float
 from kedfem.dynamics.history import LinkMoment, Snapshot
 from kedfem.dynamics.joints.constraint_matrices import joint_rows
 from kedfem.dynamics.joints.ports import add_port_forces
-from kedfem.dynamics.matrices.closed import closed, coupled_all
-from kedfem.dynamics.matrices.interface import static_tie
+from kedfem.dynamics.matrices.closed import closed
 from kedfem.dynamics.matrices.substructure import Substructure
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.stepping.state import NodalOf, Rayleigh, damping_times
 from kedfem.links.record import Link, mass_times
 from kedfem.motion.newton import cross_matrix
-from kedfem.motion.rigid import RigidMotion
+from kedfem.motion.rigid import RigidMotion, joined
 
 
 def residual_deflections(
@@ -36,14 +35,14 @@ def residual_deflections(
     -------
     (n, d) of each link, at each of these times
     """
-    cases = []
-    for snapshot in snapshots:
-        motion = snapshot.motion.part(snapshot.k, snapshot.k + 1)
-        rows = joint_rows(full.rows, motion, full.interface_unknowns)
-        tie = None if rows is None else static_tie(rows, 0)
-        R = [state.R for state in snapshot.states]
-        cases.append((closed(parts, R, tie), _residuals(full, model, motion, snapshot.states)))
-    return coupled_all(parts, cases)
+    motions = [snapshot.motion.part(snapshot.k, snapshot.k + 1) for snapshot in snapshots]
+    every = [_residuals(full, model, each, x.states) for each, x in zip(motions, snapshots, strict=True)]
+    if not every:
+        return []
+    R = [np.stack([x.states[k].R for x in snapshots]) for k in range(len(parts))]
+    frozen = closed(parts, R, joint_rows(full.rows, joined(motions), full.interface_unknowns))
+    found = frozen.deflections([np.stack(each) for each in zip(*every, strict=True)])
+    return [[x[t] for x in found] for t in range(len(snapshots))]
 
 
 def _residuals(full: Model, model: Model, motion: RigidMotion, states: Sequence[LinkMoment]) -> list[NodalOf]:
