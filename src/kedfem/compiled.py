@@ -214,12 +214,18 @@ class _Part(codegen.JITCodeLibrary):
     The loops are as fast, and compiled in less time. Nor is it made machine code of.
     """
 
-    def _optimize_final_module(self) -> None:
-        """Nothing; see above."""
+    def add_llvm_module(self, module: Any) -> None:
+        """Put what is compiled beside what it calls."""
+        module.data_layout = self._codegen._data_layout
+        self._final_module.link_in(module)
 
-    def _finalize_final_module(self) -> None:
+    def finalize(self) -> None:
+        """Put what it calls beside it, unchecked: the loops are, with all of it."""
+        self._raise_if_finalized()
+        for library in dict.fromkeys(self._linking_libraries):
+            self._reload_init.update(library._reload_init)
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
         self._finalize_dynamic_globals()
-        self._verify_declare_only_symbols()
         self._finalized = True
 
     def get_pointer_to_function(self, name: str) -> int:
@@ -250,13 +256,18 @@ def _compile_parts_once() -> None:
     made.create_library, made.set_env = part_or_whole, set_where_it_is
 
 
+_QUICK: dict[str, Any] = {}
 if KNOWN:
+    from kedfem.passes_kernel import Quick, ask_once
+
     _compile_parts_once()
+    ask_once()
+    _QUICK = {"pipeline_class": Quick}
 _FAST: dict[str, Any] = {
     "cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True,
     "fastmath": {"reassoc", "contract", "nsz"},
 }  # fmt: skip
 compiled = _kept(_FAST)
-_INNER: dict[str, Any] = {**_FAST, "no_cpython_wrapper": True, "_nrt": False}
+_INNER: dict[str, Any] = {**_FAST, **_QUICK, "no_cpython_wrapper": True, "_nrt": False}
 inner = _kept(_INNER)
 """Called by compiled loops only, and allocates nothing, so that no references are counted: compiled in less time."""
