@@ -214,11 +214,6 @@ class _Part(codegen.JITCodeLibrary):
     The loops are as fast, and compiled in less time. Nor is it made machine code of.
     """
 
-    def add_llvm_module(self, module: Any) -> None:
-        """Put what is compiled beside what it calls."""
-        module.data_layout = self._codegen._data_layout
-        self._final_module.link_in(module)
-
     def finalize(self) -> None:
         """Put what it calls beside it, unchecked: the loops are, with all of it."""
         self._raise_if_finalized()

@@ -157,3 +157,51 @@ def test_of_two_processes_that_need_the_same_loop_one_waits_for_the_other(tmp_pa
     command = [sys.executable, "-c", AT_ONCE, str(tmp_path)]
     both = [subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(2)]
     assert sorted(each.communicate(timeout=120)[0] for each in both) == ["0 0\n", "1 1\n"]
+
+
+WAYS = """
+@inner
+def led(x, rest, pair):
+    total, least, last = 0.0, x[0], -1
+    for k in range(len(x)):
+        if x[k] < 0.0:
+            continue
+        least, last = min(least, x[k]), k
+        step = x[k] if k % 2 else pair[1] * x[k]
+        while step > 4.0:
+            step -= pair[0]
+            if step < 4.5:
+                break
+        total += step
+    if rest is not None:
+        for y in rest[1:]:
+            total += y
+            last = -last
+    first, second = pair
+    return total, least, last, first // second
+
+@compiled
+def both(x):
+    one, other = led(x, None, (3, 0.5)), led(x, x[2:], (2, 0.25))
+    return one[0], one[1], one[2], one[3], other[0], other[1], other[2], other[3]
+"""
+ASKED = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import numpy as np
+from ways_kernel import both
+print(both(np.array(eval(sys.argv[2]))))
+"""
+
+
+def test_parts_do_what_python_does(tmp_path: Path) -> None:
+    """Numba's own passes are left out of what compiles them; loops, branches, breaks and None stay what they are."""
+    numbers = [2.0, -1.0, 9.5, 7.25, 0.5, 11.0]
+    (tmp_path / "ways_kernel.py").write_text("from kedfem.compiled import compiled, inner\n" + WAYS)
+    environment = os.environ | {"KEDFEM_CACHE": str(tmp_path / "cache")}
+    environment.pop("NUMBA_CACHE_DIR", None)
+    command = [sys.executable, "-c", ASKED, str(tmp_path), str(numbers)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=True)
+    plain: dict[str, Any] = {"inner": lambda f: f, "compiled": lambda f: f}
+    exec(WAYS, plain)
+    assert done.stdout.strip() == str(plain["both"](numbers))

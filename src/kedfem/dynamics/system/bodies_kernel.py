@@ -49,7 +49,7 @@ def rigid_frame_end(c, bodies, i, R, F, g, Ag, state, history, t, work):  # type
     if bodies.dense[i]:
         copied(g, Mg)
     else:
-        mass_times(bodies, i, u, Mg)
+        mass_times(bodies.mass, bodies, i, u, Mg)
         momentum = state.momentum[3 * first : 3 * last]
         carried_on(c, Mg, momentum)
         copied(momentum[N : 2 * N], history.Mv[t, first:last])
@@ -133,7 +133,7 @@ def mass_damped(c, bodies, i, R, u, state, trial, work):  # type: ignore[no-unty
     if bodies.dense[i]:
         turned_back(R, d, u[first:last], work.y[:N])
     else:
-        mass_times(bodies, i, u[first:last], work.turned)
+        mass_times(bodies.mass, bodies, i, u[first:last], work.turned)
         turned_back(R, d, work.turned[:N], work.y[:N])
     for x in range(N):
         work.y[x] *= c.alpha
@@ -189,7 +189,7 @@ def residual(c, bodies, i, R, F, u, state, trial, out, work):  # type: ignore[no
             room[x - first] = r + alpha_f * (F0[x] - f0[x]) - alpha_m * a0[x]
     else:
         N, momentum = last - first, state.momentum[3 * first : 3 * last]
-        mass_times(bodies, i, u[first:last], out[first:last])
+        mass_times(bodies.mass, bodies, i, u[first:last], out[first:last])
         for x in range(N):
             later = n0 * (out[first + x] - momentum[x]) - n1 * momentum[x + N] - n2 * momentum[x + 2 * N]
             r = c_f * (F[first + x] - f1[first + x]) - c_m * later
@@ -204,7 +204,7 @@ def own_end(c, bodies, i, R, F, u, state, trial, history, t, work):  # type: ign
     N = last - first
     moved_to(c, first, last, u[first:last], F, state, history, t)
     if not bodies.dense[i]:
-        mass_times(bodies, i, u[first:last], work.y)
+        mass_times(bodies.mass, bodies, i, u[first:last], work.y)
         carried_on(c, work.y[:N], state.momentum[3 * first : 3 * last])
     copied(trial.f[first:last], state.f[first:last])
     if bodies.rigid[i]:

@@ -1,6 +1,7 @@
 """Products of bodies' mass and stiffness with vectors, and what sparse bodies do while their interface points are held.
 
 Arrays of the latter are found by their addresses: each body has its own, as factors are too large for copies in one.
+Without any sparse body, their addresses and mass may be None: nothing of this is compiled then.
 """
 
 from kedfem.compiled import compiled, inner
@@ -10,12 +11,14 @@ from kedfem.dynamics.system.reference import integers_at, reals_at
 
 
 @inner
-def mass_times(bodies, i, x, out):  # type: ignore[no-untyped-def]
+def mass_times(of, bodies, i, x, out):  # type: ignore[no-untyped-def]
     """out becomes M x of a sparse body, in whichever axes; of a matrix that is symmetric rows end at their diagonal.
 
     One that all three components share is read once.
     """
-    n, d, of = bodies.functions[i], bodies.components[i], bodies.mass
+    if of is None:
+        return
+    n, d = bodies.functions[i], bodies.components[i]
     shared = d == 3 and of.of[i, 0] == of.of[i, 1] == of.of[i, 2]
     for b in range(1 if shared else d):
         at = of.at[of.of[i, b]]
@@ -123,14 +126,16 @@ def add_answer(arrays, w, out):  # type: ignore[no-untyped-def]
 
 
 @inner
-def sparse_held(bodies, i, trial, called):  # type: ignore[no-untyped-def]
+def sparse_held(arrays, bodies, i, trial, called):  # type: ignore[no-untyped-def]
     """trial.held = Ã⁻¹ r and trial.reaction of a sparse body from trial.r."""
-    arrays, first, last = bodies.arrays[i], bodies.at[i], bodies.at[i + 1]
-    taken = arrays[0, 1] > 0
+    if arrays is None:
+        return
+    first, last = bodies.at[i], bodies.at[i + 1]
+    taken = arrays[i, 0, 1] > 0
     if not taken:
         called(i)
     reaction = trial.reaction[bodies.port_at[i] : bodies.port_at[i + 1]]
-    held(arrays, trial.r[first:last], trial.held[first:last], reaction, taken)
+    held(arrays[i], trial.r[first:last], trial.held[first:last], reaction, taken)
 
 
 @inner
@@ -144,7 +149,15 @@ def displaced(bodies, i, trial, out):  # type: ignore[no-untyped-def]
         add_transposed(bodies.Y, bodies.Y_at[i], q, N, w, out)
     else:
         copied(trial.held[first:last], out[:N])
-        add_answer(bodies.arrays[i], w, out[:N])
+        sparse_answer(bodies.arrays, i, w, out[:N])
+
+
+@inner
+def sparse_answer(arrays, i, w, out):  # type: ignore[no-untyped-def]
+    """`add_answer` of body i."""
+    if arrays is None:
+        return
+    add_answer(arrays[i], w, out)
 
 
 @inner
@@ -152,8 +165,16 @@ def add_at_ports(bodies, i, x, out):  # type: ignore[no-untyped-def]
     """out + Wᵀ x, x on a body's interface points."""
     if bodies.dense[i]:
         add_transposed(bodies.W, bodies.Y_at[i], len(x), bodies.at[i + 1] - bodies.at[i], x, out)
+    else:
+        sparse_at_ports(bodies.arrays, i, x, out)
+
+
+@inner
+def sparse_at_ports(arrays, i, x, out):  # type: ignore[no-untyped-def]
+    """The same of a sparse body."""
+    if arrays is None:
         return
-    at, place, weight, _, _, _, _ = condensed(bodies.arrays[i])
+    at, place, weight, _, _, _, _ = condensed(arrays[i])
     for k in range(len(x)):
         for m in range(at[k], at[k + 1]):
             out[place[m]] += weight[m] * x[k]
@@ -169,8 +190,16 @@ def take_ports(bodies, i, u, out):  # type: ignore[no-untyped-def]
             for m in range(N):
                 x += row[m] * u[m]
             out[k] -= x
+    else:
+        take_sparse_ports(bodies.arrays, i, u, out)
+
+
+@inner
+def take_sparse_ports(arrays, i, u, out):  # type: ignore[no-untyped-def]
+    """The same of a sparse body."""
+    if arrays is None:
         return
-    at, place, weight, _, _, _, _ = condensed(bodies.arrays[i])
+    at, place, weight, _, _, _, _ = condensed(arrays[i])
     for k in range(len(out)):
         x = 0.0
         for m in range(at[k], at[k + 1]):

@@ -139,6 +139,8 @@ def _unused(record: Any) -> list[str]:
             "elements": (record.elements.number < 0).all(),
             "turning": not len(record.turning.body),
             "stresses": not (record.frame == STRESSED).any(),
+            "mass": record.dense.all(),
+            "arrays": record.dense.all(),
         }
     elif isinstance(record, Ends):
         none = {"knots": not len(record.line)}

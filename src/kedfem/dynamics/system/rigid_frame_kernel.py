@@ -16,7 +16,7 @@ def rigid_frame_begin(c, bodies, i, R, F, state, trial, work, solved):  # type: 
     frame_copied(R, trial.Rp[i])
     right_hand_side(c, bodies, i, trial.Rp[i], F, state, trial.r, work.room)
     if not bodies.dense[i]:
-        sparse_held(bodies, i, trial, solved)
+        sparse_held(bodies.arrays, bodies, i, trial, solved)
         return
     q = bodies.port_at[i + 1] - of_ports
     reaction = trial.reaction[of_ports : of_ports + q]

@@ -172,7 +172,7 @@ def asked(c, bodies, ends, of, driving, t, iteration, state, trial, work, solved
                 reaction = trial.reaction[bodies.port_at[i] : bodies.port_at[i + 1]]
                 product(bodies.Y, bodies.Y_at[i], q, N, trial.r[first:last], reaction)
             else:
-                sparse_held(bodies, i, trial, solved)
+                sparse_held(bodies.arrays, bodies, i, trial, solved)
         if own:
             turned_back(trial.Rp[i], d, trial.u[first:last], work.y[:N])
         offset(bodies, i, work.y, trial, own)
