@@ -23,7 +23,7 @@ LOOP = 5e-5  # the same where all links are small: one compiled loop, recording 
 ARRAY_PASSES = 60  # arrays of a link read or written in a step beside the solve
 RUN_BYTES = 1e7  # beside libraries, of the smallest runs
 TRIED = 60_000  # unknowns of a model, of solids, that is factored (in seconds) only to try its steps
-FIRST, MORE, MOST = (4, 4, 1024)  # steps that are tried: a few, then so many times as many until they take ENOUGH more
+FIRST, MORE, MOST = (4, 4, 16_384)  # steps that are tried: a few, then so many times as many until they take ENOUGH more
 ENOUGH = 0.5  # seconds
 
 
