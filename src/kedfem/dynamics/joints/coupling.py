@@ -167,12 +167,6 @@ def _mixed(
     the one in it: a hinge by the ends of its pin, two new unknowns; a weld by two for each point of the planar link.
     """
     joint, welds = scene.joints[name], scene.joints[name].kind == "weld"
-    if not welds and joint.kind not in {"revolute", "spherical"}:
-        kinds = " and ".join(f"'{link}' ({links[link].kind})" for link in surfaces)
-        raise MeshError(
-            f"joints.{name}: must be a hinge or a weld between a planar link and one in space, "
-            f"got a {joint.kind} joint of {kinds}"
-        )
     planar_first = {link: surfaces[link] for link in sorted(surfaces, key=lambda each: not links[each].planar)}
     unknowns = 0
     for link, surface in surfaces.items():
