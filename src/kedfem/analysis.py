@@ -24,7 +24,7 @@ from kedfem.accuracy.step_estimate import StepEstimate
 from kedfem.dynamics.loads import coarse_steps
 from kedfem.dynamics.stepping.cost import factor_words
 from kedfem.dynamics.stepping.levels import level_steps
-from kedfem.dynamics.stepping.solvers import eased_warning, stresses_in
+from kedfem.dynamics.stepping.solvers import eased_warning, stresses_in, unstable_balance, unstable_balance_warning
 from kedfem.dynamics.stepping.start import period_map
 from kedfem.dynamics.system.period.map import Carried
 from kedfem.dynamics.system.steps import Steps
@@ -181,6 +181,7 @@ def _analysed(
         *undetermined_warning(untold),
         *watched.passes.warnings(),
         *eased_warning(solvers),
+        *unstable_balance_warning(solvers),
         *given_warning(seen.given, asked),
         *keeper.warnings(),
     ]
@@ -207,7 +208,7 @@ def _analysed(
     add_notes(folder / "results.h5", notes)
     results = replace(results, notes={**results.notes, **notes})
     why = meaningless(found, balance, efforts.unworked)
-    if why := unstable(steady) or why:
+    if why := unstable(steady) or unstable_balance(solvers) or why:
         mark_doubtful(folder / "results.h5", why)
         results = replace(results, status="doubtful", reason=why)
     if period:

@@ -63,7 +63,7 @@ def test_a_plan_that_was_kept_leaves_title_fatigue_and_output_as_the_scene_has_t
     monkeypatch.setenv("KEDFEM_CACHE", str(tmp_path / "cache"))
     raw = arm(model="beam")
     first = planned(scene_from(raw, tmp_path / "here"))
-    monkeypatch.setattr("kedfem.accuracy.plan._planned", lambda *_: pytest.fail("it is kept"))
+    monkeypatch.setattr("kedfem.accuracy.plan._chosen", lambda *_: pytest.fail("it is kept"))
     materials = {"steel": {"group": "steel", "tensile_strength": "500 MPa"}}
     more = {"title": "again", "output": {"csv": True, "animation": False}, "fatigue": {"materials": materials}}
     again = planned(scene_from(raw | more, tmp_path / "there"))

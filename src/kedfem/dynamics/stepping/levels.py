@@ -109,7 +109,7 @@ def leveled(
     """
     marks = fine if isinstance(fine, Marks) else Marks.of(len(solvers), kept=False)
     for each, mark in zip(solvers, marks.levels, strict=True):
-        each.eased, each.steady = mark.eased, mark.steady
+        each.eased, each.steady, each.unstable = mark.eased, mark.steady, [*mark.unstable]
     if len(solvers) == 1:
         yield from _single(scene, linkage, along, model, solvers[0], marks)
         return

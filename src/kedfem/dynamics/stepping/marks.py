@@ -17,6 +17,7 @@ class Mark:
     state : of the solver before it; None before the first time point
     eased : steps of the solver so far whose tolerance was eased
     steady : what the solver found of a steady motion; None of another
+    unstable : positions so far whose balance is, in words
     kept : whether anybody stores it
     start : the state at t = 0, where the march begins there, if it is known
     last : δ'' and the balance's acceleration before it of each link, where levels are combined
@@ -27,9 +28,10 @@ class Mark:
     eased: int = 0
     last: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)
     steady: Any = None
+    unstable: list[str] = field(default_factory=list)
     kept: bool = False
     start: Any = None
-    REMEMBERED: ClassVar = ("step", "state", "eased", "last", "steady")
+    REMEMBERED: ClassVar = ("step", "state", "eased", "last", "steady", "unstable")
 
     def set(self, step: int, state: Any, solver: Any) -> None:
         """The march begins a block; a state that its solver uses up is copied, if anybody stores it.
@@ -38,7 +40,7 @@ class Mark:
         """
         if self.kept:
             self.step, self.eased = step, int(getattr(solver, "eased", 0))
-            self.steady = getattr(solver, "steady", None)
+            self.steady, self.unstable = getattr(solver, "steady", None), [*getattr(solver, "unstable", ())]
             self.state = state if isinstance(state, State) else deepcopy(state)
 
 

@@ -59,6 +59,24 @@ def eased_warning(solvers: Sequence[Steps]) -> tuple[str, ...]:
     )
 
 
+def unstable_balance(solvers: Sequence[Steps]) -> str:
+    """Why positions are none that a mechanism stays in; empty if it does in those that were examined."""
+    found = [each for solver in solvers for each in solver.unstable]
+    if not found:
+        return ""
+    more = f" and {len(found) - 1} more of the positions examined" * (len(found) > 1)
+    return (
+        f"the balance of forces is unstable at {found[0]}{more}: a small push takes the link away for good, as a column "
+        "beyond its buckling load or a mast that stands on its tip"
+    )
+
+
+def unstable_balance_warning(solvers: Sequence[Steps]) -> tuple[str, ...]:
+    """What the user should know of that."""
+    why = unstable_balance(solvers)
+    return (f"{why}; take smaller loads, stiffer links or springs, or kind = 'transient' with damping",) if why else ()
+
+
 def block_length(model: Model) -> int:
     """Time points whose states are kept together: as many as take BLOCK_BYTES, at most POINTS."""
     return max(1, min(POINTS, BLOCK_BYTES // (9 * 8 * model.unknowns)))

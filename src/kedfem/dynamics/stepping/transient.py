@@ -17,6 +17,7 @@ from kedfem.dynamics.system.period.search import residual_of
 from kedfem.dynamics.system.starts.deflected import quasi_static_position, static
 from kedfem.dynamics.system.starts.instant import Instant
 from kedfem.dynamics.system.starts.modified_newton import NoBalanceError
+from kedfem.dynamics.system.starts.stability import UNSTABLE, stability
 from kedfem.dynamics.system.state import State
 from kedfem.dynamics.system.steps import Steps
 from kedfem.errors import SolveError
@@ -25,6 +26,7 @@ from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import Scene, time_grid, without_vibration
 
+LOOKED_AT = 8  # positions of an analysis whose balance is examined for stability
 BEYOND = 1e9  # m: a displacement that has grown past that is no more finite than inf
 STIFFENED = 'stiffening is not a small term; take frames = "co-rotational"'
 
@@ -81,18 +83,22 @@ def _positions(scene: Scene, linkage: Linkage, along: Path, model: Model, solver
     """All positions of a static or quasi-static analysis, each with the deflection at which all forces balance."""
     grid, motion_at, of, state = time_grid(scene), motion_of(scene, linkage, along), solver.ready, mark.state
     shared = Instant(of, motion_at, 0.0)
+    at_rest, bent = scene.analysis.kind == "static", not of.c.single or of.stressed is not None
+    looked_at = {grid.steps - grid.steps * k // LOOKED_AT for k in range(LOOKED_AT)} if bent else set()
     for k in range(mark.step, grid.steps + 1):
         mark.set(k, state, solver)
         t = k * grid.step
         motion = motion_at(np.array([t]))
         forcing = forcings(model, motion)
         try:
-            if scene.analysis.kind == "static":
+            if at_rest:
                 state = static(of, motion_at, t, near=state, like=shared)
             else:
                 state = quasi_static_position(of, motion_at, t, near=state, like=shared)
         except NoBalanceError as failed:
             raise SolveError(_unbalanced(scene, _moment(linkage, motion, 0), failed.moves)) from None
+        if k in looked_at and (found := stability(of, motion_at, state, at_rest, shared)) and found.least < UNSTABLE:
+            solver.unstable.append(f"{_moment(linkage, motion, 0)} (link '{found.moves}')")
         links, multipliers = solver.first(state, forcing, motion_at, shared)
         yield from _finite(linkage, Block(k, motion, links, multipliers=multipliers))
 

@@ -107,6 +107,7 @@ class Steps:
         self.corotational, self.stiffening = corotational(scene), system.stiffening
         self.ready = ready(system, scheme) if tolerance is None else ready(system, scheme, tolerance)
         self.factorisations, self.eased, self.iterations = len(self.ready.parts), 0, 0
+        self.unstable: list[str] = []  # positions whose balance is, in words
         self.steady: Periodic | None = None
         self.over: PeriodMap | None = None  # whose steady state that is
         self.watch: Watch = lambda marched: None

@@ -23,7 +23,7 @@ from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
 from kedfem.dynamics.system.starts.internal_forces import drawn, own, rows, turned_rate
 from kedfem.dynamics.system.starts.laws import feels_rates
 from kedfem.dynamics.system.starts.modified_newton import FREE, ROUNDING, NoBalanceError, equilibrium, unpropped
-from kedfem.dynamics.system.starts.turning_bodies import CONVERGED, Spins
+from kedfem.dynamics.system.starts.turning_bodies import CONVERGED, Spins, spins_of
 from kedfem.dynamics.system.state import State
 from kedfem.errors import MotionError, SolveError
 from kedfem.motion.newton import cross_matrix
@@ -166,7 +166,7 @@ def plucked(of: Ready, motion_at: Motion, forces: Rows, time: float = 0.0) -> St
         return static(of, motion_at, time, forces)
     found = _moving(now, motion_at)
     pull = as_work(of, forces)
-    u = equilibrium(now, found.u, _constant(pull), _spins(now), now.interface(found.v))
+    u = equilibrium(now, found.u, _constant(pull), spins_of(now), now.interface(found.v))
     return begun(now, u, found.v, strained=found.strained)
 
 
@@ -214,9 +214,9 @@ def _differenced(first: Instant, motion_at: Motion, h: float) -> tuple[Moved, fl
                 now.slow = now.slow or instants[k - 1].slow
                 z1 = now.interface(v[k]) if again else None
                 if again or k:
-                    u[k] = equilibrium(now, guess, _constant(np.zeros_like(guess)), _spins(now), z1)
+                    u[k] = equilibrium(now, guess, _constant(np.zeros_like(guess)), spins_of(now), z1)
                 else:
-                    u[k] = _balance(now, guess, np.zeros_like(guess), _spins(now))
+                    u[k] = _balance(now, guess, np.zeros_like(guess), spins_of(now))
         except SolveError:
             if again < 2:  # rounding has not grown yet
                 raise
@@ -253,13 +253,6 @@ def _scatter(u: Float[np.ndarray, "5 N"]) -> float:
 def _feels_rates(of: Ready) -> bool:
     """Whether a law's force depends on a rate."""
     return any(feels_rates(each.law) for each in of.system.constraints)
-
-
-def _spins(now: Instant) -> Spins:
-    """[α]× + [ω]×² of all bodies, world components."""
-    alpha = cross_matrix(now.motion.alpha[0][now.of.bodies.motion])
-    omega = cross_matrix(now.omega)
-    return np.asarray(alpha + omega @ omega)
 
 
 def _relieved(now: Instant, v: Flat) -> tuple[Flat, Flat]:

@@ -8,12 +8,20 @@ from kedfem.dynamics.system.sparse import SparsePart, momentum
 from kedfem.dynamics.system.starts.instant import Flat, Instant
 from kedfem.dynamics.system.starts.internal_forces import own
 from kedfem.dynamics.system.starts.linear_equations import HeldBody, LinearEquations, held_body
+from kedfem.motion.newton import cross_matrix
 
 KRYLOV = 60
 LEFT = 1e-4  # of a residual, by GMRES: iterations of the deflection go on, and rounding may leave 1e-8
 CONVERGED = 1e-10  # change of an iteration, of the deflection
 
 Spins = Float[np.ndarray, "L 3 3"]
+
+
+def spins_of(now: Instant) -> Spins:
+    """[α]× + [ω]×² of all bodies, world components."""
+    alpha = cross_matrix(now.motion.alpha[0][now.of.bodies.motion])
+    omega = cross_matrix(now.omega)
+    return np.asarray(alpha + omega @ omega)
 
 
 class TurningBodies:
