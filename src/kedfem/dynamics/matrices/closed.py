@@ -87,9 +87,13 @@ def _common(
     held: Sequence[Int[np.ndarray, " c"]], own: Sequence[Float[np.ndarray, "c c"]], k: int
 ) -> Float[np.ndarray, "k k"] | sp.csr_array:
     """The links' matrices on the interface unknowns that each has a share in, added up; sparse where there are many."""
+    if k <= MANY:
+        H = np.zeros((k, k))
+        for c, x in zip(held, own, strict=True):
+            H[np.ix_(c, c)] += x
+        return H
     at = [np.concatenate([x.ravel() for x in each]) for each in zip(*(np.meshgrid(c, c) for c in held), strict=True)]
-    H = sp.csr_array(sp.coo_array((np.concatenate([x.T.ravel() for x in own]), at), (k, k)))
-    return H if k > MANY else H.toarray()
+    return sp.csr_array(sp.coo_array((np.concatenate([x.T.ravel() for x in own]), at), (k, k)))
 
 
 def turned_interface(part: Substructure, R: Float[np.ndarray, "T d d"]) -> Float[np.ndarray, "T c k"]:
