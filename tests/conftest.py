@@ -14,7 +14,7 @@ from beartype import beartype
 from hypothesis import settings
 from jaxtyping import AbstractArray, install_import_hook, jaxtyped
 
-from tests.slow import LIST, STUDIES, listed
+from tests.slow import ASIDE, LIST, STUDIES, listed
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ["KEDFEM_CACHE"] = "off"
@@ -90,8 +90,8 @@ def pytest_runtest_setup() -> None:
 @pytest.hookimpl(tryfirst=True)  # before -m chooses
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark tests of laws and numbers that are no long studies, which .ci/run repeats with other BLAS and numba kernels;
-    then those that the default run leaves out as they are slow, and those that .ci/run leaves out too."""
-    lists = {"slow": listed(LIST), "study": listed(STUDIES)}
+    then those that the default run leaves out as they are slow, some of which other kernels or .ci/run leave out too."""
+    lists = {"aside": listed(ASIDE), "slow": listed(LIST), "study": listed(STUDIES)}
     for item in items:
         if item.path.parent.name in NUMERICAL and not item.get_closest_marker("long"):
             item.add_marker("kernels")

@@ -12,6 +12,8 @@ from pathlib import Path
 
 MOST = 180.0  # seconds of all workers together: with shorter tests less than 5 minutes of two
 LIST = Path(__file__).with_name("slow.txt")
+ASIDE = Path(__file__).with_name("aside.txt")
+"""Tests that the default run leaves out, and no other."""
 STUDIES = Path(__file__).with_name("studies.txt")
 """Tests that .ci/run leaves out too: dear kinds of what cheaper kinds show as well."""
 LINE = re.compile(r"(\d+\.\d+)s (?:call|setup|teardown) +(\S.*)")
