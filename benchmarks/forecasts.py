@@ -6,6 +6,7 @@ from tempfile import TemporaryDirectory
 from benchmarks.memory import memory_held, most_memory
 from benchmarks.pages import ROOT, apart, script, table, write_page
 from benchmarks.scenes import mechanisms, with_reduced_links
+from kedfem.precompile import precompile
 from kedfem.scene import Scene, read_scene, scene_from
 
 EXAMPLES = (
@@ -17,6 +18,7 @@ QUIET = {"animation": None, "plots": False, "picture": False, "report": False, "
 
 def bench_forecasts(folder: Path, quick: bool) -> None:
     """Forecast and run of mechanisms unreduced and reduced, and of examples; table to the folder."""
+    precompile(lambda stage, done, total: None)
     names = [*_cases(), *EXAMPLES]
     rows = []
     for name in names[:2] if quick else names:
@@ -64,10 +66,9 @@ def told(name: str) -> dict[str, float]:
 def run(name: str) -> dict[str, float]:
     """What a run takes, and what memory it adds to a process that has run a small one."""
     from kedfem.analysis import analyse
-    from kedfem.precompile import few_steps
+    from kedfem.precompile import KINDS, few_steps
 
-    for kind in ("rigid-body frames", "co-rotational frames"):
-        few_steps(kind)
+    few_steps(*KINDS)
     held = memory_held()
     with TemporaryDirectory() as folder:
         done = analyse(_into(_scene(name), folder))
