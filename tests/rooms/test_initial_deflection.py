@@ -7,8 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.errors import KedfemError
+from tests.laws.test_limits import AXES
 from tests.laws.test_turning_loads import ASKEW, arm
-from tests.moving import ran, state
+from tests.moving import beam_in_space, channels, ran, state
 
 Raw = dict[str, Any]
 FORCE, LENGTH = 40.0, 0.5
@@ -59,6 +60,30 @@ def test_a_plucked_cantilever_swings_with_its_first_frequency(kind: str, R: Any,
     omega = (1.8751 / LENGTH) ** 2 * np.sqrt(BENDING[kind] / MASS[kind])
     t = np.concatenate([block.motion.t for block in blocks])
     assert_allclose(moved, moved[0] * np.cos(omega * t), atol=0.1 * moved[0])
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_a_plucked_rigid_rod_swings_on_its_spring(axis: str) -> None:
+    """From k θ = F L cos θ about its end, with its first frequency."""
+    n, stiffness, force = AXES[axis], 200.0, 4.0
+    d = np.cross(n, [0.3, 0.5, 0.9])
+    end = LENGTH * d / np.linalg.norm(d)
+    rod = {**beam_in_space((0, 0, 0), end, 2, n), "model": "rigid"}
+    del rod["beam"]
+    ready, blocks = ran({
+        "gravity": [0, 0, 0], "links": {"rod": rod},
+        "joints": {"A": {"kind": "revolute", "links": ["ground", "rod"], "at": [0, 0, 0], "axis": n.tolist()}},
+        "springs": {"S": {"kind": "torsion", "joint": "A", "stiffness": stiffness}},
+        "analysis": {"end_time": 0.15, "step": 2e-4, "rho_inf": 0.95, "initial_deflection": {"tip": {
+            "link": "rod", "at": end.tolist(), "force": (force * np.cross(n, end) / LENGTH).tolist()}}},
+    })  # fmt: skip
+    theta = channels(ready, blocks)["springs/S/angle"][:, 0]
+    assert_allclose(stiffness * theta[0], force * LENGTH * np.cos(theta[0]), rtol=1e-7)
+    mass = 7850 * np.pi * 0.02**2 / 4 * LENGTH
+    omega = np.sqrt(stiffness / (mass * (LENGTH**2 / 3 + 0.02**2 / 16)))
+    t = np.concatenate([block.motion.t for block in blocks])
+    assert_allclose(theta, theta[0] * np.cos(omega * t), atol=2e-3 * theta[0])
+    assert omega * t[-1] > 2 * np.pi
 
 
 REFUSED = [

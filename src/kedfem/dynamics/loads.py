@@ -169,14 +169,14 @@ def initial_forces(scene: Scene, links: Sequence[Link]) -> list[Float[np.ndarray
     Raises
     ------
     MeshError, SceneError
-        If a point is not on its link, or this is rigid and has no elastic state.
+        If a point is not on its link, or a drive holds this where it is.
     """
     out = [np.zeros((link.n, link.d)) for link in links]
     parts = {str(k): link for k, link in enumerate(links)}
     for name, force in scene.analysis.initial_deflection.items():
         where = f"analysis.initial_deflection.{name}"
-        if all(link.name != force.link or link.rigid for link in links):
-            raise SceneError(f"{where}.link: must name an elastic link, got '{force.link}', which does not deform")
+        if all(link.name != force.link for link in links):
+            raise SceneError(f"{where}.link: must name a link that can give, got '{force.link}', which its drive holds")
         key, weights = at_point(where, force.link, np.asarray(force.at), parts)
         out[int(key)] += np.outer(weights, as_rows(parts[key], np.asarray(force.force)))
     return out

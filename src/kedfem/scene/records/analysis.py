@@ -45,7 +45,7 @@ class InitialForce(Record):
     """A force at a point of a link that has deflected the mechanism, and is let go at the start."""
 
     link: LinkName
-    """the link it acts on, an elastic one"""
+    """the link it acts on, an elastic one or a rigid one that no drive holds"""
     at: Point
     """where, in the reference position"""
     force: ForceVector
