@@ -225,10 +225,10 @@ def test_a_slider_is_pulled_against_its_stop_with_all_frames(frames: str, stiffe
 
 
 def test_what_no_stop_holds_is_refused() -> None:
-    """Pulled away from its stop, on a slide: nothing else holds it. By some roundings its first step says so."""
+    """Pulled away from its stop, along the rod's other way, on a slide: nothing else holds it."""
     n = AXES["x"]
     d = across(n)
-    with pytest.raises(KedfemError, match=r"a deflection that can be found|iterations of a step must converge"):
+    with pytest.raises(KedfemError, match="must be a deflection that can be found"):
         ran({
             "links": {"rod": beam_in_space((0, 0, 0), L * d, 2, n)},
             "joints": {"J": {"kind": "prismatic", "links": ["rod", "ground"], "at": [0, 0, 0], "axis": n.tolist()}},

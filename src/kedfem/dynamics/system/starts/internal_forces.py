@@ -163,6 +163,11 @@ def rows(of: Ready, k: int, x: Flat) -> Nodal:
     return np.asarray(rows_of(link, of.parts[k], x.reshape(1, link.d, link.n))[0])
 
 
+def moved(of: Ready, x: Float[np.ndarray, " _"]) -> list[float]:
+    """How far each body moves by coordinates, at the most of one component [m]."""
+    return [float(np.abs(rows(of, k, x[own(of, k)])).max(initial=0.0)) for k in range(len(of.parts))]
+
+
 def own(of: Ready, k: int) -> slice:
     """Where the coordinates of body k stand."""
     return slice(int(of.bodies.at[k]), int(of.bodies.at[k + 1]))

@@ -27,7 +27,7 @@ from kedfem.dynamics.system.record import COROTATIONAL
 from kedfem.dynamics.system.sparse import momentum
 from kedfem.dynamics.system.starts.instant import Flat, Instant
 from kedfem.dynamics.system.starts.internal_forces import Frames as Sought
-from kedfem.dynamics.system.starts.internal_forces import drawn, own, rows
+from kedfem.dynamics.system.starts.internal_forces import drawn, moved, own, rows
 from kedfem.dynamics.system.starts.linear_equations import LinearEquations
 from kedfem.dynamics.system.starts.turning_bodies import CONVERGED, Spins, TurningBodies
 from kedfem.errors import SolveError
@@ -38,6 +38,7 @@ SHORTEST, IN_A_ROW = 1 / 64, 4  # of a step; so many of them end a search
 FALLS = 0.25  # of a step's length: share by which what is left has to fall
 KRYLOV = 40
 OPEN = 1e-4  # of the largest link: what joints may be open in a balance; found ones are at 1e-9
+FAR = 1e4  # of the largest link: displacements of what nothing holds
 LEFT = 1e-3  # of a residual by GMRES: an iteration leaves about as much of the error
 ROUNDING = 1e-8  # of the deflection: changes below it that do not fall
 LEAST = 1e-6  # the same of soft directions, where nothing is left to rounding and no step lessens it
@@ -190,8 +191,8 @@ class Equilibrium:
     def moves(self, at: Point, new: Point, change: Flat) -> str:
         """What moves most along a change, and whose force changes most between two points."""
         of = self.now.of
-        far = [float(np.abs(rows(of, k, change[own(of, k)])).max(initial=0.0)) for k in range(len(of.parts))]
-        words = f"link '{of.system.model.links[int(np.argmax(far))].name}' moves most from iteration to iteration"
+        most = of.system.model.links[int(np.argmax(moved(of, change)))].name
+        words = f"link '{most}' moves most from iteration to iteration"
         forces = np.abs(new.laws - at.laws)
         if forces.any():
             words += f", and the force of {of.system.constraints[int(np.argmax(forces))].name} changes most"
@@ -230,14 +231,18 @@ def gaps(now: Instant, u: Flat, z: Flat) -> list[Flat]:
 
 
 def stands_off(now: Instant, u: Flat, z1: Flat | None) -> str:
-    """Which link a deflection leaves off its joints, in words; nothing where all are closed.
+    """Which link a deflection leaves off its joints, or farther off than anything holds it; nothing if it does neither.
 
-    Forces of open joints balance nothing: iterations of large motions may settle there.
+    Forces of open joints balance nothing: iterations of large motions may settle there. So may they where what nothing
+    holds has gone so far that changes are small beside it.
     """
     system, z = now.of.system, now.interface(u)
     links = system.model.links
     off = [np.abs(x).max(initial=0.0) for x in gaps(now, u, z)]
-    size = OPEN * max(map(reach, links))
+    largest, far = max(map(reach, links)), moved(now.of, u)
+    if max(far) > FAR * largest:
+        return f"link '{links[int(np.argmax(far))].name}' would move by {max(far):.3g} m"
+    size = OPEN * largest
     if max(off) > size:
         return f"link '{links[int(np.argmax(off))].name}' would stand {max(off):.3g} m off its joints"
     C, e = now.measured(z, z1)

@@ -12,16 +12,13 @@ import numpy as np
 from kedfem.arrays import Bool
 from kedfem.dynamics.system.record import Stop
 from kedfem.dynamics.system.starts.instant import Flat, Instant, turned
-from kedfem.dynamics.system.starts.internal_forces import own, rows
 from kedfem.dynamics.system.starts.laws import Props
 from kedfem.errors import SolveError
-from kedfem.links.reduced import reach
 
 STIFFER, STIFFENED = 1e2, 4  # props than the stops, so many times, until a balance is found
 LOOSER, LEAST_LOOSER = 0.1, 0.7  # from one balance to the next, and where that is far too
 STILL = 1e-2  # of how far limited coordinates have gone: changes from one to the next below which props bear nothing
 LAST = 1e-12  # of a stop's stiffness: the loosest
-FAR = 1e4  # of the largest link: displacements of what no stop holds
 
 Sought = Callable[[Instant, Flat], Flat]
 
@@ -42,8 +39,6 @@ def without_props(now: Instant, u: Flat, z1: Flat | None, sought: Sought) -> Fla
     """
     laws, still = [each.law for each in now.of.system.constraints], now.always.still
     stiffness = np.array([each.stiffness if isinstance(each, Stop) else 0.0 for each in laws])
-    links = now.of.system.model.links
-    far = FAR * max(map(reach, links))
     about, bearing = limited(now, u, z1)
     near, frames, at, e = now.near, still.frames(), u, about
 
@@ -81,8 +76,6 @@ def without_props(now: Instant, u: Flat, z1: Flat | None, sought: Sought) -> Fla
             if alone is not None:
                 now.near = near
                 return alone
-        if max(float(np.abs(rows(now.of, k, at[own(now.of, k)])).max()) for k in range(len(links))) > far:
-            return None
         looser = max(LOOSER, looser**2)
         factor *= looser
     return None

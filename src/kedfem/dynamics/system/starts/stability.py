@@ -16,7 +16,7 @@ import numpy as np
 
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion
-from kedfem.dynamics.system.starts.internal_forces import own, rows
+from kedfem.dynamics.system.starts.internal_forces import moved
 from kedfem.dynamics.system.starts.linear_equations import LinearEquations
 from kedfem.dynamics.system.starts.newton_krylov import Equilibrium, Point
 from kedfem.dynamics.system.starts.turning_bodies import spins_of
@@ -60,7 +60,7 @@ def stability(of: Ready, motion_at: Motion, state: State, at_rest: bool, like: I
         least, x = tangent.least()
     except (SolveError, np.linalg.LinAlgError):
         return None
-    return Stability(least, of.system.model.links[int(np.argmax(_far(of, x)))].name)
+    return Stability(least, of.system.model.links[int(np.argmax(moved(of, x)))].name)
 
 
 class _Tangent:
@@ -78,7 +78,7 @@ class _Tangent:
         self.falling = np.where(at.hard, 0.0, np.minimum(at.slopes, 0.0))  # tangents of laws that A does not have
 
     def __call__(self, x: Flat) -> Flat:
-        problem, at, now, most = self.problem, self.at, self.problem.now, max(_far(self.problem.now.of, x))
+        problem, at, now, most = self.problem, self.at, self.problem.now, max(moved(self.problem.now.of, x))
         if most == 0.0:
             return x
         part = self.far / most
@@ -118,8 +118,3 @@ class _Tangent:
                 break
             basis.append(x / H[k + 1, k])
         return least, np.asarray(np.stack(basis[: k + 1], axis=1) @ vectors[:, n].real)
-
-
-def _far(of: Ready, x: Flat) -> list[float]:
-    """How far each body moves by coordinates."""
-    return [float(np.abs(rows(of, k, x[own(of, k)])).max(initial=0.0)) for k in range(len(of.parts))]
