@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks.pages import script, table, write_page
 from kedfem.motion.batch import Choice, settled
-from kedfem.motion.linkage import Linkage, linkage
+from kedfem.motion.linkage import Linkage, linkage, resting_poses
 from kedfem.motion.newton import target
 from kedfem.motion.path import Path as MotionPath
 from kedfem.motion.path import path
@@ -74,7 +74,7 @@ def _time(work: Callable[[], object]) -> float:
 
 def _one_by_one(link: Linkage, along: MotionPath, tau: np.ndarray) -> np.ndarray:
     """Angular accelerations by Newton from each point to the next."""
-    poses, near, out = link.start, along.near[:1], []
+    poses, near, out = resting_poses(len(link.bodies)), along.near[:1], []
     for each in tau:
         at = np.array([each])
         got = settled(link, Choice(link.rows), poses, target(link, at, near), link.drives.at(at)[1:])
