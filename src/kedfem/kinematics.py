@@ -18,7 +18,6 @@ from kedfem.links.record import Link
 from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.motion.counted_turns import require_counted
 from kedfem.motion.linkage import Linkage
-from kedfem.motion.mobility import free_motion_count
 from kedfem.motion.path import Path
 from kedfem.motion.transmission import LEAST
 from kedfem.output.animation import AnimationWriter, remove_animation
@@ -159,7 +158,7 @@ def _missing(scene: Scene, linked: Linkage, masses: Inertias) -> Iterator[str]:
         got = ", ".join(f"{name} (a slider without mass)" if name in sliders else name for name in bare)
         yield f"rigid forces: links without shape and material are taken to have no mass: {got}"
     if linked.mobility:
-        free = free_motion_count(scene, linked)
+        free = linked.mobility
         yield f"free motions ({free}) are held in the reference position; forces of joints are left out"
 
 

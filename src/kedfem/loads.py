@@ -11,7 +11,6 @@ from kedfem.accuracy.prepared import moving
 from kedfem.arrays import Bool
 from kedfem.errors import KedfemError, OutputError
 from kedfem.motion.linkage import Linkage
-from kedfem.motion.mobility import free_motion_count
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.output.load_files import write_drive_load, write_joint_load, write_polar, write_summary
 from kedfem.results import Results, read_results, ready_folder, results_file
@@ -107,7 +106,7 @@ def _moved(scene: Scene, results: Results) -> tuple[Linkage | None, RigidMotion 
     try:
         linked, along = moving(scene)
         if linked.mobility:
-            return None, None, (f"beside the drive links move freely ({free_motion_count(scene, linked)}): {left}",)
+            return None, None, (f"beside the drive links move freely ({linked.mobility}): {left}",)
         motion = rigid_motion(linked, along, results.time, path_parameter(scene, results.time))
     except KedfemError as error:
         return None, None, (f"the rigid motion cannot be found again ({error}): {left}",)

@@ -8,7 +8,7 @@ import pytest
 from kedfem.accuracy.prepared import moving
 from kedfem.export.motion import export_motion
 from kedfem.kinematics import kinematics
-from kedfem.motion.mobility import free_motion_count, mobility
+from kedfem.motion.mobility import mobility
 from kedfem.scene import Scene, scene_from
 from tests.moving import bar, beam_in_space
 
@@ -37,7 +37,7 @@ def test_commands_count_free_motions_as_check_does(axis: list[float] | None, cou
     scene = hanging(axis)
     linked, along = moving(scene)
     found = mobility(scene, linked, along)
-    assert sum(motion.basis.shape[1] for motion in found.free) == count == free_motion_count(scene, linked)
+    assert sum(motion.basis.shape[1] for motion in found.free) == count == linked.mobility
     told = f"free motions ({count}) are held in the reference position"
     assert told in export_motion(scene, tmp_path / "motion.csv")[1]
     assert any(words.startswith(told) for words in kinematics(scene, tmp_path / "moved").warnings)

@@ -33,7 +33,6 @@ from kedfem.dynamics.reduced_model import reduced_model, restored_model, stored_
 from kedfem.errors import SceneError
 from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
-from kedfem.motion.mobility import free_motion_count
 from kedfem.motion.path import Path
 from kedfem.scene import Scene, time_grid, without_vibration
 from kedfem.store import kept
@@ -136,7 +135,7 @@ def reduced(
     if full.linkage.mobility:
         raise SceneError(
             f"links.{next(iter(chosen))}.reduced: must be left out where motions are free (modes are found for a "
-            f"motion that the drive prescribes), got {free_motion_count(full.scene, full.linkage)} free"
+            f"motion that the drive prescribes), got {full.linkage.mobility} free"
         )
     stage("modes")
     parts = static_parts(full.model)

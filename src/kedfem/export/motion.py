@@ -8,7 +8,6 @@ from kedfem.dynamics.rigid_body import all_motions
 from kedfem.export.files import require_ending
 from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.motion.counted_turns import require_counted
-from kedfem.motion.mobility import free_motion_count
 from kedfem.output.motion_file import write_motion
 from kedfem.scene import Scene
 
@@ -26,6 +25,6 @@ def export_motion(scene: Scene, path: Path) -> tuple[int, tuple[str, ...]]:
     linked, along = moving(scene)
     require_counted(scene, linked, along)
     count = write_motion(path, scene, linked, (motion for _, motion in all_motions(scene, linked, along)))
-    held = f"free motions ({free_motion_count(scene, linked)}) are held in the reference position"
+    held = f"free motions ({linked.mobility}) are held in the reference position"
     free = (held,) if linked.mobility else ()
     return count, (*assembly_warning(assembly), *free)

@@ -1,6 +1,7 @@
 """Constraint equations of a scene's joints, gears and drives."""
 
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from kedfem.motion.constraints import ANGLE, GAP, ConstraintEquation, coupled, f
 from kedfem.scene import Joint, Scene
 
 GROUND = "ground"
+PLANE = "the plane"
 
 
 def joint_points(scene: Scene) -> Float[np.ndarray, "j 3"]:
@@ -81,6 +83,12 @@ def joint_free_rows(scene: Scene, name: str, bodies: tuple[str, ...]) -> list[Co
     joint = scene.joints[name]
     axis, point = None if joint.axis is None else unit(joint.axis), np.asarray(joint.at) - scene_centre(scene)
     return free_rows(joint.kind, name, *_pair(joint, bodies), point, axis)
+
+
+def plane_rows(bodies: tuple[str, ...]) -> list[ConstraintEquation]:
+    """Rows that hold all links in planes z = constant."""
+    planes = (joint_rows("planar", PLANE, k, 0, np.zeros(3), np.eye(3)[2]) for k in range(1, len(bodies)))
+    return list(chain.from_iterable(planes))
 
 
 def _pair(joint: Joint, bodies: tuple[str, ...]) -> tuple[int, int]:

@@ -21,15 +21,26 @@ from kedfem.motion.joint_equations import (
     gear_row,
     joint_free_rows,
     joint_points,
+    plane_rows,
     rows_of,
     scene_centre,
 )
 from kedfem.motion.parts import parts
 from kedfem.motion.redundancy import LOOSER, Looser, would_move
-from kedfem.motion.released_motions import RANK_TOLERANCE, Drawn, free_motions, listed, rank
+from kedfem.motion.released_motions import (
+    RANK_TOLERANCE,
+    Basis,
+    Drawn,
+    free_motions,
+    listed,
+    null_space,
+    planar,
+    rank,
+    span,
+)
 from kedfem.motion.released_motions import remedy as held_by
 from kedfem.motion.values import Poses, features, jacobian
-from kedfem.scene import Scene, corotational_links
+from kedfem.scene import Scene, corotational_links, plane_scene
 
 # by so much less counts each further joint motion, so that rounding chooses none that is to be held
 FIRST = 1e-6
@@ -46,7 +57,7 @@ class Linkage:
     size : characteristic length, makes rows and columns comparable [m]
     centre : of the joints; poses are those of points drawn there, so that the scene may lie far from the origin [m]
     drives : what is driven
-    mobility : free motions that the drives leave; as many rows, the last ones, hold these
+    mobility : free motions that the drives leave, of a plane scene in its plane; as many rows, the last ones, hold these
     blocks : how rows are solved entry by entry, of linkages of many bodies
     """
 
@@ -97,12 +108,16 @@ def linkage(scene: Scene) -> Linkage:
     several = blocks(every, len(bodies), size) if driven and len(bodies) > MANY else None
     free = 0
     if not driven:
-        rest, names = resting_poses(len(bodies)), [row.joint for row in rows]
-        free = 6 * (len(bodies) - 1) - sum(x.rank(rest, size) for x in parts(every, names, len(bodies)))
+        rest, held = resting_poses(len(bodies)), rows + (plane_rows(bodies) if plane_scene(scene) else [])
+        every_part = parts(stacked(held), [row.joint for row in held], len(bodies))
+        free = 6 * (len(bodies) - 1) - sum(part.rank(rest, size) for part in every_part)
     elif several is None or not _well_driven(every, several, size):
         drawn = drawn_linkage(scene, rows)
+        if plane_scene(scene):
+            rows = rows + _across(drawn, bodies)
+            drawn = planar(drawn_linkage(scene, rows))
         free = _check_mobility(scene, drawn)
-        rows = rows + _holding(scene, drawn.J, bodies, size, free)
+        rows = rows + _holding(scene, drawn, free)
         every = stacked(rows)
         several = several and blocks(every, len(bodies), size)
     joints = tuple(row.joint for row in rows)
@@ -237,19 +252,31 @@ def _other_drives(scene: Scene, drawn: Drawn) -> list[str]:
     return out
 
 
-def _holding(scene: Scene, J: np.ndarray, bodies: tuple[str, ...], size: float, free: int) -> list[ConstraintEquation]:
-    """Rows that hold as many joint motions as are free in the reference position: those that these change most, of equal
-    ones the first.
-    """
+def _across(drawn: Drawn, bodies: tuple[str, ...]) -> list[ConstraintEquation]:
+    """Rows that hold the motions that only leave the plane of a plane scene: its links know none of them."""
+    released, inside = null_space(drawn.J), null_space(planar(drawn).J)
+    across = span(released - inside @ (inside.T @ released))
+    return _most_changed(plane_rows(bodies), across, len(bodies), drawn.size)
+
+
+def _holding(scene: Scene, drawn: Drawn, free: int) -> list[ConstraintEquation]:
+    """Rows that hold as many joint motions as are free in the reference position."""
     if not free:
         return []
-    motions = scipy.linalg.svd(J)[2][-free:].T
+    bodies, motions = (GROUND, *drawn.links), scipy.linalg.svd(drawn.J)[2][-free:].T
     undriven = (name for name in scene.joints if name not in scene.driven_joints)
-    rows = [row for name in undriven for row in _free_rows(scene, name, bodies, size, motions)]
-    change = drawn_jacobian(rows, len(bodies), size) @ motions
+    rows = [row for name in undriven for row in _free_rows(scene, name, bodies, drawn.size, motions)]
+    return _most_changed(rows, motions, len(bodies), drawn.size)
+
+
+def _most_changed(rows: list[ConstraintEquation], motions: Basis, bodies: int, size: float) -> list[ConstraintEquation]:
+    """As many rows as there are motions: those that these change most, of equal ones the first."""
+    if not motions.shape[1]:
+        return []
+    change = drawn_jacobian(rows, bodies, size) @ motions
     first = 1 - FIRST * np.arange(len(rows))
     _, _, order = scipy.linalg.qr((first[:, None] * change).T, pivoting=True, mode="economic")
-    return [rows[k] for k in order[:free]]
+    return [rows[k] for k in order[: motions.shape[1]]]
 
 
 def _free_rows(

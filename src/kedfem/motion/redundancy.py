@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.motion.joint_equations import unit
+from kedfem.motion.joint_equations import PLANE, unit
 from kedfem.motion.released_motions import Drawn, directions, listed, null_space, of_joints, rank, span
 
 LOOSER = {
@@ -123,7 +123,7 @@ def would_move(drawn: Drawn, looser: Looser) -> str:
 
 def _undriven(drawn: Drawn) -> Iterator[str]:
     driven = set(np.array(drawn.rows)[drawn.driven].tolist())
-    return (name for name in dict.fromkeys(drawn.rows) if name not in driven)
+    return (name for name in dict.fromkeys(drawn.rows) if name not in {*driven, PLANE})
 
 
 def _moves(drawn: Drawn) -> bool:

@@ -1,7 +1,7 @@
 """What a linkage may still do in the reference position, in words that name links and joints."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -9,12 +9,14 @@ import scipy.linalg
 
 from kedfem.arrays import Bool, Float
 from kedfem.motion.constraints import cross
+from kedfem.motion.joint_equations import PLANE
 from kedfem.scene import Joint
 
 RANK_TOLERANCE = 1e-6  # of the largest singular value: axes that far out of true count as parallel
 STILL = 1e-6  # of a motion: what counts as none
 SEARCHED = 10  # links up to which all groups are looked through for motions of their own
 AXES = np.eye(3)
+ACROSS = np.array([2, 3, 4])  # columns of a link that leave the xy plane: v_z, ω_x, ω_y
 Basis = Float[np.ndarray, "k n"]
 
 
@@ -67,6 +69,27 @@ def span(vectors: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k d"]:
     """Orthonormal basis of some vectors; what all but vanishes is left out."""
     U, s, _ = np.linalg.svd(vectors, full_matrices=False)
     return np.asarray(U[:, s > STILL])
+
+
+# -- the plane ----------------------------------------------------------------------------------------------
+
+
+def planar(drawn: Drawn) -> Drawn:
+    """A linkage whose links the xy plane holds: of each joint and drive what is left of its rows there."""
+    keys = list(zip(drawn.rows, drawn.driven.tolist(), strict=True))
+    rows = {key: in_plane(drawn.J[[each == key for each in keys]]) for key in dict.fromkeys(keys)}
+    held = np.eye(drawn.J.shape[1]).reshape(len(drawn.links), 6, -1)[:, ACROSS].reshape(-1, drawn.J.shape[1])
+    names = [name for (name, _), J in rows.items() for _ in J] + [PLANE] * len(held)
+    driven = [moves for (_, moves), J in rows.items() for _ in J] + [False] * len(held)
+    return replace(drawn, J=np.concatenate([*rows.values(), held]), rows=tuple(names), driven=np.array(driven, bool))
+
+
+def in_plane(rows: Float[np.ndarray, "m k"]) -> Float[np.ndarray, "n k"]:
+    """Independent equations that the rows of one joint are between motions in the plane."""
+    left = rows.copy().reshape(len(rows), -1, 6)
+    left[:, :, ACROSS] = 0.0
+    _, s, Vt = np.linalg.svd(left.reshape(rows.shape), full_matrices=False)
+    return np.asarray(Vt[s > RANK_TOLERANCE * s.max(initial=0.0)])
 
 
 # -- words --------------------------------------------------------------------------------------------------
