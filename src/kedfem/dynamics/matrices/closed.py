@@ -1,15 +1,18 @@
 """The linkage with its joints closed: all links together, through the common system of their interface unknowns."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, cast
 
 import numpy as np
-import scipy.sparse as sp
 
-from kedfem.arrays import Float, Int
+from kedfem.arrays import Float
 from kedfem.dynamics.joints.constraint_matrices import JointRows
-from kedfem.dynamics.matrices.interface import MANY, solver, static_tie
+from kedfem.dynamics.matrices.profile import Profile, profile_of
 from kedfem.dynamics.matrices.substructure import Substructure
+from kedfem.dynamics.system.arrays import Bodies, Constraints, ends_of, flat, groups
+from kedfem.dynamics.system.state import Trial
 from kedfem.errors import SolveError
 
 Loads = Sequence[Float[np.ndarray, "T n_ d_"]]
@@ -19,23 +22,35 @@ Loads = Sequence[Float[np.ndarray, "T n_ d_"]]
 class Closed:
     """A linkage with its joints closed where its links have some orientations at T times, for any loads.
 
-    RB : per link Rᵀ B of the interface unknowns that it has a share in
-    interface : z from what links exert on it
+    bodies, of : links and constraint equations as steps take them, what is at rest of them
+    R : (T, links, 3, 3), link to world
+    C, compliance : (T, n) gradients of constraints and springs, (r,) 1/κ
     """
 
     parts: Sequence[Substructure]
-    RB: Sequence[Float[np.ndarray, "T _ _"]]
-    interface: Callable[[Float[np.ndarray, "T k"]], Float[np.ndarray, "T k"]]
+    bodies: Bodies
+    of: Constraints
+    R: Float[np.ndarray, "T l 3 3"]
+    C: Float[np.ndarray, "T n"]
+    compliance: Float[np.ndarray, " r"]
 
     def forces(self, loads: Loads) -> list[Float[np.ndarray, "T _"]]:
-        """[λ; μ] on all links at their ports and anchors, link frames, from loads there."""
-        v = [x.reshape(len(x), -1) @ part.Y for x, part in zip(loads, self.parts, strict=True)]
-        each = [(part, b, part.attachment.columns, x) for part, b, x in zip(self.parts, self.RB, v, strict=True)]
-        z = np.zeros((len(v[0]), self.parts[0].attachment.unknowns))
-        for part, b, c, x in each:  # Σ Bᵀ (R S Rᵀ) B z = Σ Bᵀ R S v
-            z[:, c] += np.einsum("tck,tc->tk", part.S @ b, x)
-        z = self.interface(z)
-        return [((b @ z[:, c, None])[..., 0] - x) @ part.S for part, b, c, x in each]
+        """[λ; μ] on all links at their ports and anchors, link frames, from loads there.
+
+        Raises
+        ------
+        SolveError
+            If something is free to move.
+        """
+        from kedfem.dynamics.matrices.closed_kernel import closed_over
+        from kedfem.dynamics.system.reference import Handed
+
+        v = np.concatenate([x.reshape(len(x), -1) @ part.Y for x, part in zip(loads, self.parts, strict=True)], axis=1)
+        out, records = np.empty_like(v), [Handed(x) for x in (self.bodies, self.of, _room(self.bodies, self.of))]
+        closed_over(*records, self.R, self.C, self.compliance, v, out)
+        if not np.isfinite(out).all():
+            raise SolveError("joints: the joints' common system must be definite, got one that lets links move freely")
+        return np.split(out, self.bodies.port_at[1:-1], axis=1)
 
     def deflections(self, loads: Loads) -> Loads:
         """g of all links; all times go together."""
@@ -56,53 +71,57 @@ def closed(
     ----------
     R : per link, link to world
     rows : constraint equations, springs of bushings among them, on z; then Σ Bᵀ R λ is what these exert
-
-    Raises
-    ------
-    SolveError
-        If something is free to move.
     """
-    RB = [turned_interface(part, each) for part, each in zip(parts, R, strict=True)]
-    held, k = [part.attachment.columns for part in parts], parts[0].attachment.unknowns
-    own = [b.transpose(0, 2, 1) @ (part.S @ b) for part, b in zip(parts, RB, strict=True)]
-    if not k:
-        return Closed(parts, RB, lambda f: f)
-    if rows is None and k <= MANY:
-        H = np.zeros((len(RB[0]), k, k))
-        for c, x in zip(held, own, strict=True):
-            H[:, c[:, None], c] += x
-        try:
-            np.linalg.cholesky(H)
-        except np.linalg.LinAlgError as error:
-            raise SolveError(f"joints: the joints' common system must be definite, got {error}") from error
-        return Closed(parts, RB, lambda f: np.linalg.solve(H, f[..., None])[..., 0])
-    solvers = [
-        solver(_common(held, [x[t] for x in own], k), None if rows is None else static_tie(rows, t))
-        for t in range(len(RB[0]))
-    ]
-    return Closed(parts, RB, lambda f: np.stack([solved(x)[0] for solved, x in zip(solvers, f, strict=True)]))
+    joints, T = [part.attachment for part in parts], len(R[0])
+    if rows is None:
+        rows = JointRows(np.zeros((T, 0)), np.zeros(1, int), np.zeros(0, int), joints[0].unknowns, np.zeros(0))
+    coupled = [rows.columns[first:last] for first, last in pairwise(rows.row_at)]
+    made = profile_of([joint.columns for joint in joints], coupled, rows.unknowns)
+    order = [first + np.argsort(made.number[c]) for first, c in zip(rows.row_at[:-1], coupled, strict=True)]
+    of = _with(
+        Constraints,
+        linear=np.ones(len(coupled), bool),
+        place=made.constraint,
+        column_at=rows.row_at,
+        columns=flat(made.columns, int),
+    )
+    frames = np.zeros((T, len(parts), 3, 3))
+    for k, each in enumerate(R):
+        frames[:, k, : each.shape[1], : each.shape[2]] = each
+    C = np.ascontiguousarray(rows.entries[:, flat(order, int)])
+    return Closed(parts, _bodies(parts, made), of, frames, C, 1 / rows.stiffness)
 
 
-def _common(
-    held: Sequence[Int[np.ndarray, " c"]], own: Sequence[Float[np.ndarray, "c c"]], k: int
-) -> Float[np.ndarray, "k k"] | sp.csr_array:
-    """The links' matrices on the interface unknowns that each has a share in, added up; sparse where there are many."""
-    if k <= MANY:
-        H = np.zeros((k, k))
-        for c, x in zip(held, own, strict=True):
-            H[np.ix_(c, c)] += x
-        return H
-    at = [np.concatenate([x.ravel() for x in each]) for each in zip(*(np.meshgrid(c, c) for c in held), strict=True)]
-    return sp.csr_array(sp.coo_array((np.concatenate([x.T.ravel() for x in own]), at), (k, k)))
+def _bodies(parts: Sequence[Substructure], made: Profile) -> Bodies:
+    """What the interface has of links; of anchors it has nothing, each is a point of its own."""
+    joints, sizes = [part.attachment for part in parts], [len(part.S) for part in parts]
+    B, component, port = [], [], []
+    for joint, q in zip(joints, sizes, strict=True):
+        free = q - len(joint.keep)
+        B.append(np.pad(joint.B, ((0, free), (0, 0))))
+        component.append(np.pad(joint.keep % joint.components, (0, free)))
+        port.append(np.append(joint.keep // joint.components, len(joint.weights) + np.arange(free)))
+    return cast("Bodies", _with(
+        Bodies, motion=np.arange(len(parts)), port_at=ends_of(sizes), component=flat(component, int), group=groups(port),
+        S_at=ends_of([part.S.size for part in parts]), S=flat([part.S for part in parts]),
+        B_at=ends_of([each.size for each in B]), B=flat(B), column_at=ends_of([len(joint.columns) for joint in joints]),
+        columns=flat([made.number[joint.columns] for joint in joints], int), place=made.unknown, first=made.first,
+        row_at=made.at, multiplier=made.multiplier,
+    ))  # fmt: skip
 
 
-def turned_interface(part: Substructure, R: Float[np.ndarray, "T d d"]) -> Float[np.ndarray, "T c k"]:
-    """[Rᵀ B; 0] over time: port components in the link frame from the interface unknowns that the link has a share in."""
-    joint = part.attachment
-    (p, d), k = (len(joint.weights), joint.components), joint.B.shape[1]
-    B = np.zeros((p * d, k))
-    B[joint.keep] = joint.B
-    turned = np.einsum("tba,pbk->tpak", R, B.reshape(p, d, k)).reshape(len(R), p * d, k)
-    out = np.zeros((len(R), len(part.S), k))
-    out[:, : len(joint.keep)] = turned[:, joint.keep]
-    return out
+def _room(bodies: Bodies, of: Constraints) -> Trial:
+    k, r, (q, B, size) = (
+        len(bodies.place),
+        len(of.place),
+        (int(x[-1]) for x in (bodies.port_at, bodies.B_at, bodies.row_at)),
+    )
+    sizes = {"reaction": q, "w": q, "force": q, "RB": B, "SRB": B, "H": size, "K": size, "inverse": k + r, "x": k + r,
+             "C": len(of.columns), "target": r, "compliance": r, "beside": r, "m": r, "right": k, "dz": k}  # fmt: skip
+    room = {name: np.zeros(n) for name, n in sizes.items()}
+    return cast("Trial", _with(Trial, Rp=np.zeros((len(bodies.motion), 3, 3)), **room))
+
+
+def _with(record: Any, **fields: Any) -> Any:
+    """A record with nothing else in it."""
+    return record(**(dict.fromkeys(record._fields) | fields))

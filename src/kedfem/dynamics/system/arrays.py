@@ -18,6 +18,17 @@ def ends_of(sizes: Sequence[int]) -> Int[np.ndarray, " _"]:
     return np.concatenate([[0], np.cumsum(np.array(sizes, int))])
 
 
+def flat(arrays: Sequence[np.ndarray], kind: type = float) -> np.ndarray:
+    """All numbers of some arrays, one after the other."""
+    return np.concatenate([np.zeros(0, kind), *(np.asarray(x, kind).ravel() for x in arrays)])
+
+
+def groups(ports: Sequence[Int[np.ndarray, " q"]]) -> Int[np.ndarray, " _"]:
+    """Where the components of each one's interface point begin, from these points' numbers on each body."""
+    starts = ends_of([len(each) for each in ports])[:-1]
+    return flat([at + np.searchsorted(each, each) for at, each in zip(starts, ports, strict=True)], int)
+
+
 class Coefficients(NamedTuple):
     """Of one member of generalised-α at a fixed step, and of Rayleigh damping.
 

@@ -85,8 +85,11 @@ def pushed(bodies, i, trial):  # type: ignore[no-untyped-def]
 
 
 @inner
-def evaluated(c, ends, of, driving, t, state, trial, work):  # type: ignore[no-untyped-def]
-    """Gradients of all constraints and laws at z, and what these ask of Δz; forces without a tangent are known ones."""
+def evaluated(c, ends, of, driving, t, state, trial, work, begins):  # type: ignore[no-untyped-def]
+    """Gradients of all constraints and laws at z, and what these ask of Δz; forces without a tangent are known ones.
+
+    Linear ones keep their gradients from when a step begins.
+    """
     if of is None:
         return
     r, share = len(of.law), 1 - c.alpha_f
@@ -94,7 +97,9 @@ def evaluated(c, ends, of, driving, t, state, trial, work):  # type: ignore[no-u
         placed(ends, driving.R[t], driving.p[t], trial.z, trial.moving, work.end, work.vectors)
     rigid_motion = (driving.R[t], driving.v[t], driving.omega[t])
     for a in range(r):
-        e, rate = differentiated(ends, of, a, rigid_motion, trial, work)
+        e, rate = 0.0, 0.0
+        if begins or not of.linear[a]:
+            e, rate = differentiated(ends, of, a, rigid_motion, trial, work)
         columns, row = gradient(of, a, trial)
         if of.linear[a]:
             e = along(row, columns, trial.z)
@@ -169,7 +174,7 @@ def acts(row):  # type: ignore[no-untyped-def]
 
 @inner
 def bordered(bodies, of, trial):  # type: ignore[no-untyped-def]
-    """trial.K becomes H with a part of each constraint and law, and with what is left of them; so do compliances."""
+    """trial.K becomes H with a part `beside` of each constraint and law, and with what is left of them."""
     K, place, first, at = trial.K, bodies.place, bodies.first, bodies.row_at
     copied(trial.H, K)
     trace = 0.0
@@ -185,22 +190,20 @@ def bordered(bodies, of, trial):  # type: ignore[no-untyped-def]
             size += row[m] ** 2
         usual = trace / len(place) / size if size > 0.0 else 0.0
         sigma = usual / (1.0 + 2.0 * usual * trial.compliance[a])
-        left = 1.0 - sigma * trial.compliance[a]
         trial.beside[a] = sigma
-        trial.compliance[a], trial.target[a] = trial.compliance[a] / left, trial.target[a] / left
         own = of.place[a]
         for m in range(len(row)):
             i, x = place[columns[m]], sigma * row[m]
             K[at[own] + i - first[own]] = row[m]
             for o in range(m + 1):
                 K[at[i] + place[columns[o]] - first[i]] += x * row[o]
-        K[at[own + 1] - 1] = -trial.compliance[a]
+        K[at[own + 1] - 1] = -trial.compliance[a] / (1.0 - sigma * trial.compliance[a])
 
 
 @inner
 def interface_solved(bodies, of, trial, begins):  # type: ignore[no-untyped-def]
-    """trial.dz and trial.m from the right-hand side; without constraints the step's matrix is factored once."""
-    k, r, x, inverse = len(trial.z), len(trial.m), trial.x, trial.inverse
+    """trial.dz and trial.m from the right-hand side; where all constraints are linear by one factor for a step."""
+    k, r, x, inverse = len(trial.dz), len(trial.m), trial.x, trial.inverse
     if of is None:
         if begins:
             copied(trial.H, trial.K)
@@ -211,15 +214,16 @@ def interface_solved(bodies, of, trial, begins):  # type: ignore[no-untyped-def]
         for m in range(k):
             trial.dz[m] = x[bodies.place[m]]
         return
-    bordered(bodies, of, trial)
-    profile_factored(trial.K, bodies.first, bodies.row_at, bodies.multiplier, inverse)
+    if begins or not of.linear.all():
+        bordered(bodies, of, trial)
+        profile_factored(trial.K, bodies.first, bodies.row_at, bodies.multiplier, inverse)
     trial.dz[:] = 0.0
     for again in range(2):  # the second closes joints to rounding
         for m in range(k):
             x[bodies.place[m]] = trial.right[m] if again == 0 else 0.0
         for a in range(r):
             columns, row = gradient(of, a, trial)
-            left = trial.target[a] - trial.compliance[a] * trial.m[a]
+            left = (trial.target[a] - trial.compliance[a] * trial.m[a]) / (1.0 - trial.beside[a] * trial.compliance[a])
             x[of.place[a]] = left - along(row, columns, trial.dz)
         profile_solved(trial.K, bodies.first, bodies.row_at, inverse, x)
         for m in range(k):

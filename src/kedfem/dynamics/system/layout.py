@@ -14,7 +14,7 @@ from kedfem.dynamics.metric import element_tables
 from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.dynamics.system import record
-from kedfem.dynamics.system.arrays import Beams, Bodies, Coefficients, Constraints, Ends, ends_of
+from kedfem.dynamics.system.arrays import Beams, Bodies, Coefficients, Constraints, Ends, ends_of, flat, groups
 from kedfem.dynamics.system.forces.stresses import stress_tables
 from kedfem.dynamics.system.forces.turning_loads import turning_loads
 from kedfem.dynamics.system.record import Constraint, Curve, Driven, Held, Law, Spring, Stop, System, curve_of
@@ -86,15 +86,16 @@ def body_arrays(system: System, parts: Sequence[Part], profile: Profile) -> Bodi
         at=at, functions=np.array([x.n for x in links]), components=np.array([x.d for x in links]),
         motion=np.array(numbers), frame=np.array(frames), kind=np.array([KINDS[x.kind] for x in links]),
         dense=dense, arrays=address_tables(parts), passed=passed, port_at=ends_of(ports),
-        component=_flat([joint.keep % joint.components for joint in joints], int), group=_groups(joints),
+        component=flat([joint.keep % joint.components for joint in joints], int),
+        group=groups([joint.keep // joint.components for joint in joints]),
         G_at=ends_of([x.G.size for x in parts]), Y_at=ends_of([x.size for x in Y]),
         S_at=ends_of([q * q for q in ports]), B_at=ends_of([q * len(c) for q, c in zip(ports, columns, strict=True)]),
-        G=_flat([x.G for x in parts]), Y=_flat(Y), W=_flat(W),
-        S=_flat([x.S for x in parts]), B=_flat([joint.B for joint in joints]),
-        column_at=ends_of([len(c) for c in columns]), columns=_flat([profile.number[c] for c in columns], int),
+        G=flat([x.G for x in parts]), Y=flat(Y), W=flat(W),
+        S=flat([x.S for x in parts]), B=flat([joint.B for joint in joints]),
+        column_at=ends_of([len(c) for c in columns]), columns=flat([profile.number[c] for c in columns], int),
         place=profile.unknown, first=profile.first, row_at=profile.at, multiplier=profile.multiplier,
-        X=_flat([x for x, _, _ in fits]), one=_flat([x for _, x, _ in fits]), fit=_flat([x for _, _, x in fits]),
-        K=_flat(stiff),
+        X=flat([x for x, _, _ in fits]), one=flat([x for _, x, _ in fits]), fit=flat([x for _, _, x in fits]),
+        K=flat(stiff),
         beams=Beams(
             np.array(beams, int), np.array([numbers[k] for k in beams], int), at[beams],
             np.array([links[k].n for k in beams], int),
@@ -134,20 +135,6 @@ def _beam_tables(
     return rows, tangent, rigidity
 
 
-def _groups(joints: Sequence[Attachment]) -> Int[np.ndarray, " q"]:
-    """Where the components of each one's interface point begin."""
-    out, at = [], 0
-    for joint in joints:
-        port = joint.keep // joint.components
-        out.append(at + np.searchsorted(port, port))
-        at += len(port)
-    return _flat(out, int)
-
-
-def _flat(arrays: Sequence[np.ndarray], kind: type = float) -> np.ndarray:
-    return np.concatenate([np.zeros(0, kind), *(np.asarray(x, kind).ravel() for x in arrays)])
-
-
 def end_arrays(system: System, number: Int[np.ndarray, " k"]) -> Ends:
     """All ends as flat arrays on the renumbered interface unknowns."""
     ends = system.ends
@@ -166,11 +153,11 @@ def end_arrays(system: System, number: Int[np.ndarray, " k"]) -> Ends:
         directions=np.array([end.directions for end in ends]).reshape(-1, 3, 3),
         lengths=_rows([end.lengths for end in ends]), known=np.array([end.known for end in ends], int),
         components=np.array([end.onto.shape[1] for end in ends], int), column_at=ends_of([len(c) for c in columns]),
-        columns=_flat([number[c] for c in columns], int), onto_at=ends_of([x.size for x in onto]), onto=_flat(onto),
+        columns=flat([number[c] for c in columns], int), onto_at=ends_of([x.size for x in onto]), onto=flat(onto),
         line=np.array(lines, int), line_at=ends_of([len(x) for x in full]), full_at=ends_of([x.size for x in full]),
-        full=_flat(full), number=np.array([lines.index(n) if n in lines else -1 for n in range(len(ends))], int),
+        full=flat(full), number=np.array([lines.index(n) if n in lines else -1 for n in range(len(ends))], int),
         free=np.array([n in free for n in lines], bool), axis=_rows([axis for axis, _ in of_lines]),
-        knots=_flat([along.s for _, along in of_lines]), cubic_at=ends_of([x.size for x in cubics]), cubics=_flat(cubics),
+        knots=flat([along.s for _, along in of_lines]), cubic_at=ends_of([x.size for x in cubics]), cubics=flat(cubics),
         weights=np.zeros(sum(map(len, full))), slopes=np.zeros(sum(map(len, full))), pin=np.zeros(len(lines)),
     )  # fmt: skip
 
@@ -196,12 +183,12 @@ def constraint_arrays(constraints: Sequence[Constraint], profile: Profile) -> Co
         numbers=np.array([x for _, x, _ in laws], float).reshape(-1, 4),
         drive=np.array([x for _, _, x in laws], int), over=np.array([x.over for x in curves], int),
         curve_at=ends_of([len(x.force.at) for x in curves]),
-        abscissa=_flat([np.array(x.force.at) for x in curves]),
+        abscissa=flat([np.array(x.force.at) for x in curves]),
         cubics=np.array([c for x in curves for c in x.force.coefficients], float).reshape(-1, 4),
         period=np.array([x.force.period for x in curves], float),
         jumps=np.array([isinstance(x.law, Stop) and x.law.damping > 0 for x in constraints], bool),
         place=profile.constraint, column_at=ends_of([len(c) for c in profile.columns]),
-        columns=_flat(profile.columns, int),
+        columns=flat(profile.columns, int),
     )  # fmt: skip
 
 

@@ -49,7 +49,7 @@ def solved_at_once(c, bodies, ends, of, driving, t, state, trial, work):  # type
         offset(bodies, i, work.y, trial, False)
         pushed(bodies, i, trial)
     unmoved(ends, of, driving, t, trial, work)
-    evaluated(c, ends, of, driving, t, state, trial, work)
+    evaluated(c, ends, of, driving, t, state, trial, work, True)
     interface_solved(bodies, of, trial, True)
     for i in range(len(bodies.motion)):
         ported(bodies, i, trial)

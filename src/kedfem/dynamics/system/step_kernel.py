@@ -177,7 +177,7 @@ def asked(c, bodies, ends, of, driving, t, iteration, state, trial, work, solved
             turned_back(trial.Rp[i], d, trial.u[first:last], work.y[:N])
         offset(bodies, i, work.y, trial, own)
         pushed(bodies, i, trial)
-    evaluated(c, ends, of, driving, t, state, trial, work)
+    evaluated(c, ends, of, driving, t, state, trial, work, iteration == 0)
     interface_solved(bodies, of, trial, iteration == 0)
     for i in range(len(bodies.motion)):
         ported(bodies, i, trial)
