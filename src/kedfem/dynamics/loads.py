@@ -77,13 +77,13 @@ def patterns(scene: Scene, links: Mapping[str, Link], prescribed: bool = False) 
     for name, load in scene.loads.items():
         for key, found in _load_patterns(scene, f"loads.{name}", load, links).items():
             own = links[key].fit is not None and not prescribed
-            out[key] += [replace(x, own=own and _turns(x), load=name) for x in found]
+            out[key] += [replace(x, own=own and _turns(links[key], x), load=name) for x in found]
     return {key: tuple(found) for key, found in out.items()}
 
 
-def _turns(pattern: Pattern) -> bool:
+def _turns(link: Link, pattern: Pattern) -> bool:
     """Whether a load depends on how its link has turned: ψ of a planar beam takes a torque however it has."""
-    return pattern.follows and bool(pattern.forces[:, :2].any())
+    return pattern.follows and bool(pattern.forces[:, : 2 if link.kind == "beam" else 3].any())
 
 
 def coarse_steps(scene: Scene) -> tuple[str, ...]:

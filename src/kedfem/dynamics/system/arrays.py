@@ -67,11 +67,12 @@ class TurningLoads(namedtuple("TurningLoads", (
 ))):  # fmt: skip
     """Loads that turn with bodies, as directions shown by the body turn; see `turning_loads`.
 
-    body, at : (w,) number, and where its coordinates' share of `force` and twice its functions' of `shown` begin
+    body, at : (w,) number, and where its coordinates' share of `force` and its functions' of `shown` begin, thrice those
     planar_beam : (w,) whether an angle shows how it turns
-    drawn : (w, 2, 3) the directions in the reference position; shown : weights of functions on what they move by
-    force : on the body's coordinates, components along the directions' frame
-    axis, fixed : (w, 3) in that frame and in the world, whose product a load's amount has for a factor; zero: none
+    drawn : (w, 3, 3) Σ e ⊗ e of the directions in the reference position
+    shown : Σ e ⊗ of functions' weights on what they move by; of planar beams those on ψ
+    force : on the body's coordinates, components in the reference position
+    axis, fixed : (w, 3) there and in the world, whose product a load's amount has for a factor; zero: none
     """
 
 

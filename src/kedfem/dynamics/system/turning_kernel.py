@@ -4,6 +4,8 @@ import numpy as np
 
 from kedfem.compiled import inner
 
+TURNS = 30
+
 
 @inner
 def turned_loads(loads, bodies, R, amounts, u, f, frame):  # type: ignore[no-untyped-def]
@@ -43,7 +45,7 @@ def turned_loads(loads, bodies, R, amounts, u, f, frame):  # type: ignore[no-unt
 
 @inner
 def shown_frame(loads, bodies, w, R, u, frame):  # type: ignore[no-untyped-def]
-    """frame becomes the axes of the directions that show how load w has turned, in columns, world components."""
+    """frame becomes the rotation by which load w has turned, from the reference position to the world."""
     i, at = loads.body[w], loads.shown_at[w]
     first, n, d = bodies.at[i], bodies.functions[i], bodies.components[i]
     for b in range(3):
@@ -58,7 +60,7 @@ def shown_frame(loads, bodies, w, R, u, frame):  # type: ignore[no-untyped-def]
             frame[b, 0], frame[b, 1] = R[b, 0] * c + R[b, 1] * s, R[b, 1] * c - R[b, 0] * s
         frame[2, 2] = 1.0
         return
-    for m in range(2):
+    for m in range(3):
         for b in range(3):
             y = 0.0
             for k in range(3):
@@ -67,29 +69,32 @@ def shown_frame(loads, bodies, w, R, u, frame):  # type: ignore[no-untyped-def]
                 for x in range(n):
                     y += loads.shown[at + m * n + x] * u[first + b * n + x]
             frame[b, m] = y
-    if d == 2:
-        size = np.sqrt(frame[0, 0] * frame[0, 0] + frame[1, 0] * frame[1, 0])
-        c, s = frame[0, 0] / size, frame[1, 0] / size
-        frame[0, 0], frame[1, 0], frame[0, 1], frame[1, 1], frame[2, 1], frame[2, 2] = c, s, -s, c, 0.0, 1.0
-        return
-    unit(frame, 0)
-    across(frame, 0, 1, 2)
-    unit(frame, 2)
-    across(frame, 2, 0, 1)
+    rotated(frame)
 
 
 @inner
-def unit(frame, m):  # type: ignore[no-untyped-def]
-    """Column m becomes of length one."""
-    size = np.sqrt(frame[0, m] ** 2 + frame[1, m] ** 2 + frame[2, m] ** 2)
-    for b in range(3):
-        frame[b, m] /= size
+def rotated(A):  # type: ignore[no-untyped-def]
+    """A = Q U becomes its rotation Q: by Newton, from (A + cof A) / 2, which has the same one, of rank two as well."""
+    det = 1.0
+    for turn in range(TURNS):
+        C = (crossed(A, 1, 2), crossed(A, 2, 0), crossed(A, 0, 1))
+        if turn > 0:
+            det = A[0, 0] * C[0][0] + A[0, 1] * C[0][1] + A[0, 2] * C[0][2]
+        size = 0.0
+        for b in range(3):
+            for m in range(3):
+                change = (C[b][m] / det - A[b, m]) / 2
+                size = max(size, abs(change))
+                A[b, m] += change
+        if size <= 1e-8:  # the next, quadratically smaller, is rounding
+            break
 
 
 @inner
-def across(frame, i, j, k):  # type: ignore[no-untyped-def]
-    """Column k becomes column i × column j."""
-    frame_0 = frame[1, i] * frame[2, j] - frame[2, i] * frame[1, j]
-    frame_1 = frame[2, i] * frame[0, j] - frame[0, i] * frame[2, j]
-    frame_2 = frame[0, i] * frame[1, j] - frame[1, i] * frame[0, j]
-    frame[0, k], frame[1, k], frame[2, k] = frame_0, frame_1, frame_2
+def crossed(A, i, j):  # type: ignore[no-untyped-def]
+    """Row i × row j."""
+    return (
+        A[i, 1] * A[j, 2] - A[i, 2] * A[j, 1],
+        A[i, 2] * A[j, 0] - A[i, 0] * A[j, 2],
+        A[i, 0] * A[j, 1] - A[i, 1] * A[j, 0],
+    )

@@ -1,10 +1,9 @@
 """Loads that turn with bodies whose frames are their own: where a load acts, two directions of the body show how.
 
-They are y_m = R e_m + Σ_a w_ma u_a, e_m in the reference position: of a beam in space the section's directions where the
-load is, of other
-bodies those of the mean deformation, linear in u. With a = y_1/|y_1|, n = a × y_2/|a × y_2| and G = (a, n × a, n), the
-nodal forces are p G G0ᵀ, G0 in the reference position; of a planar beam they turn by ψ where the load is. A torque fixed
-in the world is three loads, the couples about the body's axes e_k, times m · G G0ᵀ e_k.
+They are y_m = R e_m + Σ_a w_ma u_a, e_m in the reference position: of a beam in space the section's two directions where
+the load is, of other bodies two or three of the mean deformation, linear in u. Nodal forces are p Qᵀ, with the rotation
+Q of Σ y_m ⊗ e_m = Q U, U symmetric, which no choice of axes changes; of a planar beam they turn by ψ where the load is. A
+torque fixed in the world is three loads, the couples about the body's axes e_k, times m · Q e_k.
 """
 
 from collections.abc import Sequence
@@ -18,7 +17,7 @@ from kedfem.dynamics.system.arrays import TurningLoads
 from kedfem.links.record import Link
 
 Loads = Sequence[Sequence[Pattern]]
-Shown = tuple[Float[np.ndarray, "2 3"], Float[np.ndarray, "2 n"]]
+Shown = tuple[Float[np.ndarray, "m 3"], Float[np.ndarray, "m n"]]
 
 
 def turning(loads: Loads) -> list[tuple[int, Pattern]]:
@@ -33,22 +32,20 @@ def turning_loads(links: Sequence[Link], parts: Sequence[Coordinates], loads: Lo
     for k, load in every:
         link, part = links[k], parts[k]
         e, weights = shown_by(link, load.forces)
-        G0 = axes(e[None])[0]
-        own = load.forces @ G0[: link.d, : link.d] if link.kind != "beam" else load.forces
-        force.append(work_on(part, own).ravel())
+        force.append(work_on(part, load.forces).ravel())
         of = 2 if link.kind == "beam" else 0
         T = part.T[of] if part.T else np.eye(link.n)
-        shown.append((weights @ T).ravel())
-        drawn.append(e)
+        shown.append((weights[:1] if of else e.T @ weights) @ T)
+        drawn.append(e.T @ e)
         about, world = load.share if load.share is not None else (np.zeros(3), np.zeros(3))
-        axis.append(G0.T @ about)
+        axis.append(about)
         fixed.append(world)
         force_at.append(force_at[-1] + len(force[-1]))
-        shown_at.append(shown_at[-1] + len(shown[-1]))
+        shown_at.append(shown_at[-1] + shown[-1].size)
     return TurningLoads(
         body=np.array([k for k, _ in every], int), force_at=np.array(force_at), shown_at=np.array(shown_at),
         planar_beam=np.array([links[k].kind == "beam" for k, _ in every], bool),
-        drawn=np.array(drawn).reshape(-1, 2, 3), shown=np.concatenate([np.zeros(0), *shown]),
+        drawn=np.array(drawn).reshape(-1, 3, 3), shown=np.concatenate([np.zeros(0), *(x.ravel() for x in shown)]),
         force=np.concatenate([np.zeros(0), *force]), axis=np.array(axis).reshape(-1, 3),
         fixed=np.array(fixed, float).reshape(-1, 3),
     )  # fmt: skip
@@ -76,19 +73,18 @@ def turned(
         return np.asarray(factor[:, None, None] * out)
     y = e @ R.transpose(0, 2, 1)
     y[:, :, : link.d] += weights @ u
-    Q = axes(y) @ axes(e[None])[0].T
+    Q = rotations(y.transpose(0, 2, 1) @ e)
     if load.share is not None:
         about, world = load.share
         factor = factor * (Q @ about @ world)
     return np.asarray(factor[:, None, None] * (load.forces @ Q[:, : link.d, : link.d].transpose(0, 2, 1)))
 
 
-def axes(y: Float[np.ndarray, "T 2 3"]) -> Float[np.ndarray, "T 3 3"]:
-    """G of directions over time, its axes in columns; of planar ones about z."""
-    a = y[:, 0] / np.linalg.norm(y[:, 0], axis=1)[:, None]
-    n = np.cross(a, y[:, 1])
-    n /= np.linalg.norm(n, axis=1)[:, None]
-    return np.stack([a, np.cross(n, a), n], axis=2)
+def rotations(A: Float[np.ndarray, "T 3 3"]) -> Float[np.ndarray, "T 3 3"]:
+    """Q of A = Q U, U symmetric; of rank two as well."""
+    left, _, right = np.linalg.svd(A)
+    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
+    return np.asarray(left @ right)
 
 
 def shown_by(link: Link, forces: Float[np.ndarray, "n d"]) -> Shown:
@@ -101,17 +97,15 @@ def shown_by(link: Link, forces: Float[np.ndarray, "n d"]) -> Shown:
     """
     if link.fit is None:
         raise ValueError(f"link {link.name} must have a frame of its own")
+    s = 2 if link.planar else 3
     if link.rigid:  # its field is affine
-        known = np.column_stack([link.one, link.X[:, : 2 if link.planar else 3]])
-        return np.eye(3)[:2], np.linalg.pinv(known)[1:3]
+        return np.eye(3)[:s], np.linalg.pinv(np.column_stack([link.one, link.X[:, :s]]))[1:]
     if link.kind == "beam":
         share = np.abs(forces[:, :2]).sum(axis=1)
-        return np.eye(3)[:2], np.stack([share / share.sum(), 0 * share])
+        return np.eye(3)[:1], share[None] / share.sum()
     if link.triples is not None:
         at_stations = (abs(link.triples) @ np.abs(forces).sum(axis=1)).reshape(-1, 3).sum(axis=1)
         share = at_stations / at_stations.sum()
         weights = np.stack([share @ link.triples[m::3].toarray() for m in (1, 2)])
         return weights @ link.X, weights
-    s = 2 if link.planar else 3
-    fit = np.linalg.solve((link.X.T @ link.fit)[:s, :s].T, link.fit.T[:s])
-    return np.eye(3)[:2], fit[:2]
+    return np.eye(3)[:s], np.linalg.solve((link.X.T @ link.fit)[:s, :s].T, link.fit.T[:s])

@@ -50,24 +50,18 @@ def _on_curve(curve: Curve | None, at: RigidMotion, e: float, rate: float) -> fl
 def turned_load(
     link: Link, load: Pattern, R: Float[np.ndarray, "3 3"], u: Float[np.ndarray, "n d"]
 ) -> Float[np.ndarray, "n d"]:
-    """Nodal forces of a load that turns with a link of orientation R, displaced by u: rotations from QR factors."""
+    """Nodal forces of a load that turns with a link of orientation R, displaced by u: rotations that align best."""
+    from scipy.spatial.transform import Rotation
+
     drawn, weights = shown_by(link, load.forces)
     if link.kind == "beam":
-        from scipy.spatial.transform import Rotation
-
         turn = Rotation.from_rotvec([0, 0, float(weights[0] @ u[:, 2])]).as_matrix() @ R
         return np.asarray(load.forces @ np.block([[turn[:2, :2].T, np.zeros((2, 1))], [np.zeros((1, 2)), 1.0]]))
     moved = drawn @ R.T
     moved[:, : link.d] += weights @ u
-    turn = _orthonormal(moved) @ _orthonormal(drawn).T
+    turn = Rotation.align_vectors(moved, drawn)[0].as_matrix()
     share = 1.0 if load.share is None else float(load.share[1] @ turn @ load.share[0])
     return np.asarray(share * load.forces @ turn[: link.d, : link.d].T)
-
-
-def _orthonormal(pair: Float[np.ndarray, "2 3"]) -> Float[np.ndarray, "3 3"]:
-    q, r = np.linalg.qr(pair.T)
-    q = q * np.sign(np.diag(r))
-    return np.column_stack([q, np.cross(q[:, 0], q[:, 1])])
 
 
 @dataclass(frozen=True, slots=True)
