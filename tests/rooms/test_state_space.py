@@ -26,6 +26,7 @@ from tests.moving import bar, turning
 from tests.moving import turned as turned_scene
 
 Raw = dict[str, Any]
+MESHES = "frequencies: meshes must be fine enough for 1 %"
 
 
 def values(scene: Scene) -> dict[str, np.ndarray]:
@@ -76,7 +77,7 @@ def test_a_constant_load_bends_as_in_quasi_static_positions(kind: str, axis: str
     none = values(bar_scene(kind, axis, tmp_path, output=more["output"], analysis=analysis))
     for modes in (2, 12):
         space, warnings = state_space(bar_scene(kind, axis, tmp_path, **more), modes)
-        assert not warnings
+        assert all(each.startswith(MESHES) for each in warnings)  # these are coarse
         assert space.inputs == ("loads/f",)
         assert len(space.A) == 2 * modes
         for name in ("probes/end/displacement", "probes/own/displacement", "probes/stress/stress"):
@@ -250,7 +251,9 @@ def test_loads_on_what_the_drive_holds_are_named(tmp_path: Path) -> None:
     if raw["links"][name]["model"] == "rigid":
         pytest.fail("the other link bends")
     _, warnings = state_space(scene_from(raw, tmp_path), 2)
-    assert warnings == ("state space: input loads/f does nothing: what it acts on is held by the drive or the ground",)
+    assert tuple(each for each in warnings if not each.startswith(MESHES)) == (
+        "state space: input loads/f does nothing: what it acts on is held by the drive or the ground",
+    )
 
 
 def test_what_cannot_be_asked(tmp_path: Path) -> None:

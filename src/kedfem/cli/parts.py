@@ -115,7 +115,7 @@ def frequencies(
             loaded = read_scene(what, within=within)
             done = found_of(loaded, Wanted(modes, positions, free, harmonics, shapes), folder, watch)
     if alone:
-        show(part_tables(found))
+        show(part_tables(found), found.warnings)
         say(found.folder, f"table{', mode shapes' * (shapes > 0)}")
     else:
         show(frequencies_tables(loaded, done), done.warnings)

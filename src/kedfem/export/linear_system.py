@@ -6,26 +6,23 @@ from pathlib import Path
 
 import numpy as np
 
-from kedfem.accuracy.plan import as_planned
-from kedfem.accuracy.prepared import moving
+from kedfem.accuracy.frequencies import frozen
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Block, LinkHistory
 from kedfem.dynamics.loads import unit_forces
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.frozen import require_drive, tangent_warning
 from kedfem.dynamics.modes.linear_model import LinearModel, Shapes, linear_model
-from kedfem.dynamics.modes.stiffened import frozen_linkage
-from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.record import System
 from kedfem.errors import SceneError
 from kedfem.export.files import read_record, write_record
 from kedfem.links.record import Link
 from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.motion.linkage import Linkage
-from kedfem.motion.rigid import RigidMotion, rigid_motion
+from kedfem.motion.rigid import RigidMotion
 from kedfem.results.probes import probe_channels
 from kedfem.results.recorded import Recorded, drive_prefix
-from kedfem.scene import Motor, Scene, path_parameter, time_grid
+from kedfem.scene import Motor, Scene, time_grid
 
 FORMAT = "kedfem state space 1"
 # of a link's size: displacements from whose differences outputs are; exact where these are linear
@@ -94,24 +91,20 @@ def state_space(
     """
     _require(scene, modes, at, free)
     scene, assembly = assembled(scene)
-    scene = as_planned(scene, stage)
     stage("mesh and matrices")
-    linkage, along = moving(scene)
+    made, _, meshes = frozen(scene, modes, at, (lambda scene: _let_go(scene)[0]) if free else None)
+    scene, system, motion = made.scene, made.system, made.motion(np.array([at]))
     loose, elements = _let_go(scene) if free else (scene, ())
     motors = (_Element(x, f"motors/{x}", motor.torque is not None) for x, motor in scene.motors.items())
     elements = (*motors, *elements)
-    system = system_of(loose, linkage, along)
-    t = np.array([at])
-    motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
     stage("modes")
-    frozen = frozen_linkage(scene, system, linkage, along, modes, free).frozen(motion)
     names = {each.name: n for n, each in enumerate(system.constraints)}
     found = linear_model(
-        frozen, motion, (system.model.damping, system.model.links),
+        made.solver.frozen(motion), motion, (system.model.damping, system.model.links),
         [_unit(system, name, motion) for name in scene.loads], [names[f"motors.{each.motor}"] for each in elements],
     )  # fmt: skip
-    space = _space(loose, linkage, system.model, motion, found, elements)
-    return space, (*assembly_warning(assembly), *tangent_warning(system, "state space"), *_idle(space))
+    space = _space(loose, made.linkage, system.model, motion, found, elements)
+    return space, (*assembly_warning(assembly), *tangent_warning(system, "state space"), *meshes, *_idle(space))
 
 
 def _require(scene: Scene, modes: int, at: float, free: bool) -> None:

@@ -7,13 +7,11 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from kedfem.accuracy.plan import as_planned
-from kedfem.accuracy.prepared import moving
+from kedfem.accuracy.frequencies import frozen
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Snapshot, bent
 from kedfem.dynamics.modes.frozen import Frozen, Modes, UnstableError, require_drive, tangent_warning
-from kedfem.dynamics.modes.stiffened import Stiffened, frozen_linkage
-from kedfem.dynamics.system.build import system_of
+from kedfem.dynamics.modes.stiffened import Stiffened
 from kedfem.dynamics.system.record import System
 from kedfem.errors import SceneError
 from kedfem.frequencies.campbell import Campbell, Crossing, crossed
@@ -64,6 +62,7 @@ class Frequencies:
 
     time : (P,) [s]; angle : (P,) drive angle [rad] or travel [m] there, of one that goes on turning from its first turn
     values : (P, f) natural frequencies in rising order [Hz], NaN where there are fewer
+    errors : (f,) relative, of the meshes, estimated at the first position; NaN where they are not known
     still : motions without strain, at zero frequency
     speed : of the drive, where it goes on turning, else 0 [rad/s]
     crossings : with harmonics of the drive, over all speeds
@@ -74,6 +73,7 @@ class Frequencies:
     time: Float[np.ndarray, " P"]
     angle: Float[np.ndarray, " P"]
     values: Float[np.ndarray, "P f"]
+    errors: Float[np.ndarray, " e"]
     still: int
     speed: float
     crossings: tuple[Crossing, ...]
@@ -102,18 +102,15 @@ def frequencies(
         raise SceneError(f"--shapes: must be between 0 and --modes ({wanted.modes}), got {wanted.shapes}")
     require_drive(scene, wanted.free)
     scene, assembly = assembled(scene)
-    scene = as_planned(scene, lambda name: watch(name, 0, 0))
     watch("mesh and matrices", 0, 0)
-    linkage, along = moving(scene)
-    loose = scene.model_copy(update={"drive": None, "drives": {}}) if wanted.free else scene
-    system = system_of(loose, linkage, along)
-    solver = frozen_linkage(scene, system, linkage, along, wanted.modes, wanted.free)
     t = _positions(scene, wanted.positions)
+    made, errors, meshes = frozen(scene, wanted.modes, t[0], without_drives if wanted.free else None)
+    scene, system, solver = made.scene, made.system, made.solver
     turn = turn_steps(scene)
     speed = 2 * np.pi / (turn * time_grid(scene).step) if turn else 0.0
     phi, rate, change = path_parameter(scene, t)
     shares = SPEEDS if speed and scene.analysis.stiffening else (1.0,)
-    motions = {x: rigid_motion(linkage, along, t, (phi, x * rate, x**2 * change)) for x in shares}
+    motions = {x: rigid_motion(made.linkage, made.along, t, (phi, x * rate, x**2 * change)) for x in shares}
     found, buckled = _at_speeds(solver, motions, speed, watch)
     motion, every = motions[1.0], found[1.0]
     still = max(each.still for each in every)
@@ -122,9 +119,9 @@ def frequencies(
     over = Campbell(speed * np.array(list(tables)), np.array(list(tables.values())), len(shares) > 1)
     angle = motion.phi - (2 * np.pi * np.floor(motion.phi.min() / (2 * np.pi) + 1e-9) if speed else 0.0)
     crossings = tuple(crossed(over, wanted.harmonics)) if speed else ()
-    warnings = (*assembly_warning(assembly), *tangent_warning(system, "frequencies"), *buckled)
+    warnings = (*assembly_warning(assembly), *tangent_warning(system, "frequencies"), *meshes, *buckled)
     with claimed(folder or frequencies_folder(scene)) as target:
-        done = Frequencies(target, t, angle, values, still, speed, crossings, solver.factorisations, warnings)
+        done = Frequencies(target, t, angle, values, errors, still, speed, crossings, solver.factorisations, warnings)
         _write_files(target, scene, wanted, done, over, max(found) * speed)
         if wanted.shapes:
             watch("mode shapes", 0, 0)
@@ -134,6 +131,11 @@ def frequencies(
             ]
             write_shapes(target, _shapes(scene, system, motion, every, where, wanted.shapes), scene.gravity)
     return done
+
+
+def without_drives(scene: Scene) -> Scene:
+    """The scene whose drives have let go of their joints."""
+    return scene.model_copy(update={"drive": None, "drives": {}})
 
 
 def _write_files(

@@ -7,7 +7,8 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from kedfem.accuracy.plan import as_planned
+from kedfem.accuracy.frequencies import USUAL, allowed_error, mesh_warning, resolved, unsimplified
+from kedfem.accuracy.variants import refinable, refined, with_links
 from kedfem.arrays import Float, Int
 from kedfem.dynamics.history import bent
 from kedfem.dynamics.modes.frozen import Modes
@@ -32,6 +33,7 @@ from kedfem.scene.records.wording import either, one_of
 Watch = Callable[[str, int, int], None]
 HELD = ("revolute", "spherical", "weld")  # joints of which what they hold needs no other link
 MANY = 12  # names of faces that a message lists
+FROM_FILE = "frequencies: how far off they are by the mesh is not known, as one from a file is not made finer"
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +42,9 @@ class Part:
 
     held : what holds it, in words
     folder : where its frequencies go
+    allowed : relative error of frequencies, as far as the mesh is open
+    finer : it with elements smaller by a factor; None of a mesh from a file
+    open : whether the mesh was left open
     """
 
     name: str
@@ -47,6 +52,9 @@ class Part:
     support: Support
     held: tuple[str, ...]
     folder: FilePath
+    allowed: float
+    finer: Callable[[float], "Part"] | None
+    open: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,13 +62,16 @@ class PartFrequencies:
     """Of a single link.
 
     values : (f,) natural frequencies in rising order [Hz]
+    errors : (e,) relative, of the mesh, estimated; none of a mesh from a file, NaN where they are not known
     still : motions without strain, at zero frequency: six of a free part
     """
 
     folder: FilePath
     part: Part
     values: Float[np.ndarray, " f"]
+    errors: Float[np.ndarray, " e"]
     still: int
+    warnings: tuple[str, ...]
 
     @property
     def mass(self) -> float:
@@ -89,7 +100,14 @@ def part_from_file(file: FilePath, given: LinkScene, material: Material, faces: 
     words = tuple(each if isinstance(each, str) else each.label for each in faces)
     solid = getattr(given.shape, "solid", None)
     stem = file.stem if solid is None else f"{file.stem}-{solid}"
-    return Part(file.name, link, support, words, file.with_name(f"{stem}-frequencies"))
+
+    def finer(factor: float) -> Part:
+        return part_from_file(file, refined(given, factor), material, faces)
+
+    return Part(
+        file.name, link, support, words, file.with_name(f"{stem}-frequencies"), USUAL,
+        finer if refinable(given) else None, "mesh" not in given.model_fields_set,
+    )  # fmt: skip
 
 
 def _facets(link: Link, face: str | ChosenFace) -> Int[np.ndarray, " f"]:
@@ -116,11 +134,18 @@ def link_of_scene(scene: Scene, name: str, joints: Sequence[str] = ()) -> Part:
     require_elastic(scene.links, name)
     for joint in joints:
         _check(scene, name, joint)
-    scene = as_planned(scene)
-    link = single_link(scene, name)
+    scene = unsimplified(scene)
+    given, link = scene.links[name], single_link(scene, name)
     support = together(link, [held_at(scene, joint, link, _turns(scene, joint)) for joint in joints])
     folder = frequencies_folder(scene)
-    return Part(name, link, support, tuple(joints), folder.with_name(f"{folder.name}-{name}"))
+
+    def finer(factor: float) -> Part:
+        return link_of_scene(with_links(scene, {name: refined(given, factor)}), name, joints)
+
+    return Part(
+        name, link, support, tuple(joints), folder.with_name(f"{folder.name}-{name}"), allowed_error(scene),
+        finer if refinable(given) else None, scene.analysis.accuracy != "quick" and "mesh" not in given.model_fields_set,
+    )  # fmt: skip
 
 
 def _check(scene: Scene, name: str, joint: str) -> None:
@@ -167,13 +192,42 @@ def part_frequencies(
     if part.support.clamped.all():
         raise SceneError("--hold: must leave something of the part that can move, got all of it")
     watch("frequencies", 0, 0)
-    modes = link_modes(part.link, part.support, count)
+    solved, errors = _solved(part, count), np.zeros(0)
+    if part.finer:
+        solved, errors = resolved(solved, _finer, _finer if part.open else None, part.allowed)
+    warnings = mesh_warning(errors, part.allowed, "take a finer mesh") if part.finer else (FROM_FILE,)
+    part, modes = solved.part, solved.modes
     with claimed(folder or part.folder) as target:
         write_part_frequencies(target / "frequencies.csv", modes.frequencies)
         if shapes:
             watch("mode shapes", 0, 0)
             write_shapes(target, _shapes(part, modes, shapes))
-    return PartFrequencies(target, part, modes.frequencies, modes.still)
+    return PartFrequencies(target, part, modes.frequencies, errors, modes.still, warnings)
+
+
+@dataclass(frozen=True, slots=True)
+class _Solved:
+    part: Part
+    modes: Modes
+    count: int
+
+    @property
+    def frequencies(self) -> Float[np.ndarray, " f"]:
+        return self.modes.frequencies
+
+    @property
+    def unknowns(self) -> int:
+        return self.part.link.unknowns
+
+
+def _solved(part: Part, count: int) -> _Solved:
+    return _Solved(part, link_modes(part.link, part.support, count), count)
+
+
+def _finer(solved: _Solved, factor: float) -> _Solved:
+    if not solved.part.finer:
+        raise ValueError("a mesh from a file is not made finer")
+    return _solved(solved.part.finer(factor), solved.count)
 
 
 def _shapes(part: Part, modes: Modes, count: int) -> list[Shape]:

@@ -1,0 +1,184 @@
+"""Meshes that resolve the vibrations asked for: frequencies with them, and with elements that are smaller throughout."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Protocol, TypeVar
+
+import numpy as np
+
+from kedfem.accuracy.choices import elastic
+from kedfem.accuracy.error_budget import UNKNOWNS, percent
+from kedfem.accuracy.prepared import moving
+from kedfem.accuracy.variants import families, of_family, refinable, refined, with_links
+from kedfem.arrays import Float
+from kedfem.dynamics.modes.frozen import Frozen
+from kedfem.dynamics.modes.stiffened import Stiffened, frozen_linkage
+from kedfem.dynamics.system.build import system_of
+from kedfem.dynamics.system.record import System
+from kedfem.motion.linkage import Linkage
+from kedfem.motion.path import Path
+from kedfem.motion.rigid import RigidMotion, rigid_motion
+from kedfem.scene import MeshFile, Scene, path_parameter
+
+FACTOR, LITTLE = 1.5, 1.2  # by which elements are made smaller at a time: usually, and at least
+# at which the error of a frequency falls with the size of elements, of linear ones; that of others falls faster
+ORDER = 2.0
+LEFT = 1 / (FACTOR**ORDER - 1)  # of the change by smaller elements: the error that these leave
+STALLED = 0.8  # of the error before: where smaller elements of the open links leave more, others cause it
+USUAL = 0.01  # error that is allowed where a scene asks for plain defaults, and of parts
+FEW = 6  # modes that a warning lists
+
+
+class Solved(Protocol):
+    """What has been meshed and solved: its lowest frequencies [Hz], and its unknowns."""
+
+    @property
+    def frequencies(self) -> Float[np.ndarray, " f"]: ...  # noqa: D102
+
+    @property
+    def unknowns(self) -> int: ...  # noqa: D102
+
+
+T = TypeVar("T", bound=Solved)
+Finer = Callable[[T, float], T]
+LetGo = Callable[[Scene], Scene]
+
+
+def resolved(made: T, finer: Finer[T], chosen: Finer[T] | None, allowed: float) -> tuple[T, Float[np.ndarray, " f"]]:
+    """What is made, with smaller elements where these are left open, until the error of the frequencies is allowed.
+
+    Two meshes show the error of the coarser one, as frequencies converge at ORDER at least (Strang and Fix, An Analysis
+    of the Finite Element Method, 6.3), though more slowly at edges that point inwards. Elements are made smaller up to
+    UNKNOWNS.
+
+    Parameters
+    ----------
+    finer : makes it with all elements smaller by a factor
+    chosen : the same with those that are left open; None where none is
+
+    Returns
+    -------
+    Also relative errors, estimated; NaN where they are not known.
+    """
+    before = np.inf
+    while (UNKNOWNS / made.unknowns) ** (1 / 3) >= LITTLE:
+        better = finer(made, FACTOR)
+        both = min(len(made.frequencies), len(better.frequencies))
+        change = np.abs(made.frequencies[:both] / better.frequencies[:both] - 1)
+        lacking = len(made.frequencies) < len(better.frequencies)
+        worst = np.inf if lacking else (1 + LEFT) * change.max(initial=0.0)
+        if worst <= allowed or chosen is None or worst > STALLED * before < np.inf:
+            return made, (1 + LEFT) * change
+        if chosen is finer and not lacking and LEFT * change.max() <= allowed:
+            return better, LEFT * change
+        made, before = better if chosen is finer else chosen(made, FACTOR), worst
+    return made, np.full(len(made.frequencies), np.nan)
+
+
+def unsimplified(scene: Scene) -> Scene:
+    """The scene with links that leave their model open as the best that their shape allows: what is rigid or flat enough
+    for a motion lacks vibrations."""
+    auto = {name: link for name, link in scene.links.items() if link.model == "auto"}
+    return with_links(scene, {name: of_family(link, families(link)[-1]) for name, link in auto.items()})
+
+
+@dataclass(frozen=True, slots=True)
+class Linked:
+    """A scene's linkage and system, what finds its modes, and its frequencies at a position [Hz]."""
+
+    scene: Scene
+    linkage: Linkage
+    along: Path
+    system: System
+    solver: Frozen | Stiffened
+    frequencies: Float[np.ndarray, " f"]
+
+    @property
+    def unknowns(self) -> int:
+        """Of all links, before joints share any."""
+        return int(self.system.model.unknowns)
+
+    def motion(self, t: Float[np.ndarray, " T"]) -> RigidMotion:
+        """Its rigid-body motion."""
+        return rigid_motion(self.linkage, self.along, t, path_parameter(self.scene, t))
+
+
+def frozen(
+    scene: Scene, modes: int, at: float, let_go: LetGo | None = None
+) -> tuple[Linked, Float[np.ndarray, " f"], tuple[str, ...]]:
+    """A scene's linkage, unreduced, with meshes that resolve its lowest vibrations where they are left open.
+
+    Parameters
+    ----------
+    modes : how many
+    at : time at which the drive is where errors are estimated [s]
+    let_go : makes a scene whose drives have let go of their joints; None where they hold them
+
+    Returns
+    -------
+    Also relative errors, estimated (NaN where they are not known), and warnings of them.
+    """
+    scene, allowed = unsimplified(scene), allowed_error(scene)
+    names = [name for name, link in scene.links.items() if elastic(link, "solid", "plane", "beam") and refinable(link)]
+    quick = scene.analysis.accuracy == "quick"
+    left_open = [name for name in names if not quick and "mesh" not in scene.links[name].model_fields_set]
+
+    def finer(made: Linked, factor: float, names: Sequence[str] = names) -> Linked:
+        links = {name: refined(made.scene.links[name], factor) for name in names}
+        return _frozen(with_links(made.scene, links), modes, at, let_go)
+
+    chosen = finer if left_open == names else partial(finer, names=left_open)
+    made, errors = resolved(_frozen(scene, modes, at, let_go), finer, chosen if left_open else None, allowed)
+    return made, errors, (*mesh_warning(errors, allowed, remedy(scene)), *file_warning(scene))
+
+
+def _frozen(scene: Scene, modes: int, at: float, let_go: LetGo | None) -> Linked:
+    linkage, along = moving(scene)
+    system = system_of(let_go(scene) if let_go else scene, linkage, along)
+    solver = frozen_linkage(scene, system, linkage, along, modes, let_go is not None)
+    t = np.array([at])
+    found = solver.at(rigid_motion(linkage, along, t, path_parameter(scene, t)))
+    return Linked(scene, linkage, along, system, solver, found.frequencies)
+
+
+def allowed_error(scene: Scene) -> float:
+    """What its accuracy allows."""
+    return USUAL if scene.analysis.accuracy == "quick" else float(scene.analysis.accuracy)
+
+
+def remedy(scene: Scene) -> str:
+    """What makes the frequencies of a scene more exact."""
+    stated = any("mesh" in link.model_fields_set for link in scene.links.values())
+    if scene.analysis.accuracy == "quick" and not stated:
+        return 'leave analysis.accuracy = "quick" out'
+    return "leave links.NAME.mesh out, or make it finer"
+
+
+def mesh_warning(errors: Float[np.ndarray, " f"], allowed: float, remedy: str) -> tuple[str, ...]:
+    """A warning of frequencies that the meshes do not resolve, or of which that is not known."""
+    if np.isnan(errors).any():
+        why = f"models of more than {UNKNOWNS:,} unknowns are not meshed more finely to see it"
+        return (f"frequencies: how far off they are by the mesh is not known, as {why}: compare with another mesh",)
+    beyond = np.flatnonzero(errors > allowed)
+    if not len(beyond):
+        return ()
+    least, most = percent(errors[beyond].min()), percent(errors.max())
+    listed = [str(k + 1) for k in beyond]
+    modes = ", ".join(listed) if len(listed) <= FEW else f"{listed[0]} to {listed[-1]}"
+    return (
+        f"frequencies: meshes must be fine enough for {percent(allowed)}, got estimated errors of {least} to {most} "
+        f"(modes {modes}): {remedy}, or ask for fewer --modes",
+    )
+
+
+def error_words(errors: Float[np.ndarray, " f"]) -> str:
+    """What a table says of them; nothing where they are not known."""
+    known = errors.size and not np.isnan(errors).any()
+    return f"error by the mesh, estimated: {percent(errors.max())} at most" if known else ""
+
+
+def file_warning(scene: Scene) -> tuple[str, ...]:
+    """A warning of links whose meshes come from files, which are not made finer."""
+    names = [name for name, link in scene.links.items() if link.model != "rigid" and isinstance(link.shape, MeshFile)]
+    return (f"frequencies: errors by the meshes from files are not known: links {', '.join(names)}",) if names else ()
