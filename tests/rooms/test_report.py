@@ -16,6 +16,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
+from kedfem.accuracy.error_budget import percent
 from kedfem.analysis import analyse
 from kedfem.cli.results import written_page
 from kedfem.errors import OutputError, SceneError
@@ -406,6 +407,7 @@ def test_natural_frequencies_are_shown_where_they_are_of_the_same_scene(tmp_path
     assert "frequencies" not in told(folder)
     shown = page(folder)
     assert shown.count('alt="Natural frequencies"') == 2
+    assert f"Error by the mesh, estimated: {percent(found.errors.max())} at most." in shown
     for end in (found.values.min(axis=0), found.values.max(axis=0)):
         for value in end:
             assert f"<td>{with_prefix(value, 'Hz')}</td>".replace(" ", "\u00a0") in shown

@@ -7,7 +7,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from kedfem.accuracy.frequencies import frozen
+from kedfem.accuracy.frequencies import error_words, frozen
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Snapshot, bent
 from kedfem.dynamics.modes.frozen import Frozen, Modes, UnstableError, require_drive, tangent_warning
@@ -164,7 +164,8 @@ def _summary(done: Frequencies, source: str | None, wanted: Wanted) -> Summary:
     every = done.values[:, ~np.isnan(done.values).any(axis=0)]
     met = [(x.mode, x.harmonic, RPM * x.slowest, RPM * x.fastest) for x in done.crossings]
     lowest, highest = (f(every, axis=0).tolist() for f in (np.min, np.max))
-    return Summary(source, len(done.time), wanted.free, done.still, lowest, highest, RPM * done.speed, met)
+    notes = [*filter(None, [error_words(done.errors)]), *done.warnings]
+    return Summary(source, len(done.time), wanted.free, done.still, lowest, highest, RPM * done.speed, met, notes)
 
 
 def _at_speeds(

@@ -23,6 +23,7 @@ class Summary:
     lowest, highest : of each mode over all positions [Hz]
     speed : of the drive [rpm]; 0 of one that does not go on turning
     crossings : mode, harmonic of the drive, slowest and fastest speed at which they meet [rpm]
+    notes : how exact they are, and warnings
     """
 
     scene: str | None
@@ -33,6 +34,7 @@ class Summary:
     highest: list[float]
     speed: float
     crossings: list[tuple[int, int, float, float]]
+    notes: list[str]
 
 
 def write_summary(folder: Path, summary: Summary) -> None:
