@@ -84,6 +84,8 @@ def read_raw():
         ("-90 deg/s", "rad/s", -math.pi / 2),
         ("60 deg", "rad", math.pi / 3),
         ("2 turns", "rad", 4.0 * math.pi),
+        ("2 rev", "rad", 4.0 * math.pi),
+        ("30 rev/min", "rad/s", math.pi),
         ("7850 kg/m^3", "kg/m^3", 7850.0),
         ("7.85 g/cm**3", "kg/m^3", 7850.0),
         ("70 GPa", "Pa", 70e9),
@@ -105,8 +107,8 @@ def test_a_number_with_a_unit_becomes_si(text, unit, number):
     ("text", "unit"),
     [(f"2 {prefix}Hz", "rad/s") for prefix in ("", "k", "m", "M")]
     + [("2 cps", "rad/s"), ("2 Bq", "rad/s"), ("2 count/s", "rad/s")]
-    + [(f"2 {speed}", "Hz") for speed in ("rpm", "krpm", "mrad/s", "turn/s", "gon/s")]
-    + [(f"5 {length}", "m") for length in ("mm/turn", "mm/rad", "mm/deg", "m*rad")]
+    + [(f"2 {speed}", "Hz") for speed in ("rpm", "krpm", "mrad/s", "turn/s", "rev/s", "gon/s")]
+    + [(f"5 {length}", "m") for length in ("mm/turn", "mm/rev", "mm/rad", "mm/deg", "m*rad")]
     + [("600 rpm", "1/s"), ("90 deg", "1"), ("3 N*m/deg", "N*m"), ("1 m*rad/s", "m/s")],
 )
 def test_what_is_off_by_an_angle_or_a_turn_is_refused(text, unit):

@@ -63,7 +63,9 @@ def unit_registry() -> pint.UnitRegistry[float]:
     """Pint's registry of units, imported when the first string with a unit is met."""
     import pint
 
-    return pint.UnitRegistry()
+    registry: pint.UnitRegistry[float] = pint.UnitRegistry()
+    registry.define("@alias revolution = rev")
+    return registry
 
 
 class Evaluated(str):
