@@ -61,7 +61,7 @@ def resolved(made: T, finer: Finer[T], chosen: Finer[T] | None, allowed: float) 
     -------
     Also relative errors, estimated; NaN where they are not known.
     """
-    before = np.inf
+    before, errors = np.inf, np.full(len(made.frequencies), np.nan)
     while (UNKNOWNS / made.unknowns) ** (1 / 3) >= LITTLE:
         better = finer(made, FACTOR)
         both = min(len(made.frequencies), len(better.frequencies))
@@ -70,10 +70,12 @@ def resolved(made: T, finer: Finer[T], chosen: Finer[T] | None, allowed: float) 
         worst = np.inf if lacking else (1 + LEFT) * change.max(initial=0.0)
         if worst <= allowed or chosen is None or worst > STALLED * before < np.inf:
             return made, (1 + LEFT) * change
-        if chosen is finer and not lacking and LEFT * change.max() <= allowed:
-            return better, LEFT * change
         made, before = better if chosen is finer else chosen(made, FACTOR), worst
-    return made, np.full(len(made.frequencies), np.nan)
+        known = chosen is finer and not lacking
+        errors = LEFT * change if known else np.full(len(made.frequencies), np.nan)
+        if known and errors.max(initial=0.0) <= allowed:
+            break
+    return made, errors
 
 
 def unsimplified(scene: Scene) -> Scene:
