@@ -83,8 +83,12 @@ def test_the_cylinder_of_a_lift_does_the_work_that_lifts_the_weights(tmp_path: P
 
 
 def test_the_drives_of_a_robot_hold_its_weights(tmp_path: Path) -> None:
-    """T = Σ m g x at rest, before the motion and after it."""
-    found = run(template("robot_arm"), tmp_path, end_time="1.5 s", step="2 ms")
+    """T = −Σ m g x about y at rest, before and after the motion: the shoulder raises by 40°, the elbow lowers by 60°."""
+    raw = template("robot_arm")
+    raw["output"]["probes"]["hand"] = {"link": "forearm", "at": "H", "quantity": "position"}
+    found = run(raw, tmp_path, end_time="1.5 s", step="2 ms")
+    up = 0.4 + 0.4 * np.sin(np.radians(40.0)) - 0.35 * np.sin(np.radians(20.0))
+    assert_allclose(found.channels["probes/hand/position"][1][-1, 2], up, atol=2e-3)  # less what the arms bend
     upper = ALUMINIUM * np.pi * (0.035**2 - 0.031**2) * 0.4
     fore = ALUMINIUM * np.pi * (0.025**2 - 0.022**2) * 0.35
     for row, shoulder, elbow, tolerance in ((0, 0.0, 0.0, 2e-3), (-1, -40.0, 60.0, 1e-2)):
@@ -94,7 +98,7 @@ def test_the_drives_of_a_robot_hold_its_weights(tmp_path: Path) -> None:
         about_shoulder = about_elbow + G * ((3 + fore) * 0.4 * np.cos(a) + upper * 0.2 * np.cos(a))
         for name, torque in (("elbow", about_elbow), ("shoulder", about_shoulder)):
             value = found.channels[f"drive/{name}/torque"][1][row, 0]
-            assert_allclose(abs(value), torque, rtol=tolerance)
+            assert_allclose(value, -torque, rtol=tolerance)
         assert abs(found.channels["drive/turn/torque"][1][row, 0]) < 0.05 * about_shoulder
 
 
