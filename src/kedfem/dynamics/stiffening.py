@@ -19,7 +19,7 @@ from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
 from kedfem.dynamics.joints.constraint_matrices import joint_rows
 from kedfem.dynamics.joints.ports import Rotation, port_columns
-from kedfem.dynamics.loads import Pattern
+from kedfem.dynamics.loads import Pattern, applied
 from kedfem.dynamics.matrices.closed import closed
 from kedfem.dynamics.matrices.substructure import Substructure, factored, mass_matrix
 from kedfem.dynamics.model import Model
@@ -72,12 +72,15 @@ class Stiffening:
 
     joints : those that are enforced by constraint equations
     elements : motors and springs, whose forces are those that the rigid-body motion has
+    turned : links whose loads turn with frames of their own: number, link, all its loads, as turned by the rigid-body
+        motion, and number in the linkage
     """
 
     parts: Sequence[Substructure]
     modes: Sequence[StressModes]
     joints: Sequence[ConstraintJoint]
     elements: RigidElements | None
+    turned: Sequence[tuple[int, Link, tuple[Pattern, ...], int]]
 
     def over(self, forcing: Sequence[Forcing], motion: RigidMotion) -> list[Forcing]:
         """The same over the times of a motion with the factors s_i of the stress modes."""
@@ -91,10 +94,13 @@ class Stiffening:
 
     def _loads(self, forcing: Sequence[Forcing], motion: RigidMotion) -> list[Float[np.ndarray, "T n d"]]:
         """Loads of all links with those of motors and springs, world components."""
+        F = [each.F for each in forcing]
+        for k, link, loads, body in self.turned:
+            F[k] = applied(link, loads, motion, body)
         if self.elements is None:
-            return [each.F for each in forcing]
+            return F
         _, forces = self.elements.over(motion)
-        return [with_elements(k, each.F, self.elements, forces) for k, each in enumerate(forcing)]
+        return [with_elements(k, each, self.elements, forces) for k, each in enumerate(F)]
 
     def turnings(self, forcing: Sequence[Forcing], motion: RigidMotion) -> list[Turning]:
         """g → k g P of all links at the first time of a motion."""
@@ -111,7 +117,7 @@ class Stiffening:
 
 
 def stiffening(model: Model, elements: RigidElements | None = None) -> Stiffening:
-    """Stress modes of a model's links.
+    """Stress modes of a model's links; of those with co-rotational frames none, which know what their stresses do.
 
     Parameters
     ----------
@@ -124,10 +130,16 @@ def stiffening(model: Model, elements: RigidElements | None = None) -> Stiffenin
     """
     parts = [factored(link, joint, 0.0, 1.0) for link, joint in zip(model.links, model.joints, strict=True)]
     modes = [
-        stress_modes(link, part, loads, [] if elements is None else unit_loads_on(k, link, elements))
+        _no_modes(link) if link.fit is not None
+        else stress_modes(link, part, loads, [] if elements is None else unit_loads_on(k, link, elements))
         for k, (link, part, loads) in enumerate(zip(model.links, parts, model.loads, strict=True))
-    ]
-    return Stiffening(parts, modes, model.rows, elements)
+    ]  # fmt: skip
+    every = enumerate(zip(model.links, model.loads, model.bodies, strict=True))
+    turned = [
+        (k, link, tuple(replace(load, own=False) for load in loads), body)
+        for k, (link, loads, body) in every if any(load.own for load in loads)
+    ]  # fmt: skip
+    return Stiffening(parts, modes, model.rows, elements, turned)
 
 
 def stress_modes(link: Link, part: Substructure, loads: Sequence[Pattern], elements: Sequence[Nodal] = ()) -> StressModes:
@@ -154,6 +166,11 @@ def stress_modes(link: Link, part: Substructure, loads: Sequence[Pattern], eleme
     states = (g @ (vectors[:, kept] / size[:, None] / np.sqrt(values[kept]))).T.reshape(-1, link.n, link.d)
     of = stress_stiffness(link)
     return StressModes(states, *_stacked([of(each) for each in states], link.n), turned_directions(link))
+
+
+def _no_modes(link: Link) -> StressModes:
+    none, pattern = np.zeros((0, link.n, link.d)), np.zeros(link.n + 1, np.int32)
+    return StressModes(none, np.zeros((0, 0)), pattern[:0], pattern, turned_directions(link))
 
 
 def unit_loads(
@@ -197,7 +214,7 @@ def _factors(
     modes: StressModes, part: Substructure, load: Float[np.ndarray, "T n d"], force: Float[np.ndarray, "T q"]
 ) -> Float[np.ndarray, "T m"]:
     """s_i = g_i · (load + Wᵀ λ), λ the first of all forces."""
-    flat = modes.states.reshape(len(modes.states), -1)
+    flat = modes.states.reshape(len(modes.states), load[0].size)
     at_ports = flat @ port_columns(part.attachment, modes.states.shape[1])
     s = np.asarray(load.reshape(len(load), -1) @ flat.T + force[:, : at_ports.shape[1]] @ at_ports.T)
     share = np.abs(s).max(axis=0) * np.linalg.norm(modes.k, axis=1)

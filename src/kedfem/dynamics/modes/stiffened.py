@@ -27,7 +27,7 @@ from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion
-from kedfem.scene import Scene
+from kedfem.scene import Scene, corotational_links
 
 Rigid = tuple[Float[np.ndarray, "k r"], Float[np.ndarray, "r r"]]
 """Rigid motions of a link, and its mass in them."""
@@ -133,11 +133,16 @@ def frozen_linkage(
     Raises
     ------
     SceneError
-        Stiffening of a link that a drive which lets go has carried.
+        Stiffening of a link that a drive which lets go has carried, or beside links with co-rotational frames.
     """
     released = linkage.mobility + (len(scene.driven_joints) if free else 0)
     if not scene.analysis.stiffening:
         return Frozen(system, count, released)
+    if names := ", ".join(sorted(corotational_links(scene))):
+        raise SceneError(
+            "analysis.stiffening: must be combined with rigid-body frames of all links for frequencies (co-rotational "
+            f"links have no stress modes), got co-rotational ones of {names}: take rigid-body frames"
+        )
     driven = elastic_model(scene, linkage, along=along)
     _refuse_prescribed(driven, free)
     return Stiffened(system, driven, count, released, rigid_elements_of(scene, driven, along))

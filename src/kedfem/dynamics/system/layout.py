@@ -66,7 +66,8 @@ def body_arrays(system: System, parts: Sequence[Part], profile: Profile) -> Bodi
     model, stiffening = system.model, system.stiffening
     links, joints, numbers = model.links, model.joints, model.bodies
     columns = [joint.columns for joint in joints]
-    frames = [frame_of(link) if stiffening is None else record.STRESSED for link in links]
+    stressed = [stiffening is not None and len(stiffening.modes[k].states) > 0 for k in range(len(links))]
+    frames = [record.STRESSED if x else frame_of(link) for x, link in zip(stressed, links, strict=True)]
     sizes, ports = [link.unknowns for link in links], [len(joint.keep) for joint in joints]
     beams = [k for k, frame in enumerate(frames) if frame == record.TANGENTIAL]
     at = ends_of(sizes)

@@ -119,7 +119,7 @@ REFUSALS = (
     Refusal("links", {"drive": ("none",), "frames": ("rigid-body",)}, "{where}.frames",
         "be 'co-rotational' in a scene without a drive", "there is no rigid-body motion", "'rigid-body'",
         "leave it out, or give a drive"),
-    Refusal("analysis", {"stiffening": ("on",), "frames": ("co-rotational",)}, "{where}.stiffening",
+    Refusal("analysis", {"stiffening": ("on",), "every link": ("co-rotational",)}, "{where}.stiffening",
         "be combined with rigid-body frames", "co-rotational ones know all of it", "it with co-rotational frames",
         "leave stiffening out"),
     *(Refusal("analysis", {"frames": ("rigid-body",), "start": (key,)}, f"{{where}}.{key}",

@@ -34,8 +34,10 @@ def frames_of(parts: Parts, link: Entry | None = None) -> str:
 def common_facts(parts: Parts) -> dict[str, str]:
     """What the whole scene says."""
     record = parts.analysis.record
-    following = any(frames_of(parts, link) == "co-rotational" for link in parts.links.values())
+    every = [frames_of(parts, link) == "co-rotational" for link in parts.links.values()]
+    following = any(every)
     return {
+        "every link": "co-rotational" if all(every) else "",
         "frames": "co-rotational" if following else "rigid-body",
         "stiffening": "on" if parts.analysis.raw.get("stiffening") is True else "off",
         "drive": "given" if parts.driven else "none",
