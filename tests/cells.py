@@ -19,7 +19,7 @@ from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.starts.accelerations import accelerated_in_a_step
 from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.errors import KedfemError
-from kedfem.scene.checks.capabilities import DRIVEN, KINDS, REFUSALS, SLID, Refusal
+from kedfem.scene.checks.capabilities import DRIVEN, KINDS, REFUSALS, SLID, TURNED, Refusal
 from tests.moving import beam_in_space
 from tests.partners import IN_PLANE, chain
 from tests.systems import Begun, begun, by_oracle, marched, rows
@@ -41,6 +41,7 @@ LAWS = (
     "motor at the crank", "bushing", "damped bushing", "bushing against rotations", "shaft", "drive on the joint", "gear",
     "rack", "point mass", "damping", "damping of mass", "no numerical damping",
 )  # fmt: skip
+LIMIT = "limit of the joint"
 WITHIN = {"rigid-body": 1e-8, "stiffening": 1e-8, "co-rotational": 1e-7}
 #: rigid-body, with beams in space: rounding beside the stiff rigid parts at their ends limits the fast step; a diameter
 #: changed by 1e-14 of itself changes what it finds by 8.5e-8 of the peak, and what the oracle finds by 4e-11
@@ -83,6 +84,8 @@ class Cell:
         """Whether there is such a mechanism: planar links have planar joints, what has no drive no law of one."""
         if self.plane and self.joint not in IN_PLANE:
             return False
+        if self.law == LIMIT and not (self.joint in (*TURNED, *SLID) and (self.driven or self.frames == "co-rotational")):
+            return False  # refused whatever its law, or as a spring on the joint is
         if self.law == "shaft" and not self.driven:
             return False
         if self.law == "drive on the joint" and (self.joint not in DRIVEN or not self.driven):
@@ -91,7 +94,7 @@ class Cell:
 
 
 FACTORS: dict[str, tuple[Any, ...]] = {
-    "joint": KINDS, "frames": FRAMES, "driven": (True, False), "links": tuple(LINKS), "law": LAWS,
+    "joint": KINDS, "frames": FRAMES, "driven": (True, False), "links": tuple(LINKS), "law": (*LAWS, LIMIT),
 }  # fmt: skip
 
 
@@ -108,16 +111,17 @@ def all_cells() -> list[Cell]:
     """All joint × frames × driven or not × links under loads, and so many more that each pair of levels is in one."""
     first = [Cell(*x) for x in product(KINDS, FRAMES, (True, False), LINKS)]
     found = [cell for cell in first if cell.drawn]
-    every = [cell for x in product(*FACTORS.values()) if (cell := Cell(*x)).drawn]
-    np.random.default_rng(12).shuffle(every)  # type: ignore[arg-type]
-    left = set().union(*map(pairs, every)) - set().union(*map(pairs, found))
-    while left:
-        best = max(every[:2000], key=lambda cell: len(pairs(cell) & left))
-        if not pairs(best) & left:
-            best = next(cell for cell in every if pairs(cell) & left)
-        found.append(best)
-        left -= pairs(best)
-        every.remove(best)
+    for laws in (LAWS, (LIMIT,)):
+        every = [cell for x in product(*{**FACTORS, "law": laws}.values()) if (cell := Cell(*x)).drawn]
+        np.random.default_rng(12).shuffle(every)  # type: ignore[arg-type]
+        left = set().union(*map(pairs, every)) - set().union(*map(pairs, found))
+        while left:
+            best = max(every[:2000], key=lambda cell: len(pairs(cell) & left))
+            if not pairs(best) & left:
+                best = next(cell for cell in every if pairs(cell) & left)
+            found.append(best)
+            left -= pairs(best)
+            every.remove(best)
     return found
 
 
@@ -172,7 +176,9 @@ def sections(cell: Cell, crank: Any) -> Raw:
     along, preloaded = cell.joint in SLID, {"stiffness": 200.0, "damping": 0.2, "preload": 3.0}
     slides = cell.joint == "prismatic"
     spring = {"kind": "spring", "between": ends, "stiffness": 2e4, "damping": 20.0, "preload": 30.0}
+    stop = {"kind": "travel" if along else "angle", "joint": "J", "stiffness": 2e5 if along else 4e3, "damping": 3.0}
     by_law: dict[str, Raw] = {
+        LIMIT: {"limits": {"s": {"lower": -1e-5, "upper": 1e-5, **stop}}},
         "spring between points": {"springs": {"s": spring}},
         "spring on the joint": {"springs": {"s": {"kind": "spring" if along else "torsion", "joint": "J", **preloaded}}},
         "motor on the joint": {"motors": {"m": {"joint": "J", "force" if slides else "torque": torque}}},
@@ -223,14 +229,15 @@ def executed(cell: Cell) -> tuple[str, float]:
     Both of the system's march and of a run; not of one with rigid links, which are stiff ones there: that is of second
     order in the step.
     """
+    divided = cell.law == LIMIT
     try:
         of = begun(scene_of(cell))
         run = run_of(of)
         if cell.frames == "stiffening":
             return "ran", apart(run, run_of(of, monolithic=True))
         of = as_a_run(of) if cell.frames == "co-rotational" else of
-        wanted = by_oracle(of, STEPS, keeps=True)[0]
-        found = [rows(of.ready, marched(of, STEPS)[1].u)]
+        wanted = by_oracle(of, STEPS, keeps=True, divided=divided)[0]
+        found = [rows(of.ready, marched(of, STEPS, divided)[1].u)]
         if "rigid" not in cell.links:
             found.append(run)
         return "ran", max(apart(each, wanted) for each in found)

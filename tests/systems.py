@@ -86,16 +86,20 @@ def rows(of: Ready, x: np.ndarray) -> np.ndarray:
     return np.concatenate(every, axis=1)
 
 
-def by_oracle(of: Begun, count: int, keeps: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """Displacements (T, N) and multipliers (T, r) of the first steps, by the oracle from the same start.
+def by_oracle(
+    of: Begun, count: int, keeps: bool = False, divided: bool = False, first: int = 1
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Displacements (T, N) and multipliers (T, r) of some steps, by the oracle from the same state.
 
     keeps : see `Monolithic`; where forces bend sharply it may find another solution
+    divided : whether steps are where stops with damping are met
+    first : number of the first step
     """
     solver = Monolithic(of.ready.system, of.ready.scheme, keeps)
     now = as_the_oracle_begins(of.ready, of.state, of.motion)
-    along, out = of.steps(count), []
+    along, out = of.steps(count, first), []
     for k in range(count):
-        now = solver.step(now, along.part(k, k + 1))
+        now = solver.step(now, along.part(k, k + 1), of.motion if divided else None)
         out.append((now.u, now.multiplier))
     return np.stack([u for u, _ in out]), np.stack([m for _, m in out])
 
@@ -107,9 +111,9 @@ def against_oracle(of: Begun, count: int = 3, keeps: bool = False) -> float:
     return float(np.abs(rows(of.ready, history.u) - wanted).max() / np.abs(wanted).max())
 
 
-def marched(of: Begun, count: int) -> tuple[State, History]:
-    """The first steps."""
-    return march(of.ready, of.state, of.steps(count))
+def marched(of: Begun, count: int, divided: bool = False, first: int = 1) -> tuple[State, History]:
+    """Some steps, the first ones at first, divided where they must be if that is asked for."""
+    return march(of.ready, of.state, of.steps(count, first), of.motion if divided else None)
 
 
 def assembled_deflection(of: Ready, at: RigidMotion) -> np.ndarray:

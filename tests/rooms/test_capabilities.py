@@ -102,8 +102,6 @@ def unlike_across(model: str = "beam", driven: bool = False) -> Raw:
 
 
 SCENES: list[Raw] = [
-    slid("prismatic", limits=STOPS, analysis={**inverted()["analysis"], "solver": "monolithic", "stiffening": True,
-         "initial_deflection": {"d": {**AT, "link": "arm", "force": [0, 1]}}}),
     slid("prismatic", limits=STOPS, analysis={**inverted()["analysis"], "extrapolation_levels": 2}),
     unlike_across(),
     slid("prismatic", analysis={**inverted()["analysis"], "kind": "steady", "solver": "monolithic", "rho_inf": 1.0,

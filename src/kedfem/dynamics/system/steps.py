@@ -180,8 +180,7 @@ class Steps:
         if self.oracle is not None:
             from kedfem.dynamics.system.oracle.monolithic_steps import monolithic_march
 
-            frames = motion_at if self.corotational else None
-            later, found = monolithic_march(self.ready, self.oracle, state, motion, frames)
+            later, found = monolithic_march(self.ready, self.oracle, state, motion, motion_at)
         elif not isinstance(state, State):
             raise ValueError("a march must begin with a state of the system, got one of the oracle")
         else:

@@ -139,9 +139,8 @@ def analysis(parts: Parts) -> Iterator[Told]:
     entry = parts.analysis
     at = entry.where
     if parts.limits:
-        limits = {"elements": shown(list(parts.limits))}
-        yield "analysis", {"element": "limit", "frames": "", "solver": ""}, at, limits
-        yield "analysis", limited(parts), at, limits
+        levels = "several" if entry.record is not None and (entry.record.extrapolation_levels or 1) > 1 else "one"
+        yield "analysis", only(element="limit", levels=levels), at, {"elements": shown(list(parts.limits))}
     yield "analysis", {"drive": ""}, at, {}
     yield from kinds(parts)
     if entry.word("frames"):
@@ -186,14 +185,6 @@ def fatigue(parts: Parts) -> Iterator[Told]:
     if parts.fatigue.where:
         period = "given" if parts.fatigue.has("period") else "none"
         yield "fatigue", only(period=period), parts.fatigue.where, {}
-
-
-def limited(parts: Parts) -> dict[str, str]:
-    """Factors of an analysis with limits of joints."""
-    several = parts.analysis.record is not None and (parts.analysis.record.extrapolation_levels or 1) > 1
-    deflected = "initial_deflection" if parts.analysis.raw.get("initial_deflection") else ""
-    solver = parts.analysis.word("solver") or "condensed"
-    return only(element="limit", levels="several" if several else "one", start=deflected, solver=solver)
 
 
 def only(**facts: str) -> dict[str, str]:

@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 import scipy.sparse as sp
 
-from kedfem.arrays import Float
+from kedfem.arrays import Bool, Float
 from kedfem.dynamics.frames import Deformed, deformation, frame_force, frames_of, rotation
 from kedfem.dynamics.joints.attachments import interface_matrix
 from kedfem.dynamics.joints.ports import port_columns
@@ -27,6 +27,7 @@ from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.dynamics.system.oracle.monolithic_lines import measured
 from kedfem.dynamics.system.oracle.monolithic_places import force, turned_load
+from kedfem.dynamics.system.oracle.monolithic_stops import HALVINGS, Motion, in_parts, sides
 from kedfem.dynamics.system.oracle.monolithic_tangent import Inverse, inverse, tangent
 from kedfem.dynamics.system.record import Driven, Held, System
 from kedfem.errors import SolveError
@@ -48,7 +49,10 @@ Seen = tuple[float, np.ndarray]
 
 @dataclass(slots=True)
 class Now:
-    """One time: rows of all bodies flat, and what belongs to them; as `record.State`, but in nodal rows."""
+    """One time: rows of all bodies flat, and what belongs to them; as `record.State`, but in nodal rows.
+
+    met : stops whose push begins here, with the step after it
+    """
 
     u: Column
     v: Column
@@ -64,6 +68,7 @@ class Now:
     z_rates: Float[np.ndarray, "3 k"]
     multiplier: Column = field(default_factory=lambda: np.zeros(0))
     port_force: Column = field(default_factory=lambda: np.zeros(0))
+    met: Bool[np.ndarray, " r"] = field(default_factory=lambda: np.zeros(0, bool))
 
 
 @dataclass
@@ -74,6 +79,7 @@ class Monolithic:
     kept : the tangent's inverse
     stressed : of all links the stiffness that stresses of the rigid-body motion give at the end of the step, world
         components; none without stiffening
+    sides : of all laws which stop may push in the step
     """
 
     system: System
@@ -81,6 +87,7 @@ class Monolithic:
     keeps: bool = False
     kept: Inverse | None = None
     stressed: Sequence[Matrix] = ()
+    sides: Sequence[int | None] = ()
 
     def __post_init__(self) -> None:
         model = self.system.model
@@ -102,15 +109,25 @@ class Monolithic:
         n, r = self.scheme.acceleration, self.scheme.rate
         return r[0] * (x - x0) - r[1] * v0 - r[2] * a0, n[0] * (x - x0) - n[1] * v0 - n[2] * a0
 
-    def step(self, old: Now, at: RigidMotion) -> Now:
-        """The state one step later.
+    def step(self, old: Now, at: RigidMotion, between: Motion | None = None, halvings: int = HALVINGS) -> Now:
+        """The state one step later; steps in which stops with damping are met are divided, as those of `march` are.
+
+        Parameters
+        ----------
+        between : rigid-body motion at any times; without it steps stay undivided
+        halvings : how often parts may be divided
 
         Raises
         ------
         SolveError
             If the iterations do not converge.
         """
-        self.stressed = self._stresses(at)
+        return in_parts(self, old, at, between, halvings)
+
+    def undivided(self, old: Now, at: RigidMotion, apart: bool = False) -> Now:
+        """The same in one part; `apart`: stops with damping that do not push at its beginning do not push in it."""
+        stiffening, self.sides = self.system.stiffening, sides(self.system, old, apart)
+        self.stressed = () if stiffening is None else stiffening.stiffness(forcings(self.system.model, at), at)
         if self.keeps:
             try:
                 return self._stepped(old, at, patience=1)
@@ -118,13 +135,6 @@ class Monolithic:
                 pass
         self.kept = None
         return self._stepped(old, at, patience=0)
-
-    def _stresses(self, at: RigidMotion) -> Sequence[Matrix]:
-        stiffening = self.system.stiffening
-        if stiffening is None:
-            return ()
-        every: list[Matrix] = stiffening.stiffness(forcings(self.system.model, at), at)
-        return every
 
     def _stepped(self, old: Now, at: RigidMotion, patience: int) -> Now:
         """The same; `patience` is how many changes in a row may fall slowly before tangents are assembled anew."""
@@ -139,10 +149,10 @@ class Monolithic:
             e, C = self.coordinates(now.z, now.turned, at)
             now.e[0] = e
             now.e[1], now.e[2] = self.rates(e, *old.e)
-            own = self.own_rates(now, old, at)
+            own = self.own_rates(now, self.rates(now.z, *old.z_rates)[0], at)
             for n, each in enumerate(self.system.constraints):
                 if n not in hard:
-                    m[n] = -(1 - scheme.alpha_f) * force(each, at, now.e[0, n], own[n])[0]
+                    m[n] = -(1 - scheme.alpha_f) * force(each, at, now.e[0, n], own[n], self.sides[n])
             left = [
                 self._unbalanced(now, old) - self.W.T @ lam,
                 self.W @ now.u - self.B @ now.z,
@@ -255,14 +265,14 @@ class Monolithic:
                 e[n] = C[n] @ z
         return e, C
 
-    def own_rates(self, now: Now, old: Now, at: RigidMotion) -> Column:
+    def own_rates(self, now: Now, z1: Column, at: RigidMotion) -> Column:
         """Rates of all coordinates: Newmark's of linear ones and of those less a drive's travel.
 
-        Of others by differences: the mechanism and z move on, and back, as their rates show.
+        Of others by differences: the mechanism and z move on, and back, as their rates, z' of these, show.
         """
         from scipy.spatial.transform import Rotation
 
-        out, z1 = now.e[1].copy(), self.rates(now.z, *old.z_rates)[0]
+        out = now.e[1].copy()
         if len(self.hard) == len(out):
             return np.asarray(out)
         ahead = np.array([-2, -1, 1, 2]) * (RATES * self.scheme.h)

@@ -21,19 +21,17 @@ ALIGNED = 1e-12  # sine of an angle below which any normal of an axis is one of 
 Column = Float[np.ndarray, " _"]
 
 
-def force(each: Constraint, at: RigidMotion, e: float, rate: float) -> tuple[float]:
-    """Force of a law against its coordinate, at one time."""
+def force(each: Constraint, at: RigidMotion, e: float, rate: float, side: int | None) -> float:
+    """Force of a law against its coordinate, at one time; `side` as of `monolithic_stops.sides`."""
     match law_at(each.law, at.t, at.phi):
         case Spring(stiffness=k, damping=c, free=free, curve=curve):
-            return (k * (e - free) + c * rate - _on_curve(curve, at, e, rate),)
+            return float(k * (e - free) + c * rate - _on_curve(curve, at, e, rate))
         case Curve() as curve:
-            return (-_on_curve(curve, at, e, rate),)
+            return -_on_curve(curve, at, e, rate)
         case Stop(lower=lower, upper=upper, stiffness=k, damping=c):
-            if lower <= e <= upper:
-                return (0.0,)
-            beyond = e - upper if e > upper else e - lower
-            force = k * beyond + c * rate
-            return (force if force * beyond > 0 else 0.0,)
+            side = int(e > upper) - int(e < lower) if side == 0 else side
+            push = k * (e - (upper if side > 0 else lower)) + c * rate if side else 0.0
+            return push if side and side * push > 0 else 0.0
         case _:
             raise ValueError(f"{each.name}: a constraint has no force law")
 

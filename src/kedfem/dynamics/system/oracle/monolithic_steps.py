@@ -24,7 +24,8 @@ def monolithic_march(
 
     Parameters
     ----------
-    motion_at : rigid-body motion at any times, which co-rotational frames of a state need
+    motion_at : rigid-body motion at any times, which co-rotational frames of a state need; without it steps in which
+        stops are met stay undivided
 
     Raises
     ------
@@ -35,9 +36,9 @@ def monolithic_march(
     history, number = empty_history(len(motion.t), of.bodies, of.constraints), renumbered(of)
     for t in range(len(motion.t)):
         before, at = now, motion.part(t, t + 1)
-        now = solver.step(before, at)
+        now = solver.step(before, at, motion_at)
         history.z[t, number], history.e[t], history.multiplier[t] = now.z, now.e[0], now.multiplier
-        history.rate[t] = solver.own_rates(now, before, at)
+        history.rate[t] = solver.own_rates(now, now.z_rates[1], at)
         history.port_force[t] = now.port_force
         for k, link in enumerate(of.system.model.links):
             whole, here = motion.R[t, of.bodies.motion[k]], solver.of[k]
@@ -61,7 +62,7 @@ def begun(of: Ready, state: State, motion_at: Motion | None) -> Now:
 
     Parameters
     ----------
-    motion_at : rigid-body motion at any times, for its co-rotational frames; these are rigid-body ones without it
+    motion_at : rigid-body motion at any times, for co-rotational frames
     """
     links = of.system.model.links
     u, v, a = (
@@ -76,7 +77,7 @@ def begun(of: Ready, state: State, motion_at: Motion | None) -> Now:
         rates = np.split(state.damped[3 * here.start : 3 * here.stop], 3)
         damped.append(np.stack([nodal_forces(of, k, x) for x in rates]))
     seen: list[list[Seen]] = [[] for _ in links]
-    if motion_at is not None:
+    if motion_at is not None and any(link.fit is not None for link in links):
         inside = Instant(of, motion_at, float(state.time[0])).inside(state.u, state.v)
         seen = [[(x.angle, np.stack([x.g, x.g1, 0 * x.g])) for x in each.frames] for each in inside]
     return Now(

@@ -18,7 +18,8 @@ from kedfem.motion.rigid import RigidMotion
 if TYPE_CHECKING:
     from kedfem.dynamics.system.oracle.monolithic import Monolithic, Now
 
-DIFFERENCE = 1e-6  # of differences for tangents: Newton's method needs no better ones
+DIFFERENCE = 1e-6  # of central differences for tangents: Newton's method needs no better ones
+ONE_SIDED = 1e-8  # of others: with 1e-6 a stiff body that turns freely by 0.02 rad a step had Newton's method diverge
 TINY = 1e-300  # size of a row of zeros
 REPEATED = 1e-9  # singular values of rows of length one that repeat each other
 Matrix = Float[np.ndarray, "_ _"]
@@ -34,13 +35,16 @@ def tangent(of: Monolithic, now: Now, old: Now, at: RigidMotion, C: Matrix, m: C
     ----------
     C, m : gradients of all constraints, and their multipliers
     """
-    s, hard = of.scheme, sp.csr_array(C[of.hard])
-    bodies = sp.block_diag([_of_body(of, n, now, old, at) for n in range(len(of.of))])
+    s, bodies = of.scheme, sp.block_diag([_of_body(of, n, now, old, at) for n in range(len(of.of))])
     A = (1 - s.alpha_m) * s.a0 * of.M + (1 - s.alpha_f) * bodies
-    pull = sp.csr_array(_of_pull(of, now, old, at, m))
-    none = sp.csr_array((len(of.hard), len(of.hard)))
+    return assembled(of, A, _of_pull(of, now, old, at, m), C[of.hard])
+
+
+def assembled(of: Monolithic, A: sp.csr_array, pull: Matrix, C: Matrix) -> sp.csr_array:
+    """Bodies with a matrix A, coupled by interface points and constraints; `pull` is what forces on z change with z."""
+    hard, none = sp.csr_array(C), sp.csr_array((len(C), len(C)))
     blocks = [
-        [A, None, -of.W.T, None], [of.W, -of.B, None, None], [None, -pull, of.B.T, -hard.T],
+        [A, None, -of.W.T, None], [of.W, -of.B, None, None], [None, -sp.csr_array(pull), of.B.T, -hard.T],
         [None, hard, None, none],
     ]  # fmt: skip
     return sp.csr_array(sp.block_array(blocks))
@@ -54,9 +58,9 @@ def _of_body(of: Monolithic, n: int, now: Now, old: Now, at: RigidMotion) -> sp.
         K = rotated_stiffness(link.K0, at.R[0, model.bodies[n], : link.d, : link.d])
         out = K + a1 * (model.damping.alpha * of.masses[n] + model.damping.beta * K)
         return sp.csr_array(out + of.stressed[n] if of.stressed else out)
-    pushed = np.eye(own.stop - own.start) * DIFFERENCE
+    pushed = np.eye(own.stop - own.start) * ONE_SIDED
     change = [of.force_of(n, now.u[own] + x, old, at)[0] - now.f[own] for x in pushed]
-    return np.array(change).T / DIFFERENCE
+    return np.array(change).T / ONE_SIDED
 
 
 def rotated_stiffness(K0: sp.csr_array, R: Matrix) -> sp.csr_array:
@@ -88,7 +92,7 @@ def _of_pull(of: Monolithic, now: Now, old: Now, at: RigidMotion, m: Column) -> 
             pull, rate = m.copy(), of.rates(e, *old.e)[0]
             for n in set(which).difference(of.hard):
                 each = of.system.constraints[n]
-                pull[n] = -(1 - of.scheme.alpha_f) * force(each, at, e[n], rate[n])[0]
+                pull[n] = -(1 - of.scheme.alpha_f) * force(each, at, e[n], rate[n], of.sides[n])
             pushed.append(moved[which].T @ pull[which])
         out[:, column] = (pushed[0] - pushed[1]) / (2 * DIFFERENCE)
     return out

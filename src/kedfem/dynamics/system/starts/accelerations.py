@@ -66,12 +66,12 @@ def accelerated_in_a_step(now: Instant, r: Flat, u: Flat, v: Flat, asked: Asked)
     alone = accelerations(now, r - pushed, u, v, replace(asked, known=0 * asked.known))
     if not (asked.known.any() or pushed.any()):
         return alone
-    more = in_a_step(now, pushed, replace(asked, target=0 * asked.target))
+    more = in_a_step(now, pushed, replace(asked, target=0 * asked.target), now.R)
     return Solved(alone.x + more.x, alone.z + more.z, alone.m + more.m, alone.forces + more.forces, more.f)
 
 
-def in_a_step(now: Instant, pushed: Flat, asked: Asked) -> Solved:
-    """Accelerations under forces on bodies, and those that constraints know, with a step's matrix; see above."""
+def in_a_step(now: Instant, pushed: Flat, asked: Asked, R: Float[np.ndarray, "bodies 3 3"]) -> Solved:
+    """Accelerations under forces on bodies, and that constraints know, with a step's matrix, turned by R; see above."""
     of, still = now.of, now.always.still
     share = of.c.c_K / of.c.c_M
     held = [
@@ -79,7 +79,7 @@ def in_a_step(now: Instant, pushed: Flat, asked: Asked) -> Solved:
         else held_body(np.eye(len(still.K[k])) + share * still.K[k], part.W)
         for k, part in enumerate(of.parts)
     ]  # fmt: skip
-    balance = LinearEquations(of, held, now.R, asked)
+    balance = LinearEquations(of, held, R, asked)
     more = balance.solved(pushed)
     x = [balance.turned(k, more.x[own(of, k)], back=True) for k in range(len(held))]
     f = np.concatenate([balance.turned(k, share * still.times(k, each)) for k, each in enumerate(x)])

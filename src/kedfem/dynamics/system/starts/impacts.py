@@ -90,7 +90,8 @@ def _pushed(of: Ready, state: State, between: Motion, met: Bool[np.ndarray, " r"
     m = np.where(met, -of.constraints.numbers[:, 3] * now.coordinates(z)[1], 0.0)
     hard = now.hard(C)
     none = np.zeros(int(hard.sum()))
-    found = in_a_step(now, np.zeros_like(state.u), Asked(C[hard], none, none, C.T @ m))
+    R = np.stack([each.R for each in now.inside(state.u, state.v)])  # links may have turned far from rigid-body motion
+    found = in_a_step(now, np.zeros_like(state.u), Asked(C[hard], none, none, C.T @ m), R)
     m[hard] += found.m
     state.a[:] += found.x
     if found.f is not None:
