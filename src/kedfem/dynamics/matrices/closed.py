@@ -111,11 +111,9 @@ def _bodies(parts: Sequence[Substructure], made: Profile) -> Bodies:
 
 
 def _room(bodies: Bodies, of: Constraints) -> Trial:
-    k, r, (q, B, size) = (
-        len(bodies.place),
-        len(of.place),
-        (int(x[-1]) for x in (bodies.port_at, bodies.B_at, bodies.row_at)),
-    )
+    """Arrays that the compiled loop works in."""
+    k, r = len(bodies.place), len(of.place)
+    q, B, size = (int(x[-1]) for x in (bodies.port_at, bodies.B_at, bodies.row_at))
     sizes = {"reaction": q, "w": q, "force": q, "RB": B, "SRB": B, "H": size, "K": size, "inverse": k + r, "x": k + r,
              "C": len(of.columns), "target": r, "compliance": r, "beside": r, "m": r, "right": k, "dz": k}  # fmt: skip
     room = {name: np.zeros(n) for name, n in sizes.items()}
