@@ -93,3 +93,15 @@ def test_a_single_link_is_resolved_too(tmp_path: Path) -> None:
     assert_allclose(found.values, EXACT, rtol=0.015)
     assert found.errors.max() <= 0.01
     assert not found.warnings
+
+
+def test_rigid_links_alone_have_no_such_error(tmp_path: Path) -> None:
+    raw = hanging({"model": "rigid"}, [1, 0, 0], "z")
+    ends = [{"link": "arm", "at": [LENGTH, 0, 0]}, {"link": "ground", "at": [LENGTH, 0.3, 0]}]
+    raw["springs"] = {"s": {"kind": "spring", "between": ends, "stiffness": 2000.0}}
+    got, errors, warnings = bending(raw, tmp_path, 1)
+    mass = 7850 * HEIGHT**2 * LENGTH
+    inertia = mass * (LENGTH**2 / 3 + HEIGHT**2 / 12)
+    assert_allclose(got, [np.sqrt(2000 * LENGTH**2 / inertia) / (2 * np.pi)], rtol=1e-6)
+    assert not len(errors)
+    assert not warnings

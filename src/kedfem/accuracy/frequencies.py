@@ -119,7 +119,7 @@ def frozen(
 
     Returns
     -------
-    Also relative errors, estimated (NaN where they are not known), and warnings of them.
+    Also relative errors, estimated (NaN where they are not known; none where no mesh can be finer), and warnings of them.
     """
     scene, allowed = unsimplified(scene), allowed_error(scene)
     names = [name for name, link in scene.links.items() if elastic(link, "solid", "plane", "beam") and refinable(link)]
@@ -130,8 +130,10 @@ def frozen(
         links = {name: refined(made.scene.links[name], factor) for name in names}
         return _frozen(with_links(made.scene, links), modes, at, let_go)
 
-    chosen = finer if left_open == names else partial(finer, names=left_open)
-    made, errors = resolved(_frozen(scene, modes, at, let_go), finer, chosen if left_open else None, allowed)
+    made, errors = _frozen(scene, modes, at, let_go), np.zeros(0)
+    if names:
+        chosen = finer if left_open == names else partial(finer, names=left_open)
+        made, errors = resolved(made, finer, chosen if left_open else None, allowed)
     return made, errors, (*mesh_warning(errors, allowed, remedy(scene)), *file_warning(scene))
 
 
