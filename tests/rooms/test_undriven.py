@@ -165,7 +165,7 @@ def test_a_scene_without_any_joint_can_be_built() -> None:
                      "initial_motions": {"arm": {"at": [0.5, 0], "velocity": [1, 2], "angular_velocity": [0, 0, 30]}}},
     }  # fmt: skip
     ready = meshed(scene_from(raw))
-    assert ready.linkage.mobility == 6
+    assert ready.linkage.mobility == 3  # in its plane
     assert ready.model.coordinates == 21  # of seven nodes
     for link, rate in zip(ready.model.links, initial_rates(ready.scene, ready.linkage, ready.model), strict=True):
         x, one = link.X[:, 0], np.ones(link.n)
