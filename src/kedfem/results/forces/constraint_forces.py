@@ -28,12 +28,14 @@ class ConstraintForces:
 
     @cached_property
     def rows(self) -> tuple[Float[np.ndarray, "r k"], Float[np.ndarray, "r n"]]:
-        """Rows of all joints in the reference position, and the combinations of them that say nothing."""
+        """Rows of all joints in the reference position, and combinations of what holds that say nothing; springs tell."""
         still = resting(1 + max((b for joint in self.model.rows for b in joint.bodies), default=0), np.zeros(1))
         found = joint_rows(self.model.rows, still, self.model.interface_unknowns)
-        C = sp.csr_array((0, 0)) if found is None else found.at(0)
-        silent, null = np.ones(C.shape[0], bool), []
-        for here, _, dense in blocks(C):
+        if found is None:
+            return np.zeros((0, 0)), np.zeros((0, 0))
+        C, holds = found.at(0), np.isinf(found.stiffness)
+        silent, null = holds.copy(), []
+        for here, _, dense in blocks(sp.csr_array(sp.diags_array(holds.astype(float)) @ C)):
             U, s, _ = np.linalg.svd(dense / np.linalg.norm(dense, axis=1, keepdims=True))
             part = np.zeros((len(silent), len(here) - int((s > DEPENDENT).sum())))
             part[here], silent[here] = U[:, len(here) - part.shape[1] :], False
