@@ -106,17 +106,27 @@ def _own_obstacles(scene: Scene, name: str, around: Iterable[Placed]) -> Iterato
 
 
 def leaving(scene: Scene, whose: str) -> Iterator[Fault]:
-    """Gravity and forces out of the xy plane, and torques in it."""
+    """Gravity, forces and speeds out of the xy plane, and torques and rotations in it."""
     if scene.gravity[2] != 0.0:
         yield Fault(("gravity",), f"must lie in the xy plane {whose} [m/s^2], got {vector(scene.gravity)}")
+    for where, given, turns in _vectors(scene):
+        if given is not None and turns and any(given[:2]):
+            yield Fault(where, f"must be along z {whose}, got {vector(given)}")
+        elif given is not None and not turns and given[2] != 0.0:
+            yield Fault(where, f"must lie in the xy plane {whose}, got {vector(given)}")
+
+
+def _vectors(scene: Scene) -> Iterator[tuple[Where, XYZ | None, bool]]:
+    """What acts on links and moves them at the start, and whether it turns them."""
     for name, load in scene.loads.items():
-        given = getattr(load, "vector", None)
-        if given is None:
-            continue
-        if load.kind == "torque" and any(given[:2]):
-            yield Fault(("loads", name, "vector"), f"must be along z {whose}, got {vector(given)}")
-        elif load.kind != "torque" and given[2] != 0.0:
-            yield Fault(("loads", name, "vector"), f"must lie in the xy plane {whose}, got {vector(given)}")
+        yield ("loads", name, "vector"), getattr(load, "vector", None), load.kind == "torque"
+    if (start := getattr(scene, "analysis", None)) is None:  # of what is good of a faulty scene
+        return
+    for name, force in start.initial_deflection.items():
+        yield ("analysis", "initial_deflection", name, "force"), force.force, False
+    for name, motion in start.initial_motions.items():
+        yield ("analysis", "initial_motions", name, "velocity"), motion.velocity, False
+        yield ("analysis", "initial_motions", name, "angular_velocity"), motion.angular_velocity, True
 
 
 def tilted(where: Where, joint: Joint, whose: str, upright: Collection[str]) -> Iterator[Fault]:
