@@ -17,8 +17,9 @@ Which combinations of joints, frames, drives, links and force elements a scene m
 end meets is not refused for its combination; numbers in the matrices are lines of it. Scenes are checked by the same
 table, and messages are its words; words in capitals are those of a scene. `enforced` is how a joint is: by points that
 its links share for good, or by constraint equations, as joints are between links that slide or turn on each other,
-driven ones, gears and bushings. What a single part needs (a key of a kind of link, a surface at a joint, points of planar
-links in one plane) is in [scene.md](scene.md) and [meshing.md](meshing.md).
+driven ones, gears and bushings, and in space hinges and welds of links with unlike frames. What a single part needs (a
+key of a kind of link, a surface at a joint, points of planar links in one plane) is in [scene.md](scene.md) and
+[meshing.md](meshing.md).
 
 It is executed (`python -m tests.cells`). Of {all} cells, each kind of joint with all frames, with and without a drive, on
 13 pairs of kinds of links, and each pair of these with one of 18 loads and laws, {ran} ran three steps from a loaded,

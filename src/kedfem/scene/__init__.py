@@ -1,6 +1,7 @@
 """The scene: what a user describes, validated completely; SI units, points as coordinates."""
 
 from kedfem.scene.questions.curves import Pieces, pieces
+from kedfem.scene.questions.enforced import enforced_by_equations
 from kedfem.scene.questions.laws import (
     curves,
     drive_angle,
@@ -11,13 +12,7 @@ from kedfem.scene.questions.laws import (
     load_factor,
     path_parameter,
 )
-from kedfem.scene.questions.modelling import (
-    corotational,
-    corotational_links,
-    enforced_by_equations,
-    link_frames,
-    moving_grounds,
-)
+from kedfem.scene.questions.modelling import corotational, corotational_links, link_frames, moving_grounds
 from kedfem.scene.questions.planes import plane_scene, spatial_beams
 from kedfem.scene.questions.timing import TimeGrid, cycle, time_grid, turn_steps, without_vibration
 from kedfem.scene.read.files import part_geometry

@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping
 from kedfem.errors import Fault, Where
 from kedfem.scene.checks.capabilities import CONSTRAINED, SHARED, Facts, refusals
 from kedfem.scene.checks.parts import Entry, Parts, category, link_names
-from kedfem.scene.questions.modelling import default_frames, enforced_by_equations
+from kedfem.scene.questions.enforced import enforced_by_equations
+from kedfem.scene.questions.modelling import default_frames
 from kedfem.scene.questions.planes import spatial_beams
 from kedfem.scene.records.joints import Bushing
 from kedfem.scene.records.wording import shown

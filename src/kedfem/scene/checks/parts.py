@@ -12,7 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from kedfem.errors import Fault
 from kedfem.scene.checks.hints import below
-from kedfem.scene.records.analysis import Output
+from kedfem.scene.records.analysis import Analysis, Output
 from kedfem.scene.records.materials import BUILT_IN
 from kedfem.scene.records.points import XYZ
 from kedfem.scene.records.scene import Scene
@@ -148,25 +148,26 @@ def scene_parts(raw: Mapping[str, Any], scene: Scene | None, folder: Path, sketc
 
     own = raw.get("materials")
     tables = {name: entries(name) for name in TABLES} | {"probes": entries("output", "probes")}
-    drive = single("drive") if raw.get("drive") is not None else NONE
+    drive, analysis = single("drive") if raw.get("drive") is not None else NONE, single("analysis")
     return Parts(
-        **tables, drive=drive, damping=single("damping"), analysis=single("analysis"),
+        **tables, drive=drive, damping=single("damping"), analysis=analysis,
         animation=single("output", "animation"),
         fatigue=single("fatigue") if raw.get("fatigue") is not None else NONE,
         materials=[*(own if isinstance(own, Mapping) else ()), *BUILT_IN], raw=raw, folder=folder,
-        sketch=sketch, good=scene or good_scene(tables, drive, record_of(raw.get("gravity"), "gravity")),
+        sketch=sketch, good=scene or good_scene(tables, drive, analysis, record_of(raw.get("gravity"), "gravity")),
     )  # fmt: skip
 
 
-def good_scene(tables: Mapping[str, Mapping[str, Entry]], drive: Entry, gravity: XYZ | None) -> Scene:
-    """The scene of all records without a fault, for questions about it; without its analysis."""
+def good_scene(tables: Mapping[str, Mapping[str, Entry]], drive: Entry, analysis: Entry, gravity: XYZ | None) -> Scene:
+    """The scene of all records without a fault, for questions about it; an analysis with one says its frames alone."""
     good: dict[str, Any] = {
         section: {name: entry.record for name, entry in table.items() if entry.record is not None}
         for section, table in tables.items()
     }
     output = Output.model_construct(probes=good.pop("probes"))
     still = gravity or (0.0, 0.0, 0.0)
-    return Scene.model_construct(**good, drive=drive.record, gravity=still, output=output)
+    asked = analysis.record or Analysis.model_construct(frames=analysis.word("frames"))
+    return Scene.model_construct(**good, drive=drive.record, analysis=asked, gravity=still, output=output)
 
 
 def category(link: Entry) -> str:

@@ -50,13 +50,6 @@ def by_constraint_equations(joint: Joint, drive: Drive | None = None, kinds: fro
     return joint.kind != "prismatic" or drive is not None or GROUND not in joint.links
 
 
-def enforced_by_equations(scene: Scene, name: str) -> bool:
-    """Whether a joint of a scene is enforced by constraint equations."""
-    joint = scene.joints[name]
-    kinds = frozenset(scene.links[each].category for each in joint.links if each in scene.links)
-    return by_constraint_equations(joint, scene.driven_joints.get(name), kinds)
-
-
 def moving_grounds(scene: Scene) -> dict[str, str]:
     """Rigid links without a shape that drives alone move: parts of the ground. Each with its driven joint.
 

@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterable, Iterator
 from typing import Any
 
 from kedfem.errors import Fault, Where
-from kedfem.scene.questions.modelling import enforced_by_equations
+from kedfem.scene.questions.modelling import by_constraint_equations
 from kedfem.scene.records.joints import Joint
 from kedfem.scene.records.points import XYZ, Apart
 from kedfem.scene.records.scene import Scene
@@ -56,7 +56,7 @@ def rigid_in_space(scene: Scene, name: str) -> bool:
     if link.category != "rigid" or link.rigid_line or link.shape is None:
         return False
     driven = [x for x in scene.driven_joints.keys() & scene.joints.keys() if name in scene.joints[x].links]
-    return all(enforced_by_equations(scene, each) for each in driven)
+    return all(by_constraint_equations(scene.joints[each], scene.driven_joints[each]) for each in driven)
 
 
 def welded(scene: Scene, name: str) -> set[str]:
