@@ -12,7 +12,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.arrays import Bool
-from tests.cells import IN_A_PLANE, WITHIN, Cell, scene_of
+from tests.cells import IN_A_PLANE, WITHIN, Cell, executed, scene_of
 from tests.laws.test_joint_partners import TURNS
 from tests.moving import turned
 from tests.partners import partner
@@ -109,3 +109,9 @@ def test_a_body_bounces_far_from_where_it_is_drawn(kind: str, joint: str, axis: 
     before = int(np.flatnonzero(marched(of, FLIGHT, divided=True)[1].multiplier @ pushing(of))[0]) - 1
     near = replace(of, state=marched(of, before)[0])
     as_by_the_oracle(near, BOUNCE, WITHIN["co-rotational"], before + 1)
+
+
+def test_the_oracle_finds_rates_of_fast_coordinates() -> None:
+    """Of a damped spring that turns by 1 to 3 rad a step; differences over four times as long are 8.7e-7 off."""
+    cell = Cell("revolute", "rigid-body", True, "solid and beam", "spring on the joint")
+    assert executed(cell)[1] < 2e-8

@@ -35,7 +35,7 @@ from kedfem.links.record import Matrix
 from kedfem.motion.rigid import RigidMotion
 
 ITERATIONS = 40
-RATES = 0.01  # of a step, by which a mechanism moves on for the rates of its coordinates, of fourth order
+RATES = 2.5e-3  # of a step, by which a mechanism moves on for the rates of its coordinates, of fourth order
 SLOW = 0.1  # changes that do not fall faster have their tangents assembled anew
 DIVERGED = 1e9  # m: a change with which iterations will not come back; forces of beams would soon overflow
 STIFF = 0.01  # of the displacement: changes of linear steps below it are rounding, beside far stiffer links,
