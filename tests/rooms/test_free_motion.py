@@ -202,6 +202,17 @@ def test_a_structure_cannot_start_to_move() -> None:
         moving(scene)
 
 
+@pytest.mark.parametrize("given", [(0, 1, 2), (0.1, 0.7, -0.3), (0, 0, 3)])
+@pytest.mark.parametrize("at", [(0.5, 0, 0), (0.1, 0.2, 0.7)])
+def test_a_zero_speed_is_reached_but_for_rounding(given: tuple[float, ...], at: tuple[float, ...]) -> None:
+    """A link that moves without a rotation, or turns about a point that stands: which rounding gives some 1e-16."""
+    for v, omega in ((given, (0, 0, 0)), ((0, 0, 0), given)):
+        asked = {"one": {"at": list(at), "velocity": list(v), "angular_velocity": list(omega)}}
+        _, v0, turning = twists({"J": ("spherical", "one", "two", (0.3, 0, 0))}, initial_motions=asked)
+        np.testing.assert_allclose(velocity(v0, turning, 1, at), v, atol=1e-12)
+        np.testing.assert_allclose(turning[1], omega, atol=1e-12)
+
+
 def test_a_link_that_flies_starts_as_it_is_told() -> None:
     joints = {"A": ("weld", "one", "other", (0.3, 0, 0))}
     asked = {"one": {"at": [1, 2, 3], "velocity": [1, 0, -2], "angular_velocity": [3, 2, 1]}}

@@ -63,7 +63,7 @@ def initial_twists(scene: Scene, linkage: Linkage) -> tuple[Float[np.ndarray, "B
         other = [row for name, joint in scene.joints.items() for row in joint_free_rows(scene, name, linkage.bodies)
                  if name not in given or (row.kind == ANGLE and joint.kind not in TURNING)]  # fmt: skip
         q = free @ _least(A / sizes[:, None] @ free, b / sizes, drawn_jacobian(other, bodies, size) @ free)
-        _check_reached(asked, A @ q)
+        _check_reached(asked, A @ q, size)
         twists[1:] = (q * column).reshape(-1, 6)
     v, omega = twists[:, :3], twists[:, 3:]
     return v - cross(omega, np.broadcast_to(linkage.centre, omega.shape)), np.array(omega)
@@ -121,14 +121,11 @@ def _wanted(scene: Scene, linkage: Linkage) -> Iterator[Wanted]:
                 yield Wanted(where, unit, row.ravel(), value)
 
 
-def _check_reached(asked: list[Wanted], got: Float[np.ndarray, " w"]) -> None:
-    """Raise an error for speeds that the joints do not allow together."""
-    for unit in ("rad/s", "m/s"):
-        alike = [(each.value, x) for each, x in zip(asked, got, strict=True) if each.unit == unit]
-        fastest = max((abs(value) for value, _ in alike), default=0.0)
-        if any(abs(value - x) > REACHED * fastest for value, x in alike):
-            break
-    else:
+def _check_reached(asked: list[Wanted], got: Float[np.ndarray, " w"], size: float) -> None:
+    """Raise an error for speeds that the joints do not allow together; of rotations at an arm of the linkage's size."""
+    arms = np.array([1.0 if each.unit == "m/s" else size for each in asked])
+    values = np.array([each.value for each in asked])
+    if (np.abs(values - got) * arms <= REACHED * np.abs(values * arms).max()).all():
         return
     lines = []
     for each, x in zip(asked, got.tolist(), strict=True):
