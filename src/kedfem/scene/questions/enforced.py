@@ -1,7 +1,7 @@
 """Which joints of a scene are enforced by constraint equations, and which by points that their links share."""
 
 from kedfem.scene.questions.modelling import by_constraint_equations, link_frames
-from kedfem.scene.questions.planes import spatial_beams
+from kedfem.scene.questions.planes import plane_scene, spatial_beams
 from kedfem.scene.records.scene import Scene
 
 TURNED = ("revolute", "weld")  # joints by shared points that make links rotate together
@@ -15,14 +15,27 @@ def enforced_by_equations(scene: Scene, name: str) -> bool:
 
 
 def _unlike(scene: Scene, name: str) -> bool:
-    """Whether it makes elastic links in space rotate together of which one alone has a co-rotational frame.
+    """Whether it makes links rotate together of which one alone has a co-rotational frame, and not by their angle.
 
     A rotation ψ stretches the cross-section of the other by ψ²/2, so that points which both share would resist it.
     """
     joint = scene.joints[name]
-    links = [each for each in joint.links if each in scene.links and scene.links[each].category != "rigid"]
-    if joint.kind not in TURNED or len({scene.links[each].frames for each in links}) < 2:
+    if joint.kind not in TURNED or len({scene.links[each].frames for each in joint.links if each in scene.links}) < 2:
         return False
+    links = [each for each in joint.links if each in scene.links and _displaced(scene, each)]
     if len({link_frames(scene, each) for each in links}) < 2:
         return False
-    return any(scene.links[each].category == "solid" for each in links) or not spatial_beams(scene).isdisjoint(links)
+    kinds = {scene.links[each].category for each in links}
+    if "solid" in kinds or not spatial_beams(scene).isdisjoint(links):
+        return True
+    return not plane_scene(scene) if kinds == {"rigid"} else joint.kind == "weld" and "plane" in kinds
+
+
+def _displaced(scene: Scene, name: str) -> bool:
+    """Whether a link has displacements of its own: not a slider, whose mass rides on a link, nor what a drive carries."""
+    link = scene.links[name]
+    if link.category != "rigid":
+        return True
+    drives = ((scene.joints[x], drive) for x, drive in scene.driven_joints.items() if x in scene.joints)
+    carried = any(name in joint.links and not by_constraint_equations(joint, drive) for joint, drive in drives)
+    return not carried and (link.shape is not None or link.inertia is not None)
