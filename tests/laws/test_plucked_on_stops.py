@@ -151,8 +151,8 @@ def test_what_a_static_analysis_finds_under_loads_is_let_go(axis: str, spring: f
 
 def test_energy_is_kept_at_second_order_after_a_stop_lets_go() -> None:
     """It begins with ½ k θ² of the spring, ½ k s² of the stop and that of the bent rod, and leaves the stop: signs of
-    the error change from step to step, so that its order is that over all."""
-    spring, gap, stiffness, counts, apart = 500.0, 5e-3, 2e3, (30, 60, 120, 250, 500, 1000, 2000), []
+    the error change from step to step, so that its order is that over all, of steps of which rounding chooses none."""
+    spring, gap, stiffness, counts, apart = 500.0, 5e-3, 2e3, (120, 250, 500, 1000, 2000, 4000), []
     for count in counts:
         raw = hinged("oblique", 100.0, {"upper": gap, "stiffness": stiffness}, spring)
         raw["analysis"] |= {"end_time": 0.03, "step": 0.03 / count, "rho_inf": 0.95}
@@ -165,7 +165,7 @@ def test_energy_is_kept_at_second_order_after_a_stop_lets_go() -> None:
         assert angle.min() < -3 * gap
         apart.append(float(np.abs(energy / energy[0] - 1).max()))
     assert apart[-1] < 1e-5, apart
-    assert np.polyfit(np.log(counts), np.log(apart), 1)[0] < -1.7, apart
+    assert -2.5 < np.polyfit(np.log(counts), np.log(apart), 1)[0] < -1.7, apart
 
 
 def on_a_crank() -> Raw:

@@ -35,7 +35,7 @@ from kedfem.links.record import Matrix
 from kedfem.motion.rigid import RigidMotion
 
 ITERATIONS = 40
-RATES = 2.5e-3  # of a step, by which a mechanism moves on for the rates of its coordinates, of fourth order
+RATES = 0.01  # of a step, by which a mechanism moves on for the rates of its coordinates, of sixth order
 SLOW = 0.1  # changes that do not fall faster have their tangents assembled anew
 DIVERGED = 1e9  # m: a change with which iterations will not come back; forces of beams would soon overflow
 STIFF = 0.01  # of the displacement: changes of linear steps below it are rounding, beside far stiffer links,
@@ -275,13 +275,13 @@ class Monolithic:
         out = now.e[1].copy()
         if len(self.hard) == len(out):
             return np.asarray(out)
-        ahead = np.array([-2, -1, 1, 2]) * (RATES * self.scheme.h)
+        ahead = np.array([-3, -2, -1, 1, 2, 3]) * (RATES * self.scheme.h)
         values = []
         for dt in ahead:
             turn = Rotation.from_rotvec(dt * at.omega[0]).as_matrix() @ at.R[0]
             moved = replace(at, R=turn[None], p=at.p + dt * at.v)
             values.append(self.coordinates(now.z + dt * z1, now.turned.copy(), moved)[0])
-        rates = np.array([1, -8, 8, -1]) @ np.array(values) / (12 * RATES * self.scheme.h)
+        rates = np.array([-1, 9, -45, 45, -9, 1]) @ np.array(values) / (60 * RATES * self.scheme.h)
         for n, each in enumerate(self.system.constraints):
             if not each.linear and getattr(each.law, "drive", -1) < 0:
                 out[n] = rates[n]

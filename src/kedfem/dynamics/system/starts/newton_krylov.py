@@ -240,7 +240,7 @@ def stands_off(now: Instant, u: Flat, z1: Flat | None) -> str:
     links = system.model.links
     off = [np.abs(x).max(initial=0.0) for x in gaps(now, u, z)]
     largest, far = max(map(reach, links)), moved(now.of, u)
-    if max(far) > FAR * largest:
+    if max(far) > FAR * largest and max(off) <= OPEN * max(far):
         return f"link '{links[int(np.argmax(far))].name}' would move by {max(far):.3g} m"
     size = OPEN * largest
     if max(off) > size:
