@@ -95,7 +95,8 @@ def _compiled(names: Sequence[str]) -> list[str]:
     rows = []
     for name in names:
         with TemporaryDirectory() as folder:
-            copied = copytree(CHECKOUT / "examples" / name, Path(folder) / name)
+            copytree(CHECKOUT / "geometry", Path(folder) / "geometry")
+            copied = copytree(CHECKOUT / "examples" / name, Path(folder) / "examples" / name)
             environment = os.environ | {"KEDFEM_CACHE": f"{folder}/cache"}
             command = [sys.executable, "-c", COMPILING, str(copied / "scene.toml")]
             said = subprocess.run(command, capture_output=True, check=True, text=True, env=environment)
