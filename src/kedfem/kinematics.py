@@ -158,8 +158,7 @@ def _missing(scene: Scene, linked: Linkage, masses: Inertias) -> Iterator[str]:
         got = ", ".join(f"{name} (a slider without mass)" if name in sliders else name for name in bare)
         yield f"rigid forces: links without shape and material are taken to have no mass: {got}"
     if linked.mobility:
-        free = linked.mobility
-        yield f"free motions ({free}) are held in the reference position; forces of joints are left out"
+        yield f"free motions ({linked.mobility}) are held in the reference position; forces of joints are left out"
 
 
 def _transmission(results: Results, recorded: Kinematics) -> Iterator[str]:

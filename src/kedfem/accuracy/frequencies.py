@@ -87,23 +87,20 @@ def unsimplified(scene: Scene) -> Scene:
 
 @dataclass(frozen=True, slots=True)
 class Linked:
-    """A scene's linkage and system, what finds its modes, and its frequencies at a position [Hz]."""
+    """A scene's linkage and system, what finds its modes, and its motion and frequencies at a position [Hz]."""
 
     scene: Scene
     linkage: Linkage
     along: Path
     system: System
     solver: Frozen | Stiffened
+    motion: RigidMotion
     frequencies: Float[np.ndarray, " f"]
 
     @property
     def unknowns(self) -> int:
         """Of all links, before joints share any."""
         return int(self.system.model.unknowns)
-
-    def motion(self, t: Float[np.ndarray, " T"]) -> RigidMotion:
-        """Its rigid-body motion."""
-        return rigid_motion(self.linkage, self.along, t, path_parameter(self.scene, t))
 
 
 def frozen(
@@ -142,8 +139,8 @@ def _frozen(scene: Scene, modes: int, at: float, let_go: LetGo | None) -> Linked
     system = system_of(let_go(scene) if let_go else scene, linkage, along)
     solver = frozen_linkage(scene, system, linkage, along, modes, let_go is not None)
     t = np.array([at])
-    found = solver.at(rigid_motion(linkage, along, t, path_parameter(scene, t)))
-    return Linked(scene, linkage, along, system, solver, found.frequencies)
+    motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
+    return Linked(scene, linkage, along, system, solver, motion, solver.at(motion).frequencies)
 
 
 def allowed_error(scene: Scene) -> float:

@@ -93,7 +93,7 @@ def state_space(
     scene, assembly = assembled(scene)
     stage("mesh and matrices")
     made, _, meshes = frozen(scene, modes, at, (lambda scene: _let_go(scene)[0]) if free else None)
-    scene, system, motion = made.scene, made.system, made.motion(np.array([at]))
+    scene, system, motion = made.scene, made.system, made.motion
     loose, elements = _let_go(scene) if free else (scene, ())
     motors = (_Element(x, f"motors/{x}", motor.torque is not None) for x, motor in scene.motors.items())
     elements = (*motors, *elements)

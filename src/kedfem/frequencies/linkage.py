@@ -104,7 +104,7 @@ def frequencies(
     scene, assembly = assembled(scene)
     watch("mesh and matrices", 0, 0)
     t = _positions(scene, wanted.positions)
-    made, errors, meshes = frozen(scene, wanted.modes, t[0], without_drives if wanted.free else None)
+    made, errors, meshes = frozen(scene, wanted.modes, t[0], _without_drives if wanted.free else None)
     scene, system, solver = made.scene, made.system, made.solver
     turn = turn_steps(scene)
     speed = 2 * np.pi / (turn * time_grid(scene).step) if turn else 0.0
@@ -133,7 +133,7 @@ def frequencies(
     return done
 
 
-def without_drives(scene: Scene) -> Scene:
+def _without_drives(scene: Scene) -> Scene:
     """The scene whose drives have let go of their joints."""
     return scene.model_copy(update={"drive": None, "drives": {}})
 

@@ -1,7 +1,6 @@
 """Constraint equations of a scene's joints, gears and drives."""
 
 from dataclasses import replace
-from itertools import chain
 
 import numpy as np
 
@@ -87,8 +86,8 @@ def joint_free_rows(scene: Scene, name: str, bodies: tuple[str, ...]) -> list[Co
 
 def plane_rows(bodies: tuple[str, ...]) -> list[ConstraintEquation]:
     """Rows that hold all links in planes z = constant."""
-    planes = (joint_rows("planar", PLANE, k, 0, np.zeros(3), np.eye(3)[2]) for k in range(1, len(bodies)))
-    return list(chain.from_iterable(planes))
+    numbers, origin, z = range(1, len(bodies)), np.zeros(3), np.eye(3)[2]
+    return [row for k in numbers for row in joint_rows("planar", PLANE, k, 0, origin, z)]
 
 
 def _pair(joint: Joint, bodies: tuple[str, ...]) -> tuple[int, int]:

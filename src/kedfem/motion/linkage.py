@@ -27,17 +27,7 @@ from kedfem.motion.joint_equations import (
 )
 from kedfem.motion.parts import parts
 from kedfem.motion.redundancy import LOOSER, Looser, would_move
-from kedfem.motion.released_motions import (
-    RANK_TOLERANCE,
-    Basis,
-    Drawn,
-    free_motions,
-    listed,
-    null_space,
-    planar,
-    rank,
-    span,
-)
+from kedfem.motion.released_motions import RANK_TOLERANCE, Drawn, free_motions, listed, null_space, planar, rank, span
 from kedfem.motion.released_motions import remedy as held_by
 from kedfem.motion.values import Poses, features, jacobian
 from kedfem.scene import Scene, corotational_links, plane_scene
@@ -114,8 +104,9 @@ def linkage(scene: Scene) -> Linkage:
     elif several is None or not _well_driven(every, several, size):
         drawn = drawn_linkage(scene, rows)
         if plane_scene(scene):
-            rows = rows + _across(drawn, bodies)
-            drawn = planar(drawn_linkage(scene, rows))
+            across = _across(drawn, bodies)
+            rows = rows + across
+            drawn = planar(drawn_linkage(scene, rows) if across else drawn)
         free = _check_mobility(scene, drawn)
         rows = rows + _holding(scene, drawn, free)
         every = stacked(rows)
@@ -254,7 +245,10 @@ def _other_drives(scene: Scene, drawn: Drawn) -> list[str]:
 
 def _across(drawn: Drawn, bodies: tuple[str, ...]) -> list[ConstraintEquation]:
     """Rows that hold the motions that only leave the plane of a plane scene: its links know none of them."""
-    released, inside = null_space(drawn.J), null_space(planar(drawn).J)
+    released = null_space(drawn.J)
+    if not released.shape[1]:
+        return []
+    inside = null_space(planar(drawn).J)
     across = span(released - inside @ (inside.T @ released))
     return _most_changed(plane_rows(bodies), across, len(bodies), drawn.size)
 
@@ -269,7 +263,9 @@ def _holding(scene: Scene, drawn: Drawn, free: int) -> list[ConstraintEquation]:
     return _most_changed(rows, motions, len(bodies), drawn.size)
 
 
-def _most_changed(rows: list[ConstraintEquation], motions: Basis, bodies: int, size: float) -> list[ConstraintEquation]:
+def _most_changed(
+    rows: list[ConstraintEquation], motions: Float[np.ndarray, "k n"], bodies: int, size: float
+) -> list[ConstraintEquation]:
     """As many rows as there are motions: those that these change most, of equal ones the first."""
     if not motions.shape[1]:
         return []

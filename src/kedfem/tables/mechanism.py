@@ -141,7 +141,7 @@ def frequencies_tables(scene: Scene, found: Frequencies) -> list[Table]:
         out.append(listed(title, columns, (
             (place, *("–" if np.isnan(row[k]) else f"{row[k]:.4g}" for k in modes))
             for place, row in zip(places, found.values, strict=True)
-        ), caption=Text(error_words(found.errors)) if error_words(found.errors) else None))  # fmt: skip
+        ), caption=_caption(error_words(found.errors))))  # fmt: skip
     ranges = {(x.mode, x.harmonic): _range(x, found.speed) for x in found.crossings}
     harmonics = sorted({k for _, k in ranges})
     side_by_side = WIDTH // (BORDER + max(map(len, ranges.values()), default=1))
@@ -177,8 +177,13 @@ def part_tables(found: PartFrequencies) -> list[Table]:
     part, still = found.part, found.still
     held = f"held at {', '.join(part.held)}" if part.held else "free"
     left_out = f"{still} motions without strain, at 0 Hz, are left out" if still else ""
-    caption = "; ".join(filter(None, (left_out, error_words(found.errors))))
     rows = [("mass", with_prefix(found.mass, "kg")), ("unknowns", str(part.link.unknowns))]
     rows += [(f"mode {number}", f"{f:.5g} Hz") for number, f in enumerate(found.values, 1)]
     title = Text(f"Natural frequencies of {part.name}, {held}")
-    return [facts(title, rows, caption=Text(caption) if caption else None, min_width=60)]
+    return [facts(title, rows, caption=_caption(left_out, error_words(found.errors)), min_width=60)]
+
+
+def _caption(*words: str) -> Text | None:
+    """What is below a table; none of empty words."""
+    told = "; ".join(filter(None, words))
+    return Text(told) if told else None

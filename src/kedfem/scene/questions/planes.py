@@ -120,8 +120,7 @@ def _vectors(scene: Scene) -> Iterator[tuple[Where, XYZ | None, bool]]:
     """What acts on links and moves them at the start, and whether it turns them."""
     for name, load in scene.loads.items():
         yield ("loads", name, "vector"), getattr(load, "vector", None), load.kind == "torque"
-    if (start := getattr(scene, "analysis", None)) is None:  # of what is good of a faulty scene
-        return
+    start = scene.analysis
     for name, force in start.initial_deflection.items():
         yield ("analysis", "initial_deflection", name, "force"), force.force, False
     for name, motion in start.initial_motions.items():

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Forcing
 from kedfem.dynamics.stiffening import Stiffening, StressModes
-from kedfem.dynamics.system.arrays import Stresses, ends_of
+from kedfem.dynamics.system.arrays import Stresses, ends_of, flat
 from kedfem.dynamics.system.sparse import Part, SparsePart
 from kedfem.motion.rigid import RigidMotion
 
@@ -37,9 +37,8 @@ class Stressed:
         for each, entries, size in zip(self.stiffening.over(forcing, motion), self.entries, self.size, strict=True):
             every.append(fewer_terms(each.factors * size, entries / size[:, None]))
         sizes = [k.shape[1] for _, k in every for _ in range(len(k))]
-        flat = np.concatenate([np.zeros(0), *(k.ravel() for _, k in every)])
         factors = np.ascontiguousarray(np.concatenate([s for s, _ in every], axis=1))
-        return factors, ends_of([len(k) for _, k in every]), ends_of(sizes), flat
+        return factors, ends_of([len(k) for _, k in every]), ends_of(sizes), flat([k for _, k in every])
 
 
 def stressed(stiffening: Stiffening, parts: Sequence[Part]) -> Stressed:

@@ -13,7 +13,7 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.matrices.dense import Coordinates, work_on
-from kedfem.dynamics.system.arrays import TurningLoads
+from kedfem.dynamics.system.arrays import TurningLoads, flat
 from kedfem.links.record import Link
 
 Loads = Sequence[Sequence[Pattern]]
@@ -32,7 +32,7 @@ def turning_loads(links: Sequence[Link], parts: Sequence[Coordinates], loads: Lo
     for k, load in every:
         link, part = links[k], parts[k]
         e, weights = shown_by(link, load.forces)
-        force.append(work_on(part, load.forces).ravel())
+        force.append(work_on(part, load.forces))
         of = 2 if link.kind == "beam" else 0
         T = part.T[of] if part.T else np.eye(link.n)
         shown.append((weights[:1] if of else e.T @ weights) @ T)
@@ -40,13 +40,13 @@ def turning_loads(links: Sequence[Link], parts: Sequence[Coordinates], loads: Lo
         about, world = load.share if load.share is not None else (np.zeros(3), np.zeros(3))
         axis.append(about)
         fixed.append(world)
-        force_at.append(force_at[-1] + len(force[-1]))
+        force_at.append(force_at[-1] + force[-1].size)
         shown_at.append(shown_at[-1] + shown[-1].size)
     return TurningLoads(
         body=np.array([k for k, _ in every], int), force_at=np.array(force_at), shown_at=np.array(shown_at),
         planar_beam=np.array([links[k].kind == "beam" for k, _ in every], bool),
-        drawn=np.array(drawn).reshape(-1, 3, 3), shown=np.concatenate([np.zeros(0), *(x.ravel() for x in shown)]),
-        force=np.concatenate([np.zeros(0), *force]), axis=np.array(axis).reshape(-1, 3),
+        drawn=np.array(drawn).reshape(-1, 3, 3), shown=flat(shown),
+        force=flat(force), axis=np.array(axis).reshape(-1, 3),
         fixed=np.array(fixed, float).reshape(-1, 3),
     )  # fmt: skip
 
