@@ -185,5 +185,5 @@ def part_tables(found: PartFrequencies) -> list[Table]:
 
 def _caption(*words: str) -> Text | None:
     """What is below a table; none of empty words."""
-    told = "; ".join(filter(None, words))
-    return Text(told) if told else None
+    text = "; ".join(filter(None, words))
+    return Text(text) if text else None
