@@ -42,7 +42,7 @@ def _by_step(steps: Sequence[int]) -> list[str]:
     rows = []
     for count in steps:
         rows.append((f"{count:,}", _percent(_run(*FINEST, "co-rotational", count)[0], reference)))
-    return table(("steps a turn", "error, co-rotational"), rows)
+    return table(("steps a revolution", "error, co-rotational"), rows)
 
 
 def _run(nodes: int, elements: int, frames: str, steps: int) -> tuple[Histories, float]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.corotational_run import BLOCKS, POINTS, Curve, Ran, cost, four_bar, run
+from benchmarks.corotational_whole import whole_runs
 from benchmarks.pages import script, table, write_page
 
 STEPS = 3000  # usual number
@@ -55,7 +56,7 @@ def bench_corotational(folder: Path, quick: bool) -> None:
               *(f"rms, {kind}" for kind in kinds), "iterations", "factorisations", "3,000 steps [ms]",
               "of linear")  # fmt: skip
     exact = references["damped"]
-    tables = [table(header, rows), _space(study, kinds, quick), _time(study, references, quick)]
+    tables = [whole_runs(quick), table(header, rows), _space(study, kinds, quick), _time(study, references, quick)]
     if not quick:
         tables += [_solids(study, exact), _reduced(study, exact), _costs()]
     peaks = [(kind, f"{np.abs(y).max() / 1e6:.0f}") for kind, y in references.items()]

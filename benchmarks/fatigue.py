@@ -12,7 +12,7 @@ from kedfem.links.recovery import StressRecovery, stress_recovery
 from kedfem.links.solid import solid_link
 from kedfem.mesh import link_mesh
 from kedfem.results.fatigue.strength import strength_of
-from kedfem.results.fatigue.surface import Look, Period
+from kedfem.results.fatigue.surface import Period, SurfaceHistory
 from kedfem.results.stresses.envelope import Kept
 from kedfem.scene import Bar, Fatigue, FatigueData, LinkScene, Material, Meshing
 
@@ -38,11 +38,11 @@ def bench_fatigue(folder: Path, quick: bool) -> None:
     write_page(folder, "performance/fatigue", [table(header, rows)])
 
 
-def _look(recovery: StressRecovery, kept: Kept, criterion: str) -> Look:
+def _look(recovery: StressRecovery, kept: Kept, criterion: str) -> SurfaceHistory:
     data = FatigueData.model_validate({"group": "steel", "tensile_strength": 8e8})
     asked = Fatigue.model_validate({"materials": {"steel": data}, "criterion": criterion})
     nowhere, period = [""] * recovery.points, Period(PERIOD, 2 * PERIOD, before=True)
-    return Look(recovery, kept, nowhere, strength_of(data, 2.1e11), asked, period)
+    return SurfaceHistory(recovery, kept, nowhere, strength_of(data, 2.1e11), asked, period)
 
 
 def _plate(elements: tuple[int, int, int]) -> StressRecovery:

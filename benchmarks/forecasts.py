@@ -3,7 +3,7 @@
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from benchmarks.memory import memory_held, most_memory
+from benchmarks.memory import forget_most, memory_held, most_memory
 from benchmarks.pages import ROOT, apart, script, table, write_page
 from benchmarks.scenes import mechanisms, with_reduced_links
 from kedfem.precompile import precompile
@@ -22,14 +22,14 @@ def bench_forecasts(folder: Path, quick: bool) -> None:
     names = [*_cases(), *EXAMPLES]
     rows = []
     for name in names[:2] if quick else names:
-        told, run = apart("benchmarks.forecasts", "told", name), apart("benchmarks.forecasts", "run", name)
+        expected, run = apart("benchmarks.forecasts", "expected", name), apart("benchmarks.forecasts", "run", name)
         cells = [name, f"{run['unknowns']:,.0f}", f"{run['steps']:,.0f}"]
         for key, unit, form in (("time", 1.0, ".2f"), ("memory", 1e6, ".0f")):
-            cells += [f"{told[key] / unit:{form}}", f"{run[key] / unit:{form}}", f"{told[key] / run[key]:.2f}"]
+            cells += [f"{expected[key] / unit:{form}}", f"{run[key] / unit:{form}}", f"{expected[key] / run[key]:.2f}"]
         rows.append(tuple(cells))
     header = ["scene", "unknowns", "steps"]
     for what in ("factors and steps [s]", "memory [MB]"):
-        header += [f"{what}, told", "taken", "ratio"]
+        header += [f"{what}, forecast", "taken", "ratio"]
     write_page(folder, "performance/forecasts", [table(header, rows)])
 
 
@@ -51,7 +51,7 @@ def _into(scene: Scene, folder: str) -> Scene:
     return scene.model_copy(update={"output": scene.output.model_copy(update={"folder": folder})})
 
 
-def told(name: str) -> dict[str, float]:
+def expected(name: str) -> dict[str, float]:
     """What the check says of a scene."""
     from kedfem.accuracy.plan import plan_for
     from kedfem.accuracy.reduction import prepared
@@ -69,6 +69,7 @@ def run(name: str) -> dict[str, float]:
     from kedfem.precompile import KINDS, few_steps
 
     few_steps(*KINDS)
+    forget_most()
     held = memory_held()
     with TemporaryDirectory() as folder:
         done = analyse(_into(_scene(name), folder))

@@ -18,8 +18,8 @@ def bench_growth(folder: Path, quick: bool) -> None:
     found = [apart("benchmarks.growth", "one_size", size) for size in sizes]
     rows = [
         (f"{f['unknowns']:,}", f"{f['assemble']:.2f}", f"{f['factor']:.2f}", f"{1e3 * f['solve']:.1f}",
-         f"{f['assemble'] / f['factor']:.2f}", f"{f['memory'] / 1e9:.2f}", f"{told(f) / 1e9:.2f}",
-         f"{told(f) / f['memory']:.2f}")
+         f"{f['assemble'] / f['factor']:.2f}", f"{f['memory'] / 1e9:.2f}", f"{forecast(f) / 1e9:.2f}",
+         f"{forecast(f) / f['memory']:.2f}")
         for f in found
     ]  # fmt: skip
     header = ("unknowns", "assemble [s]", "factor [s]", "solve [ms]", "assemble / factor", "memory [GB]",
@@ -32,7 +32,7 @@ def bench_growth(folder: Path, quick: bool) -> None:
     write_loglog(folder, "growth", curves, ("unknowns in one link", "seconds"))
 
 
-def told(measured: dict[str, float]) -> float:
+def forecast(measured: dict[str, float]) -> float:
     """Bytes that are forecast from the number of unknowns: more than the machine has is refused before it is meshed."""
     return sum(least_bytes(measured["unknowns"]))
 

@@ -1,4 +1,4 @@
-"""Levels in time on the source's four-bar at 600 rpm: error against the truth, as estimated, and processor time."""
+"""Levels in time on the source's four-bar at 600 rpm: true error, estimated error, and processor time."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -23,12 +23,12 @@ TURN = 0.1  # s
 SHOWN = {"stress": "probes/stress/stress", "torque": "drive/torque"}
 MARCHES = ((500, 1), (1000, 1), (2000, 1), (4000, 1), (250, 2), (500, 2), (1000, 2), (250, 3), (500, 3))
 BEAMS, PLATES = {"model": "beam", "mesh": {"elements": 1}}, {"reduction": 8}
-HEADER = ("levels, steps a turn", "stress", "estimated", "torque", "estimated", "seconds", "order 2 needs")
+HEADER = ("levels, steps a revolution", "stress", "estimated", "torque", "estimated", "seconds", "order 2 needs")
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One start, damping, kind of frames and of links, headed in the page; steps a turn of the truth, in three levels."""
+    """One start, damping, kind of frames and of links, headed in the page; steps of the reference, in three levels."""
 
     link: Mapping[str, Any]
     damped: bool = True

@@ -8,7 +8,7 @@ from kedfem.scene import Scene, scene_from
 
 
 def plates(accuracy: float) -> Scene:
-    """The four-bar of examples/four_bar_solids, half a turn at 150 rpm."""
+    """The four-bar of examples/four_bar_solids, half a revolution at 150 rpm."""
     shape = {"kind": "plate_link", "width": 0.0254, "thickness": 0.0254, "eye_diameter": 0.045, "bore_diameter": 0.02}
     raw = four_bar_of(shape, {})
     raw["drive"]["motion"]["speed"] = "150 rpm"

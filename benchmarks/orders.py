@@ -29,7 +29,7 @@ TIMED = {
     "orders_corotational": "pass, co-rotational frames",
     "orders_slides": "solve, slide",
 }
-DOUBT = 10.0  # times the truth's own error, from which on errors are told
+DOUBT = 10.0  # times the truth's own error, from which on errors are shown
 
 
 @dataclass(frozen=True)
@@ -69,8 +69,8 @@ def _table(found: Mapping[str, Found], asked: float) -> list[str]:
     for name in names:
         cells = []
         for each in found.values():
-            told = name in each.curves and asked > DOUBT * each.doubt
-            cells.append(needed(*each.curves[name], asked) if told else "-")
+            shown = name in each.curves and asked > DOUBT * each.doubt
+            cells.append(needed(*each.curves[name], asked) if shown else "-")
         rows.append((name, *cells))
     return table((f"work a turn for {100 * asked:g} %", *found), rows)
 

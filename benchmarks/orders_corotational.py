@@ -17,12 +17,12 @@ from jaxtyping import Float
 from benchmarks.orders_equation import SEEN, TURN, TURNS, Equation, Mechanism, Run
 from benchmarks.orders_kernel import force_at, solved_often, staged
 from benchmarks.orders_schemes import Scheme, Tableau, extrapolated, is_coupled
-from kedfem.dynamics.anderson import Mixing
+from kedfem.dynamics.anderson import AndersonAcceleration
 from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.stepping.scheme import Scheme as Newmark
 from kedfem.dynamics.system.arrays import Coefficients
 from kedfem.dynamics.system.march import Ready, driving, ready
-from kedfem.dynamics.system.reference import handed
+from kedfem.dynamics.system.reference import by_address
 from kedfem.dynamics.system.sparse import solver
 from kedfem.dynamics.system.state import copied, empty_trial, room
 
@@ -101,7 +101,7 @@ class Corotational(Mechanism):
         trial = trial._replace(**{name: getattr(trial, name).astype(kind) for name in names})
         bodies = of.bodies._replace(**{name: getattr(of.bodies, name).astype(kind) for name in "GYS"})
         since = process_time()
-        solved_often(handed(bodies), COUNT, handed(trial), np.zeros(len(trial.u), kind))
+        solved_often(by_address(bodies), COUNT, by_address(trial), np.zeros(len(trial.u), kind))
         return (process_time() - since) / COUNT
 
     @property
@@ -127,8 +127,8 @@ class Corotational(Mechanism):
         solved = solver(of.parts, of.bodies.at, trial)
         records = (own, inside, of.bodies, of.ends, of.constraints, along)
         found, passes, failed = staged(
-            *map(handed, records), (A, b, c, h), self.size, steps // SEEN,
-            *map(handed, (state, trial, room(of.bodies))), solved,
+            *map(by_address, records), (A, b, c, h), self.size, steps // SEEN,
+            *map(by_address, (state, trial, room(of.bodies))), solved,
         )  # fmt: skip
         return np.where(failed, np.nan, found), passes
 
@@ -176,8 +176,8 @@ class Force:
         """Applied less internal force at the time of a number."""
         self.trial.u[:] = self.state.u[:] = u
         self.state.v[:] = v
-        c, bodies, along = map(handed, (self.c, self.bodies, self.along))
-        force_at(c, bodies, along, n, self.size, *map(handed, (self.state, self.trial, self.work)))
+        c, bodies, along = map(by_address, (self.c, self.bodies, self.along))
+        force_at(c, bodies, along, n, self.size, *map(by_address, (self.state, self.trial, self.work)))
         return np.asarray(self.along.F[n] - self.trial.f)
 
     def turns(self, n: int, u: Flat) -> Flat:
@@ -203,7 +203,7 @@ class Coupled:
             for link, part, (a, b) in parts
         ]) @ inverse.T  # fmt: skip
         self.force = Force(of, ((np.arange(steps)[:, None] + self.c) * self.h).ravel())
-        self.mixing, self.passes = Mixing(), 0
+        self.mixing, self.passes = AndersonAcceleration(), 0
 
     def marched(self) -> tuple[Float[np.ndarray, "S N"], float]:
         """Coordinates at `SEEN` instants, and the work in passes: by what forces, and solves of either kind, cost."""

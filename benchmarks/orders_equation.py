@@ -119,7 +119,7 @@ class Equation:
 
     @cached_property
     def directions(self) -> Float[np.ndarray, "w r F"]:
-        """Fourier coefficients of B over a turn."""
+        """Fourier coefficients of B over a revolution."""
         at, of = self.mechanism.motion_at, self.mechanism.of
         if not of.system.constraints:
             return np.zeros((1, 0, self.T.shape[1]))

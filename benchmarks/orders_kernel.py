@@ -8,7 +8,7 @@ history to take them from.
 import numpy as np
 
 from kedfem.compiled import compiled, inner
-from kedfem.dynamics.anderson_kernel import mixed
+from kedfem.dynamics.anderson_kernel import accelerated
 from kedfem.dynamics.beams_kernel import begun
 from kedfem.dynamics.matrices.profile_kernel import profile_solved
 from kedfem.dynamics.system.algebra_kernel import add_transposed, frame_copied, product, turned, turned_back
@@ -102,7 +102,7 @@ def stage(c, c_inside, bodies, ends, of, driving, t, before, size, state, trial,
             reached += (c.weight * (trial.z[m] - before[len(trial.u) + m])) ** 2
         settled = change <= c.tolerance**2 * reached + c.floor**2
         if not settled:
-            mixed(memory, state.counts, iteration, trial.change)
+            accelerated(memory, state.counts, iteration, trial.change)
         taken(c, bodies, trial)
         if settled or not np.isfinite(change):
             break

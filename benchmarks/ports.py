@@ -1,4 +1,4 @@
-"""What rigid couplings change: a plate link with two bores on three meshes, averaged against stiff; how stiff is
+"""What rigid couplings change: a plate link with two bores on three meshes, distributing against rigid; how stiff is
 enough."""
 
 from dataclasses import dataclass, replace

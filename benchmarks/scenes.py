@@ -25,7 +25,7 @@ def bar_four_bar(
 
 
 def ten_turns(folder: str) -> Scene:
-    """The plates of `plate_four_bar`, 25.4 mm thick, reduced to 1 %: ten turns of 1,000 steps, time series only."""
+    """The plates of `plate_four_bar`, 25.4 mm thick, reduced to 1 %: ten revolutions of 1,000 steps, time series only."""
     raw = plate_four_bar("solid", 2, 0.0254).model_dump(mode="json", exclude_unset=True)
     for link in raw["links"].values():
         link |= {"reduction": "modal", "element": "hex20"}

@@ -17,7 +17,7 @@ from kedfem.sweep.axes import axes_of
 from kedfem.sweep.points import Base
 from kedfem.sweep.run import Asked
 
-#: scene, speeds, damping β [s], steps in a turn
+#: scene, speeds, damping β [s], steps in a revolution
 MAPS = {
     "four-bar": (plane_four_bar, "3000rpm:8000rpm:26", "5e-6,1e-5,2e-5,4e-5", 360),
     "slider-crank": (plane_slider_crank, "2400rpm:4400rpm:21", "5e-6,1e-5,2e-5,4e-5", 360),

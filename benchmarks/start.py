@@ -70,7 +70,7 @@ def _ten_turns(repeats: int) -> list[tuple[str, str]]:
         command = [sys.executable, "-c", TURNS, f"{folder}/results"]
         run = partial(subprocess.run, command, capture_output=True, check=True, env=environment, cwd=CHECKOUT)
         cold, warm = seconds(run, 1), seconds(run, repeats)
-    return [("ten turns, cold cache", f"{cold:.1f}"), ("ten turns, warm cache", f"{warm:.1f}")]
+    return [("ten revolutions, cold cache", f"{cold:.1f}"), ("ten revolutions, warm cache", f"{warm:.1f}")]
 
 
 def _examples(names: Sequence[str], repeats: int) -> list[str]:

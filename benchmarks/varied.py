@@ -22,7 +22,7 @@ def varied_scenes() -> dict[str, dict[str, Any]]:
         "bars, gravity, 30 rpm": _four_bar(30, initial="quasi-static", gravity=[0, -9.81, 0]),
         "bars, side load": _four_bar(150, loads={"side": _force("coupler", "N", [0, 0, 50])}),
         "bars, load put on at once": _four_bar(60, loads={"hit": _force("rocker", "M", [300, 0, 0], STEP_LOAD)}),
-        "bars, two turns": _four_bar(300, revolutions=2),
+        "bars, two revolutions": _four_bar(300, revolutions=2),
         "bars, no flywheel, damped": _four_bar(300, damping=DAMPED, bodies={}),
         "bars, 6 mm thick": _four_bar(100, BAR | {"thickness": 0.006}, damping=DAMPED),
         "plates, 150 rpm, from rest": _four_bar(150, PLATE),

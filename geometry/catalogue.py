@@ -22,7 +22,7 @@ from kedfem.links.solid import solid_basis
 from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.mesh.cad.model import CadKeys
 from kedfem.mesh.elements.bounds import determinant_bounds
-from kedfem.mesh.isolated import LONGEST, PART, apart
+from kedfem.mesh.isolated import LONGEST, PART, in_own_process
 from kedfem.mesh.methods import made_mesh
 from kedfem.output.mesh_picture import write_mesh_picture
 from kedfem.scene import Cad, link_from
@@ -617,7 +617,7 @@ def row(name: str, folder: Path) -> tuple[str, SolidMesh | None]:
     """A line of the table, and the mesh."""
     file, exact = written(name, folder)
     try:
-        mesh, seconds = apart(file.name, PART, LONGEST, timed, file)
+        mesh, seconds = in_own_process(file.name, PART, LONGEST, timed, file)
     except MeshError as error:
         return f"| {name} | refused: {error} | | | | | |", None
     lower, _ = determinant_bounds(mesh.points, mesh.cells)

@@ -113,7 +113,7 @@ def cases() -> Iterator[Case]:
             yield Case(f"{speed} rpm, {count} {element} a link, co-rotational", raw, fine)
     for speed in (60, 150):
         fine = four_bar(speed, 4320, FINE, frames="co-rotational")
-        yield Case(f"{speed} rpm, 2 beam5, 120 steps a turn", four_bar(speed, 120, beams("beam5", 2)), fine)
+        yield Case(f"{speed} rpm, 2 beam5, 120 steps a revolution", four_bar(speed, 120, beams("beam5", 2)), fine)
         rest = {"initial": "rest", "revolutions": 0.5}
         raw = four_bar(speed, 1440, beams("beam5", 1), **rest)
         yield Case(f"{speed} rpm, 1 beam5, from rest", raw, four_bar(speed, 11520, FINE, frames="co-rotational", **rest))

@@ -19,7 +19,7 @@ from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.starts.accelerations import accelerated_in_a_step
 from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.errors import KedfemError
-from kedfem.scene.checks.capabilities import DRIVEN, KINDS, REFUSALS, SLID, TURNED, Refusal
+from kedfem.scene.checks.capabilities import DRIVEN, GEARED, KINDS, RACKED, REFUSALS, SLID, TURNED, Refusal
 from tests.moving import beam_in_space
 from tests.partners import IN_PLANE, chain
 from tests.systems import Begun, begun, by_oracle, marched, rows
@@ -38,14 +38,18 @@ LINKS: dict[str, tuple[str, str]] = {
 IN_A_PLANE = ("planar beams", "plane links", "plane and beam", "planar rigid", "plane on the ground")
 LAWS = (
     "loads", "loads that turn", "spring between points", "spring on the joint", "motor on the joint",
-    "motor at the crank", "bushing", "damped bushing", "bushing against rotations", "shaft", "drive on the joint", "gear",
-    "rack", "point mass", "damping", "damping of mass", "no numerical damping",
+    "motor at the crank", "bushing", "damped bushing", "bushing against rotations", "shaft", "drive on the joint",
+    "drive of the travel", "gear", "rack", "gear on the joint", "rack on the joint", "point mass", "damping",
+    "damping of mass", "no numerical damping",
 )  # fmt: skip
 LIMIT = "limit of the joint"
+ON_JOINT = {"drive on the joint": DRIVEN, "drive of the travel": ("cylindrical", "screw", "planar")}
 WITHIN = {"rigid-body": 1e-8, "stiffening": 1e-8, "co-rotational": 1e-7}
 #: rigid-body, with beams in space: rounding beside the stiff rigid parts at their ends limits the fast step; a diameter
 #: changed by 1e-14 of itself changes what it finds by 8.5e-8 of the peak, and what the oracle finds by 4e-11
 ROUNDED = 5e-7
+GEARS_ON = {"gear on the joint": GEARED, "rack on the joint": RACKED}
+GEARS = ("gear", "rack", *GEARS_ON)
 STEPS = 3
 FAST = {("weld", "solids")}  # chains some of whose links are a hundred times faster than the crank's end
 
@@ -88,9 +92,11 @@ class Cell:
             return False  # refused whatever its law, or as a spring on the joint is
         if self.law == "shaft" and not self.driven:
             return False
-        if self.law == "drive on the joint" and (self.joint not in DRIVEN or not self.driven):
+        if self.law in ON_JOINT and (self.joint not in ON_JOINT[self.law] or not self.driven):
             return False
-        return not (self.law in {"gear", "rack"} and self.plane)
+        if self.joint not in GEARS_ON.get(self.law, KINDS):
+            return False
+        return not (self.law in GEARS and self.plane)
 
 
 FACTORS: dict[str, tuple[Any, ...]] = {
@@ -108,8 +114,9 @@ def pairs(cell: Cell) -> set[tuple[tuple[str, Any], ...]]:
 
 
 def all_cells() -> list[Cell]:
-    """All joint × frames × driven or not × links under loads, and so many more that each pair of levels is in one."""
+    """All joint × frames × driven or not × links under loads, all drives, and so many more that each pair is in one."""
     first = [Cell(*x) for x in product(KINDS, FRAMES, (True, False), LINKS)]
+    first += [Cell(*x) for x in product(DRIVEN, FRAMES, (True,), ("beams in space", "on the ground"), ON_JOINT)]
     found = [cell for cell in first if cell.drawn]
     for laws in (LAWS, (LIMIT,)):
         every = [cell for x in product(*{**FACTORS, "law": laws}.values()) if (cell := Cell(*x)).drawn]
@@ -127,8 +134,9 @@ def all_cells() -> list[Cell]:
 
 def scene_of(cell: Cell) -> Raw:
     """A closed chain that moves from the first step on under gravity and a force, of as few elements as can be."""
-    on_joint = cell.law == "drive on the joint"
-    raw = chain(cell.joint, LINKS[cell.links], driven=on_joint, plane=cell.plane)
+    travel = cell.law == "drive of the travel"
+    on_joint = cell.law in ON_JOINT
+    raw = chain(cell.joint, LINKS[cell.links], driven="travel" if travel else on_joint, plane=cell.plane)
     for link in raw["links"].values():
         if "mesh" in link:
             counts = link["mesh"]["elements"]
@@ -140,7 +148,8 @@ def scene_of(cell: Cell) -> Raw:
     raw["analysis"] |= {"frames": "co-rotational" if cell.frames == "co-rotational" else "rigid-body"}
     if cell.frames == "stiffening":
         raw["analysis"]["stiffening"] = True
-    speed = 0.3 if (on_joint and cell.joint == "prismatic") or (cell.joint, cell.links) in FAST else 3.0
+    slow = travel or (on_joint and cell.joint == "prismatic") or (cell.joint, cell.links) in FAST
+    speed = 0.3 if slow else 3.0
     raw["drive"]["motion"] = {"kind": "constant_speed", "speed": speed}
     if not cell.driven:
         del raw["drive"]
@@ -149,7 +158,7 @@ def scene_of(cell: Cell) -> Raw:
     frame = "link" if cell.law == "loads that turn" else "world"
     vector = [10.0, 20.0, 0.0 if cell.plane else 5.0]
     raw["loads"] = {"f": {"kind": "force", "link": "crank", "at": crank, "vector": vector, "frame": frame}}
-    more: Raw = {**raw, **sections(cell, crank)}
+    more: Raw = {**raw, **sections(cell, crank, raw["joints"]["J"])}
     J, laws = raw["joints"]["J"], BUSHINGS.get(cell.law)
     if laws is not None:
         J["bushing"] = dict(laws)
@@ -157,7 +166,7 @@ def scene_of(cell: Cell) -> Raw:
         raw["drive"] |= {"shaft_stiffness": 500.0, "shaft_damping": 0.1}
     if cell.law == "no numerical damping":
         raw["analysis"]["rho_inf"] = 1.0
-    if cell.law in {"gear", "rack"}:
+    if cell.law in GEARS:
         geared(more, cell)
     return more
 
@@ -168,20 +177,25 @@ BUSHINGS: dict[str, Raw] = {
 }  # fmt: skip
 
 
-def sections(cell: Cell, crank: Any) -> Raw:
-    """Sections that a law puts into a scene; `crank` is the place of its end."""
+def sections(cell: Cell, crank: Any, J: Raw) -> Raw:
+    """Sections that a law puts into a scene; `crank` is the place of its end, `J` the joint in question."""
     torque = {"over": "speed", "at": [-50, 50], "value": [5, -5]}
     away = [crank[0] + 0.05, crank[1] + 0.1, *crank[2:]]
     ends = [{"link": "crank", "at": crank}, {"link": "ground", "at": away}]
-    along, preloaded = cell.joint in SLID, {"stiffness": 200.0, "damping": 0.2, "preload": 3.0}
-    slides = cell.joint == "prismatic"
+    along, slides = cell.joint in SLID, cell.joint in {"prismatic", "planar"}
+    on = {"joint": "J"}
+    if cell.joint == "universal":
+        on["about"] = J["links"][0]
+    elif cell.joint == "planar":
+        on["along"] = [float(x) for x in np.cross(J["axis"], [0.3, -0.5, 0.7])]
+    preloaded = {"stiffness": 200.0, "damping": 0.2, "preload": 3.0, **on}
     spring = {"kind": "spring", "between": ends, "stiffness": 2e4, "damping": 20.0, "preload": 30.0}
-    stop = {"kind": "travel" if along else "angle", "joint": "J", "stiffness": 2e5 if along else 4e3, "damping": 3.0}
+    stop = {"kind": "travel" if along else "angle", **on, "stiffness": 2e5 if along else 4e3, "damping": 3.0}
     by_law: dict[str, Raw] = {
         LIMIT: {"limits": {"s": {"lower": -1e-5, "upper": 1e-5, **stop}}},
         "spring between points": {"springs": {"s": spring}},
-        "spring on the joint": {"springs": {"s": {"kind": "spring" if along else "torsion", "joint": "J", **preloaded}}},
-        "motor on the joint": {"motors": {"m": {"joint": "J", "force" if slides else "torque": torque}}},
+        "spring on the joint": {"springs": {"s": {"kind": "spring" if along else "torsion", **preloaded}}},
+        "motor on the joint": {"motors": {"m": {"force" if slides else "torque": torque, **on}}},
         "motor at the crank": {"motors": {"m": {"joint": "A", "torque": torque}}},
         "point mass": {"bodies": {"w": {"kind": "point_mass", "link": "crank", "at": crank, "mass": 0.4}}},
         "damping": {"damping": {"beta": 1e-5}},
@@ -191,12 +205,12 @@ def sections(cell: Cell, crank: Any) -> Raw:
 
 
 def geared(raw: Raw, cell: Cell) -> None:
-    """A wheel that the crank's hinge turns, or a rack that it moves."""
+    """A wheel that the crank's hinge or joint J turns, a rack that the crank moves, or a wheel that moves J as a rack."""
     raw["links"]["wheel"] = beam_in_space((0.0, -0.3, 0.1), (0.1, -0.35, 0.1), 1)
     axis = {"at": [0.0, -0.3, 0.1], "axis": [0.2, 0.3, 1.0], "links": ["wheel", "ground"]}
-    slides = cell.law == "rack"
-    raw["joints"]["W"] = {"kind": "prismatic" if slides else "revolute", **axis}
-    raw["gears"] = {"g": {"joints": ["A", "W"], **({"radius": 0.08} if slides else {"ratio": -1.5})}}
+    raw["joints"]["W"] = {"kind": "prismatic" if cell.law == "rack" else "revolute", **axis}
+    joints = {"gear on the joint": ["J", "W"], "rack on the joint": ["W", "J"]}.get(cell.law, ["A", "W"])
+    raw["gears"] = {"g": {"joints": joints, **({"radius": 0.08} if "rack" in cell.law else {"ratio": -1.5})}}
 
 
 # -- what becomes of them -----------------------------------------------------------------------------------

@@ -119,7 +119,8 @@ def with_small_deflections(raw: Raw) -> dict[str, float]:
     """How far co-rotational from rigid-body frames are, of a fifth of what they are with links ten times as soft.
 
     At least HUBS: as hubs are stiff, not rigid, and not as stiff in both. Where they are further apart, it must be by
-    hubs of co-rotational beams, which give up to 1/HUB_STIFF of what one element does, and go as these are stiffer.
+    hubs of co-rotational beams, which give up to 1/RIGID_NODE_STIFF of what one element does, and go as these
+    are stiffer.
     """
 
     def apart() -> dict[str, float]:
@@ -129,7 +130,7 @@ def with_small_deflections(raw: Raw) -> dict[str, float]:
     found = apart()
     if all(x < 1 for x in found.values()):
         return found
-    with patch.object(metric, "HUB_STIFF", 100 * metric.HUB_STIFF):
+    with patch.object(metric, "RIGID_NODE_STIFF", 100 * metric.RIGID_NODE_STIFF):
         return apart()
 
 

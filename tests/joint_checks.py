@@ -11,7 +11,7 @@ from kedfem.accuracy.prepared import Prepared
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.attachments import Attachment, interface_matrix
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
-from kedfem.dynamics.joints.constraint_matrices import joint_rows
+from kedfem.dynamics.joints.constraint_matrices import constraint_matrices
 from kedfem.dynamics.joints.ports import port_values, turned_ports, turned_vectors
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.system.record import TURN
@@ -204,7 +204,7 @@ def interface_values(joints: Sequence[Attachment], u: Sequence[np.ndarray]) -> n
 def row_values(ready: Prepared, block: Block) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """C (T, r, k) of all rows, z (T, k), and the rows' forces μ (T, r) from port forces alone: Σ Bᵀ R λ = Cᵀ μ."""
     model, T = ready.model, len(block)
-    rows = joint_rows(model.rows, block.motion, model.interface_unknowns)
+    rows = constraint_matrices(model.rows, block.motion, model.interface_unknowns)
     assert rows is not None
     C = np.stack([rows.at(k).toarray() for k in range(T)])
     every = list(zip(model.joints, block.links, strict=True))

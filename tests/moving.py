@@ -131,7 +131,7 @@ def geared() -> dict[str, Any]:
     }
 
 
-DIRECTIONS = {"axis", "axes", "up", "vector", "gravity", "angular_velocity"}
+DIRECTIONS = {"axis", "axes", "along", "up", "vector", "gravity", "angular_velocity"}
 
 
 def turned(raw: dict[str, Any], R: np.ndarray, shift: Any = (0.0, 0.0, 0.0)) -> dict[str, Any]:

@@ -38,6 +38,8 @@ SEEDS: dict[tuple[str, int], int] = {
     ("universal", 1): 10, ("spherical", 0): 2, ("spherical", 1): 1, ("spherical", 2): 10, ("planar", 0): 10,
     ("planar", 1): 3, ("slot", 0): 10, ("slot", 1): 10, ("weld", 0): 5, ("weld", 1): 12, ("weld", 2): 8,
 }  # fmt: skip
+#: the same with a drive on J, of an angle
+DRIVEN_SEEDS: dict[tuple[str, int], int] = {("planar", 1): 0}
 SPATIAL = ("beam", "solid", "reduced", "rigid", "bare")
 PLANAR = ("planar beam", "plane", "solid", "rigid", "bare")
 
@@ -86,7 +88,16 @@ def direction(kind: str, at: int, places: Sequence[np.ndarray], plane: bool, ran
     return np.cross(one, two) if kind == "revolute" else any_
 
 
-def axis_of(kind: str, partners: tuple[str, str], driven: bool = False, plane: bool = False) -> np.ndarray:
+def prescribed(of: Raw, travel: bool) -> Raw:
+    """Keys of a drive on a joint that say which of its coordinates it prescribes."""
+    if of["kind"] == "universal":
+        return {"about": of["links"][0]}
+    if travel and of["kind"] == "planar":
+        return {"along": [float(x) for x in np.cross(of["axis"], GENERIC)]}
+    return {"coordinate": "travel"} if travel and of["kind"] in {"cylindrical", "screw"} else {}
+
+
+def axis_of(kind: str, partners: tuple[str, str], driven: bool | str = False, plane: bool = False) -> np.ndarray:
     """The axis of a chain's joint J as it is without a rotation."""
     axes: list[np.ndarray] = []
     chain(kind, partners, driven, plane, lambda axis: axes.append(axis) or np.eye(3))  # type: ignore[func-returns-value]
@@ -96,7 +107,7 @@ def axis_of(kind: str, partners: tuple[str, str], driven: bool = False, plane: b
 def chain(
     kind: str,
     partners: tuple[str, str],
-    driven: bool = False,
+    driven: bool | str = False,
     plane: bool = False,
     turned: Callable[[np.ndarray], np.ndarray] = lambda axis: np.eye(3),
 ) -> Raw:
@@ -105,7 +116,7 @@ def chain(
     Parameters
     ----------
     partners : of J; the second may be "ground"
-    driven : J has the drive instead of the crank's hinge
+    driven : J has the drive instead of the crank's hinge; if not of its angle, or of a slide's travel, which: "travel"
     turned : rotation of all of it, from the axis of J as it is drawn without one
     """
     on_ground, sliding = partners[1] == "ground", "bare" in partners
@@ -117,7 +128,8 @@ def chain(
     solids = {"solid", "reduced", "rigid"}.issuperset(partners)
     if kind == "weld" and here < last and (plane or solids):
         places[here + 1] = 2 * places[here] - places[here - 1]  # two of a width are welded along one face or edge
-    random = np.random.default_rng(SEEDS.get((kind, form), 0))
+    seeds = SEEDS | DRIVEN_SEEDS if driven and driven != "travel" else SEEDS
+    random = np.random.default_rng(seeds.get((kind, form), 0))
     axes = [direction(kind if k == here else each, k, places, plane, random) for k, each in enumerate(kinds, start=1)]
     R = turned(axes[here - 1])
 
@@ -151,10 +163,12 @@ def chain(
         if "axes" in made:
             made["axes"] = [vector(x) for x in made["axes"]]
         joints[each if each == "J" else f"K{k}"] = made
-    slides = driven and kind == "prismatic"
+    slides = driven == "travel" or (bool(driven) and kind == "prismatic")
     motion = {"kind": "cycloidal", "travel" if slides else "angle": 0.02 if driven else 0.3, "rise": 0.03}
     analysis = {"end_time": 0.002, "step": 5e-4, "rho_inf": 0.8, "initial": "quasi-static", "accuracy": "quick"}
+    on = "J" if driven else "A"
+    drive = {**prescribed(joints[on], slides), "joint": on, "motion": motion}
     return {
-        "links": links, "joints": joints, "drive": {"joint": "J" if driven else "A", "motion": motion},
+        "links": links, "joints": joints, "drive": drive,
         "gravity": vector(flat * [2.0, -9.0, 3.0]), "analysis": analysis,
     }  # fmt: skip

@@ -1,7 +1,7 @@
 """Steps and levels that a plan chooses: ``python -m tests.planned_steps`` writes docs/performance/planned_steps.md.
 
-The source's four-bar over two turns. Truth is the largest difference in time of the worst channel, of its peak, from
-three levels of a quarter of the step, on the same links. Work is the steps of all levels.
+The source's four-bar over two revolutions. Truth is the largest difference in time of the worst channel, of its peak,
+from three levels of a quarter of the step, on the same links. Work is the steps of all levels.
 """
 
 import tomllib
@@ -32,7 +32,7 @@ SOLIDS = {"model": "solid", "mesh": {"elements": [8, 1, 1]}, "reduction": "modal
 
 @dataclass(frozen=True)
 class Planned:
-    """A choice: the scene with it, its error as expected and in truth, that of one level in 2,000 steps a turn."""
+    """A choice: the scene with it, its error as expected and in truth, that of one level in 2,000 steps a revolution."""
 
     scene: Scene
     expected: float
@@ -88,10 +88,11 @@ def cases() -> Iterator[tuple[str, Scene]]:
 def main(say: Callable[[str], None] = print) -> None:
     lines = [
         "# The step that a plan chooses", "",
-        "Written by `python -m tests.planned_steps`: the source's four-bar, two turns, 0.3 % allowed. Truth: the largest",
-        "difference in time of the worst channel, of its peak, from three levels of a quarter of the step. Work: steps",
-        "of all levels in a turn; the last column is what a single level, of order 2, would need for the 0.3 %.", "",
-        "| run | chosen, a turn | expected | truth | work | choosing, running | order 2 needs |",
+        "Written by `python -m tests.planned_steps`: the source's four-bar, two revolutions, 0.3 % allowed.",
+        "Truth: the largest difference in time of the worst channel, of its peak, from three levels of a quarter of the",
+        "step. Work: steps of all levels in a revolution; the last column is what a single level, of order 2, would need",
+        "for the 0.3 %.", "",
+        "| run | chosen, a revolution | expected | truth | work | choosing, running | order 2 needs |",
         "|---|---|---:|---:|---:|---:|---:|",
     ]  # fmt: skip
     for name, scene in cases():

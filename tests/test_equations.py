@@ -3,6 +3,7 @@
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -19,10 +20,13 @@ NUMBERS = re.compile(r"\(\d+[a-z]?\)(?:(?:, ?|[-–])?\(\d+[a-z]?\))*")
 Named = tuple[str, ast.FunctionDef | ast.ClassDef]
 
 
-def modules() -> Iterator[tuple[str, ast.Module]]:
-    """Name within the package and syntax tree of every module."""
-    for file in sorted(PACKAGE.rglob("*.py")):
-        yield ".".join(file.relative_to(PACKAGE).with_suffix("").parts), ast.parse(file.read_text("utf-8"))
+@cache
+def modules() -> dict[str, ast.Module]:
+    """Syntax tree of every module, by its name within the package."""
+    return {
+        ".".join(file.relative_to(PACKAGE).with_suffix("").parts): ast.parse(file.read_text("utf-8"))
+        for file in sorted(PACKAGE.rglob("*.py"))
+    }
 
 
 def defined(tree: ast.AST, prefix: str) -> Iterator[Named]:
@@ -36,11 +40,11 @@ def defined(tree: ast.AST, prefix: str) -> Iterator[Named]:
             yield from defined(node, prefix)
 
 
-def docstrings() -> Iterator[tuple[str, str]]:
+@cache
+def docstrings() -> tuple[tuple[str, str], ...]:
     """Name and docstring of every function and class; modules are left out."""
-    for module, tree in modules():
-        for name, node in defined(tree, module):
-            yield name, ast.get_docstring(node) or ""
+    named = (pair for module, tree in modules().items() for pair in defined(tree, module))
+    return tuple((name, ast.get_docstring(node) or "") for name, node in named)
 
 
 def numbers(text: str) -> set[int]:
@@ -140,7 +144,7 @@ def members(node: ast.ClassDef) -> set[str]:
 def code_names() -> set[str]:
     """Functions, variables, and `Class.member`, of the whole package."""
     out = set()
-    for module, tree in modules():
+    for module, tree in modules().items():
         out |= {x.id for x in ast.walk(tree) if isinstance(x, ast.Name) and isinstance(x.ctx, ast.Store)}
         for name, node in defined(tree, module):
             last = name.rsplit(".", 1)[1]

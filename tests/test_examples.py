@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from reference.results import told
+from reference.results import entries
 
 import kedfem
 from kedfem.results import read_results
@@ -65,4 +65,4 @@ def test_an_example_runs_and_its_assertions_hold(name: str, tmp_path: Path) -> N
     assert not done.stderr
     for file in tmp_path.rglob("results.h5"):
         channels = read_results(file).channels
-        assert [each for each, (channel, _) in channels.items() if not told(channel)] == []
+        assert [each for each, (channel, _) in channels.items() if not entries(channel)] == []

@@ -4,6 +4,7 @@ import re
 import stat
 import tomllib
 from dataclasses import fields
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -93,8 +94,11 @@ def test_ci_begins_with_the_readmes_tests_and_runs_every_example() -> None:
     script = (ROOT / ".ci/run").read_text(encoding="utf-8")
     steps = [line for line in script.splitlines() if line.startswith(("scripts/", ".venv/"))]
     assert steps[0].split()[0] == commands()[1]
-    assert any(line.startswith('scripts/test -m "long and not study"') for line in steps)
-    assert not any("test_examples" in name for name in listed(STUDIES))  # the examples are among these
+    assert not any("test_examples" in name for name in listed(STUDIES))
+    chosen = ["not long", *re.findall(r'scripts/test -m "([^"]+)"', script)]
+    for long, slow, kernels in product([True, False], repeat=3):
+        marks = {"long": long or slow, "slow": slow, "kernels": kernels, "study": False}
+        assert any(eval(each, marks) for each in chosen), marks
 
 
 def test_python_of_pyproject_is_python_of_readme_and_setup() -> None:

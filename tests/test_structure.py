@@ -1,5 +1,7 @@
 """The package stays one that can be found one's way in: short files, and folders that are seen at a glance."""
 
+import ast
+import re
 from collections import Counter
 from pathlib import Path
 
@@ -21,3 +23,24 @@ def test_no_file_is_long() -> None:
 def test_no_folder_has_many_files() -> None:
     count = Counter(str(path.parent.relative_to(PACKAGE)) for path in PACKAGE.rglob("*.py"))
     assert {folder: files for folder, files in count.items() if files > FILES} == {}, "group them in folders"
+
+
+FOREIGN = {"_replace", "_fields", "_compiler", "_cache", "_cache_file", "_save_index", "_mesh", "_exit"}
+"""Private by their spelling, of named tuples, numba, meshio and os; not kedfem's."""
+
+
+def test_tests_use_no_private_name_of_the_package() -> None:
+    """A folder may be rebuilt as long as its records and public functions stay."""
+    used = []
+    for file in sorted(Path(__file__).parent.rglob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            names: list[str] = []
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("kedfem"):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.Attribute) and not (isinstance(node.value, ast.Name) and node.value.id == "self"):
+                names = [node.attr]
+            elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "setattr":
+                texts = [x.value for x in node.args if isinstance(x, ast.Constant) and isinstance(x.value, str)]
+                names = [texts[0].rpartition(".")[2]] if texts else []
+            used += [f"{file.name}: {name}" for name in names if re.match("_[^_]", name) and name not in FOREIGN]
+    assert used == []

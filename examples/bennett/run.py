@@ -33,8 +33,10 @@ def main() -> None:
     rms = np.sqrt(np.mean((torque - rigid_torque)[last] ** 2) / np.mean(rigid_torque[last] ** 2))
     print(f"drive torque {np.abs(torque).max():.2f} N m, rms {100 * rms:.2f} % from that of rigid links")
     assert rms < 0.15  # the coupler rings, at 68 Hz
-    told = {name for name in "ABCD" if f"joints/{name}/rigid_force" in channels}
-    print(f"forces that rigid links tell: at joints {', '.join(sorted(told)) or 'none'}; elastic ones: at A, B, C, D")
+    known = {name for name in "ABCD" if f"joints/{name}/rigid_force" in channels}
+    print(
+        f"forces that rigid links determine: at joints {', '.join(sorted(known)) or 'none'}; elastic ones: at A, B, C, D"
+    )
     assert all(f"joints/{name}/force" in channels for name in "ABCD")
     assert run.balance is not None
     assert run.balance.energy < 1e-3

@@ -24,7 +24,8 @@ def main() -> None:
     inertia = mass * RADIUS * SPEED**2 * (1 + RADIUS / ROD)
     first, last = (abs(channels["joints/C/force"][1][row, 0]) for row in (0, -1))
     print(
-        f"pin at the top dead centre: {first:.0f} N, and {last:.0f} N after two turns; m r ω² (1 + λ) is {inertia:.0f} N"
+        f"pin at the top dead centre: {first:.0f} N, and {last:.0f} N after two revolutions; "
+        f"m r ω² (1 + λ) is {inertia:.0f} N"
     )
     assert max(abs(first / inertia - 1), abs(last / inertia - 1)) < 0.02
     # the guide pushes across its direction only; stiff links: the torque is that of rigid ones

@@ -31,7 +31,7 @@ def main() -> None:
 
 
 def stress(steps_per_revolution: int, elements: int, speed: str = "600 rpm", revolutions: int = 8) -> np.ndarray:
-    """Stress of the last turn [Pa]."""
+    """Stress of the last revolution [Pa]."""
     raw = tomllib.loads(SCENE.read_text(encoding="utf-8"))
     for link in raw["links"].values():
         link["mesh"] = {"elements": elements}

@@ -9,7 +9,7 @@ from kedfem.analysis import Run, analyse
 from kedfem.scene import scene_from
 
 SCENE = Path(__file__).with_name("scene.toml")
-PEAK = 352.6e6  # Pa, three turns; geometrically exact beams (Reissner 1972), converged in mesh and step
+PEAK = 352.6e6  # Pa, three revolutions; geometrically exact beams (Reissner 1972), converged in mesh and step
 
 
 def main() -> None:

@@ -21,7 +21,7 @@ def main() -> None:
     print(f"energy not accounted for: {run.balance.energy:.1e} of the largest exchanged")
     assert run.balance.energy < 1e-3
 
-    # over the last turn the motor gives what the damper takes; weights and spring return what they were given
+    # over the last revolution the motor gives what the damper takes; weights and spring return what they were given
     last = angle >= angle[-1] - 2 * np.pi
     given = np.trapezoid(channels["motors/drive/torque"][last], angle[last])
     taken = -np.trapezoid(channels["springs/load/torque"][last], channels["springs/load/angle"][last])
@@ -32,7 +32,7 @@ def main() -> None:
     # it settles where the motor's mean torque is the damper's, T (1 - w/w0) = c w <(rocker's speed / crank's)^2>
     settled = TORQUE / (TORQUE / NO_LOAD + DAMPER * transmission())
     mean = 2 * np.pi / np.ptp(run.results.time[last])
-    print(f"mean speed of the last turn: {mean:.3f} rad/s, of rigid links at even speed {settled:.3f} rad/s")
+    print(f"mean speed of the last revolution: {mean:.3f} rad/s, of rigid links at even speed {settled:.3f} rad/s")
     assert abs(mean / settled - 1) < 0.01
     assert np.ptp(speed[last]) < 0.2 * mean
 

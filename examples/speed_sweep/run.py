@@ -29,7 +29,7 @@ def main() -> None:
           f"{1e-6 * stress[0]:.1f} MPa at {speeds[0]:.0f} rpm")  # fmt: skip
     assert abs(speeds[worst] - expected) < 51
     assert stress[worst] > 3 * stress[0]
-    # 2 % damping leaves exp(-2 pi 0.02 f T) of the rod's first vibration after a turn
+    # 2 % damping leaves exp(-2 pi 0.02 f T) of the rod's first vibration after a revolution
     left = np.exp(-2 * np.pi * 0.02 * found.values[0, 0] * 60 / speeds)
     assert np.all(growth < 1)
     assert np.abs(growth / left - 1).max() < 0.02

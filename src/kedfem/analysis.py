@@ -1,4 +1,4 @@
-"""The whole job: a scene in; time series, animation, plots and a picture out."""
+"""The whole analysis of a scene: from its record to time series, animation, plots and a picture."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -7,8 +7,7 @@ from pathlib import Path as FilePath
 
 from kedfem.accuracy.choices import open_step
 from kedfem.accuracy.error_budget import Budget, attributes, budget_warning, kind_of_name, meaningless
-from kedfem.accuracy.estimates import Strained, budget
-from kedfem.accuracy.given import given_warning
+from kedfem.accuracy.estimates import PeakStrainStates, budget
 from kedfem.accuracy.histories import Histories, steady_state
 from kedfem.accuracy.mass_damping import mass_damping_warning
 from kedfem.accuracy.meshes import stubby_warning
@@ -16,6 +15,7 @@ from kedfem.accuracy.plan import Plan, ready_to_step
 from kedfem.accuracy.prepared import ALONE, Neighbours, Prepared
 from kedfem.accuracy.reduction import Reduction
 from kedfem.accuracy.resolution import resolution, resolution_warnings, stability_warning
+from kedfem.accuracy.rigid_link_compliance import compliance_warning
 from kedfem.accuracy.rounding import IDLE, unstressed
 from kedfem.accuracy.singular import SingularPasses
 from kedfem.accuracy.sizes import Sizes, size_warnings, sizes
@@ -24,9 +24,9 @@ from kedfem.accuracy.step_estimate import StepEstimate
 from kedfem.dynamics.loads import coarse_steps
 from kedfem.dynamics.stepping.cost import factor_words
 from kedfem.dynamics.stepping.levels import level_steps
-from kedfem.dynamics.stepping.solvers import eased_warning, stresses_in, unstable_balance, unstable_balance_warning
+from kedfem.dynamics.stepping.solvers import eased_warning, unstable_balance, unstable_balance_warning
 from kedfem.dynamics.stepping.start import period_map
-from kedfem.dynamics.system.period.map import Carried
+from kedfem.dynamics.system.period.map import StateArrays
 from kedfem.dynamics.system.steps import Steps
 from kedfem.dynamics.vibration import Vibration, vibration
 from kedfem.links.recovery import stress_recovery
@@ -52,21 +52,21 @@ from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.fatigue.damage import fatigue_of, kept_since, stress_period
 from kedfem.results.fatigue.strength import require_fatigue
 from kedfem.results.forces.force_elements import measured_elements
-from kedfem.results.forces.indeterminate import undetermined, undetermined_warning
+from kedfem.results.forces.indeterminate import indeterminate_channels, indeterminate_warning
 from kedfem.results.on_demand import Chosen
 from kedfem.results.recording import recording
 from kedfem.results.stresses.envelope import Envelope
 from kedfem.results.stresses.peaks import highest, hot_spots, peaks
-from kedfem.results.stresses.singular_stress import doubtful
+from kedfem.results.stresses.singular_stress import singular_places
 from kedfem.results.table import drive_heading, require_parquet
 from kedfem.resume import EVERY, Keeper, remove_state
-from kedfem.scene import Scene, without_vibration
+from kedfem.scene import Scene, refuse_few_rows, without_vibration
 from kedfem.stepping import Clock, Watch, Watched, stepped
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What a run leaves: results, files, highest stress, seconds per stage, warnings for the user, choices made.
+    """The outcome of a run: results, files, highest stress, seconds per stage, warnings for the user, choices made.
 
     peaks, peak : highest stress over all steps, of each link that has stress, and of all
     worst : the frame of that instant, a VTU file
@@ -91,7 +91,7 @@ class Run:
     sizes: Sizes | None = None
     step: StepEstimate | None = None
     steady: Steady | None = None
-    begun: Carried | None = None
+    begun: StateArrays | None = None
 
     @property
     def peaks(self) -> Mapping[str, Peak]:
@@ -158,17 +158,18 @@ def _analysed(
     asked, chosen = None if scene.analysis.accuracy == "quick" else scene.analysis.accuracy, open_step(scene)
     plan, ready, reduction = ready_to_step(scene, clock.stage, beside.ends)
     scene = ready.scene
+    refuse_few_rows(scene)
     plain = sizes(scene, ready.model)
     notices = [*size_warnings(scene, plain), *assembly_warning(assembly), *stubby_warning(ready.model)]
     solvers = clock.timed("factor", lambda: _solvers(ready, beside), factor_words(ready.model))
-    account = Account(ready.model, measured_elements(scene, ready.model), lambda: stresses_in(solvers))
+    account = Account(ready.model, measured_elements(scene, ready.model), lambda: solvers[0].stiffening)
     recorded = clock.timed("probes", lambda: recording(scene, ready.model, account, ready.path, ready.linkage))
     every = [*ready.model.links, *(each.link for each in ready.model.prescribed)]
     recoveries = clock.timed("recovery", lambda: [stress_recovery(link) for link in every])
     notices += _about_steps(ready)
     moving = None if without_vibration(scene) else clock.timed("frequencies", lambda: resolution(ready))
     channels = [each.channel for each in recorded]
-    untold = undetermined(scene, ready.model, [each.name for each in channels])
+    untold = indeterminate_channels(scene, ready.model, [each.name for each in channels])
     efforts = CrossChecks(scene, ready.linkage, channels, account)
     watched = Watched(recorded, untold, efforts, recoveries, SingularPasses(ready), since, kept_since(scene, period))
     envelope, seen, step = clock.timed("steps", lambda: stepped(ready, solvers, watched, folder, watch, keeper))
@@ -178,15 +179,15 @@ def _analysed(
         *unbalanced,
         *(mass_damping_warning(ready, balance.resisted) if balance else ()),
         *efforts.warnings(),
-        *undetermined_warning(untold),
+        *indeterminate_warning(untold),
         *watched.passes.warnings(),
         *eased_warning(solvers),
         *unstable_balance_warning(solvers),
-        *given_warning(seen.given, asked),
+        *compliance_warning(seen.compliance, asked),
         *keeper.warnings(),
     ]
-    doubts = doubtful(scene, ready.model, recoveries)
-    add_peaks(folder / "results.h5", peaks(envelope.links(), envelope.when(), doubts))
+    singular = singular_places(scene, ready.model, recoveries)
+    add_peaks(folder / "results.h5", peaks(envelope.links(), singular))
     results = read_results(folder / "results.h5")
     errors = step.errors if step.levels > 1 else None
     idle = unstressed(ready.model, peak := highest(results.peaks))
@@ -212,10 +213,10 @@ def _analysed(
         mark_doubtful(folder / "results.h5", why)
         results = replace(results, status="doubtful", reason=why)
     if period:
-        damaged = clock.timed("fatigue", lambda: _damaged(ready, folder, envelope, doubts, period))
+        damaged = clock.timed("fatigue", lambda: _damaged(ready, folder, envelope, singular, period))
         results = replace(results, fatigue=damaged)
     notices += [*peak_warning(peak, since), *fatigue_warning(results.fatigue)]
-    _stress_files(ready, folder, results.drive, envelope, doubts)
+    _stress_files(ready, folder, results.drive, envelope, singular)
     notices += clock.timed("pictures", lambda: write_derived(scene, results, peak, folder))
     _mesh_field(seen.strained, folder / MESH)
     add_account(folder / "results.h5", notices, clock.seconds)
@@ -251,25 +252,27 @@ def _about_steps(ready: Prepared) -> list[str]:
     return [*stability_warning(ready.scene), *coarse_steps(ready.scene)]
 
 
-def _stress_files(ready: Prepared, folder: FilePath, drive: Channel, envelope: Envelope, doubts: list[list[str]]) -> None:
+def _stress_files(
+    ready: Prepared, folder: FilePath, drive: Channel, envelope: Envelope, singular: list[list[str]]
+) -> None:
     """The envelope of stresses, the top ten of each link, and the frame of the highest of all."""
     scene, named = ready.scene, drive_heading(drive)
-    extremes = Extremes(envelope.links(), envelope.when(), doubts, named)
+    extremes = Extremes(envelope.links(), singular, named)
     write_envelope(folder, extremes, scene.output.csv)
-    write_top(folder, hot_spots(extremes.found, extremes.when, doubts), named)
+    write_top(folder, hot_spots(extremes.found, singular), named)
     if (worst := envelope.worst) is not None:
         write_frame(folder / WORST, worst.t, fields(scene, ready.model, envelope.recoveries, worst))
 
 
-def _damaged(ready: Prepared, folder: FilePath, envelope: Envelope, doubts: list[list[str]], period: float) -> Fatigue:
+def _damaged(ready: Prepared, folder: FilePath, envelope: Envelope, singular: list[list[str]], period: float) -> Fatigue:
     """Damage over the last period, in its files and in that of the results."""
-    found, fields = fatigue_of(ready.scene, ready.model, envelope, doubts, period)
+    found, fields = fatigue_of(ready.scene, ready.model, envelope, singular, period)
     write_fatigue(folder, found, fields, ready.scene.output.csv)
     add_fatigue(folder / "results.h5", found)
     return found
 
 
-def _mesh_field(strained: Strained, file: FilePath) -> None:
+def _mesh_field(strained: PeakStrainStates, file: FilePath) -> None:
     """The mesh's indicator in each element of solid and plane links, for ParaView."""
     parts = [
         ((link.full or link), each.elements)
@@ -281,6 +284,8 @@ def _mesh_field(strained: Strained, file: FilePath) -> None:
 
 
 def _in_memory(results: Results, solvers: Sequence[Steps]) -> Histories:
-    """The channels of a run as its errors are judged."""
+    """The channels of a run as its errors are judged; none where not all time points are rows."""
+    if results.every > 1:
+        return Histories(results.time[:0], {}, begun=steady_state(solvers))
     names = tuple(name for name in results.channels if kind_of_name(name) is not None)
     return Histories(results.time, Chosen(results.channels, names), begun=steady_state(solvers))

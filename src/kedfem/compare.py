@@ -1,4 +1,4 @@
-"""Several runs beside each other, from their results files: what differs in their scenes, and in what they found."""
+"""Comparison of several runs, from their results files: differences of their scenes and of their results."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from kedfem.results.differences import Difference, Over, common_abscissa, differ
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """What `compare` leaves.
+    """The outcome of `compare`.
 
     folder : where the pictures and the table are
     names : of the runs, the first one is what the others are compared with
@@ -76,7 +76,7 @@ def compare(
     links = dict.fromkeys(link for run in runs for link in run.peaks)
     peaks = {link: np.array([run.peaks[link].stress if link in run.peaks else np.nan for run in runs]) for link in links}
     ends = float(along[0]), float(along[-1])
-    reported = (*_missing(names, runs), *_partial(names, runs))
+    reported = (*_missing(names, runs), *_partial(names, runs), *_thinned(names, runs))
     unit = "s" if over == "time" else runs[0].drive.unit
     return Comparison(target, names, over, unit, ends, differing_keys(runs), tuple(found), peaks, reported)
 
@@ -100,6 +100,13 @@ def _missing(names: Sequence[str], runs: Sequence[Results]) -> tuple[str, ...]:
             few = ", ".join(own[:5]) + (f" and {len(own) - 5} more" if len(own) > 5 else "")
             out.append(f"{name}: {few}: not recorded, or otherwise, in another run, and not compared")
     return tuple(out)
+
+
+def _thinned(names: Sequence[str], runs: Sequence[Results]) -> tuple[str, ...]:
+    """Runs that did not write all rows."""
+    seen = "alone (output.every): curves are compared there, and what differs between is not seen"
+    every = zip(names, runs, strict=True)
+    return tuple(f"{name}: has rows of one step in {run.every} {seen}" for name, run in every if run.every > 1)
 
 
 def _partial(names: Sequence[str], runs: Sequence[Results]) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Loops compiled by numba, and where they are kept: anew for every state of all of kedfem's compiled code.
+"""The cache of loops compiled by numba, with one folder for each state of kedfem's compiled code.
 
 numba compiles a function again when its own file has changed, but not when one that it calls in another file has, nor a
 constant there. So what it compiled is kept in a folder named after all `*kernel.py` files together, what they import of

@@ -1,4 +1,4 @@
-"""What goes wrong, and where: the errors that a user of kedfem can meet."""
+"""Errors that a user of kedfem can meet, each with its place."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where kedfem keeps what it need not find out twice; files that appear only when they are whole; digests.
+"""Cache folders, files that appear only when they are complete, and digests.
 
 By digests changed bytes are noticed before anything is made of them. Of content: it is kept behind its digest. Of a
 folder of files that others write and read, so that changed ones go: numba reads what it compiled by unpickling and

@@ -1,4 +1,4 @@
-"""Elements and parts of arrays in compiled code, by a third of numba's instructions: compiling takes its time for each.
+"""Indexing of arrays in compiled code with a third of numba's instructions, so that compiling takes less time.
 
 numba makes code for slices of any step, and keeps each array in memory to ask for its shape. What an index means is the
 same: negative ones count from the end, slices end where the array does. All other indices are left to numba, and so is

@@ -37,8 +37,8 @@ from kedfem.stepping import Clock, Watch, frame_steps
 
 
 @dataclass(frozen=True, slots=True)
-class Moved:
-    """What the kinematics of a scene leave: results, files, what was recorded, seconds per stage, warnings."""
+class KinematicsRun:
+    """The outcome of the kinematics of a scene: results, files, what was recorded, seconds per stage, warnings."""
 
     folder: FilePath
     results: Results
@@ -52,7 +52,9 @@ def kinematics_folder(scene: Scene) -> FilePath:
     return beside(scene.results_folder, "kinematics")
 
 
-def kinematics(scene: Scene, folder: FilePath | None = None, watch: Watch = lambda stage, done, total: None) -> Moved:
+def kinematics(
+    scene: Scene, folder: FilePath | None = None, watch: Watch = lambda stage, done, total: None
+) -> KinematicsRun:
     """Move a scene's links as rigid bodies and write positions, velocities, accelerations, forces, an animation, plots.
 
     Parameters
@@ -70,7 +72,7 @@ def kinematics(scene: Scene, folder: FilePath | None = None, watch: Watch = lamb
         return _moved(scene, target, watch)
 
 
-def _moved(scene: Scene, target: FilePath, watch: Watch) -> Moved:
+def _moved(scene: Scene, target: FilePath, watch: Watch) -> KinematicsRun:
     """The stages, in a folder of their own."""
     clock = Clock(watch)
     scene, assembly = assembled(scene)
@@ -88,7 +90,7 @@ def _moved(scene: Scene, target: FilePath, watch: Watch) -> Moved:
     warnings = (*assembly_warning(assembly), *_missing(scene, linked, masses), *_transmission(results, recorded))
     add_account(target / "results.h5", warnings, clock.seconds)
     results = replace(results, warnings=warnings, seconds=dict(clock.seconds))
-    return Moved(target, results, recorded, clock.seconds, warnings)
+    return KinematicsRun(target, results, recorded, clock.seconds, warnings)
 
 
 def rigid_links(scene: Scene) -> dict[str, Link]:

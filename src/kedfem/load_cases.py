@@ -31,7 +31,7 @@ OUT_OF_BALANCE = 0.01  # reactions of supports, of the largest force: more is re
 
 @dataclass(frozen=True, slots=True)
 class LoadCases:
-    """What `load_cases` leaves.
+    """The outcome of `load_cases`.
 
     folder : where the files are
     link : its name
@@ -55,7 +55,7 @@ def load_cases(
     file: FilePath, link: str, at: Sequence[float] = (), folder: FilePath | None = None,
     watch: Watch = lambda stage, done, total: None,
 ) -> LoadCases:  # fmt: skip
-    """Write what one link of a run bears at some instants.
+    """Write the load cases of one link of a run at some instants.
 
     Parameters
     ----------
@@ -73,24 +73,25 @@ def load_cases(
     results = read_results(path)
     scene = scene_from(json.loads(results.scene_json), path.parent.parent)
     _refuse(scene, link)
-    rows = _rows(path, results, link, at)
+    steps = _steps(path, results, link, at)
+    known = {step // results.every * results.every for step in steps}
     watch("mesh and matrices", 0, 0)
     ready, reduction = prepared(scene)
     full = meshed(scene).model if reduction else ready.model
     k = [each.name for each in full.links].index(link)
     statics = Statics(full.links[k], supports(full.links[k]))
     found: list[LoadCase] = []
-    for block in _blocks(ready, rows[-1], watch):
-        for row in rows:
-            if block.step <= row < block.step + len(block):
-                _refuse_other(path, scene, results, block, row)
-                now = block.at(row - block.step)
-                found.append(load_case(now, k, ready.model, full, statics))
+    for block in _blocks(ready, steps[-1], watch):
+        here = range(block.step, block.step + len(block))
+        for step in sorted(known.intersection(here)):
+            _refuse_other(path, scene, results, block, step)
+        for step in sorted(set(steps).intersection(here)):
+            found.append(load_case(block.at(step - block.step), k, ready.model, full, statics))
     target = ready_folder(folder or path.parent / "loads")
     return _written(target, scene, full.links[k], found, results)
 
 
-def _rows(path: FilePath, results: Results, link: str, at: Sequence[float]) -> list[int]:
+def _steps(path: FilePath, results: Results, link: str, at: Sequence[float]) -> list[int]:
     """The time steps of the instants."""
     if "energy/strain" not in results.channels or not len(results.time):
         raise OutputError(f"{path}: must be results of `kedfem run` with rows, got none with elastic motion")
@@ -98,12 +99,13 @@ def _rows(path: FilePath, results: Results, link: str, at: Sequence[float]) -> l
         if link not in results.peaks:
             raise OutputError(f"--at: is required [s], got nothing and no highest stress of '{link}' in {path}")
         at = [results.peaks[link].time]
-    first, last = float(results.time[0]), float(results.time[-1])
-    step = (last - first) / max(len(results.time) - 1, 1)
+    time = results.instants
+    first, last = float(time[0]), float(time[-1])
+    step = (last - first) / max(len(time) - 1, 1)
     for t in at:
         if not first - step / 2 <= t <= last + step / 2:
             raise OutputError(f"--at: must be from {first:g} to {last:g} s, the run's time, got {t:g}")
-    return sorted({int(np.abs(results.time - t).argmin()) for t in at})
+    return sorted({int(np.abs(time - t).argmin()) for t in at})
 
 
 def _refuse(scene: Scene, name: str) -> None:
@@ -138,13 +140,13 @@ def _blocks(ready: Prepared, last: int, watch: Watch) -> Iterator[Block]:
             return
 
 
-def _refuse_other(path: FilePath, scene: Scene, results: Results, block: Block, row: int) -> None:
+def _refuse_other(path: FilePath, scene: Scene, results: Results, block: Block, step: int) -> None:
     """The run must be the one that wrote the results: neither files nor kedfem have changed what it finds."""
     springs = scene.springs or scene.limits or any(joint.bushing for joint in scene.joints.values())
     if springs:  # whose energy the channel counts too
         return
     strain = results.channels["energy/strain"][1][:, 0]
-    again = sum(float(each.strain[row - block.step]) for each in block.links)
+    again, row = sum(float(each.strain[step - block.step]) for each in block.links), step // results.every
     if abs(again - strain[row]) > OTHER * np.abs(strain).max():
         raise OutputError(
             f"{path}: must be of the scene's present files and this kedfem, got a strain energy of {strain[row]:.6g} J "

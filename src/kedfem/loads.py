@@ -22,7 +22,7 @@ JOINTS, DRIVES = "joints.csv", "drives.csv"
 
 @dataclass(frozen=True, slots=True)
 class Loads:
-    """What `loads` leaves.
+    """The outcome of `loads`.
 
     folder : where tables and diagrams are
     joints, drives : name → numbers, by what they are with their unit
@@ -90,12 +90,22 @@ def _refuse(path: FilePath, results: Results, last: float | None) -> None:
     """Results without rows; revolutions of what makes none."""
     if not len(results.time):
         raise OutputError(f"{path}: must have rows, got none: the run was {results.status}")
+    if missing := thinned(results):
+        raise OutputError(f"{path}: {missing}")
     if last is None:
         return
     if not last > 0:
         raise OutputError(f"--last: must be positive, got {last:g}")
     if results.drive.unit != "rad":
         raise OutputError("--last: counts revolutions of the drive, got a drive that slides: leave it out")
+
+
+def thinned(results: Results) -> str:
+    """Why loads of results are not found that have not the rows of all steps; "" of others."""
+    if results.every == 1:
+        return ""
+    wanted = "must have the rows of all steps for loads, which are means and extremes"
+    return f"{wanted}, got those of one step in {results.every} (output.every)"
 
 
 def _moved(scene: Scene, results: Results) -> tuple[Linkage | None, RigidMotion | None, tuple[str, ...]]:

@@ -1,4 +1,4 @@
-"""What a run remembers from time point to time point, as names, numbers and arrays: what is stored can be put back.
+"""Memory of a run between time points, as names, numbers and arrays that can be stored and restored.
 
 A class with a tuple REMEMBERED names the attributes that change while a run steps; the others are made anew from the
 scene. Records (dataclasses and named tuples of kedfem) are stored by the names of their fields. Nothing is pickled: what

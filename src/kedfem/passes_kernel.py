@@ -1,4 +1,4 @@
-"""How numba compiles parts of loops, in less time: by the passes that they need, and without asking the same twice.
+"""Faster compilation of parts of loops by numba: only the compiler passes that they need, and no repeated type queries.
 
 Numba's own pipeline looks for closures, generators, array expressions and `with` blocks, which parts do not have, and
 after each of its passes it computes again where each variable is used. Of parts no references are counted, so that

@@ -1,4 +1,4 @@
-"""What differs between systems: how processes are told to end, that workers end with parents, limits, owners of files.
+"""Differences between operating systems: interruption of processes, workers, limits, owners of files.
 
 Nothing else in kedfem may need Linux; what a system does not know is left out here. Locks are filelock's.
 """
@@ -103,6 +103,34 @@ def caught_in(call: CodeType, caught: Callable[[BaseException], None]) -> Iterat
     finally:
         for number, each in before.items():
             signal.signal(number, each)
+
+
+@contextmanager
+def ended_at_once(words: str) -> Iterator[None]:
+    """Let what interrupts this process end it at once, while a library computes for seconds and Python hears of nothing.
+
+    For work that leaves nothing half done. The exit status is the signal's own; a shell beside it, which finds that its
+    input has ended, says the words. Undisturbed where interruptions are not `end_as_interrupted`, or there is no shell.
+    """
+    import subprocess
+
+    main = threading.current_thread() is threading.main_thread()
+    numbers = [getattr(signal, name) for name in ("SIGINT", *INTERRUPTIONS) if main and hasattr(signal, name)]
+    ours = [number for number in numbers if signal.getsignal(number) is _interrupt]
+    if os.name != "posix" or not ours:
+        yield
+        return
+    shown = "\033[?25h" * sys.stderr.isatty()  # progress bars hide the cursor
+    say = ["/bin/sh", "-c", 'read done || printf "%s\n" "$0" >&2', shown + words]
+    with subprocess.Popen(say, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, start_new_session=True) as beside:
+        try:
+            for number in ours:
+                signal.signal(number, signal.SIG_DFL)
+            yield
+        finally:
+            for number in ours:
+                signal.signal(number, _interrupt)
+            beside.communicate(b"\n")
 
 
 def import_quickly() -> None:

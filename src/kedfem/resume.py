@@ -1,4 +1,4 @@
-"""States of a run on the disk, from which it can go on to the same rows after it was ended from outside.
+"""Restart files: states of a run on disk, from which it continues with the same rows after an interruption.
 
 A state belongs to rows that are in the results file, to a scene, to the contents of its files and to this version of
 kedfem. It is put in place whole, after its rows; it goes when the run is complete, or when another one's first rows
@@ -21,7 +21,7 @@ from kedfem.errors import OutputError, SceneError
 from kedfem.folders import sealed, unsealed
 from kedfem.memory import Packed, packed
 from kedfem.results import replacing
-from kedfem.results.writer import installed_version
+from kedfem.results.layout import installed_version
 from kedfem.scene import Cad, MeshFile, Part, Scene
 from kedfem.store import contents, software
 
@@ -30,7 +30,7 @@ EVERY = 10.0  # seconds between two states: what a kill may cost
 SHARE = 20.0  # times what storing takes: a twentieth of a run's time at most
 # times `every`, after which a state is stored though it is large: steps wait for their stresses
 OVERDUE = 4.0
-FORMAT = 2
+FORMAT = 3
 ROUNDING = 1e-9  # of a model's numbers, on another machine
 
 
@@ -74,9 +74,9 @@ class Keeper:
         return keeper
 
     @property
-    def rows(self) -> int:
-        """Rows that belong to the state to go on from."""
-        return int(self.stored.content["rows"]) if self.stored else 0
+    def steps(self) -> int:
+        """Time points up to the state to go on from."""
+        return int(self.stored.content["steps"]) if self.stored else 0
 
     def prepared(self, ready: Prepared) -> None:
         """What was planned and meshed belongs to the state to go on from."""
@@ -106,11 +106,11 @@ class Keeper:
         since = perf_counter() - self._since
         return since >= max(self.every, SHARE * self._takes) * (OVERDUE if waits else 1.0)
 
-    def keep(self, rows: int, memories: Mapping[str, Any]) -> None:
-        """Store a state that belongs to so many rows; where it cannot be, the run goes on without."""
+    def keep(self, steps: int, memories: Mapping[str, Any]) -> None:
+        """Store a state that belongs to so many time points; where it cannot be, the run goes on without."""
         began = perf_counter()
         own = {k: v for k, v in self.origin.items() if k != "model" and not k.startswith("planned ")}
-        header = {"format": FORMAT, "run": self.run, "rows": rows, "all": self.origin, "origin": own}
+        header = {"format": FORMAT, "run": self.run, "steps": steps, "all": self.origin, "origin": own}
         content = packed(header | dict(memories))
         try:
             with replacing(self.folder / STATE) as part:

@@ -1,4 +1,4 @@
-"""All time steps of a run: rows to the results file, frames to the animation, states to go on from."""
+"""The time steps of a run, with rows to the results file, frames to the animation, and restart states."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from kedfem.accuracy.estimates import Seen, watcher
+from kedfem.accuracy.estimates import ErrorMonitor, watcher
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.singular import SingularPasses
 from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
@@ -78,7 +78,7 @@ class Watched:
 
 def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
              folder: FilePath, watch: Watch, keeper: Keeper | None = None,
-             ) -> tuple[Envelope, Seen, StepEstimate]:  # fmt: skip
+             ) -> tuple[Envelope, ErrorMonitor, StepEstimate]:  # fmt: skip
     """All time steps: rows to the results file, frames to the animation; also what the steps show of errors.
 
     A keeper stores states on the disk, and may have one to go on from.
@@ -89,10 +89,13 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
     seen = watcher(ready, solvers)
     errors = StepWatch(ready, watched.recorded, seen.running)
     channels = [each.channel for each in watched.recorded]
+    notes, drive = _notes(ready, watched), drive_channel(scene)
+    writer = ResultsWriter(folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes, drive)
+    writer.thinned(scene.output.every, steps + 1)
     marks = Marks.of(len(solvers), keeper is not None)
     memories = {
         "marks": marks, "frames": shown.frames, "envelope": envelope, "seen": seen, "errors": errors,
-        "efforts": watched.efforts, "account": watched.efforts.account, "passes": watched.passes,
+        "efforts": watched.efforts, "account": watched.efforts.account, "passes": watched.passes, "rows": writer.thinning,
     }  # fmt: skip
     memories |= {"one file": shown.one} if shown.one else {}
     if keeper is not None:
@@ -101,11 +104,9 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
         refuse_without(shown.frames, shown.one)
     for each in solvers:
         each.watch = lambda marched: watch(f"steady motion: march {marched} over a period", 0, 0)
-    notes, drive = _notes(ready, watched), drive_channel(scene)
-    written = ResultsWriter(folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes, drive)
-    with written.of_run(keeper.run, keeper.rows) if keeper else written as writer, closing(shown):
+    with writer.of_run(keeper.run, keeper.steps) if keeper else writer, closing(shown):
         table = _Table(writer, channels, folder)
-        if not (keeper and keeper.rows):
+        if not (keeper and keeper.steps):
             watch("start", 0, 0)
         try:
             for block in leveled(scene, ready.linkage, ready.path, model, solvers, marks):
@@ -124,7 +125,7 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
                 if keeper is not None and keeper.due(envelope.waits):
                     shown.finish()
                     table.flush()
-                    keeper.keep(writer.rows, memories)
+                    keeper.keep(writer.thinning.steps, memories)
         finally:
             table.flush()
             writer.note(errors.estimate.notes)

@@ -1,4 +1,4 @@
-"""What was found once is kept between runs: meshes, reduced links, plans.
+"""The cache of results between runs: meshes, reduced links, plans.
 
 The folder is the user's cache folder, or that in KEDFEM_CACHE; KEDFEM_CACHE=off keeps nothing. An entry belongs to a key
 that holds all that it depends on, the versions of kedfem and of the libraries among it. One that cannot be read, or is

@@ -1,4 +1,4 @@
-"""The terminal: whatever is printed, names from files and scenes send it no commands."""
+"""Output on the terminal, cleaned so that names from files and scenes cannot send it commands."""
 
 import os
 import unicodedata

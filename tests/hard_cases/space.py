@@ -37,7 +37,8 @@ def largest(found: Histories, name: str) -> float:
 @case("Parallelogram through its change points")
 def change_points() -> list[Outcome]:
     """Crank and rocker of one length, coupler and frame likewise: at 0° and 180° all links lie in a line, where it may go
-    on as a parallelogram or crossed over. A second coupler a quarter of a turn on, as on a locomotive, leaves one way.
+    on as a parallelogram or crossed over. A second coupler a quarter of a revolution on, as on a locomotive, leaves one
+    way.
     """
     single = four_bar(0.3, 0.9, 0.3, 0.9, np.radians(60))
     t = np.linspace(np.radians(-59), np.radians(119), 90)
@@ -52,12 +53,12 @@ def change_points() -> list[Outcome]:
     return [
         refused("one coupler, through them", lambda: motion_at(scene, np.linspace(0, 2.2, 90)), "in two ways"),
         Right("one coupler, up to 1° before them: the coupler's turn", float(coupler), 1e-12),
-        Right("two couplers, two turns: the wheels turn alike [rad]", float(np.abs(off).max()), 1e-12),
+        Right("two couplers, two revolutions: the wheels turn alike [rad]", float(np.abs(off).max()), 1e-12),
     ]
 
 
 def coupled_wheels() -> Joints:
-    """Two wheels with two coupling rods, a quarter of a turn apart."""
+    """Two wheels with two coupling rods, a quarter of a revolution apart."""
     joints: Joints = dict(four_bar(0.3, 0.9, 0.3, 0.9, np.radians(60)))
     across = 0.3 * np.array([np.cos(np.radians(150)), np.sin(np.radians(150)), 0.0])
     joints["E"] = ("revolute", "crank", "rod", across, Z)
@@ -124,8 +125,8 @@ def redundant() -> list[Outcome]:
 
 @case("Mass ratio of a million between neighbours")
 def mass_ratio() -> list[Outcome]:
-    """[KED]'s four-bar with a coupler a million times as light, or as heavy, as its neighbours; 60 rpm, one turn. The
-    monolithic solver, which factors the whole assembled system at each step, shows what is right.
+    """[KED]'s four-bar with a coupler a million times as light, or as heavy, as its neighbours; 60 rpm, one revolution.
+    The monolithic solver, which factors the whole assembled system at each step, shows what is right.
     """
     outcomes: list[Outcome] = []
     for factor in (1e-6, 1e6):
@@ -198,11 +199,11 @@ def many_turns() -> list[Outcome]:
     torque = run(raw).channels["drive/torque"][1][1:, 0].reshape(10_000, 60)
     change = float(np.abs(torque[-1] - torque[99]).max() / np.abs(torque[99]).max())
     return [
-        Right("rocker's angle in the last turn, from the closed form [rad]", float(np.abs(drift).max()), 2e-11),
+        Right("rocker's angle in the last revolution, from the closed form [rad]", float(np.abs(drift).max()), 2e-11),
         Right("drive's torque in turn 10,000 against turn 100", change, 1e-9),
     ]
 
 
 def turned_once(motion: Any, number: int) -> np.ndarray:
-    """Angle about z within a turn."""
+    """Angle about z within a revolution."""
     return np.asarray(np.arctan2(motion.R[:, number, 1, 0], motion.R[:, number, 0, 0]))

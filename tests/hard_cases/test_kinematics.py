@@ -1,4 +1,4 @@
-"""Rigid motion where it is difficult: close to dead points, after many turns, with axes almost parallel."""
+"""Rigid motion where it is difficult: close to dead points, after many revolutions, with axes almost parallel."""
 
 import numpy as np
 import pytest

@@ -38,7 +38,7 @@ FORMS = {8: linear, 10: tetrahedral, 20: serendipity, 27: quadratic}
 Mesh = TypeVar("Mesh", SolidMesh, QuadMesh)
 
 seeds = st.integers(0, 2**32 - 1)
-_angles = st.floats(-3.1, 3.1, allow_nan=False)  # up to half a turn about any axis
+_angles = st.floats(-3.1, 3.1, allow_nan=False)  # up to half a revolution about any axis
 rotations = st.tuples(_angles, _angles, _angles).map(lambda v: Rotation.from_rotvec(v).as_matrix())
 planar_rotations = _angles.map(lambda a: Rotation.from_rotvec([0, 0, a]).as_matrix())
 vectors = st.tuples(*[st.floats(-2.0, 2.0)] * 3).map(np.array)

@@ -102,7 +102,7 @@ def test_values_gradients_and_rates_are_one_rotation(kind: int, angle: float) ->
     term, room = Term(kind, 0, 1, axis, axis, b), np.zeros((12, 3))
     by_hand = angle * float(n @ b)
     step = along_kernel(kind == TILT, Qi, Qj, axis, b, room)
-    apart, gradient = (oracle._rotation_along if kind == ROTATION else oracle._tilt_along)(term, Qi, Qj)
+    apart, gradient = (oracle.rotation_along if kind == ROTATION else oracle.tilt_along)(term, Qi, Qj)
     omega, alpha = rng.normal(size=(2, 3))
     spin = cross_matrix(omega)
     moving = np.stack([Qi, spin @ Qi, (cross_matrix(alpha) + spin @ spin) @ Qi])
@@ -118,7 +118,7 @@ def test_values_gradients_and_rates_are_one_rotation(kind: int, angle: float) ->
     h, slopes = 1e-4, []  # the rate's rate by differences: h² of it, and rounding over h
     for s in (h, -h):
         turned = Rotation.from_rotvec(s * omega + s * s / 2 * alpha).as_matrix() @ Qi
-        by = (oracle._rotation_along if kind == ROTATION else oracle._tilt_along)(term, turned, Qj)[1]
+        by = (oracle.rotation_along if kind == ROTATION else oracle.tilt_along)(term, turned, Qj)[1]
         slopes.append(float(by @ (omega + s * alpha)))
     np.testing.assert_allclose(series[2], (slopes[0] - slopes[1]) / (2 * h), rtol=0, atol=1e-6)
 
@@ -130,7 +130,7 @@ def test_steps_with_large_rotations_in_a_bushing_are_those_of_the_oracle(kind: s
     raw["joints"]["M"]["bushing"]["rotational_damping"] = [0.01, 0.03, 0.02]
     raw["analysis"] = {"end_time": 0.02, "step": 2e-3, "frames": "co-rotational", "rho_inf": 0.8}
     of, count = begun(raw), 10
-    wanted, forces = by_oracle(of, count)
+    wanted, forces = by_oracle(of, count, keeps=kind == "revolute")  # the tangents of a weld change with every step
     _, history = march(of.ready, of.state, of.steps(count))
     assert np.abs(wanted).max() > 5e-3  # of points some 0.03 m from the joint
     np.testing.assert_allclose(rows(of.ready, history.u), wanted, rtol=0, atol=1e-7 * np.abs(wanted).max())

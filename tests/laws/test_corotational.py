@@ -267,7 +267,7 @@ def merged(raw: dict[str, Any], changes: dict[str, dict[str, Any]]) -> dict[str,
 
 
 def slow_four_bar(factor: float, follow: bool) -> dict[str, Any]:
-    """The source's four-bar at 60 rpm, E and G multiplied, half a turn; settled by its damping."""
+    """The source's four-bar at 60 rpm, E and G multiplied, half a revolution; settled by its damping."""
     raw: dict[str, Any] = four_bar(
         {
             "revolutions": 0.5,

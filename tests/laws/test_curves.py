@@ -98,7 +98,7 @@ def rod(n: np.ndarray, motor: Raw, speed: float, end: float, count: int, **analy
 
 @pytest.mark.parametrize("axis", list(AXES))
 def test_a_rod_turns_past_a_torque_that_repeats_itself_as_its_equation_says(axis: str) -> None:
-    """J φ'' = T(φ), five turns and more, by a solver of order eight and a spline of its own."""
+    """J φ'' = T(φ), five revolutions and more, by a solver of order eight and a spline of its own."""
     n = AXES[axis]
     at = np.radians([0.0, 50.0, 140.0, 200.0, 300.0])
     at = np.concatenate([at - TURN, at, at + TURN])

@@ -283,6 +283,15 @@ def test_rigid_modes_cause_no_stress(mesh: SolidMesh) -> None:
     assert np.abs(rows @ rigid_modes(link.X)).max() < 1e-11 * np.abs(rows.toarray()).max()
 
 
+@LAW
+@given(hexahedra())
+def test_stiffness_and_mass_are_symmetric_to_the_bit(mesh: SolidMesh) -> None:
+    """Factors read one half alone: what the other has of rounding would be missing of the work of forces."""
+    link = solid(mesh)
+    for A in (link.K0, link.mass[0]):
+        assert (A != A.T).nnz == 0
+
+
 @settings(LAW, max_examples=examples(6))  # the vector form is slow
 @given(hexahedra(), st.floats(-0.5, 0.45))
 def test_stiffness_is_that_of_the_vector_form(mesh: SolidMesh, nu: float) -> None:

@@ -37,7 +37,7 @@ def refusal(kind: str, partners: tuple[str, str], driven: bool, plane: bool) -> 
     """What the message says where the two do not go together; None if they do."""
     bare = partners.count("bare")
     if kind == "slot" and plane and bare and {"rigid", "bare"}.issuperset(partners):
-        return "links: must hold a link that the drive does not simply carry along"
+        return "links: must have a link whose motion no drive prescribes"
     moving_ground = driven and kind == "revolute" and partners == ("bare", "ground")
     if bare == 2 or (bare and partners[1] == "ground" and kind != "prismatic" and not moving_ground):
         return r"links\.[\w ]+\.shape: is required for a rigid link that is neither a slider"

@@ -194,7 +194,7 @@ def test_levels_in_time_do_without_what_rigid_links_give() -> None:
 def test_a_run_says_what_rigid_links_give(steps: int, tmp_path: Path) -> None:
     """12 F/(ω² m), ω h = 30, of a rod of mass m that F compresses, and what to do; nothing below 1 % of the peak."""
     run = analyse(scene_from(propped(steps), tmp_path))
-    said = [text for text in run.warnings if "rigid link prop gives" in text]
+    said = [text for text in run.warnings if "rigid link prop deforms" in text]
     moment = 9.81 * (1000 + 7850 * 0.1 * 0.06 / 2)  # of the ton and the lever about its foot
     pressed = moment / (0.5 * 0.4 / np.hypot(0.1, 0.4))
     give = 12 * pressed * 0.001**2 / (900 * 2.0)

@@ -35,7 +35,7 @@ def sliders(joints: JointTable) -> tuple[str, ...]:
     return ("slider",) if "guide" in joints else ()
 
 
-@settings(LAW, max_examples=examples(5))  # each follows two linkages over a turn
+@settings(LAW, max_examples=examples(5))  # each follows two linkages over a revolution
 @given(joint_tables, rotations, vectors)
 def test_the_motion_does_not_depend_on_where_the_scene_lies(joints: JointTable, Q: np.ndarray, s: np.ndarray) -> None:
     """Drawn at Q X + s, a link turns by Q R Qᵀ; vectors turn with Q; p' = Q p + s − (Q R Qᵀ) s."""
@@ -49,7 +49,7 @@ def test_the_motion_does_not_depend_on_where_the_scene_lies(joints: JointTable, 
     assert_allclose(there.p2, here.p2 @ Q.T - there.R2 @ s, atol=1e-11)
 
 
-@settings(LAW, max_examples=examples(5))  # each follows two linkages over a turn
+@settings(LAW, max_examples=examples(5))  # each follows two linkages over a revolution
 @given(joint_tables, st.integers(1, 1000), st.floats(0.0, 6.28))
 def test_every_turn_is_the_same(joints: JointTable, revolutions: int, phase: float) -> None:
     scene = linkage_scene(joints, sliders=sliders(joints))

@@ -10,7 +10,7 @@ from kedfem.dynamics.system.oracle.monolithic_tangent import rotated_stiffness
 from kedfem.links.beams.beam_axis import Axis, smooth_axis, straight_axis
 from kedfem.links.beams.section import rectangle
 from kedfem.links.beams.spatial_beam import (
-    HUB_INERTIA,
+    RIGID_NODE_INERTIA,
     rigidities,
     section_strains,
     space_mass,
@@ -181,7 +181,7 @@ def test_kinetic_energy_of_a_rigid_beam_with_a_body_on_its_end(motion: Motion, c
     loaded = with_body(link, surface, mass, centre, euler_tensor(inertia))
     own, omega = MATERIAL.density * h * b * L, motion.R.T @ motion.omega
     box = own / 12 * np.diag([h**2 + b**2, L**2 + b**2, L**2 + h**2])
-    hub = HUB_INERTIA * MATERIAL.density * np.sqrt(h * b) * h * b**3 / 12
+    hub = RIGID_NODE_INERTIA * MATERIAL.density * np.sqrt(h * b) * h * b**3 / 12
     v = motion.velocity(np.array([[L / 2, 0, 0], centre]))
     wanted = (own * v[0] @ v[0] + mass * v[1] @ v[1] + omega @ (box + inertia + 2 * hub * np.diag([0, 1, 1])) @ omega) / 2
     velocity = np.cross(motion.omega, link.X @ motion.R.T) + np.outer(link.one, motion.v)

@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from kedfem.dynamics.system.starts import deflected
 from kedfem.dynamics.system.starts.deflected import quasi_static
+from kedfem.errors import SolveError
 from tests.laws.test_soft_mounts import ARM, HINGED, MOUNT, MOUNTED, PUSH, TURNS, mounted
 from tests.laws.test_system import elements, four_bar
-from tests.moving import channels, ran
+from tests.laws.test_turning_loads import ASKEW
+from tests.moving import channels, ran, state
+from tests.rooms.test_initial_deflection import plucked
 from tests.systems import begun
 
 Raw = dict[str, Any]
@@ -56,3 +60,38 @@ def test_rates_of_starts_do_not_depend_on_the_step(frames: str) -> None:
           for h in (1e-4, 1e-6)]  # fmt: skip
     v, other = (quasi_static(each.ready, each.motion).v for each in of)
     assert np.linalg.norm(v - other) < 1e-5 * np.linalg.norm(v)
+
+
+AROUND = [("beam", np.eye(3)), *(pytest.param(*x, marks=pytest.mark.long) for x in (
+    ("spatial beam", ASKEW), ("spatial beam", np.eye(3)[[2, 0, 1]]), ("solid", ASKEW)))]  # fmt: skip
+
+
+@pytest.mark.parametrize("frames", FRAMES)
+@pytest.mark.parametrize(("kind", "R"), AROUND)
+def test_what_is_let_go_of_a_link_that_turns_is_at_rest_in_it(kind: str, R: np.ndarray, frames: str) -> None:
+    """v = ω × u. Without it ω δ shakes the arm along its own axis, and the force at its hinge, m ω² L/2, by twice as
+    much; it keeps the Coriolis force of the tip's swing, some 10 % of that."""
+    speed, force = 60.0, R @ [40.0, 200.0, 0.0]
+    raw = plucked(kind, R, "drive", frames)
+    if frames == "rigid-body":
+        raw["links"]["arm"].pop("segments", None)
+    raw["drive"]["motion"] = {"kind": "constant_speed", "speed": speed}
+    go = raw["analysis"]["initial_deflection"]["tip"]
+    go["force"] = force[: len(go["force"])].tolist()
+    raw["analysis"] |= {"end_time": 1e-3, "step": 2.5e-5}
+    ready, blocks = ran(raw)
+    for k, link in enumerate(ready.model.links):
+        u, v = (state(blocks, k, name)[0] for name in "uv")
+        if kind == "beam":
+            u, v = (x * [1.0, 1.0, 0.0] for x in (u, v))
+        assert np.abs(v - np.cross(speed * R[:, 2], u)).max() < 1e-5 * speed * np.abs(u).max(), link.name
+    hinge = np.linalg.norm(channels(ready, blocks)["joints/A/force"], axis=1)
+    assert np.abs(hinge / hinge[0] - 1).max() < 0.2
+
+
+def test_what_is_let_go_with_rates_that_do_not_settle_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As of a rod far off on a damped hinge, whose damper would push by their rounding."""
+    differenced = deflected.differenced_rates
+    monkeypatch.setattr(deflected, "differenced_rates", lambda *x: (differenced(*x)[0], np.inf))
+    with pytest.raises(SolveError, match="rates that dampers feel do not settle"):
+        ran(plucked("beam", np.eye(3), "drive", "rigid-body"))

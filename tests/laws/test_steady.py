@@ -114,7 +114,7 @@ SWING = {"kind": "cycloidal", "angle": 0.3, "rise": 0.03, "return_time": 0.03, "
 
 
 def geared() -> Raw:
-    """Two arms under gravity that a pair of wheels couples 20 : 30: back after three turns of the first."""
+    """Two arms under gravity that a pair of wheels couples 20 : 30: back after three revolutions of the first."""
     arm = {"model": "beam", "material": "steel"}
     shape = {"kind": "bar", "width": 0.01, "thickness": 0.01}
     at = {"one": 0.0, "two": 1.0}

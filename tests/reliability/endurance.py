@@ -130,7 +130,7 @@ def main() -> None:
     print(f"a turn leaves {slope:.4e} J, off that by {off:.1e} J at most")  # noqa: T201
     for a_turn in (A_TURN, 2 * A_TURN):
         short = endured(4 * SETTLED * a_turn, a_turn, ())[0]
-        print(f"{a_turn} steps a turn: {growth(short.turns)[0]:.4e} J a turn")  # noqa: T201
+        print(f"{a_turn} steps a revolution: {growth(short.turns)[0]:.4e} J a turn")  # noqa: T201
 
 
 if __name__ == "__main__":

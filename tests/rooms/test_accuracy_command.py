@@ -16,7 +16,7 @@ from rich.console import Console
 
 from kedfem.accuracy.study.files import write_study, write_study_plot, written
 from kedfem.accuracy.study.measuring import Seconds, Study, pareto_front, studied
-from kedfem.accuracy.study.variants import fidelities
+from kedfem.accuracy.study.variants import model_kinds
 from kedfem.cli import INTERRUPTED, USER_ERROR
 from kedfem.scene import read_scene
 from kedfem.tables import study_tables
@@ -161,20 +161,20 @@ def test_too_little_time_for_anything_is_said(run_kedfem: Command, whip: Path) -
 
 
 @pytest.mark.long
-def test_a_fidelity_that_cannot_be_built_is_one_row_that_says_why(whip: Path) -> None:
+def test_a_model_that_cannot_be_built_is_one_row_that_says_why(whip: Path) -> None:
     text = BEAM.replace("polyline", "bar").replace("points =", "between =").replace("\nmodel", "\n#")
     # a surface load has no place on a beam
     load = '\n[loads.x]\nkind = "surface"\nlink = "arm"\nat = "B"\nvector = ["1 kPa", 0]\n'
     whip.write_text(text + load, encoding="utf-8")
     scene = read_scene(whip)
-    assert {each.name for each in fidelities(scene)} == {
+    assert {each.name for each in model_kinds(scene)} == {
         "beam", "plane", "reduced plane", "solid", "reduced solid",
     }  # fmt: skip
     found = studied(scene, most=20.0, repeats=1, quick=True)
-    beams = [row for row in found.rows if row.variant.fidelity.family == "beam"]
+    beams = [row for row in found.rows if row.variant.model_kind.family == "beam"]
     assert len(beams) == 1
     assert "must name a solid or a plane link for a surface load" in beams[0].note
-    assert found.reference.variant.fidelity.name == "reduced solid"
+    assert found.reference.variant.model_kind.name == "reduced solid"
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ LINE = {"kind": "spring", "between": [{"link": "coupler", "at": "C"}, {"link": "
 
 
 def four_bar(frames: str, model: str = "beam", steps: int = 180, **rest: Any) -> dict[str, Any]:
-    """A slow four-bar of steel, a quarter of a turn."""
+    """A slow four-bar of steel, a quarter of a revolution."""
     analysis = {"revolutions": 0.25, "steps_per_revolution": steps, "frames": frames, "initial": "quasi-static"}
     mesh = {"elements": 2} if model == "beam" else {}
     kind = {"model": "solid", "reduction": "modal"} if model == "reduced" else {"model": model}

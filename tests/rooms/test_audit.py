@@ -49,7 +49,7 @@ def audited_too(raw: dict[str, Any]) -> tuple[Balance, dict[str, np.ndarray], Mo
 
 
 def example(name: str, steps: int, links: dict[str, Any] | None = None, **analysis: Any) -> dict[str, Any]:
-    """A quarter of a turn of an example."""
+    """A quarter of a revolution of an example."""
     raw = scenes.example(name)
     raw["analysis"] = {"revolutions": 0.25, "steps_per_revolution": steps, "initial": "quasi-static", **analysis}
     for link in raw["links"].values():

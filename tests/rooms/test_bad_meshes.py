@@ -107,7 +107,7 @@ class TestMeshFile:
     def test_two_coordinates(self, tmp_path, monkeypatch):
         (tmp_path / "arm.vtu").touch()
         flat = RawMesh(CUBE[:, :2], {"hexahedron": CORNERS})
-        monkeypatch.setattr("kedfem.mesh.files.read._read", lambda *_: flat)
+        monkeypatch.setattr("kedfem.mesh.files.read.raw_of_file", lambda *_: flat)
         message = refused({"kind": "mesh", "file": "arm.vtu"}, tmp_path)
         assert "must have nodes of three coordinates, got shape (8, 2) in" in message
 
@@ -253,7 +253,7 @@ class TestGmsh:
         assert refused(SQUARE) == "gmsh: must be installed to mesh this shape (pip install gmsh), got none"
 
     def test_that_leaves_triangles(self, monkeypatch):
-        monkeypatch.setattr(session, "_QUAD4", -1)
+        monkeypatch.setattr(session, "QUAD4", -1)
         assert refused(SQUARE | {"holes": [{"at": [0.2, 0.3], "diameter": 0.1}]}) == (
             "links.arm.shape: quadrilaterals must fill the sections of its layers, got none around "
             "(0.310361, 0.373113, 0); change mesh.size or the outline"
@@ -263,7 +263,7 @@ class TestGmsh:
         def failing(*_: object) -> None:
             raise Exception("Could not create wire")
 
-        monkeypatch.setattr(outlines, "_drawn", failing)
+        monkeypatch.setattr(outlines, "surface_of", failing)
         assert refused(SQUARE) == (
             "links.arm.shape: must be an area, got none from OpenCASCADE: Could not create wire; change the outline"
         )

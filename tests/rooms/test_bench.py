@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.before import by_stage, renamed
 from benchmarks.elements import cost
 from benchmarks.pages import DOCS, MEASURED, table, write_page
 from benchmarks.parts import BAR, FORMS, STEEL, answer
@@ -57,6 +58,25 @@ def test_tables_take_the_places_of_former_ones(tmp_path: Path) -> None:
     assert "| factor | " in text  # the second table, for which there is none
     with pytest.raises(ValueError, match="3 tables, got 2"):
         write_page(tmp_path, "performance/growth", new)
+
+
+def test_stages_of_an_earlier_revision_stand_in_the_same_columns() -> None:
+    old = by_stage({"functions": 1.0, "error of the reduction": 2.0, "factor": 4.0, "steps": 8.0})
+    new = by_stage({"plan: frames": 1.0, "plan: step": 2.0, "modes": 3.0, "start": 4.0, "steps": 8.0})
+    assert (old["modes"], old["steps"], old["plan"]) == (3.0, 12.0, 0.0)
+    assert (new["modes"], new["steps"], new["plan"]) == (3.0, 12.0, 3.0)
+    with pytest.raises(KeyError, match="lunch"):
+        by_stage({"lunch": 1.0})
+
+
+def test_a_scene_takes_other_words_in_all_its_tables_and_lists() -> None:
+    scene = {"links": {"a": {"frames": "nominal"}}, "analysis": {"turns": 2}, "each": [{"turns": "turns"}]}
+    found = renamed(scene, {"turns": "revolutions"}, {"nominal": "rigid-body"})
+    assert found == {
+        "links": {"a": {"frames": "rigid-body"}},
+        "analysis": {"revolutions": 2},
+        "each": [{"revolutions": "turns"}],
+    }
 
 
 @pytest.mark.long

@@ -138,7 +138,7 @@ class TestGroups:
         path.touch()
         raw = from_meshio(meshio.Mesh(points, cells, cell_sets=sets))
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("kedfem.mesh.files.read._read", lambda *_: raw)
+            patch.setattr("kedfem.mesh.files.read.raw_of_file", lambda *_: raw)
             above, both = mesh_from_file("mesh", path, 2.0).faces
         assert (above.name, above.kind, both.name, both.kind) == ("above", "plane", "both", "other")
         assert_allclose([above.centre, above.direction], [[1, 1, 2], [0, 0, 1]], atol=1e-12)

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from numpy.testing import assert_allclose
 
-from kedfem.mesh.cad.model import _alike, solid_model
+from kedfem.mesh.cad.model import same_shape, solid_model
 from kedfem.mesh.cad.text import step_bodies, step_text
 from kedfem.scene.records.shapes import Cad
 from tests.rooms.cad_files import FORMATS, KEYS, MM, edited, parts_in, read, refused, written
@@ -110,5 +110,5 @@ class TestFaceNames:
         step = with_face_names(parts / "lever.step", *"abcdefghij")
         body = next(step_bodies(step_text(step)))
         turned = body.corners[[2, 1, 0, *range(3, 10)]]
-        assert _alike(body.corners * 1e-3 + 5, body.corners)
-        assert not _alike(turned, body.corners)
+        assert same_shape(body.corners * 1e-3 + 5, body.corners)
+        assert not same_shape(turned, body.corners)

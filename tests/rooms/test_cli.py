@@ -1,6 +1,7 @@
 """The command line as a user meets it: tables, messages, exit codes, Ctrl-C, and what --help does not load."""
 
 import json
+import math
 import os
 import re
 import signal
@@ -81,7 +82,10 @@ Command = Callable[..., Said]
 
 @pytest.fixture
 def run_kedfem(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Command:
-    """kedfem in this process, in a folder of its own, on a terminal of 80 columns; it never shows a traceback."""
+    """kedfem in this process, in a folder of its own, on a terminal of 80 columns; it never shows a traceback.
+
+    It has no lines of progress, which depend on how fast the machine is."""
+    monkeypatch.setattr("kedfem.cli.screen.QUIET", math.inf)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.delenv("KEDFEM_DEBUG", raising=False)
@@ -397,11 +401,26 @@ def test_ctrl_c_before_the_first_step_leaves_an_earlier_run_alone(
     assert file.read_bytes() == before
 
 
+def test_every_command_says_that_it_was_interrupted(
+    run_kedfem: Command, arm: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("kedfem.accuracy.plan.ready_to_step", interrupted)
+    said = run_kedfem("check", arm)
+    assert (said.code, said.err.splitlines()[-1:]) == (INTERRUPTED, ["interrupted"])
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_an_interrupted_run_leaves_what_was_computed(arm: Path, number: signal.Signals) -> None:
     arm.write_text(ARM.replace("TURNS", "10000"), encoding="utf-8")
     folder = arm.with_name("arm-results")
-    running = process(MAIN, "run", arm.name, folder=arm.parent)
+    before = signal.signal(number, signal.SIG_DFL)  # it may be ignored here, as under nohup, and so it would be there
+    try:
+        running = process(MAIN, "run", arm.name, folder=arm.parent)
+    finally:
+        signal.signal(number, before)
     try:
         wait_for(lambda: (folder / "animation" / "arm_0050.vtu").exists() and (folder / "results.h5").exists(), running)
         running.send_signal(number)
@@ -462,7 +481,7 @@ def test_a_frame_that_fails_while_steps_go_on_ends_the_run_and_rows_are_kept(
 
 
 def test_a_run_that_means_nothing_is_not_called_complete(run_kedfem: Command, arm: Path) -> None:
-    """A sudden start, and eight steps a turn that do not resolve what it excites."""
+    """A sudden start, and eight steps a revolution that do not resolve what it excites."""
     text = arm.read_text("utf-8").replace("= 360", "= 8").replace('initial = "quasi-static"', "")
     arm.write_text(text.replace("60 rpm", "600 rpm"), encoding="utf-8")
     said = run_kedfem("run", arm)

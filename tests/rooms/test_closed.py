@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from kedfem.accuracy.prepared import Prepared, meshed
-from kedfem.dynamics.joints.constraint_matrices import JointRows, joint_rows
+from kedfem.dynamics.joints.constraint_matrices import ConstraintMatrices, constraint_matrices
 from kedfem.dynamics.matrices.bordered import MANY, independent_rows
 from kedfem.dynamics.matrices.closed import closed
 from kedfem.dynamics.matrices.substructure import Substructure, factored
@@ -26,7 +26,7 @@ from tests.spatial_joints import BEAMS, SOLIDS
 TURNS = {
     "z": np.eye(3), "x": np.eye(3)[[2, 0, 1]], "oblique": Rotation.from_rotvec([0.7, -1.1, 0.4]).as_matrix(),
 }  # fmt: skip
-Given = tuple[list[Substructure], list[np.ndarray], JointRows | None, list[np.ndarray]]
+Given = tuple[list[Substructure], list[np.ndarray], ConstraintMatrices | None, list[np.ndarray]]
 
 
 def given(ready: Prepared, times: int = 3) -> Given:
@@ -35,11 +35,11 @@ def given(ready: Prepared, times: int = 3) -> Given:
     motion = rigid_motion(ready.linkage, ready.path, t, path_parameter(ready.scene, t))
     parts = [factored(link, joint, 0.0, 1.0) for link, joint in zip(model.links, model.joints, strict=True)]
     forcing = forcings(model, motion)
-    rows = joint_rows(model.rows, motion, model.interface_unknowns)
+    rows = constraint_matrices(model.rows, motion, model.interface_unknowns)
     return parts, [x.R for x in forcing], rows, [x.F @ x.R for x in forcing]
 
 
-def assembled(parts: list[Substructure], R: list[np.ndarray], rows: JointRows, loads: list[np.ndarray]) -> Any:
+def assembled(parts: list[Substructure], R: list[np.ndarray], rows: ConstraintMatrices, loads: list[np.ndarray]) -> Any:
     """Forces at interface points at the first time: (H + Cᵀ κ C) z = f + Cᵀ m, C z = 0, dense and in least squares."""
     k = parts[0].attachment.unknowns
     H, f, every = np.zeros((k, k)), np.zeros(k), []

@@ -129,7 +129,7 @@ def test_joints_by_constraint_equations_bear_in_stiff_links_what_they_do_in_rigi
 
 
 def test_the_effort_of_a_drive_is_its_work_where_links_bend() -> None:
-    """A crank and an arm on which a block slides, half a turn: ∫ T dφ is the work of supports, bent arm and all."""
+    """A crank and an arm on which a block slides, half a revolution: ∫ T dφ is the work of supports, bent arm and all."""
     raw = with_analysis(inverted(), frames="co-rotational", revolutions=0.5, steps_per_revolution=480, rho_inf=0.8)
     _, got, unworked = channels(raw)
     assert np.abs(got["energy/work"][:, 1]).max() > 5.0  # J

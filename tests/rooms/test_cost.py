@@ -55,7 +55,7 @@ def test_a_forecast_holds_all_that_a_run_makes_of_its_steps(monkeypatch: pytest.
         return stepped(now, *told)
 
     monkeypatch.setattr(check, "stepped", counted)
-    monkeypatch.setattr(check, "_frame", lambda *told: 100.0)
+    monkeypatch.setattr(check, "seconds_of_frame", lambda *told: 100.0)
     assert 3100 <= forecast(ready)[0].steps < 3200
     assert tried[:2] == [(0, 4), (0, 4)]
     assert all(frames == 0 and steps <= 120 for frames, steps in tried)

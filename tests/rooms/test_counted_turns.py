@@ -60,7 +60,7 @@ def test_gears_of_a_rigid_crank_and_a_spring_that_is_wound_up_for_turns(axis: st
 def test_turns_that_nobody_can_count_are_refused(frames: str, tmp_path: Path) -> None:
     """Three quarters of a turn forwards look like a quarter backwards: its spring would be wound up the other way."""
     scene = scene_from(geared(AXES["z"], 4, frames), tmp_path)
-    said = r"springs.s: joint 'B' must turn by less than 162 deg .* got 270 deg: take 1.7 times as many"
+    said = r"springs.s: joint 'B' must rotate by less than 162 deg .* got 270 deg: take 1.7 times as many"
     for command in (analyse, kinematics):
         with pytest.raises(MotionError, match=said):
             command(scene)
@@ -69,5 +69,5 @@ def test_turns_that_nobody_can_count_are_refused(frames: str, tmp_path: Path) ->
 def test_nothing_counts_turns_of_gears_alone(tmp_path: Path) -> None:
     """With rigid-body frames they need no count; with co-rotational ones they do."""
     kinematics(scene_from(geared(AXES["z"], 4, springs={}), tmp_path))
-    with pytest.raises(MotionError, match=r"gears.g: joint 'B' must turn by less"):
+    with pytest.raises(MotionError, match=r"gears.g: joint 'B' must rotate by less"):
         kinematics(scene_from(geared(AXES["z"], 4, "co-rotational", springs={}), tmp_path))

@@ -19,7 +19,7 @@ from kedfem.links.segments import segmented
 from kedfem.links.solid import solid_link
 from kedfem.links.surfaces.candidates import candidates
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, face_surface, joint_surface, surface_weights
-from kedfem.links.surfaces.round_surfaces import rounds
+from kedfem.links.surfaces.round_surfaces import round_surfaces
 from kedfem.mesh import SolidMesh
 from kedfem.motion.linkage import linkage
 from kedfem.scene import scene_from
@@ -308,7 +308,7 @@ def test_a_prism_of_few_sides_is_no_journal_and_its_hole_no_bore(sides: int) -> 
     quads = np.column_stack([j, (j + 1) % sides, sides + (j + 1) % sides, sides + j])[:, ::-1]
     points = np.column_stack([np.tile(plane, (2, 1)), np.repeat([0.0, 0.01], len(plane))])
     link = made(SolidMesh(points, np.column_stack([quads, quads + len(plane)])))
-    found = rounds(link, np.zeros(3), np.array([0.0, 0, 1]))
+    found = round_surfaces(link, np.zeros(3), np.array([0.0, 0, 1]))
     assert sorted(each.inward for each in found) == ([] if sides < 7 else [False, True])
 
 

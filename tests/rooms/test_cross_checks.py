@@ -71,8 +71,8 @@ def test_a_drive_that_holds_what_rests_is_not_judged_by_rounding(moves: float) -
     raw = sprung(AXES["oblique"], motion, end_time=0.02, step=1e-3, initial="quasi-static")
     checks, _ = compared(*ran(raw | {"gravity": [0, 0, -9.81]}))
     assert checks.warnings() == ()
-    checks._left = 0.42 * checks.exchanged
-    assert checks._left > 0
+    checks.unbalanced = 0.42 * checks.exchanged
+    assert checks.unbalanced > 0
     if moves:
         assert checks.unworked == pytest.approx(0.42)
     assert any("by 42 % of the energy exchanged" in text for text in checks.warnings()) == bool(moves)
@@ -94,7 +94,7 @@ def test_a_drive_that_is_dropped_beside_constraints_that_vary_is_noticed(effort:
 )
 def test_a_little_work_that_is_left_over_is_no_missing_effort(share: float, said: str) -> None:
     checks, _ = compared(*ran(BEAMS["driven hinge and slide"]()))
-    checks._left = share * checks.exchanged
+    checks.unbalanced = share * checks.exchanged
     assert [said in each for each in checks.warnings()] == [True] * bool(said)
     assert all("missing" in each for each in checks.warnings()) == (share > 0.02 or not said)
 

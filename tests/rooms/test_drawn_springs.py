@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 
 from kedfem.analysis import analyse
 from kedfem.kinematics import kinematics
+from kedfem.output.joint_springs import hinge_springs, line_springs
 from kedfem.output.picture import write_picture
 from kedfem.output.springs import SLENDER, WIDTH, spring_shape, stretched
 from kedfem.output.views import hidden, labels
@@ -19,6 +20,7 @@ from kedfem.results import read_results
 from kedfem.scene import LineSpring, scene_from
 from kedfem.stepping import frame_steps
 from tests.frames import frames
+from tests.partners import chain
 from tests.rooms.test_gltf import reader_of, shown
 from tests.rooms.test_output import pixels
 from tests.rooms.test_vtkhdf import frame
@@ -179,3 +181,27 @@ def test_springs_about_hinges_turn_with_their_link(tmp_path: Path) -> None:
         for k, points in enumerate(every):
             c, s = np.cos(k * np.pi / 4), np.sin(k * np.pi / 4)
             assert_allclose(points, first @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]), atol=1e-4)
+
+
+@pytest.mark.parametrize("about", [0, 1])
+def test_a_spring_about_the_axis_of_a_link_of_a_cross_winds_about_it(about: int) -> None:
+    """It is flatter along its axis than across, and rotates with the link whose angle it is over."""
+    raw = chain("universal", ("beam", "beam"))
+    J = raw["joints"]["J"]
+    raw["springs"] = {"s": {"kind": "torsion", "joint": "J", "about": J["links"][about], "stiffness": 1.0}}
+    (drawn,) = hinge_springs(scene_from(raw), {}, 1.0).values()
+    assert drawn.link == J["links"][1 - about]
+    points = drawn.shape[0] - drawn.shape[0].mean(axis=0)
+    axis = np.asarray(J["axes"][about]) / np.linalg.norm(J["axes"][about])
+    across = np.linalg.norm(np.cross(points, axis), axis=1)
+    assert np.abs(points @ axis).max() < 0.6 * across.max()
+
+
+def test_a_spring_along_a_direction_in_the_plane_of_a_joint_lies_along_it() -> None:
+    raw = chain("planar", ("beam", "beam"))
+    along = np.cross(raw["joints"]["J"]["axis"], [0.3, -0.5, 0.7])
+    raw["springs"] = {"s": {"kind": "spring", "joint": "J", "along": along.tolist(), "stiffness": 1.0}}
+    (drawn,) = line_springs(scene_from(raw), {}, 1.0).values()
+    one, other = (np.asarray(end.at) for end in drawn.ends)
+    assert np.linalg.norm(other - one) > 0.01
+    assert_allclose(np.cross(other - one, along), 0.0, atol=1e-12)

@@ -33,7 +33,7 @@ ON_CRANK: dict[str, dict[str, Any]] = {
 
 
 def four_bar(crank: str, more: dict[str, Any], **analysis: Any) -> dict[str, Any]:
-    """At 1 rpm through a third of a turn; nothing vibrates, so that elastic and rigid links bear the same."""
+    """At 1 rpm through a third of a revolution; nothing vibrates, so that elastic and rigid links bear the same."""
     a, d, b = np.array([0.0, 0.0]), np.array([0.3, 0.0]), np.array([0.05, 0.0866])
     along = (d - b) / np.linalg.norm(d - b)
     s = (np.linalg.norm(d - b) ** 2 + 0.3**2 - 0.25**2) / (2 * np.linalg.norm(d - b))

@@ -66,7 +66,7 @@ def test_condensed_is_monolithic_over_a_whole_turn(kind: str, steps: int, bound:
     model, solver, fast = run(four_bar(kind, rho_inf=rho_inf, steps_per_revolution=steps))
     _, monolithic, slow = run(four_bar(kind, rho_inf=rho_inf, steps_per_revolution=steps, solver="monolithic"))
     assert monolithic.oracle is not None
-    assert solver.factorisations == len(model.links) == 3  # one per link, for the whole turn
+    assert solver.factorisations == len(model.links) == 3  # one per link, for the whole revolution
     peak = max(np.abs(s.u).max() for snapshot in slow for s in snapshot.states)
     for a, b in zip(fast, slow, strict=True):
         for s, r in zip(a.states, b.states, strict=True):

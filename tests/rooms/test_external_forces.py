@@ -269,7 +269,7 @@ SPUN: dict[str, tuple[str, dict[str, Any], float]] = {
 
 
 def spun(kind: str, load: dict[str, Any]) -> dict[str, np.ndarray]:
-    """Channels of a link on a hinge that a load turns from rest, by about half a turn."""
+    """Channels of a link on a hinge that a load turns from rest, by about half a revolution."""
     raw = arm(kind, {"load": {"link": "arm", **load}}, end_time=0.05, step=2.5e-4, initial="rest", rho_inf=0.8)
     del raw["drive"]
     raw["joints"]["A"]["links"] = ["arm", "ground"]

@@ -144,7 +144,7 @@ def test_files_hold_what_was_found(settled: Run) -> None:
     assert read_results(settled.folder / "results.h5").fatigue == found(settled)
     grid, spot = meshio.read(settled.folder / "fatigue.vtu"), worst(settled)
     damage = grid.point_data["damage in a period"]
-    assert_allclose(np.nanmax(damage), spot.damage, rtol=1e-9)
+    assert_allclose(np.nanmax(damage), spot.damage, rtol=2 * np.finfo(damage.dtype).eps)
     assert_allclose(grid.points[int(np.nanargmax(damage))], spot.place, atol=1e-9)
     lines = (settled.folder / "fatigue.csv").read_text(encoding="utf-8").splitlines()
     assert len(lines) == 1 + len(found(settled).spots["arm"])

@@ -1,6 +1,6 @@
 """Motors, springs and dampers: forces that do the work of their coordinate, whatever moves, and balance by themselves."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,75 +10,36 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from kedfem.dynamics.elastic_model import elastic_model
-from kedfem.dynamics.force_element import (
-    ANGLE,
-    DISTANCE,
-    PAIR,
-    POINT,
-    SINGLE,
-    SLIDE,
-    TURN,
-    End,
-    ForceElement,
-    coordinate,
-    effort,
-    placed,
-    unit_forces,
-    wrench,
-)
-from kedfem.dynamics.force_elements import force_elements, hinges
+from kedfem.dynamics.force_elements import force_elements, law_of, places
 from kedfem.dynamics.history import Block, LinkHistory
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.rigid_elements import OnLink, RigidElement, RigidElements, effort, rigid_elements
+from kedfem.dynamics.system.ends import rigid_end
 from kedfem.dynamics.system.forces.exerted import at_ends
-from kedfem.dynamics.system.forces.supports import supports
-from kedfem.dynamics.system.record import COORDINATE, RATE, TIME, Curve, Law, Spring
+from kedfem.dynamics.system.forces.poses import value
+from kedfem.dynamics.system.forces.supports import exerted, supports
+from kedfem.dynamics.system.record import ANGLE, COORDINATE, DISTANCE, GAP, RATE, TIME, Curve, Spring, Stop, Term
 from kedfem.errors import MeshError, SceneError
 from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.linkage import linkage
-from kedfem.motion.rigid import resting
+from kedfem.motion.path import path
+from kedfem.motion.rigid import RigidMotion, resting
 from kedfem.results.forces.force_elements import acting, measured_elements
 from kedfem.results.recording import recording
 from kedfem.scene import Factor, Pieces, Scene, pieces, scene_from
+from tests.force_vectors import TURN, ForceElement, coordinate, placed, wrench
+from tests.force_vectors import force_elements as by_vectors
 from tests.laws.strategies import examples
 from tests.moving import ran
 from tests.rooms.test_driven_efforts import ON_CRANK, four_bar
 from tests.scenes import bar
 
 Z = np.array([0.0, 0.0, 1.0])
-
-
-def end(form: int, X: Any, k: int = 0) -> End:
-    X = np.atleast_2d(np.asarray(X, float))
-    return End(k, 1, form, np.ones((len(X), 1)), X)
+NONE = np.zeros(3)
 
 
 def straight(at: tuple[float, ...], value: tuple[float, ...]) -> Pieces:
     return pieces(Factor(at=at, value=value))
-
-
-def hinge(one: int, other: int, axis: np.ndarray, law: Law | None = None) -> ForceElement:
-    """A hinge whose ends show themselves in two ways; the second is drawn turned by 0.4 rad about the axis."""
-    e = np.array(perpendiculars(axis))
-    aside = Rotation.from_rotvec(0.4 * axis).apply(e)
-    X = {PAIR: (e, e), SINGLE: ([e[0], axis], [aside[0], axis]), ANGLE: (np.zeros(3), np.zeros(3))}
-    return ForceElement("h", TURN, (end(one, X[one][0]), end(other, X[other][1])), law, axis)
-
-
-def drawn(element: ForceElement) -> np.ndarray:
-    x = np.zeros((2, 2, 3))
-    for e, each in enumerate(element.ends):
-        x[e, : len(each.X)] = each.X
-    return x
-
-
-def found(
-    element: ForceElement, x: np.ndarray, v: np.ndarray | None = None, t: float = 0.0, before: float = 0.0
-) -> tuple[np.ndarray, np.ndarray]:
-    """Forces (2, 2, 3), where no hub is deformed, and q, q', Q of one force element."""
-    unit = unit_forces(element, x[None])[0]
-    q, rate = coordinate(element, x[None], before), np.atleast_1d(0.0 if v is None else (unit * v).sum())
-    Q = effort(element.law, resting(1, np.array([t])), q, rate)
-    return Q * unit, np.array([q[0], rate[0], Q[0]])
 
 
 def gradient(element: ForceElement, x: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -93,168 +54,88 @@ def gradient(element: ForceElement, x: np.ndarray, q: np.ndarray) -> np.ndarray:
     return out
 
 
-def turned(x: np.ndarray, element: ForceElement, turns: Sequence[np.ndarray]) -> np.ndarray:
-    """Each end's vectors turned by its own rotation; a planar beam's angle about z added."""
-    out = x.copy()
-    for e, theta in enumerate(turns):
-        if element.ends[e].form == ANGLE:
-            out[e, 0, 2] += theta[2]
-        else:
-            out[e] = Rotation.from_rotvec(theta).apply(x[e])
-    return out
-
-
-FORMS = [(PAIR, PAIR), (PAIR, SINGLE), (SINGLE, PAIR), (SINGLE, SINGLE)]
-UPRIGHT = [(ANGLE, ANGLE), (ANGLE, PAIR), (PAIR, ANGLE), (ANGLE, SINGLE), (SINGLE, ANGLE)]
-vectors = st.lists(st.floats(-1, 1), min_size=3, max_size=3).map(np.array)
-seeds = st.integers(0, 2**32 - 1)
-
-
 def unit(seed: int) -> np.ndarray:
     n = np.random.default_rng(seed).normal(size=3)
     return np.asarray(n / np.linalg.norm(n))
 
 
-# -- the turn of a hinge ------------------------------------------------------------------------------------
+# -- coordinates and what they exert, of links that do not deform ----------------------------------------------
 
 
-@pytest.mark.parametrize(("one", "other"), FORMS + UPRIGHT)
-@pytest.mark.parametrize("axis", [Z, -Z], ids=["z", "-z"])
+def moving(theta: np.ndarray, p: np.ndarray, t: np.ndarray) -> RigidMotion:
+    """Bodies that turn by theta (B, 3) and move by p (B, 3) in a second, at steady rates."""
+    at = resting(len(theta), t)
+    at.R[:] = [[Rotation.from_rotvec(s * each).as_matrix() for each in theta] for s in t]
+    at.p[:], at.v[:], at.omega[:] = t[:, None, None] * p, p, theta
+    return at
+
+
+def term(kind: int, axis: np.ndarray) -> Term:
+    """A coordinate; the directions of an angle are drawn turned by 0.4 rad about its axis."""
+    if kind != ANGLE:
+        return Term(kind, 0, 1, np.array([0.1, 0.2, 0.3]), np.array([1.0, -0.4, 0.2]), axis)
+    e = perpendiculars(axis)[0]
+    return Term(kind, 0, 1, e, e, axis)
+
+
+BOTH = rigid_end(1, NONE), rigid_end(2, np.array([1.0, -0.4, 0.2]))
+
+
+@pytest.mark.parametrize("axis", [Z, -Z, unit(7)], ids=["z", "-z", "oblique"])
 @pytest.mark.parametrize("angle", [0.0, 1.2, -2.9, 3.1])
-def test_a_hinge_tells_its_turn(one: int, other: int, axis: np.ndarray, angle: float) -> None:
-    element = hinge(one, other, axis)
-    x = turned(drawn(element), element, [(angle + 0.3) * axis, 0.3 * axis])
-    assert found(element, x)[1][0] == pytest.approx(angle, abs=1e-12)
+def test_a_hinge_tells_its_turn(axis: np.ndarray, angle: float) -> None:
+    motion = moving(np.array([NONE, (angle + 0.3) * axis, 0.3 * axis]), np.zeros((3, 3)), np.ones(1))
+    assert value(term(ANGLE, axis), BOTH, motion, None)[0] == pytest.approx(angle, abs=1e-12)
 
 
-@pytest.mark.parametrize(("one", "other"), FORMS + UPRIGHT)
-def test_turns_are_counted_on(one: int, other: int) -> None:
-    element = hinge(one, other, Z)
-    x0, q = drawn(element), 0.0
-    for angle in [*np.arange(0, 20, 1.3), *np.arange(20, -20, -2.9)]:
-        q = float(found(element, turned(x0, element, [angle * Z, 0 * Z]), before=q)[1][0])
-        assert q == pytest.approx(angle, abs=1e-9)
-
-
-@pytest.mark.parametrize(("one", "other"), FORMS)
-@given(seed=seeds, whole=vectors, angle=st.floats(-3, 3))
+@pytest.mark.parametrize("kind", [ANGLE, GAP, DISTANCE])
+@given(seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=examples(20), deadline=None)
-def test_a_turn_does_not_depend_on_where_all_of_it_is_turned(
-    one: int, other: int, seed: int, whole: np.ndarray, angle: float
-) -> None:
+def test_the_work_of_a_force_is_that_of_its_coordinate(kind: int, seed: int) -> None:
+    """Forces times rates of both ends are Q q', the rate by central differences; they balance, moments too."""
+    rng, law = np.random.default_rng(seed), Curve(TIME, straight((0.0,), (2.5,)))
     axis = unit(seed)
-    element = hinge(one, other, axis, Spring(3.0, free=0.7))
-    x = turned(drawn(element), element, [angle * axis, 0 * axis])
-    R = Rotation.from_rotvec(3 * whole)
-    f, values = found(element, x, before=angle)
-    F, turned_values = found(element, np.array([R.apply(e) for e in x]), before=angle)
-    np.testing.assert_allclose(turned_values, values, atol=1e-9)
-    np.testing.assert_allclose(F, [R.apply(e) for e in f], atol=1e-9)
-    x += 0.1 * np.random.default_rng(seed).normal(size=x.shape)  # hubs deform and tilt
-    q = coordinate(element, np.array([x, [R.apply(e) for e in x]]), angle)
-    assert q[1] == pytest.approx(q[0], abs=1e-9)
+    theta = rng.normal(size=(3, 3)) if kind != ANGLE else np.array([NONE, 0.7 * axis, -0.4 * axis])
+    p, h, t = rng.normal(size=(3, 3)), 1e-5, 0.8
+    scene = scene_from(arm("rigid"))
+    rigid = linkage(scene)
+    of = RigidElements([RigidElement(law, term(kind, axis), (OnLink(BOTH[0]), OnLink(BOTH[1])))], scene, rigid,
+                       path(rigid, 0.0, 0.0))  # fmt: skip
+    motion = moving(theta, p, np.array([t]))
+    apart = value(term(kind, axis), BOTH, moving(theta, p, t + h * np.array([-1, 1])), None)
+    every = list(of.wrenches(motion))
+    work = 0.0
+    for body, f, m in every:
+        x, v, omega = motion.p[0, body], motion.v[0, body], motion.omega[0, body]
+        work += float(f[0] @ (v - np.cross(omega, x)) + m[0] @ omega)
+    assert work == pytest.approx(2.5 * (apart[1] - apart[0]) / (2 * h), abs=1e-7)
+    for left in (sum(f for _, f, _ in every), sum(m for _, _, m in every)):
+        np.testing.assert_allclose(left, 0.0, atol=1e-12)
 
 
-@pytest.mark.parametrize(("one", "other"), FORMS + UPRIGHT)
-@given(seed=seeds)
-@settings(max_examples=examples(20), deadline=None)
-def test_the_work_of_a_torque_is_that_of_its_turn(one: int, other: int, seed: int) -> None:
-    """Forces · δx = Q δq by central differences, along any deformation."""
-    rng = np.random.default_rng(seed)
-    axis = unit(seed) if ANGLE not in (one, other) else Z
-    element = hinge(one, other, axis, Curve(TIME, straight((0.0,), (2.5,))))
-    x = turned(drawn(element), element, [rng.uniform(-2, 2) * axis, 0 * axis])
-    v = rng.normal(size=x.shape)
-    f, values = found(element, x, v)
-    h = 1e-5
-    rate = (found(element, x + h * v)[1][0] - found(element, x - h * v)[1][0]) / (2 * h)
-    assert values[1] == pytest.approx(rate, abs=1e-7)
-    assert np.vdot(f, v) == pytest.approx(2.5 * rate, abs=1e-7)
-
-
-@pytest.mark.parametrize(("one", "other"), FORMS)
-def test_torques_on_both_ends_balance(one: int, other: int) -> None:
-    """Σ x × f over all directions is the moment, T n on the first end."""
-    axis = unit(3)
-    element = hinge(one, other, axis, Curve(TIME, straight((0.0,), (2.5,))))
-    x = turned(drawn(element), element, [0.9 * axis, 0.2 * axis])
-    moments = np.cross(x, found(element, x)[0]).sum(axis=1)
-    np.testing.assert_allclose(moments, [2.5 * axis, -2.5 * axis], atol=1e-12)
-
-
-def test_a_planar_beam_takes_the_torque_on_its_angle() -> None:
-    for axis in (Z, -Z):
-        element = hinge(ANGLE, ANGLE, axis, Curve(TIME, straight((0.0,), (2.5,))))
-        f, _ = found(element, turned(drawn(element), element, [4 * Z, 1 * Z]))
-        np.testing.assert_allclose(f[:, 0], [2.5 * axis, -2.5 * axis], atol=1e-12)
-        assert not f[:, 1].any()
+def test_a_spring_of_no_length_has_no_direction() -> None:
+    at = Term(DISTANCE, 0, 1, BOTH[1].origin, BOTH[1].origin, NONE)
+    still = resting(3, np.zeros(1))
+    assert value(at, BOTH, still, None)[0] == 0.0
+    assert not any(x.any() for _, _, f, m in exerted(at, BOTH, still, None) for x in (f, m))
 
 
 # -- laws ---------------------------------------------------------------------------------------------------
 
 
-def test_a_torsion_spring_turns_back() -> None:
-    element = hinge(PAIR, PAIR, Z, Spring(3.0, 0.5, 0.2))
-    x0 = drawn(element)
-    x = turned(x0, element, [1.2 * Z, 0 * Z])
-    v = np.zeros_like(x)
-    v[0] = np.cross(2.0 * Z, x[0])
-    _, values = found(element, x, v)
-    np.testing.assert_allclose(values, [1.2, 2.0, -3.0 * 1.0 - 0.5 * 2.0], atol=1e-12)
-
-
-def test_a_spring_between_points_pulls_along_its_line() -> None:
-    element = ForceElement("s", DISTANCE, (end(POINT, [0, 0, 0]), end(POINT, [3, 4, 0])), Spring(10.0, 2.0, 4.0))
-    x, v = drawn(element), np.zeros((2, 2, 3))
-    v[1, 0] = [1, 0, 0]  # lengthens it by 3/5
-    f, values = found(element, x, v)
-    np.testing.assert_allclose(values, [5, 0.6, -10 * 1 - 2 * 0.6])
-    np.testing.assert_allclose(f[:, 0], 11.2 * np.array([[0.6, 0.8, 0], [-0.6, -0.8, 0]]))
-
-
-def test_a_spring_of_no_length_has_no_direction() -> None:
-    element = ForceElement("s", DISTANCE, (end(POINT, [1, 0, 0]), end(POINT, [1, 0, 0])), Spring(10.0, 2.0))
-    f, values = found(element, drawn(element))
-    assert not f.any()
-    assert not values.any()
-
-
-def test_a_slide_is_pushed_along_its_axis() -> None:
-    axis = unit(5)
-    element = ForceElement("m", SLIDE, (end(POINT, [1, 2, 3]), end(POINT, [1, 2, 3], -1)), axis=axis,
-                           law=Curve(COORDINATE, straight((0.0, 1.0), (0.0, 8.0))))  # fmt: skip
-    x = drawn(element)
-    x[0, 0] += 0.25 * axis + 7 * np.array(perpendiculars(axis)[0])
-    f, values = found(element, x)
-    np.testing.assert_allclose(values, [0.25, 0, 2.0], atol=1e-12)
-    np.testing.assert_allclose(f[:, 0], [2 * axis, -2 * axis], atol=1e-12)
+def test_springs_and_stops_push_back() -> None:
+    one, q, rate = resting(1, np.zeros(3)), np.array([1.2, 0.1, -0.4]), np.array([2.0, 0.0, -1.0])
+    np.testing.assert_allclose(effort(Spring(3.0, 0.5, 0.2), one, q, rate), -3 * (q - 0.2) - 0.5 * rate)
+    np.testing.assert_allclose(effort(Stop(-0.2, 1.0, 10.0, 0.5), one, q, rate), [-3.0, 0.0, 2.5])
+    np.testing.assert_allclose(effort(Stop(-0.2, 1.0, 10.0, 2.0), one, q, -rate), [0.0, 0.0, 0.0])  # never a pull
 
 
 @pytest.mark.parametrize("over", [TIME, RATE, COORDINATE])
 def test_a_curve_is_linear_between_its_points_and_held_outside(over: int) -> None:
-    at, value = (-1.0, 0.5, 2.0), (5.0, -1.0, 3.0)
-    element = hinge(PAIR, PAIR, Z, Curve(over, straight(at, value)))
-    x0 = drawn(element)
-    for s in np.linspace(-2, 3, 21):
-        x = turned(x0, element, [(s if over == COORDINATE else 0.3) * Z, 0 * Z])
-        v = np.zeros_like(x)
-        v[0] = np.cross((s if over == RATE else 0.1) * Z, x[0])
-        got = found(element, x, v, t=s if over == TIME else 9.0)[1][2]
-        assert got == pytest.approx(np.interp(s, at, value), abs=1e-12)
-
-
-def test_several_times_at_once_are_as_one_by_one() -> None:
-    spring_ = ForceElement("s", DISTANCE, (end(POINT, [0, 0, 0]), end(POINT, [1, 0, 0])))
-    t = np.linspace(0, 2, 9)
-    for element in (hinge(PAIR, PAIR, Z), spring_, hinge(ANGLE, PAIR, Z)):
-        x = np.array([turned(drawn(element), element, [2 * s * Z, -s * Z]) for s in t])
-        q, unit = coordinate(element, x), unit_forces(element, x)
-        for k in range(9):
-            alone = coordinate(element, x[k : k + 1], q[max(k - 1, 0)])[0]
-            assert q[k] == pytest.approx(alone, abs=1e-12)
-            np.testing.assert_allclose(unit[k], unit_forces(element, x[k : k + 1])[0], atol=1e-12)
-        if element.kind == TURN:
-            np.testing.assert_allclose(q, 3 * t, atol=1e-12)
+    at, given_, s = (-1.0, 0.5, 2.0), (5.0, -1.0, 3.0), np.linspace(-2, 3, 21)
+    t, rate, q = (s if over == each else np.full(21, 0.3) for each in (TIME, RATE, COORDINATE))
+    got = effort(Curve(over, straight(at, given_)), resting(1, t), q, rate)
+    np.testing.assert_allclose(got, np.interp(s, at, given_), atol=1e-12)
 
 
 # -- on links -----------------------------------------------------------------------------------------------
@@ -289,14 +170,11 @@ def built(raw: dict[str, Any]) -> tuple[Scene, Model]:
     return scene, elastic_model(scene, linkage(scene))
 
 
-def state_of(element: ForceElement, model: Model, motion: Callable[[int, np.ndarray], np.ndarray]) -> np.ndarray:
-    """Vectors (2, 2, 3) of an element's ends where the functions of link k, at X (n, 3), are moved by motion(k, X)."""
-    x = drawn(element)
-    for e, at in enumerate(element.ends):
-        if at.k >= 0:
-            u = motion(at.k, model.links[at.k].X)
-            x[e, : len(at.X), : u.shape[1]] += (at.weights @ u) * np.array(at.mask)[: u.shape[1]]
-    return x
+def on_arm(scene: Scene, model: Model) -> RigidElements:
+    rigid = linkage(scene)
+    found = rigid_elements(scene, rigid, path(rigid, 0.0, 0.0), model)
+    assert found is not None
+    return found
 
 
 def turning(model: Model, theta: np.ndarray) -> Callable[[int, np.ndarray], np.ndarray]:
@@ -317,18 +195,17 @@ def turning(model: Model, theta: np.ndarray) -> Callable[[int, np.ndarray], np.n
 def test_every_kind_of_link_shows_its_turn_and_takes_the_torque(kind: str, angle: float) -> None:
     """Angles count about the joint's axis, here −z, of the link named first against the ground."""
     scene, model = built(arm(kind))
-    (element,) = force_elements(scene, model)
-    (looked,) = hinges(scene, model)
-    link = model.links[0]
-    x = state_of(element, model, turning(model, angle * Z))
-    f, values = found(element, x)
-    assert values[0] == pytest.approx(-angle, abs=1e-9)
-    assert found(looked, x)[1][0] == pytest.approx(-angle, abs=1e-9)
-    mask = np.array(element.ends[0].mask)[: link.d]
-    forces = np.einsum("mn,mc->nc", element.ends[0].weights, (f[0, : len(element.ends[0].X), : link.d] * mask))
+    link, (element,) = model.links[0], on_arm(scene, model).every
+    (looked,) = measured_elements(scene, model).hinges.values()
+    (block,) = blocks(model, np.array([0.0, 1.0]), np.array([angle, angle]), 2)
+    for term_, on in ((element.term, element.on), looked):
+        z = np.concatenate([each.unknowns(block) for each in on], axis=1)
+        assert value(term_, (on[0].end, on[1].end), block.motion, z)[0] == pytest.approx(-angle, abs=1e-9)
+    (forces,) = on_arm(scene, model).unit_loads(0)  # about the axis, in the reference position
+    angle = 0.0
     spin = 1e-6
     u = turning(model, (angle + spin) * Z)(0, link.X) - turning(model, (angle - spin) * Z)(0, link.X)
-    assert np.vdot(forces, u) / (2 * spin) == pytest.approx(-2.5, rel=1e-6)  # about z
+    assert np.vdot(forces, u) / (2 * spin) == pytest.approx(-1.0, rel=1e-6)  # about z
     push = np.outer(link.one, np.ones(link.d))[:, : 2 if link.planar else 3]
     assert np.abs(np.einsum("nc,nc->c", forces[:, : push.shape[1]], push)).max() < 1e-9  # no net force
 
@@ -346,10 +223,11 @@ def test_a_joint_that_names_the_ground_first_turns_its_link_all_the_same() -> No
     raw = arm("beam")
     raw["joints"]["A"]["links"] = ["ground", "arm"]
     scene, model = built(raw)
-    (element,) = force_elements(scene, model)
-    f, values = found(element, state_of(element, model, turning(model, 0.5 * Z)))
-    assert values[0] == pytest.approx(-0.5)
-    np.testing.assert_allclose(f[0, 0], [0, 0, -2.5], atol=1e-12)  # about the axis, −z
+    (on_link, moment), (on_ground, _) = (
+        (body, m[0]) for body, _, m in on_arm(scene, model).wrenches(resting(2, np.zeros(1)))
+    )
+    assert (on_link, on_ground) == (1, 0)
+    np.testing.assert_allclose(moment, [0, 0, -2.5], atol=1e-12)  # about the axis, −z
 
 
 def test_a_spring_hangs_on_points_of_links_sliders_and_the_ground() -> None:
@@ -360,16 +238,17 @@ def test_a_spring_hangs_on_points_of_links_sliders_and_the_ground() -> None:
     raw["joints"]["S"] = {"kind": "prismatic", "links": ["shoe", "ground"], "at": [1, 0], "axis": "x"}
     raw["motors"]["push"] = {"joint": "S", "force": 4}
     scene, model = built(raw)
-    motor, push, tip, shoe = force_elements(scene, model)
-    assert [x.name for x in (motor, push, tip, shoe)] == ["motors/m", "motors/push", "springs/tip", "springs/shoe"]
-    assert (tip.law, shoe.law) == (Spring(10.0, free=2.0), Spring(10.0))
-    x = state_of(tip, model, lambda k, X: np.array([[0.0, 0.5, 9.0]] * len(X)))
-    np.testing.assert_allclose(found(tip, x)[1][0], 1.5)
-    # shorter than free, it pushes down; and never by a moment on ψ
-    np.testing.assert_allclose(found(tip, x)[0][0, 0], [0, -5, 0])
-    moved = state_of(push, model, lambda k, X: np.array([[-0.2, 0.0, 9.0]] * len(X)))
-    np.testing.assert_allclose(found(push, moved)[1][[0, 2]], [-0.2, 4])
-    np.testing.assert_allclose(shoe.ends[0].X + shoe.ends[0].offset, [[1.5, 0.1, 0]])
+    every = dict(force_elements(scene))
+    assert list(every) == ["motors.m", "motors.push", "springs.tip", "springs.shoe"]
+    assert [law_of(every[f"springs.{name}"]) for name in ("tip", "shoe")] == [Spring(10.0, free=2.0), Spring(10.0)]
+    assert [link for link, _ in places(scene, every["motors.push"])] == ["shoe", "ground"]
+    motion = resting(3, np.zeros(1))
+    motion.p[0, 1] = [0.0, 0.5, 0.0]  # shorter than free, it pushes down; and never by a moment on ψ
+    loads = on_arm(scene, model).loads(motion)
+    motor, push, tip, shoe = ((k, f[0].sum(axis=0)) for k, f in loads)
+    assert [k for k, _ in (motor, push, tip, shoe)] == [0, 2, 2, 2]  # segments
+    np.testing.assert_allclose([x for _, x in (motor, push, tip, shoe)],
+                               [[0, 0, 2.5 * -1], [4, 0, 0], [0, -5, 0], [20, 0, 0]], atol=1e-12)  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", ["beam", "spatial", "solid", "plane"])
@@ -380,19 +259,21 @@ def test_ends_are_on_the_segments_that_hold_them(kind: str) -> None:
         raw["links"]["arm"]["segments"] = 3
     scene, model = built(raw)
     assert [link.name for link in model.links] == ["arm"] * 3
-    motor, tip = force_elements(scene, model)
-    assert [motor.ends[0].k, tip.ends[0].k] == [0, 2]
-    x = state_of(tip, model, turning(model, 0.3 * Z))
-    np.testing.assert_allclose(x[0, 0], 0.98 * np.array([np.cos(0.3), np.sin(0.3), 0]), atol=1e-9)
+    found = on_arm(scene, model)
+    motor, tip = found.every
+    assert [motor.on[0].k, tip.on[0].k] == [0, 2]
+    (block,) = blocks(model, np.array([0.0, 1.0]), np.array([0.3, 0.3]), 2)
+    moved = np.array([0.98, 0, 0]) + [*tip.on[0].unknowns(block)[0], 0.0, 0.0][:3]
+    np.testing.assert_allclose(moved[:2], 0.98 * np.array([np.cos(0.3), np.sin(0.3)]), atol=1e-9)
 
 
 def test_ends_must_be_on_their_links() -> None:
     scene, model = built(arm("beam", springs={"tip": spring("arm", [1, 0.01], [1, 2])}))
     with pytest.raises(SceneError, match=r"springs\.tip\.between\[0\]\.at: must lie on the axis of beam 'arm'"):
-        force_elements(scene, model)
+        on_arm(scene, model)
     scene, model = built(arm("solid", springs={"tip": spring("arm", [7, 0], [1, 2])}))
     with pytest.raises((SceneError, MeshError), match=r"springs\.tip\.between\[0\]\.at"):
-        force_elements(scene, model)
+        on_arm(scene, model)
 
 
 # -- recorded -----------------------------------------------------------------------------------------------
@@ -449,7 +330,7 @@ def test_channels_and_forces_are_those_of_laws_where_links_are(kind: str) -> Non
         raw = arm(kind, motors={"m": motor}, springs={"t": torsion, "s": spring("arm", tip, [0, 2], damping=3)})
         raw["analysis"] = {"end_time": 0.5, "step": 5e-3, "rho_inf": 0.8}
     ready, every = ran(raw)
-    elements = force_elements(ready.scene, ready.model)
+    elements = by_vectors(ready.scene, ready.model)
     measured, before = measured_elements(ready.scene, ready.model), np.zeros(len(elements))
     channels = acting(ready.scene, measured)
     assert not any(each.channel.name.startswith("drive") for each in channels)

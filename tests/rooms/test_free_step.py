@@ -108,7 +108,7 @@ def test_a_chaotic_motion_is_told_and_not_claimed(monkeypatch: pytest.MonkeyPatc
 
 
 def test_differences_that_do_not_fall_promise_nothing() -> None:
-    halved = free_step._error
+    halved = free_step.finest_error
     assert halved([0.16, 0.04, 0.01]) == pytest.approx(0.01 / 3)
     assert halved([0.01, 0.01, 0.01]) == 0.01
     assert halved([0.1, 0.3, 0.001]) == 0.3

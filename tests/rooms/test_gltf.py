@@ -12,7 +12,7 @@ from kedfem.analysis import analyse
 from kedfem.errors import OutputError
 from kedfem.report import write_gltf
 from kedfem.report.animated import animated
-from kedfem.report.gltf import _moves, normals
+from kedfem.report.gltf import normals, placed_shape
 from kedfem.report.surfaces import Placement, Surface
 from kedfem.results import read_results
 from kedfem.scene import scene_from
@@ -162,7 +162,7 @@ def test_a_spring_stretches_along_its_line_however_short_it_is(axis: list[float]
     p = np.array([[0, 0, 0], [1.0, 2.0, 3.0], [-1.0, 0, 0.5]])
     placed = [Placement(*each) for each in zip(p, R, strict=True)]
     spring = Surface("s", np.zeros((0, 3), int), every, [], placed, spring=True)
-    moves = _moves(spring)
+    moves = placed_shape(spring)
     for k in range(3):
         found = moves.p[k] + (moves.scale[k] * moves.own) @ moves.R[k].T
         assert_allclose(found, p[k] + every[k + 1] @ R[k].T, atol=1e-9)

@@ -62,7 +62,7 @@ def test_a_bore_with_a_joint_is_as_usual(tmp_path: Path) -> None:
 
 
 def test_where_finer_ones_are_too_many_the_mesh_is_the_usual_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(filling, "_MOST", 1000)
+    monkeypatch.setattr(filling, "MOST_UNKNOWNS", 1000)
     usual, mesh = (meshed(bored_shaft, tmp_path, Sizing(hollow=x)) for x in (np.pi / 4, ASKED))
     assert len(mesh.points) == len(usual.points)
     assert "fillets and free bores no finer" in mesh.method
@@ -73,7 +73,7 @@ def test_too_many_elements_along_a_bore_are_made_fewer_and_it_says_so(
 ) -> None:
     usual = meshed(bored_shaft, tmp_path, Sizing())
     most = 3 * len(usual.points) + 20_000
-    monkeypatch.setattr(filling, "_MOST", most)
+    monkeypatch.setattr(filling, "MOST_UNKNOWNS", most)
     mesh = meshed(bored_shaft, tmp_path, Sizing(hollow=np.radians(10)))
     assert 3 * len(usual.points) < 3 * len(mesh.points) <= most
     assert "fillets and free bores by " in mesh.method

@@ -347,7 +347,7 @@ def test_what_is_told_does_not_depend_on_how_redundant_rows_share(raw: dict[str,
         change = null @ rng.normal(size=null.shape[1])
         moved = False
         for each in forces.every:
-            A = forces._of(found, each)[k]
+            A = forces.channel_of(found, each)[k]
             assert np.abs(A.T @ change).max() < 1e-9 * max(np.abs(A).max(), 1.0)
         for name, each in forces.scene.joints.items():
             body = linked.bodies.index(next(x for x in each.links if x != "ground"))

@@ -78,7 +78,7 @@ plots = false
 
 
 def transmission_of(joints: Any) -> tuple[Array, str, str]:
-    """The one transmission angle over a turn, [deg]."""
+    """The one transmission angle over a revolution, [deg]."""
     scene = linkage_scene(joints)
     (found,) = transmissions(scene, linkage(scene))
     return np.degrees(found.angle(motion_at(scene, TURN))), found.coupler, found.driven
@@ -203,7 +203,7 @@ def test_a_universal_joint_turns_about_both_its_axes() -> None:
     turns = {(x.joint, x.name): x.values(motion) for x in coordinates(whole, linkage(whole))}
     hinges = {x.joint: x.values(other) for x in coordinates(crossed, linkage(crossed))}
     off = turns["D", "angle"] - hinges["D"]
-    assert_allclose(np.exp(1j * off), 1.0, atol=1e-9)  # half a turn is π or -π
+    assert_allclose(np.exp(1j * off), 1.0, atol=1e-9)  # half a revolution is π or -π
     # B: shaft 1 against the cross about the arm in shaft 1; C: the cross against shaft 2 about that in shaft 2
     assert_allclose(turns["U", "angle_about_shaft1"], -hinges["B"], atol=1e-9)
     assert_allclose(turns["U", "angle_about_shaft2"], hinges["C"], atol=1e-9)

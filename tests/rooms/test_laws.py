@@ -14,6 +14,7 @@ from kedfem.scene import (
     ConstantSpeed,
     Cycloidal,
     Damping,
+    Drive,
     Factor,
     MotionLaw,
     Polynomial,
@@ -50,7 +51,7 @@ class Driven:
 
     @property
     def driven_joints(self):
-        return {"A": self}
+        return {"A": Drive(joint="A", motion=self.motion)}
 
     @property
     def joints(self):

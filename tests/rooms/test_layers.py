@@ -505,7 +505,7 @@ class TestCount:
 
     def test_the_forecast_is_near_what_a_mesh_has(self, monkeypatch):
         """A plate with a bore in a given size: 24 unknowns an element, and those of the surfaces."""
-        monkeypatch.setattr("kedfem.mesh.layered.layers._FAR_TOO_MANY", 1)
+        monkeypatch.setattr("kedfem.mesh.layered.layers.FAR_TOO_MANY", 1)
 
         def plate(occ: ModuleType) -> Shapes:
             return occ.cut([box(occ, 0, 0, 0, 60, 40, 10)], [post(occ, 30, 20, -1, 11, 6)])[0]

@@ -57,7 +57,7 @@ def test_a_constant_load_is_its_own_equivalent(p: float) -> None:
 
 @pytest.mark.parametrize("p", [BALL, ROLLER])
 def test_a_sinusoidal_load_has_the_mean_of_the_sines_power(p: float) -> None:
-    """Mean of |sin x|^p over a turn: Γ((p + 1)/2) / (√π Γ(p/2 + 1)); of p = 3 it is 4/(3π)."""
+    """Mean of |sin x|^p over a revolution: Γ((p + 1)/2) / (√π Γ(p/2 + 1)); of p = 3 it is 4/(3π)."""
     mean = gamma((p + 1) / 2) / (pi**0.5 * gamma(p / 2 + 1))
     found = equivalent_load(TURN, 50.0 * np.abs(np.sin(TURN)), np.full(len(TURN), -OMEGA), p)
     assert_allclose(found, 50.0 * mean ** (1 / p), rtol=1e-7)

@@ -212,7 +212,7 @@ def test_gmshs_own_abaqus_files_are_read(tmp_path: Path) -> None:
 def test_a_file_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("KEDFEM_CACHE", str(tmp_path / "cache"))
     path, calls = box(tmp_path / "box.msh"), []
-    monkeypatch.setattr(read, "apart", lambda *given: calls.append(given) or read_mesh(path))
+    monkeypatch.setattr(read, "in_own_process", lambda *given: calls.append(given) or read_mesh(path))
     one, two = (mesh_from_file("mesh", path, scale) for scale in (1.0, 2.0))
     assert len(calls) == 1
     assert_allclose(two.points, 2 * one.points, rtol=0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from kedfem.links.surfaces.part_candidates import offers
+from kedfem.links.surfaces.part_candidates import part_candidates
 from kedfem.mesh import SolidMesh
 from kedfem.mesh.elements.hexahedra import Face
 from kedfem.mesh.elements.shape_functions import HEX8
@@ -22,7 +22,7 @@ def test_names_of_faces_are_whole_in_a_narrow_terminal(width: int) -> None:
     )
     mesh = SolidMesh(0.1 * HEX8, np.arange(8)[None], faces=faces)
     said = io.StringIO()
-    for table in mesh_tables("part.step", mesh, offers(mesh)):
+    for table in mesh_tables("part.step", mesh, part_candidates(mesh)):
         Console(file=said, width=width).print(table)
     text = said.getvalue()
     assert all(f" {name} " in text for name in names)

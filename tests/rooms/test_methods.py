@@ -15,7 +15,7 @@ from kedfem.links.surfaces.part_candidates import face_kind
 from kedfem.mesh import SolidMesh, link_mesh, mesh_quality, methods, part_mesh
 from kedfem.mesh.cad.solids import Solid
 from kedfem.mesh.elements.bounds import valid_everywhere
-from kedfem.mesh.isolated import LONGEST, PART, apart
+from kedfem.mesh.isolated import LONGEST, PART, in_own_process
 from kedfem.scene import LinkScene, Material, link_from, scene_from
 from tests.works import busy, busy_and_counted, busy_in, loud
 
@@ -112,41 +112,41 @@ class TestApart:
         with pytest.raises(
             MeshError, match=r"^rod.step: must be a part .* work on, got none within 1 s of processor time; mend or"
         ):
-            apart("rod.step", PART, 1, busy, 60)
+            in_own_process("rod.step", PART, 1, busy, 60)
 
     def test_what_breaks_down_is_refused_and_the_next_works(self) -> None:
         with pytest.raises(MeshError, match=r"^rod.step: must be a part .* work on, got one at which they broke down"):
-            apart("rod.step", PART, LONGEST, os._exit, 3)
-        assert apart("rod.step", PART, LONGEST, math.sqrt, 4.0) == 2.0
+            in_own_process("rod.step", PART, LONGEST, os._exit, 3)
+        assert in_own_process("rod.step", PART, LONGEST, math.sqrt, 4.0) == 2.0
 
     def test_what_it_writes_stays_there(self, capfd: pytest.CaptureFixture[str]) -> None:
-        assert apart("rod.step", PART, LONGEST, loud) == 36
+        assert in_own_process("rod.step", PART, LONGEST, loud) == 36
         assert capfd.readouterr() == ("", "")
 
     def test_what_takes_too_much_memory_is_given_up_and_the_next_works(self) -> None:
         with pytest.raises(MeshError, match=r"^rod.step: .*, got one for which they need more than 6 GB of memory; mend"):
-            apart("rod.step", PART, LONGEST, np.ones, int(1e9))
-        assert apart("rod.step", PART, LONGEST, math.sqrt, 4.0) == 2.0
+            in_own_process("rod.step", PART, LONGEST, np.ones, int(1e9))
+        assert in_own_process("rod.step", PART, LONGEST, math.sqrt, 4.0) == 2.0
 
     def test_errors_come_through_and_the_next_work_has_a_new_process(self) -> None:
-        before = apart("rod.step", PART, LONGEST, os.getpid)
-        assert apart("rod.step", PART, LONGEST, os.getpid) == before
+        before = in_own_process("rod.step", PART, LONGEST, os.getpid)
+        assert in_own_process("rod.step", PART, LONGEST, os.getpid) == before
         with pytest.raises(ValueError, match="math domain"):
-            apart("rod.step", PART, LONGEST, math.sqrt, -1.0)
-        assert apart("rod.step", PART, LONGEST, os.getpid) != before
+            in_own_process("rod.step", PART, LONGEST, math.sqrt, -1.0)
+        assert in_own_process("rod.step", PART, LONGEST, os.getpid) != before
 
     def test_what_only_a_used_process_does_not_end_is_done_by_a_new_one(self) -> None:
-        used = apart("rod.step", PART, LONGEST, os.getpid)
-        assert apart("rod.step", PART, 1, busy_in, used) != used
+        used = in_own_process("rod.step", PART, LONGEST, os.getpid)
+        assert in_own_process("rod.step", PART, 1, busy_in, used) != used
 
     @pytest.mark.parametrize("tries", [1, 2])
     def test_what_no_process_ends_is_tried_once_more_where_the_first_was_used(self, tries: int, tmp_path: Path) -> None:
         with pytest.raises(ValueError, match="math domain"):
-            apart("rod.step", PART, LONGEST, math.sqrt, -1.0)  # its process is ended
+            in_own_process("rod.step", PART, LONGEST, math.sqrt, -1.0)  # its process is ended
         if tries == 2:
-            apart("rod.step", PART, LONGEST, os.getpid)
+            in_own_process("rod.step", PART, LONGEST, os.getpid)
         with pytest.raises(MeshError, match="got none within 1 s of processor time"):
-            apart("rod.step", PART, 1, busy_and_counted, tmp_path / "tries")
+            in_own_process("rod.step", PART, 1, busy_and_counted, tmp_path / "tries")
         assert len((tmp_path / "tries").read_text()) == tries
 
 
@@ -210,7 +210,7 @@ class TestKept:
         def meshes(*_: object) -> None:
             raise RuntimeError("meshed")
 
-        monkeypatch.setattr(methods, "apart", meshes)
+        monkeypatch.setattr(methods, "in_own_process", meshes)
         again = made()
         assert np.array_equal(again.points, first.points)
         assert again.method == first.method

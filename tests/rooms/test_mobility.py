@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from kedfem.dynamics.stepping.transient import _moment as moment
+from kedfem.dynamics.stepping.transient import instant_in_words
 from kedfem.errors import MotionError
 from kedfem.motion.dead_point import DeadPoint
-from kedfem.motion.linkage import drawn_linkage, linkage, looser_rows
+from kedfem.motion.linkage import linkage, looser_rows, reference_linkage
 from kedfem.motion.messages import place
 from kedfem.motion.mobility import Mobility, mobility
 from kedfem.motion.path import path
@@ -119,7 +119,9 @@ def test_a_planar_link_that_no_joint_holds_has_three_motions() -> None:
     link = linkage(scene)
     told = mobility(scene, link, path(link, 0.0, LITTLE))
     assert (told.freedom, told.equations) == (3, 0)
-    assert [each.words for each in told.free] == ["link 'arm' can turn about z and slide along x and y, held by no joint"]
+    assert [each.words for each in told.free] == [
+        "link 'arm' can turn about z and slide along x and y, constrained by no joint"
+    ]
 
 
 def test_parallel_cranks_share_a_force_in_their_own_plane_as_well() -> None:
@@ -148,7 +150,7 @@ def test_bennett_hinges_hold_all_but_their_turn_twice() -> None:
 
 def test_self_stress_balances_on_every_link_and_does_no_work_in_its_joint() -> None:
     """Equilibrium by hand: forces, and moments about the centre, of the joints of each link sum to zero."""
-    drawn = drawn_linkage(linkage_scene(SKEW))
+    drawn = reference_linkage(linkage_scene(SKEW))
     stress = np.linalg.svd(drawn.J.T)[2][-3:].T
     for link in drawn.links:
         total = np.zeros((6, 3))
@@ -169,15 +171,15 @@ def test_the_remedy_leaves_the_motion_as_it_was_and_nothing_redundant(
 ) -> None:
     """Done as told, in a new scene: the same poses, by a linkage without redundancy.
 
-    As drawn, and about there: half a turn on, Bennett's linkage with a ball and a sleeve could leave its motion.
+    As drawn, and about there: half a revolution on, Bennett's linkage with a ball and a sleeve could leave its motion.
     """
     scene = linkage_scene(joints, sliders=sliders)
-    drawn = drawn_linkage(scene)
+    drawn = reference_linkage(scene)
     changes, left = without_redundancy(drawn, looser_rows(scene, drawn))
     assert left == 0
     other = {name: (dict(changes).get(name, joint[0]), *joint[1:]) for name, joint in joints.items()}
     cured = linkage_scene(other, sliders=sliders)
-    assert redundancy(drawn_linkage(cured)) == 0
+    assert redundancy(reference_linkage(cured)) == 0
     assert found(other, sliders=sliders).remedy == ""
     t = np.linspace(0, 1.0, 7)
     before, after = motion_at(scene, t), motion_at(cured, t)
@@ -193,7 +195,7 @@ def test_free_motions_are_told_by_the_fewest_links_that_make_them() -> None:
     joints = {name: joint for name, joint in BAR.items() if name != "D"}
     joints["E"] = ("spherical", "ground", "arm", (0.0, 1.0, 0.0))
     joints["F"] = ("prismatic", "ground", "block", (3.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    drawn = drawn_linkage(linkage_scene(joints, sliders=("block",)))
+    drawn = reference_linkage(linkage_scene(joints, sliders=("block",)))
     motions = free_motions(drawn)
     assert sorted((each.links, each.basis.shape[1], each.joints) for each in motions) == [
         (("arm",), 3, ("E",)),
@@ -207,14 +209,14 @@ def test_free_motions_are_told_by_the_fewest_links_that_make_them() -> None:
     assert words["arm",] == "link 'arm' can turn about all axes at joint E (spherical)"
     assert words["block",] == "link 'block' can slide along y at joint F (prismatic)"
     cures = {each.links: remedy(each) for each in motions}
-    assert cures["arm",] == "hold arm by a further joint"  # a ball is not driven
-    assert cures["rocker",] == "drive joint C, or hold rocker by a further joint"
+    assert cures["arm",] == "constrain arm by a further joint"  # a ball is not driven
+    assert cures["rocker",] == "drive joint C, or constrain rocker by a further joint"
 
 
 def test_making_one_ball_a_universal_joint_stops_the_idle_spin() -> None:
-    (spin,) = free_motions(drawn_linkage(linkage_scene(rssr(1.0, ball=True))))
+    (spin,) = free_motions(reference_linkage(linkage_scene(rssr(1.0, ball=True))))
     assert remedy(spin) == "make joint B or C universal"
-    assert not free_motions(drawn_linkage(linkage_scene(universal_rssr(1.0))))
+    assert not free_motions(reference_linkage(linkage_scene(universal_rssr(1.0))))
 
 
 # -- dead points --------------------------------------------------------------------------------------------
@@ -280,7 +282,7 @@ def test_the_table_reads_as_sentences() -> None:
     for row in (
         "degrees of freedom                      │ 1, driven at joint A",
         "joint equations                         │ 20, 3 of them redundant",
-        "held redundantly at joints A, B, C and D │ force along z, moments about x and y",
+        "constrained redundantly at joints A, B, C and D │ force along z, moments about x and y",
         "without these                           │ make joint B spherical and joint C cylindrical",
         "closest to a dead point                 │ at drive angle 54.06 deg, joint C about",
         "to keep away from it                    │ drive another joint, limit the drive, or let a flywheel",
@@ -373,7 +375,7 @@ def test_messages_of_a_slide_speak_of_its_travel() -> None:
     assert place(link, -0.05) == "drive travel -50 mm"
     scene = carried("co-rotational")
     motion = rigid_motion(link, path(link, -0.05, 0.05), np.array([0.25]), path_parameter(scene, np.array([0.25])))
-    assert moment(link, motion, 0) == "t = 0.25 s, drive travel -25 mm"
+    assert instant_in_words(link, motion, 0) == "t = 0.25 s, drive travel -25 mm"
     with pytest.raises(MotionError, match="free motion left at drive travel 0 mm, the reference position"):
         linkage(carried("rigid-body"))
 

@@ -217,7 +217,7 @@ def test_derivatives_of_rows_are_their_differences_also_where_joints_are_open() 
     t = np.array([-h, 0.0, h])
     R = np.stack([Rotation.from_rotvec(s * omega).as_matrix() @ R0 for s in t])
     poses, near = (R, p0 + t[:, None, None] * v), np.zeros((3, len(rows.angles)))
-    near = features(rows, (R[1:2], p0[None]), near[:1]).value[rows.angles].T + 0 * near  # none at half a turn
+    near = features(rows, (R[1:2], p0[None]), near[:1]).value[rows.angles].T + 0 * near  # none at half a revolution
     f, q = features(rows, poses, near), 0.4 + speeds * t[:, None]
     r = residuals(rows, f, q)
     twist = np.concatenate([v, omega], axis=1)[1:].ravel()

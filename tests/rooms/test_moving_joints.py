@@ -11,7 +11,7 @@ from kedfem.accuracy.reduction import prepared
 from kedfem.accuracy.variants import with_analysis
 from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.joints.constraint_matrices import joint_rows
+from kedfem.dynamics.joints.constraint_matrices import constraint_matrices
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.forces.exerted import effort, wrench
@@ -102,7 +102,7 @@ def test_joints_stay_closed_and_what_is_free_is_free(kind: str) -> None:
     ready, blocks = ran(KINDS[kind]())
     open_, size = 0.0, 0.0
     for block in blocks:
-        rows = joint_rows(ready.model.rows, block.motion, ready.model.interface_unknowns)
+        rows = constraint_matrices(ready.model.rows, block.motion, ready.model.interface_unknowns)
         assert rows is not None
         for k in range(len(block)):
             z = interface_values(ready.model.joints, [link.u[k] for link in block.links])
@@ -117,7 +117,7 @@ def test_joints_let_the_rigid_motion_pass(kind: str) -> None:
     """Rows see nothing of the linkage's own rigid rates; those of a drive see its own, 1 per radian or metre."""
     ready, blocks = ran(KINDS[kind]())
     motion, model = blocks[-1].motion, ready.model
-    rows = joint_rows(model.rows, motion, model.interface_unknowns)
+    rows = constraint_matrices(model.rows, motion, model.interface_unknowns)
     assert rows is not None
     velocities = drive_rates(ready.linkage, ready.path, motion.phi)
     for t in (0, len(motion.t) - 1):
@@ -144,7 +144,10 @@ def test_the_first_rates_and_accelerations_keep_rows_closed() -> None:
     raw["links"]["arm"] = bar("beam", (-0.3, 0), (0.8 * along - [0.3, 0]).tolist(), 16)
     raw["joints"]["S"] |= {"at": pin.tolist(), "axis": [*along.tolist(), 0]}
     ready, blocks = ran(raw)
-    first, later = (blocks[0].links, joint_rows(ready.model.rows, blocks[1].motion, ready.model.interface_unknowns))
+    first, later = (
+        blocks[0].links,
+        constraint_matrices(ready.model.rows, blocks[1].motion, ready.model.interface_unknowns),
+    )
     assert later is not None
     z, z1, z2 = (interface_values(ready.model.joints, [getattr(x, k)[0] for x in first]) for k in "uva")
     t = blocks[1].motion.t[[3, 7]]
@@ -212,7 +215,7 @@ def test_a_pin_that_does_not_move_along_its_slot_is_a_hinge_across_it() -> None:
 
 
 def test_a_pin_that_leaves_its_link_is_refused() -> None:
-    """Drawn 0.316 m from the arm's hinge, the pin is 0.4 m away half a turn on; the arm is 0.348 m long."""
+    """Drawn 0.316 m from the arm's hinge, the pin is 0.4 m away half a revolution on; the arm is 0.348 m long."""
     raw = inverted("beam", "slot", revolutions=1.0)
     raw["links"]["crank"] = bar("beam", (0, 0), (0, 0.1))
     raw["links"]["arm"] = bar("beam", (-0.3, 0), (0.03, 0.11))
@@ -352,7 +355,7 @@ def test_a_link_of_one_element_cannot_bend_along_a_slot(links: str) -> None:
     raw = scene_of(Cell("slot", "rigid-body", True, links))
     elements = raw["links"]["link 1"]["mesh"]["elements"]
     raw["links"]["link 1"]["mesh"]["elements"] = [1, *elements[1:]]
-    wanted = r"joints\.J: link 'link 1' must be able to bend .* in 4 ways, .* got 3: give it two elements along the line"
+    wanted = r"joints\.J: link 'link 1' must have 4 independent deflections .* got 3: give it two elements along the line"
     with pytest.raises(MeshError, match=wanted):
         begun(raw)
 
@@ -363,7 +366,7 @@ def test_what_does_not_suit_such_joints_is_refused() -> None:
         scene_from(inverted(rho_inf=1.0))
     raw = driven_slide()
     raw["drive"]["shaft_stiffness"] = 1.0
-    with pytest.raises(SceneError, match=r"drive\.shaft_stiffness: must be given for a hinge .*, got 'A'"):
+    with pytest.raises(SceneError, match=r"drive\.shaft_stiffness: must be given for an angle .* of 'A'"):
         scene_from(raw)
     raw = bushed(1.0)
     raw["joints"]["S"]["bushing"]["stiffness"] = [1.0, 2.0]

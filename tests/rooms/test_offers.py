@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
-from kedfem.links.surfaces.part_candidates import offers
+from kedfem.links.surfaces.part_candidates import part_candidates
 from kedfem.mesh import SolidMesh
 from kedfem.mesh.cad.model import CadKeys, solid_model
 from kedfem.mesh.cad.solids import CadFace
@@ -35,7 +35,7 @@ def test_what_a_joint_finds_is_told_of_each_coupling_surface() -> None:
     """A stepped sleeve: its journals are beside its bores, where a joint goes into the bore."""
     sleeve = turned([(0.0, 0.01, 0.005, 0.01), (0.01, 0.02, 0.004, 0.015)])
     rounds = [("wide bore", 0.005, 0, 0.01), ("bore", 0.004, 0.01, 0.02), ("rim", 0.015, 0.01, 0.02)]
-    found = {each.face.name: each for each in offers(with_rounds(sleeve, *rounds))}
+    found = {each.face.name: each for each in part_candidates(with_rounds(sleeve, *rounds))}
     assert [each.kind for each in found.values()] == ["bore", "bore", "journal"]
     assert [each.number for each in found.values()] == [1, 2, 3]
     assert [found[name].finds for name in ("wide bore", "bore")] == ["it", "it"]
@@ -46,11 +46,11 @@ def test_what_a_joint_finds_is_told_of_each_coupling_surface() -> None:
 def test_both_lugs_of_a_clevis_are_found_from_either() -> None:
     clevis = turned([(0.0, 0.004, 0.005, 0.02), (0.004, 0.012, 0.015, 0.02), (0.012, 0.016, 0.005, 0.02)])
     lugs = with_rounds(clevis, ("low", 0.005, 0, 0.004), ("high", 0.005, 0.012, 0.016))
-    assert sorted(each.finds for each in offers(lugs)) == ["it with 1", "it with 2"]
+    assert sorted(each.finds for each in part_candidates(lugs)) == ["it with 1", "it with 2"]
 
 
 def test_a_part_without_faces_offers_none_by_name() -> None:
-    assert offers(ball_on_neck(0.01)) == []
+    assert part_candidates(ball_on_neck(0.01)) == []
 
 
 def forms(tmp_path: Path, draw: Callable[[Any], Any]) -> list[str]:

@@ -1,6 +1,7 @@
 """Renamed keys and values: docs/notation.md and messages agree, and each message names the present word."""
 
 import re
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +75,7 @@ def test_the_notation_lists_all_renamed_keys_and_values() -> None:
 
 RETIRED = {
     "nominal": r"\bnominal",
-    "seat": r"(?<!ball )\bseats?\b(?!\.)|_seat\b|\bseat_",
+    "seat": r"(?<!ball[ _])\bseats?\b(?!\.)|(?<!ball)_seat\b|\bseat_",
     "literal": r"\bliteral\b|\bLiteralS|literal_(?!e)",
     "as drawn": r"\bas drawn\b(?! by hand)",
     "drawn position": r"\bdrawn position",
@@ -83,21 +84,29 @@ RETIRED = {
     "noticed": r"\bNOTICED\b",
     "looked at": r"\blooked at\b",
     "carried": r"\.carried\b",
+    "hub": r"\bhubs?_|_hubs?\b|\bHUBS?_|\.hub\b",
     "left over": r"\bleft over\b",
     "leaves free": r"\bleaves? free\b",
-    "action": r"\bactions?\b",
+    "action": r"\bactions?\b(?!=)",
     "sweeps": r"\bSWEEPS\b",
+    "turn": r"\b(two|three|four|five|ten|whole|full|last) turns\b|\b(over|after|within) (a|one) turn\b|\bsteps a turn\b",
+    "in thought": r"\bstands? still in thought\b",
+    "let go": r"\blets? go of\b",
+    "fidelity": r"(?i)\bfidelit",
+    "averaged": r"`averaged`|\bAveraged\b",
+    "truth": r"\b(from|against|beside) the truth\b",
 }
-"""Words of docs/notation.md that the package does not use any more; its names and prose have the right column."""
+"""Words of docs/notation.md that package and docs do not use any more; its names and prose have the right column."""
 
 
 @pytest.mark.parametrize("word", RETIRED)
-def test_the_package_speaks_the_words_of_the_field(word: str) -> None:
-    package = TABLE.parents[1] / "src" / "kedfem"
+def test_the_project_speaks_the_words_of_the_field(word: str) -> None:
+    root = TABLE.parents[1]
+    rooms = [(root / name).rglob("*") for name in ("src", "docs", "examples", "benchmarks", "reference")]
     used = [
-        f"{file.relative_to(package)}:{number}: {line.strip()}"
-        for file in package.rglob("*.py")
-        if file.name != "wording.py"
+        f"{file.relative_to(root)}:{number}: {line.strip()}"
+        for file in chain(root.glob("*.md"), *rooms)
+        if file.suffix in {".py", ".md", ".toml"} and file.name not in {"wording.py", TABLE.name, "CHANGELOG.md"}
         for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1)
         if re.search(RETIRED[word], line)
     ]

@@ -71,7 +71,7 @@ def test_channels_of_large_files_are_read_when_they_are_asked_for(
 
 
 def read_again(results: Results, name: str) -> np.ndarray:
-    results.channels._kept.clear()  # type: ignore[attr-defined]
+    results.channels.cached.clear()  # type: ignore[attr-defined]
     return results.channels[name][1]
 
 

@@ -527,7 +527,7 @@ def test_a_slider_on_a_solid_is_as_wide_as_that_is_across_its_length(turn: float
     """However the link lies in the reference position."""
     c, s = np.cos(turn), np.sin(turn)
     sizes = HEX27 / 2 * [0.2, 0.03, 0.01] @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
-    assert frames._width(SimpleNamespace(full=None, section=None, X=sizes)) == pytest.approx(0.03)  # type: ignore[arg-type]
+    assert frames.width_across(SimpleNamespace(full=None, section=None, X=sizes)) == pytest.approx(0.03)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("mass", [2.0, 1e-6, 1e6])

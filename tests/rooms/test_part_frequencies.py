@@ -15,6 +15,7 @@ from kedfem.mesh import SolidMesh
 from kedfem.output.vtu import write_mesh
 from kedfem.scene import scene_from
 from kedfem.tables import part_tables
+from tests.rooms.cad_files import written
 from tests.rooms.test_resolution import arm
 from tests.verification.meshes import box, mapped_mesh
 
@@ -60,6 +61,22 @@ def test_the_command_holds_faces_and_leaves_a_table(plate: Path) -> None:
     # Euler and Bernoulli's cantilever, a little below the plate whose clamped end cannot contract
     first = 1.8751**2 * np.sqrt(70e9 * 0.005**2 / 12 / 2700) / 0.1**2 / (2 * np.pi)
     assert_allclose(f[0], first, rtol=0.03)
+
+
+def test_the_mesh_of_a_part_without_sizes_is_made_finer(tmp_path: Path) -> None:
+    written(tmp_path, "block", lambda occ: occ.addBox(0, 0, 0, 40, 20, 10), ("step",))
+    command = ["frequencies", str(tmp_path / "block.step"), "--modes", "1", "--element", "hex8"]
+
+    def first(*options: str) -> float:
+        done = CliRunner().invoke(app, [*command, "--hold", "{ plane = 'x', near = [0, 0.01, 0] }", *options])
+        assert done.exit_code == 0, done.output
+        assert ("meshes must be fine enough for 1 %" in done.output) == bool(options)
+        table = np.loadtxt(tmp_path / "block-frequencies" / "frequencies.csv", delimiter=",", skiprows=1, ndmin=2)
+        return float(table[0, 1])
+
+    exact = 5080.3  # hex27, 6 elements across
+    assert_allclose(first(), exact, rtol=0.01)
+    assert first("--across", "2") > 1.05 * exact
 
 
 @pytest.mark.parametrize(

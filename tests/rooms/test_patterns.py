@@ -93,7 +93,7 @@ def written_out(pattern: Raw, **sections: Any) -> Any:
 
 
 def test_a_turn_about_any_axis_moves_points_axes_and_vectors() -> None:
-    """By Rodrigues: a third of a turn about (1, 1, 1) sends x to y to z, about a centre that stays."""
+    """By Rodrigues: a third of a revolution about (1, 1, 1) sends x to y to z, about a centre that stays."""
     body = {
         "kind": "rigid_body", "link": "arm", "at": [1, 0, 0], "mass": 1.0, "inertia": [1, 2, 2.5, 0.1, 0.2, 0.3],
         "centre": [1, 0, 0],

@@ -63,7 +63,7 @@ def test_a_plan_that_was_kept_leaves_title_fatigue_and_output_as_the_scene_has_t
     monkeypatch.setenv("KEDFEM_CACHE", str(tmp_path / "cache"))
     raw = arm(model="beam")
     first = planned(scene_from(raw, tmp_path / "here"))
-    monkeypatch.setattr("kedfem.accuracy.plan._chosen", lambda *_: pytest.fail("it is kept"))
+    monkeypatch.setattr("kedfem.accuracy.plan.found_plan", lambda *_: pytest.fail("it is kept"))
     materials = {"steel": {"group": "steel", "tensile_strength": "500 MPa"}}
     more = {"title": "again", "output": {"csv": True, "animation": False}, "fatigue": {"materials": materials}}
     again = planned(scene_from(raw | more, tmp_path / "there"))
@@ -270,7 +270,7 @@ def beams(speed: str, **analysis: Any) -> dict[str, Any]:
 
 
 def test_at_60_rpm_frames_are_rigid_body_and_the_step_is_what_is_needed() -> None:
-    """3,700 steps leave 0.13 % over two turns, 1,830 leave 0.29 % of the 0.3 % that the step may cost."""
+    """3,700 steps leave 0.13 % over two revolutions, 1,830 leave 0.29 % of the 0.3 % that the step may cost."""
     plan = planned(scene_from(beams("60 rpm")))
     assert plan.reached
     assert plan.scene.analysis.frames == "rigid-body"

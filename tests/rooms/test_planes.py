@@ -135,11 +135,11 @@ def test_a_driven_bore_is_as_stiff_whatever_its_mesh(kind: str, sizes: tuple[int
     assert_allclose(found[0], found[1], rtol=0, atol=0.01 * np.abs(found[1]).max())
 
 
-def mixed(*fidelities: str, **analysis: Any) -> dict[str, Any]:
+def mixed(*models: str, **analysis: Any) -> dict[str, Any]:
     """The four-bar of plates with a kind per link; beams are as wide as the waist."""
     raw = four_bar("plate", steps_per_revolution=60, revolutions=0.5, initial="quasi-static", **analysis)
     raw["drive"]["motion"]["speed"] = "60 rpm"
-    for link, kind in zip(raw["links"].values(), fidelities, strict=True):
+    for link, kind in zip(raw["links"].values(), models, strict=True):
         link["model"] = kind
         if kind == "beam":
             bar = {"kind": "bar", "between": link["shape"]["between"], "width": 0.0254, "thickness": 0.0254}

@@ -15,19 +15,19 @@ import pytest
 import kedfem
 from kedfem.errors import MeshError
 from kedfem.mesh import isolated
-from kedfem.mesh.isolated import LONGEST, PART, apart, side_by_side
+from kedfem.mesh.isolated import LONGEST, PART, in_own_process, side_by_side
 from kedfem.processes import BLAS_THREADS, POLL, UNUSED, at_most
 
 BUSY = """
 import os, sys, time
 from pathlib import Path
-from kedfem.mesh.isolated import LONGEST, PART, apart
+from kedfem.mesh.isolated import LONGEST, PART, in_own_process
 
 def busy(file):
     file.write_text(str(os.getpid()))
     time.sleep(60)
 
-apart("part", PART, LONGEST, busy, Path(sys.argv[1]))
+in_own_process("part", PART, LONGEST, busy, Path(sys.argv[1]))
 """
 
 QUICK = """
@@ -102,10 +102,10 @@ def reading(file: Path, hangs: int) -> int:
 def test_a_part_that_hangs_as_it_is_read_is_tried_in_three_processes(tmp_path: Path) -> None:
     file = tmp_path / "tries"
     file.write_text("")
-    assert apart("part", PART, LONGEST, reading, file, 2) == 3
+    assert in_own_process("part", PART, LONGEST, reading, file, 2) == 3
     file.write_text("")
     with pytest.raises(MeshError, match=r"^part: must be a part .*, got one that they had not read in time; mend"):
-        apart("part", PART, LONGEST, reading, file, 9)
+        in_own_process("part", PART, LONGEST, reading, file, 9)
     assert file.read_text() == "xxx"
 
 
@@ -116,11 +116,11 @@ def test_a_part_that_breaks_down_after_a_rest_is_told(tmp_path: Path, monkeypatc
     file = tmp_path / "tries"
     for hangs, expected in ((0, 1), (1, 2)):
         file.write_text("")
-        assert apart("part", PART, LONGEST, reading, file, hangs) == expected
-        assert within(30.0, lambda: not isolated._idle)
+        assert in_own_process("part", PART, LONGEST, reading, file, hangs) == expected
+        assert within(30.0, lambda: not isolated.IDLE_WORKERS)
     file.write_text("")
     with pytest.raises(MeshError, match="had not read in time"):
-        apart("part", PART, LONGEST, reading, file, 9)
+        in_own_process("part", PART, LONGEST, reading, file, 9)
 
 
 def together(here: Path, other: Path) -> int:
@@ -134,7 +134,9 @@ def test_two_pieces_of_work_are_done_at_once_in_two_processes(tmp_path: Path, mo
     monkeypatch.setenv("OMP_NUM_THREADS", "2")
     one, other = tmp_path / "one", tmp_path / "other"
     works = {"a": (one, other), "b": (other, one)}
-    found = side_by_side({name: partial(apart, "part", PART, LONGEST, together, *files) for name, files in works.items()})
+    found = side_by_side(
+        {name: partial(in_own_process, "part", PART, LONGEST, together, *files) for name, files in works.items()}
+    )
     assert list(found) == ["a", "b"]
     assert found["a"] != found["b"]
     assert os.getpid() not in found.values()
@@ -159,10 +161,12 @@ def test_what_goes_on_beside_a_mistake_is_ended_and_what_has_not_begun_is_left(
     works = {"first": (wrong, begun), "second": (waiting, begun), "third": (waiting, never)}
     since = time.monotonic()
     with pytest.raises(MeshError, match=r"^wrong$"):
-        side_by_side({name: partial(apart, "part", PART, LONGEST, work, file) for name, (work, file) in works.items()})
+        side_by_side(
+            {name: partial(in_own_process, "part", PART, LONGEST, work, file) for name, (work, file) in works.items()}
+        )
     assert time.monotonic() - since < 60.0
     assert within(10.0, lambda: not alive(int(begun.read_text())))
-    assert apart("part", PART, LONGEST, abs, -4) == 4
+    assert in_own_process("part", PART, LONGEST, abs, -4) == 4
 
 
 def test_a_process_that_is_no_worker_is_not_ended() -> None:
@@ -233,6 +237,50 @@ def test_an_interruption_that_python_drops_is_raised_again(where: str, name: str
     )
     assert done.stdout.split() == ["went", "on", "interrupted"]
     assert done.stderr == ""
+
+
+HELD = """
+import ctypes, signal, sys
+from kedfem.processes import end_as_interrupted, ended_at_once
+signal.signal(signal.SIGINT, signal.default_int_handler)
+end_as_interrupted()
+held = ctypes.PyDLL(None).sleep  # as a library that lets no other thread of Python run
+try:
+    with ended_at_once("interrupted at work"):
+        print("ready", flush=True)
+        held(0 if sys.argv[1] == "after" else 20)
+    print("done", flush=True)
+    held(1)
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs a shell")
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_an_interruption_ends_a_library_that_lets_no_signal_through(name: str) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", HELD, "within"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    sent = time.monotonic()
+    process.send_signal(signal.Signals[name])
+    assert process.communicate(timeout=30) == ("", "interrupted at work\n")
+    assert time.monotonic() - sent < 2.0
+    assert process.returncode == -signal.Signals[name]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs a shell")
+def test_after_such_work_an_interruption_is_as_before() -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", HELD, "after"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    assert [process.stdout.readline() for _ in range(2)] == ["ready\n", "done\n"]
+    process.send_signal(signal.SIGTERM)
+    assert process.communicate(timeout=30) == ("interrupted\n", "")
+    assert process.returncode == 0
 
 
 MASKED = """

@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("numba")
 
 from kedfem.compiled import compiled, inner
-from kedfem.dynamics.system.reference import handed
+from kedfem.dynamics.system.reference import by_address
 
 
 class Inside(NamedTuple):
@@ -45,11 +45,11 @@ def outer(x):  # type: ignore[no-untyped-def]
 
 def test_what_is_written_by_a_record_s_address_is_in_the_arrays_of_the_record() -> None:
     x = Outside(2.0, True, (1.0, 2.0), np.zeros((3, 2)), Inside(np.arange(3), np.zeros(1, bool)))
-    outer(handed(x))
+    outer(by_address(x))
     np.testing.assert_array_equal(x.grid, 2.0 * np.arange(3)[:, None] + [1.0, 2.0] + 100.0)
     assert x.inside.flag[0]
     y = x._replace(whether=False, rates=(0.0, 0.0))
-    outer(handed(y))
+    outer(by_address(y))
     np.testing.assert_array_equal(y.grid, 2.0 * np.arange(3)[:, None] + np.zeros(2))
 
 
@@ -81,5 +81,5 @@ def test_a_record_is_handed_on_as_it_is() -> None:
         inside = Inside(x.reshape(2, 4, 5), np.array([3, 4, 5]))
         record = Record(x[:4, :3], 0.5, (x[0], x[:, 1].copy()), whether, inside, (1.0, 2.0, 4.0), 7, np.arange(4.0))
         for which in (1, 2):
-            assert read(handed(record), which) == read.py_func(record, which)
-    assert handed(None) is None
+            assert read(by_address(record), which) == read.py_func(record, which)
+    assert by_address(None) is None

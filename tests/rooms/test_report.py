@@ -31,7 +31,7 @@ from kedfem.report import surfaces, write_report
 from kedfem.report.animated import Animated, animated
 from kedfem.report.curves import cursor_places, curve_groups
 from kedfem.report.facts import loads_tables, notes_table, steady_table
-from kedfem.report.page import _moment as moment_told
+from kedfem.report.page import instant_in_words
 from kedfem.report.surfaces import placement
 from kedfem.report.viewer import first_view
 from kedfem.results import Results, read_results
@@ -428,7 +428,7 @@ def test_a_moment_names_the_drives_position_where_there_is_one_drive(drives: int
     drive = {"joint": "A"}
     scene = {"drive": drive, "drives": {}} if drives == 1 else {"drive": None, "drives": {"A": drive, "B": drive}}
     results = Results(np.zeros(1), np.zeros(1), {}, "complete", "{}", drive=TRAVEL)
-    assert moment_told(scene, results, 0.5, 0.02) == told
+    assert instant_in_words(scene, results, 0.5, 0.02) == told
 
 
 @pytest.mark.parametrize("down", [[0, 0, -9.81], [0, -9.81, 0], [9.81, 0, 0]], ids=["z", "y", "-x"])

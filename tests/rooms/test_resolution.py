@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.reduction import prepared
-from kedfem.accuracy.resolution import StepError, local_error, meetings, resolution, resolution_warnings, step_error
+from kedfem.accuracy.resolution import StepError, local_error, resolution, resolution_warnings, resonances, step_error
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
@@ -62,15 +62,15 @@ def test_a_harmonic_that_meets_the_first_frequency_is_said() -> None:
         raw["drive"]["motion"]["speed"] = 2 * np.pi * speed
         found = resolution(meshed(scene_from(raw)))
         assert found is not None
-        assert [x.harmonic for x in found.meetings] == met
+        assert [x.harmonic for x in found.resonances] == met
         assert ["harmonic 3 " in x for x in resolution_warnings(found)] == [True] * len(met)
 
 
 def test_a_frequency_that_changes_over_the_turn_is_met_between_poses() -> None:
     first, angles = np.array([10.0, 16.0, 13.0]), np.array([0.0, 2.0, 4.0])
-    assert [(x.harmonic, x.angle) for x in meetings(first, angles, 6.0)] == [(2, 0.0)]  # 12 Hz, from 10 to 16
-    assert [x.harmonic for x in meetings(first, angles, 3.0)] == [4, 5]
-    assert meetings(first, angles, 0.0) == []
+    assert [(x.harmonic, x.angle) for x in resonances(first, angles, 6.0)] == [(2, 0.0)]  # 12 Hz, from 10 to 16
+    assert [x.harmonic for x in resonances(first, angles, 3.0)] == [4, 5]
+    assert resonances(first, angles, 0.0) == []
 
 
 @pytest.mark.parametrize("rho_inf", [1.0, 0.9, 0.5, 0.0])

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from reference.results import CHANNELS, results_page, told
+from reference.results import CHANNELS, entries, results_page
 
 from kedfem.analysis import analyse
 from kedfem.kinematics import kinematics
@@ -22,15 +22,15 @@ def test_the_page_is_made_from_the_code() -> None:
 
 
 @pytest.mark.parametrize("name", SOME)
-def test_every_channel_of_a_run_is_told(name: str, tmp_path: Path) -> None:
+def test_every_channel_of_a_run_is_described(name: str, tmp_path: Path) -> None:
     found = analyse(scene_from(short(example(name)), tmp_path)).results
-    assert not [each for each, (channel, _) in found.channels.items() if not told(channel)]
+    assert not [each for each, (channel, _) in found.channels.items() if not entries(channel)]
 
 
 @pytest.mark.parametrize("name", DRIVEN)
-def test_every_channel_of_the_rigid_motion_is_told(name: str, tmp_path: Path) -> None:
+def test_every_channel_of_the_rigid_motion_is_described(name: str, tmp_path: Path) -> None:
     found = kinematics(scene_from(short(example(name)), tmp_path)).results
-    assert not [each for each, (channel, _) in found.channels.items() if not told(channel)]
+    assert not [each for each, (channel, _) in found.channels.items() if not entries(channel)]
 
 
 @pytest.mark.parametrize(
@@ -43,8 +43,8 @@ def test_every_channel_of_the_rigid_motion_is_told(name: str, tmp_path: Path) ->
         Channel("joints/B/C/force", ("x", "y", "z"), "N", "world", ""),
     ],
 )
-def test_a_channel_of_another_kind_is_not_told(other: Channel) -> None:
-    assert not told(other)
+def test_a_channel_of_another_kind_is_not_described(other: Channel) -> None:
+    assert not entries(other)
 
 
 def test_every_line_of_the_page_says_a_unit_and_a_meaning() -> None:

@@ -45,7 +45,7 @@ def scene_of(kind: str, folder: Path, analysis: dict[str, Any]) -> Scene:
 
 
 def turning(folder: Path, **analysis: Any) -> Scene:
-    """A crank at constant speed for two turns: the second turn takes its motion from the first."""
+    """A crank at constant speed for two revolutions: the second turn takes its motion from the first."""
     beam = {
         "material": "soft",
         "model": "beam",
@@ -110,7 +110,7 @@ def test_a_resumed_run_leaves_what_an_undisturbed_one_does_bit_by_bit(tmp_path: 
     ended = scene_of(kind, tmp_path / "ended", analysis)
     ended_early(ended, 0.4)
     state = (ended.results_folder / STATE).read_bytes()
-    rows = Packed(state[32:]).content["rows"]
+    rows = Packed(state[32:]).content["steps"]
     assert STEPS / 4 < rows <= len(read_results(ended.results_folder / "results.h5").time) < STEPS
     resumed = analyse(ended, resumes=True)
     assert_same(whole, content(resumed))
@@ -167,7 +167,7 @@ def test_a_resumed_steady_motion_knows_what_the_search_for_it_found(tmp_path: Pa
 @pytest.mark.parametrize("at", [pytest.param(0.1, marks=pytest.mark.long), 0.7])
 @pytest.mark.parametrize("points", [16, 1024])
 def test_poses_that_return_are_found_again(tmp_path: Path, at: float, points: int, monkeypatch: Any) -> None:
-    """Wherever blocks of the rigid-body motion end: beyond the first turn its poses are those of the first."""
+    """Wherever blocks of the rigid-body motion end: beyond the first revolution its poses are those of the first."""
     monkeypatch.setattr(rigid_body, "POINTS", points)
     whole = content(analyse(turning(tmp_path / "whole")))
     ended_early(turning(tmp_path / "ended"), at)

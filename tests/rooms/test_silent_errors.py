@@ -9,7 +9,7 @@ import pytest
 from kedfem.accuracy.prepared import meshed
 from kedfem.dynamics.loads import coarse_steps
 from kedfem.dynamics.stepping import solvers, transient
-from kedfem.dynamics.stepping.transient import _finite
+from kedfem.dynamics.stepping.transient import finite_part
 from kedfem.dynamics.system import layout
 from kedfem.errors import SceneError, SolveError
 from kedfem.scene import scene_from
@@ -80,7 +80,7 @@ def test_growth_in_any_function_ends_a_run(value: float) -> None:
     block = blocks[1]
     g = block.links[0].g.copy()
     g[2, -1, 1] = value
-    every = _finite(ready.linkage, replace(block, links=[replace(block.links[0], g=g), *block.links[1:]]))
+    every = finite_part(ready.linkage, replace(block, links=[replace(block.links[0], g=g), *block.links[1:]]))
     assert len(next(every)) == 2
     with pytest.raises(SolveError, match="got none at step 3"):
         next(every)

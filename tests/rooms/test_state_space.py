@@ -20,7 +20,7 @@ from kedfem.motion.rigid import rigid_motion
 from kedfem.results.recording import recording
 from kedfem.scene import Scene, path_parameter, scene_from
 from tests.bars import AXES, CASES, FLAT, KINDS, START, L, bar_scene
-from tests.cells import Cell, scene_of
+from tests.cells import ON_JOINT, Cell, scene_of
 from tests.linkages import drive_rates
 from tests.moving import bar, turning
 from tests.moving import turned as turned_scene
@@ -165,14 +165,14 @@ def test_rates_are_those_of_displacements(frame: str) -> None:
 
 
 @pytest.mark.parametrize("turn", [[0.0, 0.0, 0.0], [0, 0, np.pi / 2], [0, -np.pi / 2, 0], [0.7, -0.4, 1.1]])
-@pytest.mark.parametrize("joint", ["revolute", "prismatic"])
-def test_a_drive_that_lets_go_moves_all_inertia_that_it_moves(joint: str, turn: list[float]) -> None:
+@pytest.mark.parametrize(("joint", "law"), [(joint, law) for law, joints in ON_JOINT.items() for joint in joints])
+def test_a_drive_that_lets_go_moves_all_inertia_that_it_moves(joint: str, law: str, turn: list[float]) -> None:
     """A motion without strain is driven as Σ ∫ |dx/dφ|² dm of the rigid-body motion is."""
-    raw = scene_of(Cell(joint, "rigid-body", True, "beams in space", "drive on the joint"))
+    raw = scene_of(Cell(joint, "rigid-body", True, "beams in space", law))
     del raw["loads"]
     scene = scene_from(turned_scene(raw, Rotation.from_rotvec(turn).as_matrix(), (0.3, -0.2, 0.5)))
     space, _ = state_space(scene, 4, free=True)
-    slides = joint == "prismatic"
+    slides = joint == "prismatic" or law == "drive of the travel"
     assert space.inputs == ("drive/force" if slides else "drive/torque",)
     assert space.outputs == (("drive/travel" if slides else "drive/angle"), "drive/speed")
     assert space.frequencies[0] == 0.0
@@ -261,7 +261,7 @@ def test_what_cannot_be_asked(tmp_path: Path) -> None:
     for more, options, said in (
         ({}, {"modes": 0}, r"--modes: must be at least 1, got 0"),
         (undriven, {"at": 0.1}, r"--at: must be 0 without a drive, got 0.1 s"),
-        (undriven, {"free": True}, r"--free: must be combined with a drive that lets go, got a scene without one"),
+        (undriven, {"free": True}, r"--free: must be combined with a drive to release, got a scene without one"),
         ({"loads": {}, "motors": {}}, {}, r"--state-space: must have an input, got a scene without loads and motors"),
         ({"motors": {}, "output": {}}, {}, r"--state-space: must have an output, got a scene without probes"),
     ):

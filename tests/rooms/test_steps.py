@@ -101,7 +101,7 @@ def test_the_loop_is_the_same_without_its_compiler(monkeypatch: pytest.MonkeyPat
         for name, each in list(vars(module).items()):
             if hasattr(each, "py_func"):
                 monkeypatch.setattr(module, name, each.py_func)
-    monkeypatch.setattr(reference, "handed", lambda record: record)
+    monkeypatch.setattr(reference, "by_address", lambda record: record)
     monkeypatch.setattr(linear_kernel, "marched_linear", plain)
     slow = displacements(ready, steps_of(ready.scene, ready.model))
     assert counted

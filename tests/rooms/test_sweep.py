@@ -89,6 +89,8 @@ def test_a_range_a_list_and_their_grid() -> None:
     [
         ("drive.speed=10,20", "rad/s"),
         ("drives.S.motion.speed=1:3:3", "m/s"),
+        ("drives.C.motion.speed=1:3:3", "rad/s"),
+        ("drives.T.motion.speed=1:3:3", "m/s"),
         ("analysis.initial_speeds.S=1,2", "m/s"),
         ("analysis.initial_speeds.A=1,2", "rad/s"),
         ("motors.m.torque=1,2", "N*m"),
@@ -104,7 +106,10 @@ def test_a_range_a_list_and_their_grid() -> None:
 def test_numbers_without_a_unit_have_that_of_the_scene(over: str, unit: str) -> None:
     raw = arm() | {"gravity": [0, 0, 0], "motors": {"m": {"joint": "A", "torque": 1.0}}}
     raw["joints"]["S"] = {"kind": "prismatic", "links": ["arm", "ground"], "at": [0, 0], "axis": "x"}
-    raw["drives"] = {"S": {"joint": "S", "motion": {"kind": "constant_speed", "speed": 1.0}}}
+    raw["joints"]["C"] = {**raw["joints"]["S"], "kind": "cylindrical"}
+    motion = {"kind": "constant_speed", "speed": 1.0}
+    travel = {"joint": "C", "coordinate": "travel", "motion": motion}
+    raw["drives"] = {"S": {"joint": "S", "motion": motion}, "C": {"joint": "C", "motion": motion}, "T": travel}
     raw["analysis"]["initial_speeds"] = {"A": 1.0, "S": 1.0}
     (axis,) = axes_of([over], raw)
     assert axis.unit == unit

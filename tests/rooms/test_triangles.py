@@ -1,5 +1,10 @@
 """Compiled triangular solves: they solve what was factored, and steps are those of the factorisation's own solves."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -8,6 +13,7 @@ from numpy.testing import assert_allclose
 pytest.importorskip("numba")
 
 from kedfem.compiled import compiled
+from kedfem.dynamics.matrices import cholesky
 from kedfem.dynamics.matrices.cholesky import Cholesky, Triangle
 from kedfem.dynamics.matrices.triangle_kernel import solved
 from kedfem.dynamics.system import sparse
@@ -48,6 +54,35 @@ def test_dense_blocks_solve_too() -> None:
     assert len(triangle.first) == 2  # one block, of five times four columns and three more
     alone(arrays(triangle), b, *np.empty((2, 23)), out)
     assert_allclose(A @ out, b, rtol=0, atol=1e-12 * np.abs(b).max())
+
+
+def test_large_matrices_are_factored_and_solved_so_that_an_interruption_ends_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Within two seconds: factoring at once, solves between few right-hand sides, which are as exact."""
+    A, B, begun = laplacian(13, 11), np.random.default_rng(0).normal(size=(143, 37)), list[str]()
+
+    @contextmanager
+    def watched(words: str) -> Iterator[None]:
+        begun.append(words)
+        yield
+
+    monkeypatch.setattr(cholesky, "ended_at_once", watched)
+    monkeypatch.setattr(cholesky, "LARGE", 0)
+    X = Cholesky(A, "grid").solve_many(B)
+    assert begun == []
+    monkeypatch.setattr(cholesky, "SLOW", 143)
+    monkeypatch.setattr(cholesky, "SLOW_SOLVES", 143)
+    sizes, spsolve = list[int](), cholesky.cholmod.spsolve
+
+    def counted(factor: Any, block: Any) -> Any:
+        sizes.append(block.size[1])
+        return spsolve(factor, block)
+
+    monkeypatch.setattr(cholesky, "cholmod", SimpleNamespace(**vars(cholesky.cholmod) | {"spsolve": counted}))
+    assert np.array_equal(Cholesky(A, "grid").solve_many(B), X)
+    assert begun == ["interrupted while a large matrix was factored"]
+    assert max(sizes) == 4
 
 
 @pytest.mark.parametrize(("frames", "share"), [("rigid-body", 1e-9), ("co-rotational", 1e-8)])

@@ -23,7 +23,7 @@ SCALE = 500.0  # of the other animation: this one is never exaggerated
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A quarter of a turn of a bar that spins about its end, with the deflection that this asks for."""
+    """A quarter of a revolution of a bar that spins about its end, with the deflection that this asks for."""
     end = np.pi / 2 / OMEGA
     analysis = {"end_time": end, "step": end / 20, "initial": "quasi-static", "accuracy": "quick"}
     animation = {"vtkhdf": True, "frames_per_revolution": 8, "deformation_scale": SCALE}
@@ -52,7 +52,7 @@ def frame(reader: Any, time: float) -> Any:
 def test_points_move_rigidly_and_stresses_turn_with_the_link(folder: Path) -> None:
     """Drawn along x, σ_xx = ρ ω² (L² − x²)/2; after a quarter turn the bar lies along y, and so does its stress."""
     reader = reader_of(folder / "animation.vtkhdf")
-    assert reader.GetNumberOfSteps() == 3  # eight frames a turn
+    assert reader.GetNumberOfSteps() == 3  # eight frames a revolution
     first, last = (frame(reader, t) for t in (0.0, np.pi / 2 / OMEGA))
     assert_allclose(last.field_data["drive angle [rad]"], np.pi / 2, rtol=1e-9)
     assert last.field_data["link arm"] == [0]

@@ -26,6 +26,7 @@ MODULES = (
     "kinematics",
     "spatial_kinematics",
     "mechanisms",
+    "multibody",
     "rigid_body_frames",
     "corotational",
     "cad",

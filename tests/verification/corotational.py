@@ -384,8 +384,8 @@ def four_bar_error(rpm: float, ratio: float, elements: int, h: float, nodes: int
 
 @case("Source's four-bar from rest: co-rotational frames", EXACT, long=True)
 def four_bar_from_rest() -> list[Row]:
-    """2 % damping at 20 and 200 Hz, three turns (60 rpm: one): the same rows as for rigid-body frames, whose errors are
-    0.6,
+    """2 % damping at 20 and 200 Hz, three revolutions (60 rpm: one): the same rows as for rigid-body frames, whose errors
+    are 0.6,
 
     3.8, 14, 25, 40 % of the peak. Largest difference of the stress on the rocker's outer side, of its peak."""
     rows = []

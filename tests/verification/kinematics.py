@@ -45,7 +45,7 @@ def errors(name: str, got: Curve, wanted: Curve, model: str, cap: float = CAP) -
     """Greatest errors over the motion, relative to the greatest value of each derivative."""
     what = (name, f"speed of the {name}", f"acceleration of the {name}")
     return [
-        Row(f"{q}, greatest error over a turn", 0.0, float(np.abs(g - w).max() / np.abs(w).max()), cap, model)
+        Row(f"{q}, greatest error over a revolution", 0.0, float(np.abs(g - w).max() / np.abs(w).max()), cap, model)
         for q, g, w in zip(what, got, wanted, strict=True)
     ]
 
@@ -72,7 +72,7 @@ def angle_of(
 
 @case("Four-bar", "R. L. Norton, Design of Machinery: position, velocity and acceleration of the pin-jointed four-bar")
 def planar_four_bar() -> list[Row]:
-    """The linkage of the source's example (Nath and Ghosh 1980), drawn at 60°, a full turn by a cycloidal law."""
+    """The linkage of the source's example (Nath and Ghosh 1980), drawn at 60°, a full revolution by a cycloidal law."""
     a, b, c, d = 0.3048, 0.9144, 0.762, 0.9144
     joints = four_bar(a, b, c, d, np.pi / 3)
     B, C, D = (joints[k][3] for k in "BCD")
@@ -109,7 +109,7 @@ def slider_x(joints: JointTable) -> tuple[Curve, Curve]:
 
 @case("Slider-crank", "closed form of any textbook: x = r cos φ + √(l² − r² sin² φ)")
 def planar_slider_crank() -> list[Row]:
-    """Crank 0.1 m, rod 0.3 m, drawn at 40°, a full turn by a cycloidal law."""
+    """Crank 0.1 m, rod 0.3 m, drawn at 40°, a full revolution by a cycloidal law."""
     r, rod, drawn = 0.1, 0.3, np.radians(40)
     got, drive = slider_x(slider_crank(r, rod, drawn))
     sin, cos = np.sin(drawn + drive[0]), np.cos(drawn + drive[0])
@@ -146,7 +146,7 @@ def _slider_in_space(joints: JointTable, drawn: float, model: str) -> list[Row]:
 
 @case("Cardan joint", "closed form of any textbook: tan φ2 = tan φ1 / cos β")
 def universal_joint() -> list[Row]:
-    """Shafts at 35°, a full turn by a cycloidal law; four revolutes through one point: three times redundant."""
+    """Shafts at 35°, a full revolution by a cycloidal law; four revolutes through one point: three times redundant."""
     beta = np.radians(35)
     joints = cardan(beta)
     got, drive = angle_of(joints, "shaft2", joints["D"][4], 0.0)
@@ -159,7 +159,8 @@ def universal_joint() -> list[Row]:
 
 @case("Bennett linkage", "G. T. Bennett, A new mechanism, Engineering 76 (1903): a/sin α = b/sin β, four skew revolutes")
 def bennett_linkage() -> list[Row]:
-    """a = 0.3 m, α = 40°, β = 75°: tan(θ1/2) tan(θ2/2) = sin((β+α)/2) / sin((β−α)/2); a full turn, over-constrained."""
+    """a = 0.3 m, α = 40°, β = 75°: tan(θ1/2) tan(θ2/2) = sin((β+α)/2) / sin((β−α)/2); a full revolution,
+    over-constrained."""
     t1 = 1.0
     joints, t2, K = bennett(np.radians(40), np.radians(75), t1)
     got, drive = angle_of(joints, "link2", joints["B"][4], t2, "link1")

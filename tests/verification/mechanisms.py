@@ -48,7 +48,7 @@ def histories(scene: Scene, *names: str) -> tuple[int, list[np.ndarray]]:
 
 @cache
 def stress(elements: int, steps_per_revolution: int, revolutions: float = 2.0) -> np.ndarray:
-    """σ on the rocker's outer side at 720 points a turn, 3-node beams [MPa]."""
+    """σ on the rocker's outer side at 720 points a revolution, 3-node beams [MPa]."""
     scene = four_bar(
         {"revolutions": revolutions, "steps_per_revolution": steps_per_revolution}, {"mesh": {"elements": elements}}
     )
@@ -69,28 +69,30 @@ def coordinates() -> list[Row]:
 
 @cache
 def space_errors() -> dict[int, float]:
-    """Error of the stress curve for elements a link, against 32, all at 720 steps a turn."""
+    """Error of the stress curve for elements a link, against 32, all at 720 steps a revolution."""
     return {n: difference(stress(n, 720), stress(32, 720)) for n in (1, 2, 4, 8, 16)}
 
 
 @cache
 def time_errors() -> dict[int, float]:
-    """Error of the stress curve for steps a turn, against 11520, all with 8 elements a link."""
+    """Error of the stress curve for steps a revolution, against 11520, all with 8 elements a link."""
     return {n: difference(stress(8, n), stress(8, 11520)) for n in (720, 1440, 2880)}
 
 
-@case("Source's four-bar: stress curve, elements", "against 32 elements a link, 720 steps a turn, same start")
+@case("Source's four-bar: stress curve, elements", "against 32 elements a link, 720 steps a revolution, same start")
 def elements() -> list[Row]:
-    """Bending stress on the rocker's outer side over two turns at 600 rpm; largest difference, of the peak."""
+    """Bending stress on the rocker's outer side over two revolutions at 600 rpm; largest difference, of the peak."""
     caps = {1: 0.8, 2: 0.6, 4: 0.05, 8: 0.0035, 16: 0.00025}
     return [Row("difference / peak", 0.0, e, caps[n], f"{n} beam3 a link") for n, e in space_errors().items()]
 
 
-@case("Source's four-bar: stress curve, steps", "against 11520 steps a turn, 8 elements a link, same start", long=True)
+@case(
+    "Source's four-bar: stress curve, steps", "against 11520 steps a revolution, 8 elements a link, same start", long=True
+)
 def steps() -> list[Row]:
     """The same, for the step."""
     caps = {720: 0.05, 1440: 0.0125, 2880: 0.003}
-    return [Row("difference / peak", 0.0, e, caps[n], f"{n} steps a turn") for n, e in time_errors().items()]
+    return [Row("difference / peak", 0.0, e, caps[n], f"{n} steps a revolution") for n, e in time_errors().items()]
 
 
 @case("Four-bar: solids against beams", "16 beam3 a link against bars of hex27, one turn at 600 rpm", long=True)
@@ -121,7 +123,7 @@ def rigid_errors() -> dict[int, float]:
     return found
 
 
-@case("Four-bar: E → ∞, drive torque", "virtual work of the rigid linkage; half a turn at 60 rpm")
+@case("Four-bar: E → ∞, drive torque", "virtual work of the rigid linkage; half a revolution at 60 rpm")
 def rigid_limit() -> list[Row]:
     """rms difference falls as 1/E."""
     caps = {1: 8e-3, 4: 2e-3, 16: 4e-4}

@@ -130,7 +130,7 @@ CHANNELS = {
 
 @cache
 def four_bar(kind: str, thickness: float) -> list[np.ndarray]:
-    """Channels of the example's four-bar over a turn of 90 steps at 150 rpm, on the same quadrilaterals."""
+    """Channels of the example's four-bar over a revolution of 90 steps at 150 rpm, on the same quadrilaterals."""
     raw = tomllib.loads(SCENE.read_text(encoding="utf-8"))
     raw["analysis"] |= {"revolutions": 1, "steps_per_revolution": 90}
     for link in raw["links"].values():
@@ -141,7 +141,7 @@ def four_bar(kind: str, thickness: float) -> list[np.ndarray]:
 
 @case("Four-bar of plates: plane against solid", "hex27 on the same quadrilaterals, one layer; 150 rpm", long=True)
 def against_solids() -> list[Row]:
-    """Largest difference over a turn, for the example's plates, as thick as wide, and for thinner ones.
+    """Largest difference over a revolution, for the example's plates, as thick as wide, and for thinner ones.
 
     What is left is the assumption of plane stress, which near the bores holds for thin plates only: the
     displacements' difference falls about as the square of the thickness.

@@ -119,14 +119,14 @@ def tip_history(scene: Scene) -> tuple[np.ndarray, Link]:
 
 @case("SSLV105: turning bar, through the transient solver", STEADY)
 def turning_bar_by_steps() -> list[Row]:
-    """From the quasi-static start, which is the steady state already, and from rest, over four turns."""
+    """From the quasi-static start, which is the steady state already, and from rest, over four revolutions."""
     g, link = tip_history(turning_bar_scene("quasi-static"))
     from_rest, _ = tip_history(turning_bar_scene("rest"))
-    text, tip = f"{model((6, 2, 1), link, 'hex20')}, 360 steps a turn", 0.0151572424
+    text, tip = f"{model((6, 2, 1), link, 'hex20')}, 360 steps a revolution", 0.0151572424
     return [
         Row("tip at the quasi-static start [m]", tip, float(g[0, 0]), 1e-6, text),
-        Row("greatest way from there in four turns / tip", 0.0, float(np.abs(g - g[0]).max() / tip), 1e-4, text),
-        Row("tip after four turns [m]", tip, float(g[-1, 0]), 1e-5, text),
-        Row("tip after four turns, from rest [m]", tip, float(from_rest[-1, 0]), 1e-5, text),
+        Row("greatest way from there in four revolutions / tip", 0.0, float(np.abs(g - g[0]).max() / tip), 1e-4, text),
+        Row("tip after four revolutions [m]", tip, float(g[-1, 0]), 1e-5, text),
+        Row("tip after four revolutions, from rest [m]", tip, float(from_rest[-1, 0]), 1e-5, text),
         Row("sideways then / tip", 0.0, float(np.abs(from_rest[-1, 1:]).max() / tip), 1e-5, text),
     ]

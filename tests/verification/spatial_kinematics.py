@@ -58,7 +58,7 @@ def quick_returns() -> list[Row]:
 
 @case("Inverted slider-crank", "closed form of any textbook: the rod passes through the block's pivot at all times")
 def rod_through_a_block() -> list[Row]:
-    """Crank 0.1 m, pivots 0.3 m apart, drawn at 1.2 rad, a full turn by a cycloidal law."""
+    """Crank 0.1 m, pivots 0.3 m apart, drawn at 1.2 rad, a full revolution by a cycloidal law."""
     r, d, drawn = 0.1, 0.3, 1.2
     start = float(np.angle(d - r * np.exp(1j * drawn)))
     got, drive = angle_of(inverted_slider_crank(r, d, drawn), "rod", Z, start)
@@ -76,7 +76,7 @@ def cardan_shaft(cosine: float, phi: np.ndarray) -> Curve:
 
 @case("Cardan joint, a universal joint", "closed form of any textbook: tan φ2 = tan φ1 / cos β")
 def one_universal_joint() -> list[Row]:
-    """Shafts at 35° and at 80°, a full turn by a cycloidal law."""
+    """Shafts at 35° and at 80°, a full revolution by a cycloidal law."""
     rows = []
     for degrees in (35, 80):
         beta = np.radians(degrees)

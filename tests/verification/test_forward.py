@@ -19,7 +19,7 @@ from tests.momentum import Momentum, momentum
 LENGTH, WIDTH, THICKNESS, DENSITY = 0.5, 0.03, 0.02, 7850.0
 MASS = DENSITY * LENGTH * WIDTH * THICKNESS
 INERTIA = MASS * (4 * LENGTH**2 + WIDTH**2) / 12  # about its end
-FIDELITIES = ["rigid", "beam"]
+MODELS = ["rigid", "beam"]
 Run = tuple[np.ndarray, dict[str, np.ndarray], tuple[Balance, Momentum]]
 
 
@@ -55,7 +55,7 @@ def order(errors: list[float]) -> float:
     return float(np.log2(errors[-2] / errors[-1]))
 
 
-@pytest.mark.parametrize("model", FIDELITIES)
+@pytest.mark.parametrize("model", MODELS)
 def test_a_compound_pendulum_swings_as_elliptic_integrals_say(model: str) -> None:
     """From rest level with its pin: the period is 4 K(sin 45°) √(J / (m g L/2)); it is back after one."""
     g = 9.81
@@ -73,7 +73,7 @@ def test_a_compound_pendulum_swings_as_elliptic_integrals_say(model: str) -> Non
         assert order(errors) > 1.5
 
 
-@pytest.mark.parametrize("model", FIDELITIES)
+@pytest.mark.parametrize("model", MODELS)
 def test_a_motor_whose_torque_falls_with_speed_comes_up_exponentially(model: str) -> None:
     """T = T0 (1 − ω/ω0): ω = ω0 (1 − exp(−t/τ)), τ = J ω0 / T0; from the other end of the joint's links alike."""
     T0, w0 = 5.0, 40.0
@@ -91,7 +91,7 @@ def test_a_motor_whose_torque_falls_with_speed_comes_up_exponentially(model: str
     assert balance.energy < 2e-3
 
 
-@pytest.mark.parametrize("model", FIDELITIES)
+@pytest.mark.parametrize("model", MODELS)
 def test_an_arm_on_a_torsion_spring_rings_down(model: str) -> None:
     """J φ'' + c φ' + k (φ − φ0) = 0 from φ = φ' = 0."""
     k, zeta, free = 20.0, 0.1, 0.6
@@ -107,7 +107,7 @@ def test_an_arm_on_a_torsion_spring_rings_down(model: str) -> None:
     assert errors[-1] < 1e-3
 
 
-@pytest.mark.parametrize("model", FIDELITIES)
+@pytest.mark.parametrize("model", MODELS)
 def test_an_arm_set_going_coasts(model: str) -> None:
     """No force about the pin: ω stays as at the start, and the kinetic energy with it."""
     t, x, _ = ran(arm(model, 1.0, 0.002, analysis={"initial_speeds": {"A": "60 rpm"}}))

@@ -122,12 +122,12 @@ def test_joints_stay_closed_and_links_rigid(scene: Scene) -> None:
 
 
 def test_a_million_steps_do_not_drift() -> None:
-    """Quick-return at 3° a step, 8333 turns: every 487th step, and all of the last turn, against the closed form."""
+    """Quick-return at 3° a step, 8333 revolutions: every 487th step, and all of the last one, against the closed form."""
     step, r, d = np.radians(3.0), 0.1, 0.25
     k = np.union1d(np.arange(0, 10**6 + 1, 487), np.arange(10**6 - 120, 10**6 + 1))
     scene = linkage_scene(quick_return(r, d, 0.4, block=True))
     m = motion_at(scene, k * step)
-    pin = 1j * d + r * np.exp(1j * (0.4 + (k % 120) * step))  # whole turns are taken off exactly
+    pin = 1j * d + r * np.exp(1j * (0.4 + (k % 120) * step))  # whole revolutions are taken off exactly
     arm, block = (body(scene, name) for name in ("arm", "block"))
     angle = np.angle(pin / pin[0])
     rounded = 2 * np.spacing(1e6 * step)  # of the angle of the drive at the end: 1e-11 rad

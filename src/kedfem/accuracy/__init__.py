@@ -1,1 +1,1 @@
-"""How far a result is from the truth, and the cheapest model that is near enough."""
+"""Error estimates of results, and the choice of the cheapest model that is accurate enough."""

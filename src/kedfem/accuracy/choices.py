@@ -11,10 +11,10 @@ from kedfem.accuracy.histories import histories, relative_errors, worst
 from kedfem.accuracy.resolution import fewest_steps
 from kedfem.accuracy.step_estimate import IN_STEP, LEAST_ORDER, StepChoice, StepEstimate, cheapest, single_level
 from kedfem.accuracy.trials import Trials
-from kedfem.accuracy.variants import TRIAL_STEPS, shortened, states_step, with_analysis, with_links, with_steps
+from kedfem.accuracy.variants import TRIAL_STEPS, shortened, with_analysis, with_links, with_steps
 from kedfem.dynamics.stepping.levels import most_levels
 from kedfem.errors import KedfemError
-from kedfem.scene import LinkScene, Scene, scene_from, time_grid, turn_steps, without_vibration
+from kedfem.scene import LinkScene, Scene, scene_from, states_step, time_grid, turn_steps, without_vibration
 
 FOLLOWED = 0.5  # of the accuracy: rigid-body frames that err by more give way to co-rotational frames, in scenes of beams
 DEARER = 1.5  # the same where solid or plane links would follow too: it costs them more, and the estimate is cautious

@@ -144,7 +144,7 @@ def _beyond(budget: Budget, kind: str) -> list[Share]:
 
 
 def meaningless(budget: Budget, balance: Balance | None, unworked: float) -> str:
-    """Why a run means nothing by its own account, in words; empty for one that may.
+    """Why the results of a run are useless by its own estimates, in words; else empty.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ CHOSEN_STEP = (
 
 
 def percent(error: float) -> str:
-    """An error as a reader takes it: nobody believes the third digit of an estimate."""
+    """An error in percent, with two digits: an estimate has no more."""
     return "over 100 %" if error > 1 else f"{float(f'{100 * error:.2g}'):g} %"
 
 

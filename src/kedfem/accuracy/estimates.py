@@ -1,4 +1,4 @@
-"""What a run's error is, found beside it: the same linkage run again with other steps, other meshes.
+"""Error estimates of a run, from runs of the same linkage with other steps and other meshes.
 
 Small models are run again as they are; of large links a companion on a few modes is run instead, on which a step
 takes a fraction. Their channels are compared as `histories` does: what two steps, two meshes differ by, in every channel.
@@ -20,16 +20,16 @@ import numpy as np
 
 from kedfem.accuracy.error_budget import Budget, Share, by_kind, joined
 from kedfem.accuracy.geometric import GeometricError, bent, geometric_warning
-from kedfem.accuracy.given import Given
 from kedfem.accuracy.histories import Histories, counted, extent, histories
 from kedfem.accuracy.mesh_estimate import FUNCTIONS, link_errors, mesh_share, plain_mesh_share
 from kedfem.accuracy.positions import positions_share
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, first_reduced
 from kedfem.accuracy.resolution import StepError, fewest_steps, step_error
+from kedfem.accuracy.rigid_link_compliance import RigidLinkCompliance
 from kedfem.accuracy.rounding import Rounding
 from kedfem.accuracy.step_estimate import SINGLE, single_errors
-from kedfem.accuracy.variants import states_step, with_analysis
+from kedfem.accuracy.variants import with_analysis
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.matrices.dense import SMALL
 from kedfem.dynamics.model import Model
@@ -37,7 +37,7 @@ from kedfem.dynamics.system.steps import Steps
 from kedfem.errors import KedfemError
 from kedfem.links.indicator import Indicator, indicator
 from kedfem.results.recording import recording
-from kedfem.scene import ForceLoad, Scene, time_grid, without_vibration
+from kedfem.scene import ForceLoad, Scene, states_step, time_grid, without_vibration
 
 # unknowns of a model for which no companion is made: its modes cost as much as hundreds of steps
 LARGE = 100_000
@@ -47,8 +47,8 @@ SLOW = 1000  # the same where no compiled loop runs them
 
 
 @dataclass
-class Strained:
-    """The state of each meshed link in which its strain energy was highest: there its mesh is judged."""
+class PeakStrainStates:
+    """The state of each meshed link with the highest strain energy so far, for the estimate of its mesh error."""
 
     model: Model
     energy: dict[int, float]
@@ -73,17 +73,17 @@ class Strained:
 
 
 @dataclass
-class Seen:
-    """What a run shows of its errors while it steps: meshes' worst states, how far links bend, local errors of steps."""
+class ErrorMonitor:
+    """Monitor of a run's errors as it steps: peak strain states, geometric error, local errors of steps, rounding."""
 
-    strained: Strained
+    strained: PeakStrainStates
     geometric: GeometricError
     running: StepError
     rounding: Rounding
-    given: Given
+    compliance: RigidLinkCompliance
     steps: bool = True
     """whether there are time steps, and not positions found each by itself"""
-    REMEMBERED: ClassVar = ("strained", "geometric", "running", "rounding", "given")
+    REMEMBERED: ClassVar = ("strained", "geometric", "running", "rounding", "compliance")
 
     def add(self, block: Block) -> None:
         """Look at the steps of a block."""
@@ -91,16 +91,18 @@ class Seen:
         self.geometric.add(block)
         if self.steps:
             self.running.add(block)
-            self.given.add(block)
+            self.compliance.add(block)
         self.rounding.add(block)
 
 
-def watcher(ready: Prepared, solvers: Sequence[Steps] = ()) -> Seen:
+def watcher(ready: Prepared, solvers: Sequence[Steps] = ()) -> ErrorMonitor:
     """A watcher of a prepared scene's steps, as its solvers take them; of its links alone without any."""
     scene, model = ready.scene, ready.model
     geometric = GeometricError(model, scene.analysis.stiffening, bool(scene.limits))
     rounding, steps = Rounding.of(model, solvers), not without_vibration(scene)
-    return Seen(Strained(model), geometric, step_error(ready), rounding, Given(model), steps)
+    return ErrorMonitor(
+        PeakStrainStates(model), geometric, step_error(ready), rounding, RigidLinkCompliance(model), steps
+    )
 
 
 def companion(ready: Prepared) -> Prepared | None:
@@ -109,7 +111,7 @@ def companion(ready: Prepared) -> Prepared | None:
 
 
 def budget(
-    ready: Prepared, seen: Seen, reduction: Reduction | None, ran: Histories | None = None,
+    ready: Prepared, seen: ErrorMonitor, reduction: Reduction | None, ran: Histories | None = None,
     step: Mapping[str, float] | None = None,
 ) -> Budget:  # fmt: skip
     """Estimated errors of a run.
@@ -117,12 +119,12 @@ def budget(
     Parameters
     ----------
     seen : what the run showed while it stepped
-    ran : the run's own channels, where they are at hand
+    ran : the run's own channels, where they are at hand at all time points; else, of a steady motion, its state
     step : channel → error of the step, where the run itself knows it
     """
     found = seen.strained.indicators
     eta = link_errors(ready.model, found)
-    kinds = wanted(ready)
+    kinds = channel_kinds(ready)
     small = companion(ready)
     limits = list(_limits(ready, found))
     modes = by_kind(reduction.estimate) if reduction else {}
@@ -131,16 +133,17 @@ def budget(
     if small is None:
         local = dict.fromkeys(kinds, SINGLE * seen.running.total)
         if "displacement" in local:
-            local["displacement"] += seen.given.relative
+            local["displacement"] += seen.compliance.relative
         alone = Share("step", local, "local errors of its steps: no run beside one so large")
         marched = alone if step is None else _step_share(step)
         shares += [marched if seen.steps else None, plain_mesh_share(eta, kinds)]
         return Budget(joined(shares), tuple(limits), eta)
     own = ran is not None and small.model is ready.model and len(ran.time) > 1
-    small = replace(small, scene=spanned(small.scene, small.model))
+    small = replace(small, scene=beginning(small.scene, small.model))
     known = dict(step or {})
     try:
-        base = histories(small) if ran is None or not own else replace(ran, size=extent(ready.model))
+        near = ran.begun if ran is not None and small.model is ready.model else None
+        base = replace(ran, size=extent(ready.model)) if ran is not None and own else histories(small, near=near)
         sizes = counted(base)
         counts = by_kind(sizes)
         here = [kind for kind in kinds if kind in counts]
@@ -156,13 +159,13 @@ def budget(
     return Budget(joined(shares), tuple(limits), eta, known)
 
 
-def wanted(ready: Prepared) -> tuple[str, ...]:
+def channel_kinds(ready: Prepared) -> tuple[str, ...]:
     """Kinds of channels that a scene has."""
     every = recording(ready.scene, ready.model, linked=ready.linkage)
     return tuple(by_kind({each.channel.name: 0.0 for each in every}))
 
 
-def spanned(scene: Scene, model: Model) -> Scene:
+def beginning(scene: Scene, model: Model) -> Scene:
     """The beginning of an analysis that is too long to be run beside itself; of a steady motion its period."""
     if scene.analysis.kind == "steady":
         return with_analysis(scene, stability=False)
@@ -174,7 +177,7 @@ def spanned(scene: Scene, model: Model) -> Scene:
 
 
 def frames_share(geometric: GeometricError, kinds: Sequence[str]) -> Share | None:
-    """What rigid-body frames cost; None where all are co-rotational."""
+    """The error of rigid-body frames; None where all are co-rotational."""
     if all(link.fit is not None for link in geometric.model.links):
         return None
     warned = geometric_warning(geometric)

@@ -1,4 +1,4 @@
-"""The step of a scene without a drive: marches in successively halved steps, until what they differ by shows it.
+"""The step of a scene without a drive: marches in successively halved steps, until their differences show the error.
 
 Nothing shows beforehand how fast such a scene moves, so nothing is taken from frequencies or from a coarse forecast:
 a step is chosen among those that were marched, over the whole analysis; its error is what the last halvings show.
@@ -37,7 +37,7 @@ class _Halved:
     @property
     def errors(self) -> dict[str, float]:
         """Channel → error of the march in the shortest steps."""
-        return {name: _error([pair.get(name, 1.0) for pair in self.pairs]) for name in counted(self.fine)}
+        return {name: finest_error([pair.get(name, 1.0) for pair in self.pairs]) for name in counted(self.fine)}
 
 
 def free_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, float]:
@@ -82,7 +82,7 @@ def free_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, floa
     return with_steps(single, found.steps), error
 
 
-def _error(differences: Sequence[float]) -> float:
+def finest_error(differences: Sequence[float]) -> float:
     """Of the finest march, from what successive ones differ by: by the order that they show, at most 2."""
     D = np.maximum(differences, 1e-300)
     if len(D) < PAIRS or not np.isfinite(D).all():

@@ -1,4 +1,4 @@
-"""Meshes that resolve the vibrations asked for: frequencies with them, and with elements that are smaller throughout."""
+"""Meshes that are fine enough for natural frequencies: results of a mesh compared with those of smaller elements."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -112,7 +112,7 @@ def frozen(
     ----------
     modes : how many
     at : time at which the drive is where errors are estimated [s]
-    let_go : makes a scene whose drives have let go of their joints; None where they hold them
+    let_go : makes a scene whose drives have released their joints; None where they hold them
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""How far the linear equation is off because links bend: its geometric error, estimated from a run's own deflections.
+"""The geometric error of the linear equation, estimated from the deflections of a run.
 
 Equation (20) turns K with the rigid-body motion, which leaves three things out:
 

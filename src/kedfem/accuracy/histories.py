@@ -1,4 +1,4 @@
-"""Runs kept in memory, and how far they are apart."""
+"""Time histories of trial runs in memory, and the relative errors between them."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from kedfem.arrays import Float
 from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.levels import level_steps, leveled
-from kedfem.dynamics.system.period.map import Carried, carried
+from kedfem.dynamics.system.period.map import StateArrays, state_arrays
 from kedfem.dynamics.system.period.search import Periodic, Search
 from kedfem.dynamics.system.steps import Steps
 from kedfem.results import Channel
@@ -39,14 +39,14 @@ class Histories:
     channels: Mapping[str, tuple[Channel, Float[np.ndarray, "T c"]]]
     kept: tuple[Snapshot, ...] = ()
     size: float = 0.0
-    begun: Carried | None = None
+    begun: StateArrays | None = None
 
 
 def histories(
     ready: Prepared, keep: Collection[int] = (), watch: Callable[[], None] = lambda: None,
     look: Callable[[Block], None] = lambda block: None,
     follow: Callable[[Block, dict[str, Float[np.ndarray, "T c"]]], None] = lambda block, values: None,
-    near: Carried | None = None,
+    near: StateArrays | None = None,
 ) -> Histories:  # fmt: skip
     """Run a prepared scene and keep its channels.
 
@@ -78,10 +78,10 @@ def histories(
     return Histories(np.concatenate(times), channels, tuple(kept), extent(ready.model), steady_state(solvers))
 
 
-def steady_state(solvers: Sequence[Steps]) -> Carried | None:
+def steady_state(solvers: Sequence[Steps]) -> StateArrays | None:
     """The state with which a steady motion begins, that of the finest steps; None of another motion."""
     found = getattr(solvers[-1], "steady", None)
-    return carried(found.state) if isinstance(found, Periodic) else None
+    return state_arrays(found.state) if isinstance(found, Periodic) else None
 
 
 def extent(model: Model) -> float:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from kedfem.accuracy.prepared import Prepared
-from kedfem.motion.linkage import drawn_linkage
+from kedfem.motion.linkage import reference_linkage
 from kedfem.motion.released_motions import free_motions
 from kedfem.scene import time_grid, without_vibration
 
@@ -26,7 +26,7 @@ def mass_damping_warning(ready: Prepared, taken: float | None = None) -> tuple[s
         return ()
     if taken is not None and taken < LOST:
         return ()
-    meant = [each for each in free_motions(drawn_linkage(scene)) if not each.spin]
+    meant = [each for each in free_motions(reference_linkage(scene)) if not each.spin]
     if not meant:
         return ()
     links = list(dict.fromkeys(name for each in meant for name in each.links))

@@ -8,7 +8,7 @@ import numpy as np
 
 from kedfem.accuracy.choices import elastic, open_step
 from kedfem.accuracy.error_budget import UNKNOWNS, percent
-from kedfem.accuracy.estimates import Strained
+from kedfem.accuracy.estimates import PeakStrainStates
 from kedfem.accuracy.histories import histories, worst
 from kedfem.accuracy.mesh_estimate import link_errors, mesh_errors
 from kedfem.accuracy.prepared import Prepared
@@ -103,7 +103,7 @@ def chosen_meshes(search: Trials, scene: Scene, allowed: float, auto: Sequence[s
 
 def _mesh_error(ready: Prepared, names: Sequence[str]) -> tuple[float, dict[str, float]]:
     """The error that some meshes cause in a trial run, and the indicators of all."""
-    strained = Strained(ready.model)
+    strained = PeakStrainStates(ready.model)
     base = histories(ready, look=strained.add)
     eta = link_errors(ready.model, strained.indicators)
     return worst(mesh_errors(ready, base, {name: eta[name] for name in names if name in eta})), eta

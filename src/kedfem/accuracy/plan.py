@@ -109,16 +109,10 @@ def plan_for(scene: Scene, stage: Stage = lambda name: None) -> Plan | None:
     return planned(finer, stage)
 
 
-def as_planned(scene: Scene, stage: Stage = lambda name: None) -> Scene:
-    """The scene with what its plan chooses."""
-    plan = plan_for(scene, stage)
-    return plan.scene if plan else scene
-
-
 def ready_to_step(
     scene: Scene, stage: Stage = lambda name: None, ends: Sequence[Scene] = ()
 ) -> tuple[Plan | None, Prepared, Reduction | None]:
-    """A scene as a run takes it: its plan, and all that does not need a time step (`accuracy.reduction.prepared`)."""
+    """A scene prepared for a run: its plan, and all that does not need a time step (`accuracy.reduction.prepared`)."""
     plan = plan_for(scene, stage)
     ready, reduction = prepared(plan.scene if plan else scene, stage, ends, plan.links if plan else None)
     return plan, ready, reduction
@@ -138,14 +132,15 @@ def planned(scene: Scene, stage: Stage = lambda name: None) -> Plan:
     search = Trials(asked, stage)
 
     def made() -> Plan:
-        plan = _chosen(search, scene)
+        plan = found_plan(search, scene)
         return replace(plan, links=search.links_of(plan.scene))
 
     plan: Plan = kept("plan", key(scene), made, lambda plan: replace(plan, links={}), itself)
     return replace(plan, scene=with_models(scene, plan.scene))  # kept ones are of a scene with other outputs
 
 
-def _chosen(search: Trials, scene: Scene) -> Plan:
+def found_plan(search: Trials, scene: Scene) -> Plan:
+    """The cheapest model of a scene that is near enough, by trial runs: what no plan kept from an earlier run has."""
     asked, stage = search.asked, search.stage
     if not scene.driven_joints and not beams_only(scene):
         return _step_alone(search, scene)

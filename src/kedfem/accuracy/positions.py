@@ -1,4 +1,4 @@
-"""What static and quasi-static positions may miss between them: the largest values of a run, for its table of errors.
+"""Estimate of the largest values between the positions of static and quasi-static analyses, for the error budget.
 
 A smooth curve with the second difference D about its highest point rises by at most D/8 above it between two points.
 Where a load comes or goes the curve jumps (the median of five second differences knows nothing of it), and what it has

@@ -1,4 +1,4 @@
-"""A scene with everything that does not need a time step: alone, or sharing what it can with scenes that are alike.
+"""A scene prepared for its time steps: links, matrices and rigid-body motion, shared between similar scenes.
 
 What was found for it is kept under its `key`. Scenes that differ in the speed of their drive and in damping alone have
 links with the same modes.
@@ -17,7 +17,7 @@ from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_body import drive_range
 from kedfem.dynamics.stepping.state import Rayleigh
-from kedfem.dynamics.system.period.map import Carried
+from kedfem.dynamics.system.period.map import StateArrays
 from kedfem.links.record import Link
 from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import Linkage, linkage
@@ -96,14 +96,14 @@ def key(scene: Scene) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Neighbours:
-    """What a run takes over from runs of scenes that differ little.
+    """Data that a run takes over from runs of similar scenes.
 
     ends : assembled scenes with which reduced links are shared (`accuracy.reduction.prepared`)
     near : the state with which the steady motion of one of them begins, to look for this one's from there
     """
 
     ends: Sequence[Scene] = ()
-    near: Carried | None = None
+    near: StateArrays | None = None
 
 
 ALONE = Neighbours()

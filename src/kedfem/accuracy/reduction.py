@@ -41,12 +41,12 @@ Stage = Callable[[str], None]
 
 ROUNDS = 4  # of enriching
 MOMENTS = 16  # of a run where its residual is taken, evenly over it
-CLOSER = 0.5  # a round's share of the last one's tolerance, of segments
+CLOSER = 0.25  # a round's share of the last one's tolerance, of segments, at most
 ADDED = 8  # modes that a round adds to a link, at most
 MINUTE = 60  # unknowns of a link that cannot gain from a reduction
 CAUTION = 1.6  # the richer run errs too: with this the estimate is 0.35 to 1.65 of the true error in 44 runs
 FIRST = 0.1  # of the tolerance: what the first modes leave out of the training deflections' energy norm
-SEGMENT = 1.0  # the same of segments, whose modes are sorted by what they are needed for
+SEGMENT = 0.1  # of the tolerance: the same of segments; stress errs by more, and another round costs more than modes
 
 Functions = list[Float[np.ndarray, "_ _"] | None]
 
@@ -147,9 +147,10 @@ def reduced(
     given = counts or {}
 
     def first(share: float) -> Functions:
+        shares = [share * (1.0 if link.fit is None else SEGMENT) for link in full.model.links]
         return [
-            None if basis is None else basis.first(given.get(link.name, _count(link, basis, share * tolerance)))
-            for link, basis in zip(full.model.links, found, strict=True)
+            None if basis is None else basis.first(given.get(link.name, _count(link, basis, own * tolerance)))
+            for link, basis, own in zip(full.model.links, found, shares, strict=True)
         ]
 
     stage("error of the reduction")
@@ -180,8 +181,8 @@ def reducible(model: Model) -> set[str]:
 
 
 def _count(link: Link, basis: Basis, tolerance: float) -> int:
-    """How many modes serve a tolerance to begin with."""
-    return basis.count((FIRST if link.fit is None else SEGMENT) * tolerance)
+    """How many modes serve a tolerance to begin with; those of segments are sorted by what they are needed for."""
+    return basis.count(FIRST * tolerance if link.fit is None else tolerance)
 
 
 def first_reduced(
@@ -215,7 +216,8 @@ def _settled(
     fixed : names of links whose number of modes is given
     """
     moments = set(np.linspace(1, time_grid(full.scene).steps, MOMENTS).astype(int).tolist())
-    Q = first(1.0)
+    share = 1.0
+    Q = first(share)
     small, run = _run(full, Q, moments)
     for k in range(ROUNDS + 1):
         more = _enriched(full, parts, small, run.kept)
@@ -223,7 +225,8 @@ def _settled(
         estimate = {name: CAUTION * error for name, error in relative_errors(run, better).items()}
         if worst(estimate) <= tolerance or set(chosen) <= set(fixed) or k == ROUNDS:
             break
-        segments = _closer(full.model, Q, first(CLOSER ** (k + 1)), more)
+        share *= min(CLOSER, tolerance / worst(estimate))
+        segments = _closer(full.model, Q, first(share), more)
         both = zip(full.model.links, Q, segments, strict=True)
         Q = [old if link.name in fixed else new for link, old, new in both]
         unchanged = all(new is tried for new, tried in zip(Q, more, strict=True))

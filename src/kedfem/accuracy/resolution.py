@@ -1,4 +1,4 @@
-"""Whether the time step resolves the motion and lets vibration die as links turn; whether the drive meets a frequency."""
+"""Checks of the time step: whether it resolves the motion, damps vibration in rotating links, and meets a resonance."""
 
 import math
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.reduction import frozen_frequencies, static_parts
-from kedfem.dynamics.stepping.scheme import Scheme, borne_rotation, generalised_alpha
+from kedfem.dynamics.stepping.scheme import Scheme, generalised_alpha, stable_rotation
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import rigid_motion
 from kedfem.results.stresses.envelope import largest_row
@@ -21,6 +21,7 @@ from kedfem.scene import (
     Scene,
     corotational,
     drive_angle,
+    driven_travel,
     enforced_by_equations,
     path_parameter,
     rayleigh,
@@ -28,7 +29,7 @@ from kedfem.scene import (
     turn_steps,
 )
 
-POSES = 8  # of the last turn in which the linkage stands still in thought
+POSES = 8  # of the last revolution in which the linkage is frozen
 LARGE = 100_000  # unknowns of a model whose stiffness is not factored only to look at its frequencies
 FEWEST = 10  # steps in a period: the period is then 3 % too long
 UNFOLLOWED = 0.01  # error of a step below which what vibrates unresolved is no matter
@@ -37,7 +38,7 @@ NEAR = 0.03  # of a frequency
 
 
 @dataclass(frozen=True, slots=True)
-class Meeting:
+class Resonance:
     """A harmonic of the drive [Hz] near the first frequency of the linkage at a drive angle [rad]."""
 
     harmonic: int
@@ -52,13 +53,13 @@ class Resolution:
     step : of the analysis [s]
     first : (p,) frequency in each pose [Hz]
     angles : (p,) drive angle there [rad]
-    meetings : with harmonics of the drive
+    resonances : with harmonics of the drive
     """
 
     step: float
     first: Float[np.ndarray, " p"]
     angles: Float[np.ndarray, " p"]
-    meetings: tuple[Meeting, ...]
+    resonances: tuple[Resonance, ...]
 
     @property
     def steps_per_period(self) -> float:
@@ -79,7 +80,7 @@ def resolution(ready: Prepared) -> Resolution | None:
     try:
         parts = static_parts(ready.model)
         lowest = frozen_frequencies(ready.model, parts, motion)
-    except SolveError:  # nothing holds a link
+    except SolveError:  # a link without support
         return None
     excited = [k for k, found in enumerate(lowest) if len(found)]
     if not excited:
@@ -87,17 +88,17 @@ def resolution(ready: Prepared) -> Resolution | None:
     first = np.array([lowest[k][0] for k in excited]) / (2 * np.pi)
     angles = phi[0][excited]
     speed = 1 / (turn * grid.step) if turn else 0.0
-    return Resolution(grid.step, first, angles, tuple(meetings(first, angles, speed)))
+    return Resolution(grid.step, first, angles, tuple(resonances(first, angles, speed)))
 
 
-def meetings(first: Float[np.ndarray, " p"], angles: Float[np.ndarray, " p"], speed: float) -> list[Meeting]:
+def resonances(first: Float[np.ndarray, " p"], angles: Float[np.ndarray, " p"], speed: float) -> list[Resonance]:
     """Where harmonics of a drive's speed [Hz] come near frequencies that change from pose to pose."""
     found = []
     around = [*zip(first, angles, strict=True), (first[0], angles[0])]
     for k in range(1, HARMONICS + 1):
         for (f0, at), (f1, _) in pairwise(around):
             if speed and (1 - NEAR) * min(f0, f1) <= k * speed <= (1 + NEAR) * max(f0, f1):
-                found.append(Meeting(k, k * speed, float(at)))
+                found.append(Resonance(k, k * speed, float(at)))
                 break
     return found
 
@@ -188,13 +189,13 @@ def resolution_warnings(found: Resolution | None, error: float | None = None) ->
             f"{found.steps_per_period:.2g} steps in a period{known}: vibration is not followed; take {FEWEST} or more, a "
             f"step of {1 / (FEWEST * found.first.max()):.2g} s"
         )
-    if found is not None and found.meetings:
-        numbers = ", ".join(f"{x.harmonic}" for x in found.meetings)
-        speeds = ", ".join(f"{x.frequency:.4g}" for x in found.meetings)
-        angles = ", ".join(f"{np.degrees(x.angle) % 360:.0f}" for x in found.meetings)
+    if found is not None and found.resonances:
+        numbers = ", ".join(f"{x.harmonic}" for x in found.resonances)
+        speeds = ", ".join(f"{x.frequency:.4g}" for x in found.resonances)
+        angles = ", ".join(f"{np.degrees(x.angle) % 360:.0f}" for x in found.resonances)
         out.append(
             f"the drive's harmonic {numbers} ({speeds} Hz) meets the first frequency of the linkage, "
-            f"{found.first.min():.3g} to {found.first.max():.3g} Hz over the turn, near drive angle {angles} deg: "
+            f"{found.first.min():.3g} to {found.first.max():.3g} Hz over the revolution, near drive angle {angles} deg: "
             "resonance, as far as damping and the passing lets it"
         )
     return out
@@ -210,14 +211,14 @@ def fewest_steps(scene: Scene) -> float:
     end = time_grid(scene).end
     t = np.linspace(0.0, end, 2001)
     driven = scene.driven_joints.items()
-    turning = [each.motion for name, each in driven if scene.joints[name].kind != "prismatic"]
+    turning = [each.motion for name, each in driven if not driven_travel(scene, name)]
     fastest = max((float(np.abs(drive_angle(law, t)[1]).max()) for law in turning), default=0.0)
-    return fastest * end / borne_rotation(rho_inf)
+    return fastest * end / stable_rotation(rho_inf)
 
 
 def _moving(scene: Scene) -> str | None:
     """A joint enforced by constraint equations, from whose force vibration comes that grows alike, from twice
-    `borne_rotation` on (measured)."""
+    `stable_rotation` on (measured)."""
     return next((name for name in scene.joints if enforced_by_equations(scene, name)), None)
 
 

@@ -1,4 +1,4 @@
-"""What rounding costs, measured on each link's own matrices: forces that a rigid motion of the link should not need.
+"""The error by rounding: the forces that each link's matrices exert in a rigid motion, which should be zero.
 
 A link that is much stiffer than its neighbours moves as they let it, nearly as a rigid body. Its stiffness times that
 motion is zero only as far as its numbers go: what is left, some eps |K0| |δ|, is a force that nothing balances, and grows

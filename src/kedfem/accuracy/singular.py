@@ -1,4 +1,6 @@
-"""Singular positions that an undriven mechanism passes: there rigid links get a kick, and the error is not of order 2.
+"""Singular positions that an undriven mechanism passes, where rigid links meet impact-like accelerations.
+
+The error of the step is not of order 2 there.
 
 A drive's path is searched before a run; what nothing drives goes where it goes. So the run's own positions are examined:
 the mean frames of the links put into the constraint equations, whose derivatives lose rank where two motions meet, as in
@@ -26,7 +28,7 @@ CLOSER = 0.3  # of the largest value so far, below which all are examined
 
 
 @dataclass
-class Leverage:
+class LoopSingularity:
     """The smallest singular value, of the largest one, of constraints of closed loops that a run comes to.
 
     part, rank : the loops, and the rank of their constraints in the reference position
@@ -59,7 +61,7 @@ class SingularPasses:
     """What closed loops of an undriven mechanism come to in a run, block after block."""
 
     ready: Prepared
-    loops: list[Leverage] = field(default_factory=list, repr=False)
+    loops: list[LoopSingularity] = field(default_factory=list, repr=False)
     _of: dict[int, int] = field(default_factory=dict, repr=False)
     REMEMBERED: ClassVar = ("loops",)
 
@@ -71,7 +73,7 @@ class SingularPasses:
             rest = resting_poses(len(linkage.bodies))
             found = parts(linkage.rows, linkage.joints, len(linkage.bodies))
             every = ((part, part.rank(rest, linkage.size)) for part in found if part.closed)
-            self.loops = [Leverage(part, rank) for part, rank in every if rank < part.freedoms]
+            self.loops = [LoopSingularity(part, rank) for part, rank in every if rank < part.freedoms]
 
     def add(self, block: Block) -> None:
         """The time points of one more block."""
@@ -88,7 +90,7 @@ class SingularPasses:
                 near = np.arange(max(0, k - stride), min(len(block), k + stride + 1))
                 loop.add(self._values(loop, self._poses(block, near)), block.motion.t[near])
 
-    def _values(self, loop: Leverage, poses: Poses) -> Float[np.ndarray, " T"]:
+    def _values(self, loop: LoopSingularity, poses: Poses) -> Float[np.ndarray, " T"]:
         s = np.linalg.svd(loop.part.jacobian(poses, self.ready.linkage.size), compute_uv=False)
         return np.asarray(s[:, loop.rank - 1] / s[:, 0])
 
@@ -108,7 +110,7 @@ class SingularPasses:
         return R, p
 
     @property
-    def worst(self) -> Leverage | None:
+    def worst(self) -> LoopSingularity | None:
         """The loops that come nearest to a singular position; None without any."""
         return min(self.loops, key=lambda loop: loop.of_largest, default=None)
 
@@ -117,7 +119,8 @@ class SingularPasses:
         if self.worst is None or self.worst.of_largest > NEAR:
             return ()
         return (
-            f"at {self.worst.when:.4g} s the mechanism comes near a singular position, from where it could move in more "
-            "ways than one: rigid links, and links that hardly bend, get a kick there whose size depends on the step: "
-            "little decides how they move on; compare with a shorter step, or take damping, or links that bend more",
+            f"at {self.worst.when:.4g} s the mechanism comes near a singular position, from where it could move "
+            "on in several ways: rigid links, and links that hardly bend, get impact-like accelerations there, whose "
+            "size depends on the step, and small differences decide how they move on; compare with a shorter step, or "
+            "take damping, or links that bend more",
         )

@@ -1,4 +1,4 @@
-"""Plain sizes of a scene, for a look at what its units made of it, and doubts where they are no machine's."""
+"""Sizes and masses of a scene's links, for a check of its units, and warnings where they are unlikely for a machine."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ import numpy as np
 
 from kedfem.dynamics.model import Model
 from kedfem.motion.joint_equations import joint_points
-from kedfem.scene import ConstantSpeed, Ramp, Scene
+from kedfem.scene import ConstantSpeed, Ramp, Scene, driven_travel
 from kedfem.scene.records.materials import LINE
 from kedfem.scene.records.units import RPM
 
@@ -34,7 +34,7 @@ APART = 1e4  # longest of shortest link
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """What a scene is like, in SI.
+    """Sizes, masses and speeds of a scene, in SI.
 
     overall : largest extent of the linkage in the reference position [m]
     lengths, masses : of each link by name [m, kg]; sliders without a shape have no length
@@ -62,7 +62,7 @@ def sizes(scene: Scene, model: Model) -> Sizes:
     elastic = [link.material for link in scene.links.values() if link.model != "rigid" and link.material]
     motions = {name: drive.motion for name, drive in scene.driven_joints.items()}
     final = {name: float(x.speed) for name, x in motions.items() if isinstance(x, ConstantSpeed | Ramp)}
-    slides = {name for name in final if scene.joints[name].kind == "prismatic"}
+    slides = {name for name in final if driven_travel(scene, name)}
     return Sizes(
         overall=float(np.ptp(np.concatenate([*every.values(), joint_points(scene)]), axis=0).max()),
         lengths={name: float(np.linalg.norm(np.ptp(X, axis=0))) for name, X in every.items()},
@@ -75,11 +75,11 @@ def sizes(scene: Scene, model: Model) -> Sizes:
 
 def size_warnings(scene: Scene, found: Sizes) -> tuple[str, ...]:
     """Doubts about sizes that no machine has, each with the unit that was probably meant."""
-    lengths, others = _length_doubts(scene, found), _other_doubts(scene, found)
-    return (*scene.doubts, *lengths, *_material_doubts(scene), *others)
+    lengths, others = _length_warnings(scene, found), _other_warnings(scene, found)
+    return (*scene.unit_warnings, *lengths, *_material_warnings(scene), *others)
 
 
-def _length_doubts(scene: Scene, found: Sizes) -> Iterator[str]:
+def _length_warnings(scene: Scene, found: Sizes) -> Iterator[str]:
     low, high = LENGTHS
     long = {name: x for name, x in found.lengths.items() if x > high}
     short = {name: x for name, x in found.lengths.items() if x < low}
@@ -100,11 +100,11 @@ def _length_doubts(scene: Scene, found: Sizes) -> Iterator[str]:
         for key in ("width", "thickness"):
             value = getattr(link.shape, key, None) or 0.0
             if span and name not in long and value > min(WIDE[0] * span, WIDE[1]):
-                doubt = f"{value:.4g} m for a link of {span:.4g} m: is it in mm? write '{value:.4g} mm'"
-                yield f"links.{name}.shape.{key}: {doubt}"
+                reason = f"{value:.4g} m for a link of {span:.4g} m: is it in mm? write '{value:.4g} mm'"
+                yield f"links.{name}.shape.{key}: {reason}"
 
 
-def _material_doubts(scene: Scene) -> Iterator[str]:
+def _material_warnings(scene: Scene) -> Iterator[str]:
     every = {link.material for link in scene.links.values()}
     used = {name for name in every if name and not name.startswith(LINE)}
     for name, material in scene.materials.items():
@@ -117,11 +117,11 @@ def _material_doubts(scene: Scene) -> Iterator[str]:
                 yield f"{where}: {value:.4g} {unit} is {above}: which unit is it in?"
 
 
-def _other_doubts(scene: Scene, found: Sizes) -> Iterator[str]:
+def _other_warnings(scene: Scene, found: Sizes) -> Iterator[str]:
     low, high = MASSES
-    doubted = {name for name, x in found.lengths.items() if not LENGTHS[0] <= x <= LENGTHS[1]}
+    suspicious = {name for name, x in found.lengths.items() if not LENGTHS[0] <= x <= LENGTHS[1]}
     for name, mass in found.masses.items():
-        if name not in doubted and mass and not low <= mass <= high:
+        if name not in suspicious and mass and not low <= mass <= high:
             which = "lighter" if mass < low else "heavier"
             yield f"links.{name}: its mass is {mass:.4g} kg, {which} than any machine's: are its units right?"
     size = float(np.linalg.norm(scene.gravity))
@@ -130,7 +130,7 @@ def _other_doubts(scene: Scene, found: Sizes) -> Iterator[str]:
     for name, turns in found.turns.items():
         if abs(turns) > TURNS:
             yield f"drive of joint {name}: {turns:.4g} rpm is faster than any machine's: which unit is it in?"
-        links = [link for link in scene.joints[name].links if link in found.lengths and link not in doubted]
+        links = [link for link in scene.joints[name].links if link in found.lengths and link not in suspicious]
         tip = max((found.lengths[link] for link in links), default=0.0) * abs(turns) * np.pi / 30
         if tip > TIP:
             yield (

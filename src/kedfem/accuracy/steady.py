@@ -1,4 +1,4 @@
-"""What a run of a steady motion knows of it: its period, how it was found, and whether vibrations about it die away."""
+"""Facts about the steady motion of a run: its period, how it was found, and whether vibrations about it decay."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -24,13 +24,13 @@ LEAST_ORDER = 0.7  # at which an error must fall with the step, or no step will 
 SLOW = 1e-3  # |D''|/|D| of a difference without vibration: that of 200 steps to a period
 SURE = 0.7  # of the error asked for, that a step is chosen for
 SINGLE = 2.0  # forces and stresses have more of fast motion, which is less exact, than displacements
-TWO, THREE = 0.8, 1.2  # docs/performance/levels.md has estimates beside the truth
+TWO, THREE = 0.8, 1.2  # docs/performance/levels.md has estimates beside the true errors
 Rows = Float[np.ndarray, "T c"]
 
 
 @dataclass(frozen=True, slots=True)
 class StepEstimate:
-    """What a run knows of its step's error.
+    """The estimated error of the time step of a run.
 
     h : step of the coarsest level, which is the analysis's own [s]
     levels : 1, 2 or 3

@@ -1,4 +1,4 @@
-"""Trial runs of changed copies of one scene, reduced; what several of them share is made once."""
+"""Trial runs of changed copies of one scene with reduced links; parts that several runs share are made once."""
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace

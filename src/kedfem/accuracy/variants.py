@@ -43,11 +43,6 @@ def moved(scene: Scene) -> Scene:
                          revolutions=None, steps_per_revolution=None)  # fmt: skip
 
 
-def states_step(scene: Scene) -> bool:
-    """Whether a scene states how long its steps are."""
-    return scene.analysis.step is not None or scene.analysis.steps_per_revolution is not None
-
-
 def with_steps(scene: Scene, steps: int) -> Scene:
     """The scene in so many equal steps over the same time."""
     return with_analysis(scene, step=time_grid(scene).end / steps, steps_per_revolution=None)

@@ -3,7 +3,9 @@
 import gc
 import os
 import sys
-from typing import Annotated
+from collections.abc import Callable
+from functools import wraps
+from typing import Annotated, Any
 
 import typer
 
@@ -69,11 +71,25 @@ def compile_() -> None:
     out.print("compiled")
 
 
+def _interruptible(command: Callable[..., None]) -> Callable[..., None]:
+    """The command, which says so when it is interrupted: typer would end without a word."""
+
+    @wraps(command)
+    def reporting(*given: Any, **named: Any) -> None:
+        try:
+            command(*given, **named)
+        except KeyboardInterrupt:
+            warn("interrupted")
+            raise typer.Exit(INTERRUPTED) from None
+
+    return reporting
+
+
 for each in (
     run, check, kinematics, mesh, accuracy, new, cache, compile_,
     sweep, frequencies, loads, compare, report, export, view,
 ):  # fmt: skip
-    app.command(name=each.__name__.removesuffix("_"))(each)
+    app.command(name=each.__name__.removesuffix("_"))(_interruptible(each))
 
 
 def main() -> None:

@@ -22,7 +22,9 @@ def export(
     ] = None,
     modes: Annotated[int, option("Of the linear system: vibrations that are kept.", "N")] = 12,
     at: Annotated[float, option("Of the linear system: when the drive is at the position.", "SECONDS")] = 0.0,
-    free: Annotated[bool, flag("--free", "Of the linear system: the drive lets go, and its torque is an input.")] = False,
+    free: Annotated[
+        bool, flag("--free", "For the linear system: the drive releases its joint, and its torque is an input.")
+    ] = False,
     within: Within = False,
 ) -> None:
     """For other programs: matrices of a link, the mechanism as a linear system, motion of all, moving shapes."""

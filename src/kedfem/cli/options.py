@@ -1,4 +1,4 @@
-"""What the commands share: exit statuses, arguments and options."""
+"""Exit statuses, arguments and options that several commands share."""
 
 from pathlib import Path
 from typing import Annotated, Any

@@ -27,7 +27,7 @@ def mesh(
     folder: Annotated[Path | None, goes_to("PART-mesh beside the part", "mesh and picture go")] = None,
 ) -> None:
     """Mesh one part from CAD: what joints can sit on, a mesh file, a picture, its quality."""
-    from kedfem.links.surfaces.part_candidates import offers
+    from kedfem.links.surfaces.part_candidates import part_candidates
     from kedfem.mesh import part_mesh
     from kedfem.output.mesh_picture import write_mesh_picture
     from kedfem.output.vtu import write_mesh
@@ -41,7 +41,7 @@ def mesh(
     with progress() as watch:
         watch("mesh", 0, 0)
         made = part_mesh(link, part.parent)
-        found = offers(made)
+        found = part_candidates(made)
     show(mesh_tables(part.name, made, found))
     stem = part.stem if solid is None else f"{part.stem}-{solid}"
     target = ready_folder(folder or part.with_name(f"{stem}-mesh"))
@@ -61,8 +61,8 @@ def frequencies(
     ],
     context: typer.Context,
     modes: Annotated[int, option("Frequencies at each position, or of the part.")] = 6,
-    positions: Annotated[int, option("Over a turn, or over the whole run.")] = 16,
-    free: Annotated[bool, flag("--free", "Drives let go of their joints.")] = False,
+    positions: Annotated[int, option("Over a revolution, or over the whole run.")] = 16,
+    free: Annotated[bool, flag("--free", "Drives release their joints.")] = False,
     harmonics: Annotated[int, option("Of the drive that are compared.")] = 5,
     shapes: Annotated[int, option("Lowest mode shapes that are drawn, and animated for ParaView.")] = 0,
     link: Annotated[str | None, option("One link of the scene alone.", "NAME")] = None,
@@ -80,7 +80,7 @@ def frequencies(
     folder: Annotated[Path | None, goes_to("SCENE-frequencies beside the scene")] = None,
     within: Within = False,
 ) -> None:
-    """Natural frequencies: of the linkage frozen at positions over a turn, or of one link or part, free or held."""
+    """Natural frequencies: of the linkage frozen at positions over a revolution, or of one link or part, free or held."""
     from kedfem.frequencies import Wanted, link_of_scene, part_frequencies, part_from_file
     from kedfem.frequencies import frequencies as found_of
     from kedfem.mesh import CAD_ENDINGS
@@ -104,7 +104,7 @@ def frequencies(
         if of_file:
             shape = given(kind="cad" if cad else "mesh", file=what.name, solid=solid, scale=scale)
             sizes = given(size=size, elements_across=across, unknowns=unknowns)
-            meshed = link_from(given(shape=shape, mesh=sizes, element=element))
+            meshed = link_from(given(shape=shape, mesh=sizes or None, element=element))
             faces = [face_from("--hold", each) for each in hold or []]
             part = part_from_file(what, meshed, material_from("--material", material), faces)
             found = part_frequencies(part, modes, folder, watch, shapes)

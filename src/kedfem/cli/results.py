@@ -1,4 +1,4 @@
-"""Commands about results that are there: `kedfem loads`, `compare`, `report`, `view`."""
+"""Commands that read results: `kedfem loads`, `compare`, `report`, `view`."""
 
 from pathlib import Path
 from typing import Annotated

@@ -99,9 +99,9 @@ def check(scene: ScenePath, quick: Quick = False, within: Within = False) -> Non
         plan, ready, reduction = ready_to_step(loaded, stage)
     found = sizes(loaded, ready.model)
     say(size_line(found))
-    doubts = (*size_warnings(loaded, found), *mass_damping_warning(ready))
+    warnings = (*size_warnings(loaded, found), *mass_damping_warning(ready))
     tried = forecast(ready)
-    show([assembly_table(assembly), *check_tables(ready, reduction, plan, tried)], doubts)
+    show([assembly_table(assembly), *check_tables(ready, reduction, plan, tried)], warnings)
     if tried[1] is not None:
         raise tried[1]
 

@@ -1,4 +1,4 @@
-"""What the commands print on: the two streams, tables, warnings, progress bars."""
+"""Output of the commands: the two streams, tables, warnings, progress bars."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager

@@ -8,7 +8,7 @@ DEPTH = 4  # iterations that are remembered
 SAME = 1e-8  # pairs that repeat each other
 
 
-class Mixing:
+class AndersonAcceleration:
     """Anderson acceleration of iterations: the step whose change, extrapolated from the last few iterations, is smallest.
 
     Anderson (1965), as Walker and Ni (2011) write it. It costs a few products and settles what single iterations do not:

@@ -14,8 +14,8 @@ RIDGE = 1e-13  # of a pair's own square: pairs that repeat each other
 
 
 @inner
-def mixed(memory, counts, iteration, change):  # type: ignore[no-untyped-def]
-    """Anderson acceleration, see `dynamics.anderson.Mixing`: the change asked for becomes the step to take."""
+def accelerated(memory, counts, iteration, change):  # type: ignore[no-untyped-def]
+    """Anderson acceleration, as `dynamics.anderson` has it: the change asked for becomes the step to take."""
     pairs, products, last, room = memory
     depth, N = pairs.shape[1:]
     known, slot = int(counts[2]), int(counts[3])

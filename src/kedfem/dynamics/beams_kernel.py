@@ -1,4 +1,4 @@
-"""Planar beams whose frames follow the tangent at each Gauss point, compiled by numba: strains, and the force they make.
+"""Planar beams whose frames follow the tangent at each Gauss point, compiled by numba: their strains and internal force.
 
 At a point, with x' the derivative of the position by arc length in the reference position, where |x'| = 1, and θ the
 angle it has turned,

@@ -6,12 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from kedfem.arrays import Float
+from kedfem.dynamics.inertias import hinge_axis
 from kedfem.dynamics.joints.attachments import SharedCut
 from kedfem.dynamics.joints.constraint_joints import needs_rows
 from kedfem.dynamics.joints.constraint_ports import LinkageLayout, slot_travels
 from kedfem.dynamics.joints.coupling import joined
 from kedfem.dynamics.joints.places import on_part, part_surface, slider_axis, slider_guide
-from kedfem.dynamics.joints.rigid_couplings import with_stiff_ports
+from kedfem.dynamics.joints.rigid_couplings import with_rigid_couplings
 from kedfem.dynamics.loads import patterns, slider_pattern
 from kedfem.dynamics.model import Model, PrescribedBody, Slider
 from kedfem.dynamics.moving_ground import moving_ground
@@ -27,7 +28,7 @@ from kedfem.links.reduced import rigid
 from kedfem.links.segments import Segments
 from kedfem.links.surfaces.coupling_surfaces import (
     CouplingSurface,
-    holds,
+    determines_gradient,
     is_flat,
     joint_surface,
     port_weights,
@@ -36,15 +37,29 @@ from kedfem.links.surfaces.coupling_surfaces import (
 from kedfem.motion.joint_equations import joint_axis, unit
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
-from kedfem.scene import Body, Flywheel, ForceLoad, PointMass, RigidBody, Scene, inertia_tensor, moving_grounds, rayleigh
+from kedfem.scene import (
+    GROUND,
+    Body,
+    Flywheel,
+    ForceLoad,
+    Joint,
+    PointMass,
+    RigidBody,
+    Scene,
+    inertia_tensor,
+    moving_grounds,
+    rayleigh,
+)
 from kedfem.scene.checks.capabilities import SLIDERS
+
+PARALLEL = 1e-9  # sine of the angle between axes
 
 
 def elastic_model(
     scene: Scene, linkage: Linkage, known: Mapping[str, Link] | None = None, along: Path | None = None,
     elements: bool = False,
 ) -> Model:  # fmt: skip
-    """Mesh and assemble all links and tie them together; rigid links become stiff or go with the drive.
+    """The elastic model of a scene: links meshed, assembled and joined; rigid links become stiff or prescribed.
 
     Parameters
     ----------
@@ -61,19 +76,19 @@ def elastic_model(
     """
     cut = {name: parted(scene, name, link) for name, link in bare_links(scene, known).items()}
     links = {key: part for name, link in cut.items() for key, part in zip(keys(name, link), link.parts, strict=True)}
-    links = with_stiff_ports(scene, links)
+    links = with_rigid_couplings(scene, links)
     ground = moving_grounds(scene)
-    links |= {name: moving_ground(scene, name, hub) for name, hub in ground.items()}
+    links |= {name: moving_ground(scene, name, drive_joint) for name, drive_joint in ground.items()}
     for key, body in scene.bodies.items():
         if body.link in cut or body.link in ground:
             on, carrier = with_scene_body(scene, f"bodies.{key}", body, links)
             links[on] = carrier
     prescribed = tuple(
-        PrescribedBody(x if (x := links.pop(name)).rigid else rigid(x), linkage.bodies.index(name), hub, ())
-        for name in [*cut, *ground] if (hub := hub_of(scene, name)) is not None
+        PrescribedBody(x if (x := links.pop(name)).rigid else rigid(x), linkage.bodies.index(name), drive_joint, ())
+        for name in [*cut, *ground] if (drive_joint := drive_joint_of(scene, name)) is not None
     )  # fmt: skip
     if not links:
-        wanted = "must hold a link that the drive does not simply carry along, got rigid ones only"
+        wanted = "must have a link whose motion no drive prescribes, got rigid ones only"
         raise SceneError([Fault(("links",), wanted)])
     prescribed = tuple(
         replace(x, loads=patterns(scene, {x.link.name: x.link}, prescribed=True)[x.link.name]) for x in prescribed
@@ -113,7 +128,7 @@ def _shared(name: str, link: Segments) -> list[SharedCut]:
     ]
 
 
-def hub_of(scene: Scene, name: str) -> str | None:
+def drive_joint_of(scene: Scene, name: str) -> str | None:
     """The driven joint by which a link, if it is rigid, turns on the ground with a drive; that of a moving ground."""
     if scene.links[name].model != "rigid":
         return None
@@ -124,14 +139,14 @@ def hub_of(scene: Scene, name: str) -> str | None:
 
 
 def with_scene_body(scene: Scene, where: str, body: Body, links: Mapping[str, Link]) -> tuple[str, Link]:
-    """The link or segment that carries a body, and it with the body."""
+    """The key of the link or segment that a body is attached to, and the link with the body."""
     at = np.asarray(body.at)
     near = 1e-6 * max(link.size for link in links.values() if link.name == body.link)
     here = [j for j in scene.joints.values() if body.link in j.links and np.linalg.norm(np.subtract(j.at, at)) <= near]
     axis = next((unit(j.axis) for j in here if j.axis and j.kind != "prismatic"), None)
     faces = next((j.face_names(body.link) for j in here if body.link in j.faces), ())
     if scene.links[body.link].model == "rigid" and links[body.link].kind == "solid":
-        return body.link, _carrying(links[body.link], rigid_link_surface(links[body.link], at), where, body, axis)
+        return body.link, _carrying(scene, links[body.link], rigid_link_surface(links[body.link], at), where, body)
     try:
         key, surface = on_part(links, body.link, at, lambda link: joint_surface(link, f"{where}.at", at, axis, faces))
     except MeshError:
@@ -140,28 +155,49 @@ def with_scene_body(scene: Scene, where: str, body: Body, links: Mapping[str, Li
         key, point = on_part(links, body.link, at, lambda link: point_rows(link, f"{where}.at", at))
         require_on_axis(links[key], f"{where}.at", at, point.X, "planar beam")
         return key, with_point_mass(links[key], point.value, body.mass)
-    return key, _carrying(links[key], surface, where, body, axis)
+    return key, _carrying(scene, links[key], surface, where, body)
 
 
-def _carrying(link: Link, surface: CouplingSurface, where: str, body: Body, axis: Float[np.ndarray, "3"] | None) -> Link:
+def _tilts(scene: Scene, link: str, axis: Float[np.ndarray, "3"]) -> bool:
+    """Whether a link may rotate about other axes than one, which neither its hinge on the ground nor all joints fix."""
+
+    def parallel(joint: Joint) -> bool:
+        if joint.axis is None or joint.kind == "slot":
+            return False
+        return bool(np.linalg.norm(np.cross(unit(joint.axis), axis)) < PARALLEL)
+
+    turning = [joint for joint in scene.joints.values() if joint.kind not in {"weld", "prismatic"}]
+    fixed = (parallel(x) for x in turning if x.kind == "revolute" and set(x.links) == {link, GROUND})
+    return not any(fixed) and not all(map(parallel, turning))
+
+
+def _carrying(scene: Scene, link: Link, surface: CouplingSurface, where: str, body: Body) -> Link:
     at = np.asarray(body.at)
     match body:
         case Flywheel(mass=mass, inertia=inertia):
-            spin = unit((0, 0, 1)) if axis is None else axis
-            if not link.planar and not holds(surface, spin):
+            spin = hinge_axis(scene, body)
+            if not link.planar and not determines_gradient(surface, spin):
                 raise MeshError(f"{where}.at: a flywheel must sit on {_wide_surface(link)}")
+            if is_flat(surface) and not link.planar and _tilts(scene, body.link, spin):
+                wanted, got = _whole_surface(link)
+                raise MeshError(
+                    f"{where}.at: a flywheel whose axis may tilt must sit on {wanted}, got {got} of '{link.name}'"
+                )
             return with_body(link, surface, mass, at, flywheel_tensor(surface, spin, inertia))
         case PointMass(mass=mass):
             return with_body(link, surface, mass, at, np.zeros((3, 3)))
         case RigidBody(mass=mass, inertia=inertia, centre=centre):
             if is_flat(surface):
-                wanted, got = (
-                    ("an end or a corner", "another node") if link.kind == "spatial_beam" else ("a bore", "a flat face")
-                )
+                wanted, got = _whole_surface(link)
                 raise MeshError(
                     f"{where}.at: a rigid body with full inertia must sit on {wanted}, got {got} of '{link.name}'"
                 )
             return with_body(link, surface, mass, np.asarray(centre), euler_tensor(inertia_tensor(inertia)))
+
+
+def _whole_surface(link: Link) -> tuple[str, str]:
+    """A coupling surface that shows how a link's displacement changes in all directions, and one that does not."""
+    return ("an end or a corner", "another node") if link.kind == "spatial_beam" else ("a bore", "a flat face")
 
 
 def _wide_surface(link: Link) -> str:

@@ -90,7 +90,7 @@ def deformation(link: Link, y: Nodal, Q: Float[np.ndarray, "d d"], angle: float)
 
 
 def seen_from(link: Link, frame: Frame, y: Nodal, y1: Nodal | None = None) -> Deformed:
-    """A frame within half a turn of the rigid-body one, with what it sees of a rate.
+    """A frame within half a revolution of the rigid-body one, with what it sees of a rate.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Segments with one frame that follows them, compiled by numba: as `dynamics.frames` has it."""
+"""Segments with one co-rotational frame, compiled by numba: rotation, deformation and force, as in `dynamics.frames`."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ TURNS = 50
 
 @inner
 def strained(rates, i, kind, shapes, fit, R, u, before, now, Q, angle, out, work):  # type: ignore[no-untyped-def]
-    """What segment i sees of the displacement u from its frame, with its rates; out becomes g + β g'.
+    """Deformation of segment i in its frame at the displacement u, with its rates; out becomes g + β g'.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def strained(rates, i, kind, shapes, fit, R, u, before, now, Q, angle, out, work
 
 @inner
 def balanced(i, kind, fit, R, now, Q, f, work):  # type: ignore[no-untyped-def]
-    """Add to f (L, D, n), world components, the force of segment i that K makes of its strain, balanced.
+    """Add to f (L, D, n), world components, the internal force of segment i, in balance.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the time integration hands on: all links over a block of time points."""
+"""Records that the time integration returns: states and forces of all links over a block of time points."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
@@ -12,7 +12,7 @@ from kedfem.motion.rigid import RigidMotion
 
 @dataclass(frozen=True, slots=True)
 class Forcing:
-    """What rigid motion and loads do to one link over T time points.
+    """Rigid motion and loads of one link over T time points.
 
     R : (T, d, d) orientation, link to world
     F : (T, n, d) P − M R0'', world components [N]
@@ -38,7 +38,7 @@ class Forcing:
 
 @dataclass(frozen=True, slots=True)
 class Products:
-    """Products with the state that a solver has at hand anyway; all (T, n, d), those that are not needed (T, 0, 0).
+    """Products of matrices with the state, which a solver has anyway; all (T, n, d), those not needed (T, 0, 0).
 
     Mv : M δ', world components [kg m/s]
     Kg, Cg : K0 g [N] and C0 g [N s], link frame; Cg is None without damping,
@@ -114,7 +114,7 @@ class LinkMoment:
 
 
 def bent(u: Float[np.ndarray, "n d"], R: Float[np.ndarray, "d d"]) -> LinkMoment:
-    """A link that is bent and does not move; u in world components."""
+    """A link with a constant deflection u (world components) and no rates."""
     none = np.zeros_like(u)
     return LinkMoment(u, none, none, u @ R, R, none, np.zeros(0), 0.0)
 

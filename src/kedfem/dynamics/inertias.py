@@ -147,8 +147,8 @@ def inertias_of_links(scene: Scene, linkage: Linkage, links: Mapping[str, Link])
             _add_body(out, scene, linkage, each)
     bare = [name for name in scene.links if name not in links and slider_axis(scene, name) is None]
     _add_forces(out, scene, linkage, bare)
-    for name, hub in moving_grounds(scene).items():
-        out.add(linkage.bodies.index(name), scene.links[name].mass, np.asarray(scene.joints[hub].at))
+    for name, drive_joint in moving_grounds(scene).items():
+        out.add(linkage.bodies.index(name), scene.links[name].mass, np.asarray(scene.joints[drive_joint].at))
     _add_sliders(out, scene, linkage)
     return out
 
@@ -237,11 +237,11 @@ def _add_body(out: Inertias, scene: Scene, linkage: Linkage, body: Body) -> None
         case RigidBody(mass=mass, inertia=inertia, centre=centre):
             out.add(number, mass, np.asarray(centre), euler_tensor(inertia_tensor(inertia)))
         case Flywheel(mass=mass, inertia=inertia):
-            axis = _axis_at(scene, body)
+            axis = hinge_axis(scene, body)
             out.add(number, mass, at, inertia / 2 * (np.eye(3) - np.outer(axis, axis)))
 
 
-def _axis_at(scene: Scene, body: Flywheel) -> Vector:
+def hinge_axis(scene: Scene, body: Flywheel) -> Vector:
     """Axis of the hinge that a flywheel sits on."""
     hinges = [x for x in scene.joints.values() if body.link in x.links and x.kind in ROTARY]
     nearest = min(hinges, key=lambda x: float(np.linalg.norm(np.subtract(x.at, body.at))))

@@ -87,7 +87,7 @@ def _turns(link: Link, pattern: Pattern) -> bool:
 
 
 def coarse_steps(scene: Scene) -> tuple[str, ...]:
-    """A warning for each load or spring whose factor does something between the time steps that these do not see."""
+    """A warning for each load or spring whose factor changes between two time steps without effect on them."""
     grid, out = time_grid(scene), []
     steps = grid.step * np.arange(grid.steps + 1)
     phi = path_parameter(scene, steps)[0] if scene.driven else np.zeros_like(steps)
@@ -169,14 +169,17 @@ def initial_forces(scene: Scene, links: Sequence[Link]) -> list[Float[np.ndarray
     Raises
     ------
     MeshError, SceneError
-        If a point is not on its link, or a drive holds this where it is.
+        If a point is not on its link, or a drive prescribes the link's motion.
     """
     out = [np.zeros((link.n, link.d)) for link in links]
     parts = {str(k): link for k, link in enumerate(links)}
     for name, force in scene.analysis.initial_deflection.items():
         where = f"analysis.initial_deflection.{name}"
         if all(link.name != force.link for link in links):
-            raise SceneError(f"{where}.link: must name a link that can give, got '{force.link}', which its drive holds")
+            raise SceneError(
+                f"{where}.link: must name an elastic link, or a rigid one that no drive prescribes, "
+                f"got '{force.link}', whose motion is prescribed"
+            )
         key, weights = at_point(where, force.link, np.asarray(force.at), parts)
         out[int(key)] += np.outer(weights, as_rows(parts[key], np.asarray(force.force)))
     return out
@@ -196,7 +199,7 @@ def rigid_acceleration(link: Link, motion: RigidMotion, body: int) -> Float[np.n
 
 
 def amounts(load: Pattern, motion: RigidMotion, body: int) -> Float[np.ndarray, " T"]:
-    """What a load's forces are multiplied by over time."""
+    """The factor of a load over time."""
     return load.factor(motion.t, motion.phi) * shares(load.share, motion, body)
 
 

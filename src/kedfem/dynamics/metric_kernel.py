@@ -1,4 +1,4 @@
-"""Elements of beams in space by the change of their metric, compiled by numba: as `links.metric` has it.
+"""Strains and forces of elements of beams in space, compiled by numba: as in `links.beams.metric`.
 
 Tables are those of `dynamics.metric.Elements`, room is that of `dynamics.metric.room_for`.
 """

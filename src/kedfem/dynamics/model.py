@@ -21,7 +21,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Slider:
-    """A rigid slider on a line of the ground: its mass and forces ride on the link that it is joined to.
+    """A rigid slider on a line of the ground: its mass and forces act on the link that it is joined to.
 
     name, mass [kg] : of the slider
     guide, joint : its prismatic joint, and the joint with the elastic link
@@ -47,19 +47,19 @@ class PrescribedBody:
 
     link : its record, with attached bodies
     body : its number in the linkage
-    hub : the driven joint
+    drive_joint : the driven joint
     loads : per load
     """
 
     link: Link
     body: int
-    hub: str
+    drive_joint: str
     loads: tuple[Pattern, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """Everything that the time integration needs, constant.
+    """The constant data of the time integration.
 
     bodies : number of each link in the linkage
     joints, loads : per link
@@ -121,7 +121,7 @@ def mesh_methods(model: Model) -> dict[str, str]:
 
 
 def on_segment(links: Sequence[Link], name: str, at: Float[np.ndarray, "3"], found: Callable[[Link], T]) -> tuple[int, T]:
-    """The number of the link of a name, or of its segment, that has something at a drawn point, and what was found.
+    """The number of a link, or of its segment, that has something at a reference point, and what was found.
 
     Raises
     ------

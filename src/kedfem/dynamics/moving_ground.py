@@ -17,16 +17,16 @@ EDGE = 0.02  # of the cube that is drawn for one, of the scene's size; nothing i
 ANY = Material(density=1.0, youngs_modulus=1.0, poisson_ratio=0.0)
 
 
-def moving_ground(scene: Scene, name: str, hub: str) -> Link:
+def moving_ground(scene: Scene, name: str, drive_joint: str) -> Link:
     """The record of a moving part of the ground: a cube at its driven joint, of its own mass there and no other.
 
     Parameters
     ----------
-    hub : the driven joint
+    drive_joint : the driven joint
     """
     from kedfem.mesh import link_mesh
 
-    at = np.asarray(scene.joints[hub].at, float)
+    at = np.asarray(scene.joints[drive_joint].at, float)
     edge = EDGE * scene_size(scene)
     x, y, z = at.tolist()
     ends = ((x - edge / 2, y, z), (x + edge / 2, y, z))

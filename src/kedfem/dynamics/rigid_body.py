@@ -15,7 +15,7 @@ from kedfem.motion.rigid import RigidMotion, joined, rigid_motion
 from kedfem.scene import ConstantSpeed, Scene, path_parameter, time_grid, turn_steps
 
 POINTS = 1024  # time points of rigid motion found together
-KEPT = 20_000  # time points of a turn whose rigid motion is kept
+KEPT = 20_000  # time points of a revolution whose rigid motion is kept
 
 
 def all_motions(scene: Scene, linkage: Linkage, along: Path) -> Iterator[tuple[int, RigidMotion]]:

@@ -1,4 +1,4 @@
-"""Forces of motors, springs and limits were all links rigid, at any times of the motion.
+"""Forces of motors, springs and limits were all links rigid, at any times of the motion; and their ends on links.
 
 Their coordinates depend on the times before in one thing only: rotations of hinges are counted on beyond ±π. How often a
 hinge has turned is known along the path of the linkage, so that any part of the motion can be asked for by itself.
@@ -10,125 +10,192 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.force_element import POINT, TURN, End, ForceElement, coordinate, effort, placed, unit_forces, wrench
-from kedfem.dynamics.force_elements import force_elements
-from kedfem.dynamics.model import Model
+from kedfem.dynamics.force_elements import force_elements, law_of, places, term_of
+from kedfem.dynamics.history import Block
+from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, direction
+from kedfem.dynamics.joints.constraint_ports import LinkageLayout, element_joint
+from kedfem.dynamics.model import Model, link_keys
+from kedfem.dynamics.system.ends import end_of, rigid_end
+from kedfem.dynamics.system.forces.poses import forces_in_place, value
+from kedfem.dynamics.system.forces.supports import Pushed, exerted
+from kedfem.dynamics.system.record import ANGLE, Curve, End, Law, Spring, Stop, Term, Times, stiffness_factors
 from kedfem.links.record import Link
-from kedfem.motion.path import Path, place_on
+from kedfem.motion.constraints import cross
+from kedfem.motion.counted_turns import turn_of
+from kedfem.motion.linkage import Linkage
+from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, resting
 from kedfem.scene import Scene
 
-Forces = Float[np.ndarray, "T A 2 2 3"]
+Vectors = Float[np.ndarray, "T 3"]
+
+
+@dataclass(frozen=True, slots=True)
+class OnLink:
+    """An end of a term, on a link of a model: number of the link, and weights (p, n) of the end's points.
+
+    k, d : −1 where nothing but the rigid-body motion moves it; components of the link
+    """
+
+    end: End
+    k: int = -1
+    d: int = 3
+    weights: Float[np.ndarray, "p n"] | None = None
+
+    def unknowns(self, block: Block) -> Float[np.ndarray, "T c"]:
+        """Displacements of its points, one after the other, on which the end's columns are."""
+        if self.weights is None:
+            return np.zeros((len(block), 0))
+        u = self.weights @ block.links[self.k].u
+        return np.asarray(u[:, :, : self.end.onto.shape[1]].reshape(len(block), -1))
+
+    def nodal(self, motion: RigidMotion, force: Vectors, moment: Vectors) -> Float[np.ndarray, "T n d"]:
+        """Nodal forces that do what a force and a moment on the end do in the rigid-body motion, world components."""
+        if self.weights is None:
+            raise ValueError("an end must be on a link to have nodal forces, got one that is on none")
+        y = forces_in_place(self.end, motion, force[:, None], moment[:, None])[:, 0]
+        out = np.zeros((len(y), self.weights.shape[1], self.d))
+        out[:, :, : y.shape[2]] = self.weights.T @ y
+        return out
+
+
+def on_links(model: Model, joint: ConstraintJoint, at: Sequence[Float[np.ndarray, "3"]]) -> tuple[OnLink, OnLink]:
+    """Both sides of a joint without rows, as ends whose unknowns are the displacements of their own points.
+
+    Parameters
+    ----------
+    at : where each is, in the reference position [m]
+    """
+    keys, first, found = link_keys(model), 0, list[OnLink]()
+    for side, body, point in zip(joint.sides, joint.bodies, at, strict=True):
+        rider = next((x for x in model.sliders if side is not None and x.name == side.slider), None)
+        if side is None:
+            found.append(OnLink(rigid_end(body, point)))
+            continue
+        k = rider.carrier if rider else keys.index(side.keys[0])
+        d = (2 if model.links[k].planar else 3) if rider else side.components
+        c = d * len(side.points)
+        own = replace(side, onto=np.eye(c).reshape(-1, d, c), columns=first + np.arange(c))
+        weights, first = (rider.weights[None] if rider else np.asarray(side.weights)), first + c
+        found.append(OnLink(end_of(own, joint), k, model.links[k].d, weights))
+    return found[0], found[1]
+
+
+def links_of(model: Model, names: Sequence[str]) -> tuple[dict[str, Link], LinkageLayout]:
+    """What joints ask of a model without slots."""
+    layout = LinkageLayout({name: n for n, name in enumerate(names)}, {})
+    return dict(zip(link_keys(model), model.links, strict=True)), layout
+
+
+@dataclass(frozen=True, slots=True)
+class RigidElement:
+    """A force element between two ends; `turns`: name of the joint whose counted turns it acts on, empty of others."""
+
+    law: Law
+    term: Term
+    on: tuple[OnLink, OnLink]
+    turns: str = ""
+
+    @property
+    def ends(self) -> tuple[End, End]:
+        """Of its term."""
+        return self.on[0].end, self.on[1].end
 
 
 @dataclass(frozen=True, slots=True)
 class RigidElements:
-    """Force elements whose ends move as the rigid-body motion has them.
+    """Force elements whose ends move as the rigid-body motion has them; along : path of that motion."""
 
-    along : path of that motion
-    turned : (G, A) rotations of hinges at its grid points, counted on from the reference position [rad]; zero of others
-    """
-
-    every: Sequence[ForceElement]
+    every: Sequence[RigidElement]
+    scene: Scene
+    linkage: Linkage
     along: Path
-    turned: Float[np.ndarray, "G A"]
 
-    def over(self, motion: RigidMotion) -> tuple[Forces, Forces]:
-        """Vectors of all ends at the times of a motion, and the forces on them.
+    def over(self, motion: RigidMotion) -> list[list[Pushed]]:
+        """Both ends of each element at the times of a motion, with the force and the moment on them there."""
+        return [self._pushed(each, motion) for each in self.every]
 
-        Parameters
-        ----------
-        motion : between successive times no hinge turns by π
+    def _pushed(self, each: RigidElement, motion: RigidMotion) -> list[Pushed]:
+        unit, q = exerted(each.term, each.ends, motion, None), value(each.term, each.ends, motion, None)
+        if each.turns:
+            tau = motion.t if motion.drives.shape[1] > 1 else motion.phi
+            near = turn_of(self.scene, self.linkage, self.along, each.turns, tau)
+            q = q + 2 * np.pi * np.round((near - q) / (2 * np.pi))
+        rate = np.zeros(len(q))
+        for end, x, f, t in unit:
+            omega = motion.omega[:, end.body]
+            v = motion.v[:, end.body] + cross(omega, x - motion.p[:, end.body])
+            rate += (f * v + t * omega).sum(axis=1)
+        Q = effort(each.law, motion, q, rate)[:, None]
+        return [(end, x, Q * f, Q * t) for end, x, f, t in unit]
+
+    def wrenches(self, motion: RigidMotion) -> Iterator[tuple[int, Vectors, Vectors]]:
+        """Number of the body of every end, and the force and the moment about the world's origin on it (T, 3)."""
+        for pushed in self.over(motion):
+            yield from ((end.body, f, t + cross(x, f)) for end, x, f, t in pushed)
+
+    def loads(self, motion: RigidMotion) -> Iterator[tuple[int, Float[np.ndarray, "T n d"]]]:
+        """Nodal forces on links of the model, by number, world components."""
+        for each, pushed in zip(self.every, self.over(motion), strict=True):
+            for on, (_, _, f, t) in zip(each.on, pushed, strict=True):
+                if on.k >= 0:
+                    yield on.k, on.nodal(motion, f, t)
+
+    def unit_loads(self, k: int) -> list[Float[np.ndarray, "n d"]]:
+        """Nodal forces, link frame, that those on a link of the model are combinations of at all times.
+
+        Torques about axes of hinges have the same directions on a link at all times, forces at points and torques on a
+        cross may have any.
         """
-        x, forces = np.zeros((2, len(motion.t), len(self.every), 2, 2, 3))
-        for i, (element, before) in enumerate(zip(self.every, self._turned(motion), strict=True)):
-            x[:, i], v = placed(element, motion)
-            unit = unit_forces(element, x[:, i])
-            rate = (unit * v).sum(axis=(1, 2, 3))
-            Q = effort(element.law, motion, coordinate(element, x[:, i], float(before)), rate)
-            forces[:, i] = Q[:, None, None, None] * unit
-        return x, forces
-
-    def wrenches(self, motion: RigidMotion) -> Iterator[tuple[End, Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]]:
-        """Force and moment about the world's origin (T, 3) of every end."""
-        x, forces = self.over(motion)
-        for i, e, end in self.ends():
-            yield end, *wrench(end, x[:, i, e], forces[:, i, e])
-
-    def ends(self, k: int | None = None) -> Iterator[tuple[int, int, End]]:
-        """Numbers of element and end, and the end: all, or those on a link of the model."""
-        for i, element in enumerate(self.every):
-            for e, end in enumerate(element.ends):
-                if k is None or end.k == k:
-                    yield i, e, end
-
-    def _turned(self, motion: RigidMotion) -> Float[np.ndarray, " A"]:
-        """Rotations near the first of these times."""
-        tau = (motion.t if motion.drives.shape[1] > 1 else motion.phi)[:1]
-        k, s, periods = place_on(self.along, tau)
-        near = np.minimum(k + (s > 0.5), len(self.turned) - 1)
-        return np.asarray((self.turned[near] + periods * (self.turned[-1] - self.turned[0]))[0])
+        out, still = list[Float[np.ndarray, "n d"]](), resting(len(self.linkage.bodies), np.zeros(1))
+        for each in self.every:
+            for on, at in zip(each.on, (each.term.a, each.term.a_j), strict=True):
+                if on.k != k:
+                    continue
+                units = [(e, cross(at - on.end.origin, e)) for e in np.eye(3)]
+                if each.term.kind == ANGLE:
+                    units = [direction(each.term)] if each.turns else [(np.zeros(3), e) for e in np.eye(3)]
+                for f, t in units:
+                    out.append(on.nodal(still, f[None], t[None])[0])
+        return out
 
 
-def on_rigid_motion(every: Sequence[ForceElement], along: Path) -> RigidElements:
-    """Force elements on the rigid-body motion along a path."""
-    start = int(np.abs(along.phi).argmin())
-    turned = np.zeros((len(along.phi), len(every)))
-    for order in (np.arange(start, len(along.phi)), np.arange(start, -1, -1)):
-        here = replace(resting(along.R.shape[1], np.zeros(len(order))), R=along.R[order])
-        for i, element in enumerate(every):
-            if element.kind == TURN:
-                turned[order, i] = coordinate(element, placed(element, here)[0])
-    return RigidElements(every, along, turned)
+def rigid_elements(scene: Scene, linkage: Linkage, along: Path, model: Model | None = None) -> RigidElements | None:
+    """The force elements of a scene on the rigid-body motion along a path; None if there are none.
 
-
-def rigid_elements_of(scene: Scene, model: Model, along: Path) -> RigidElements | None:
-    """The motors and springs of a scene on a model's links, without their deflection; None if there are none.
-
-    Not its limits: how hard stops are met depends on what gives, and where stiff ones are it is nothing like this.
+    Parameters
+    ----------
+    model : whose links they act on. Without limits then: how hard stops are met depends on what gives, and where stiff
+        ones are it is nothing like this
 
     Raises
     ------
     MeshError, SceneError
         If a point or joint is not on its link.
     """
-    every = force_elements(scene.model_copy(update={"limits": {}}), model)
-    return on_rigid_motion(every, along) if every else None
+    every, parts = list[RigidElement](), None if model is None else links_of(model, linkage.bodies)
+    for name, element in force_elements(scene if model is None else scene.model_copy(update={"limits": {}})):
+        (i, a), (j, a_j) = places(scene, element)
+        one, other = (OnLink(rigid_end(linkage.bodies.index(link), at)) for link, at in ((i, a), (j, a_j)))
+        if model is not None and parts is not None:
+            one, other = on_links(model, element_joint(scene, name, element, *parts), (a, a_j))
+        term = term_of(scene, element, one.end, other.end)
+        counted = term.kind == ANGLE and getattr(element, "about", None) is None
+        every.append(RigidElement(law_of(element), term, (one, other), str(element.joint) if counted else ""))
+    return RigidElements(every, scene, linkage, along) if every else None
 
 
-def with_elements(
-    k: int, F: Float[np.ndarray, "T n d"], elements: RigidElements, forces: Forces
-) -> Float[np.ndarray, "T n d"]:
-    """Loads on a link of a model with those of force elements, world components.
-
-    Parameters
-    ----------
-    k : its number
-    forces : on all ends
-    """
-    for i, e, end in elements.ends(k):
-        F = F + _nodal(end, F.shape[2], forces[:, i, e])
-    return F
-
-
-def unit_loads_on(k: int, link: Link, elements: RigidElements) -> list[Float[np.ndarray, "n d"]]:
-    """Nodal forces, link frame, that the forces of elements on a link are combinations of at all times.
-
-    Torques have the same directions on a link at all times, forces at points may have any.
-    """
-    out, space = [], 2 if link.planar else 3
-    still = resting(1 + max((end.body for _, _, end in elements.ends()), default=0), np.zeros(1))
-    for i, e, end in elements.ends(k):
-        if end.form == POINT:
-            units = np.zeros((space, 2, 3))
-            units[np.arange(space), 0, np.arange(space)] = 1.0
-        else:
-            units = unit_forces(elements.every[i], placed(elements.every[i], still)[0])[:, e]
-        out += list(_nodal(end, link.d, units))
-    return out
-
-
-def _nodal(end: End, d: int, f: Float[np.ndarray, "T 2 3"]) -> Float[np.ndarray, "T n d"]:
-    """What forces on an end's vectors are at the nodes of its link."""
-    on_rows = (f * end.mask)[:, : len(end.weights), :d]
-    return np.asarray(end.weights.T @ on_rows)
+def effort(law: Law, motion: RigidMotion, q: Times, rate: Times) -> Times:
+    """The force of a law along its coordinate at the times of a motion."""
+    match law:
+        case Curve(over=over, force=force):
+            return force((motion.t, rate, q)[over])[0]
+        case Spring(stiffness=k, damping=c, free=free, factor=factor, curve=curve):
+            along = k * stiffness_factors([factor], motion.t, motion.phi)[:, 0] * (free - q) - c * rate
+            return along if curve is None else along + effort(curve, motion, q, rate)
+        case Stop(lower=lower, upper=upper, stiffness=k, damping=c):
+            beyond = q - np.clip(q, lower, upper)
+            Q = -k * beyond - c * rate
+            return np.where(Q * beyond < 0.0, Q, 0.0)  # it pushes, and only beyond
+        case _:
+            return np.zeros_like(q)

@@ -1,4 +1,4 @@
-"""Rigid links of a model: in the span of {1, x, y, z}, and so stiff there that they do not deform beside what does."""
+"""Rigid links of a model: reduced to {1, x, y, z}, and so stiff that they do not deform beside elastic parts."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -8,7 +8,7 @@ import scipy.sparse as sp
 
 from kedfem.arrays import Float
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.stepping.scheme import borne_rotation
+from kedfem.dynamics.stepping.scheme import stable_rotation
 from kedfem.dynamics.stepping.step_limit import StepLimit
 from kedfem.errors import Fault, SceneError
 from kedfem.links.bodies import with_body, with_mass
@@ -18,7 +18,16 @@ from kedfem.links.surfaces.coupling_surfaces import rigid_link_surface
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import rigid_motion
-from kedfem.scene import AngleLimit, Scene, TorsionSpring, path_parameter, pieces, time_grid, without_vibration
+from kedfem.scene import (
+    AngleLimit,
+    Scene,
+    TorsionSpring,
+    driven_travel,
+    path_parameter,
+    pieces,
+    time_grid,
+    without_vibration,
+)
 
 LIGHT = 1e-3  # second moment of a planar beam's mass beside inertia of its sections, below which this is spread over it
 COMPACT = 1e-7  # of mass times length²: second moments, below which forces would be off by more than 1e-4
@@ -30,7 +39,7 @@ MOUNTED = 3e3  # times the frequency on the mounts: a link's own strain is 1e-7 
 def made_rigid(
     scene: Scene, links: Mapping[str, Link], linkage: Linkage, along: Path | None, thicken: bool = False
 ) -> tuple[dict[str, Link], dict[str, StepLimit]]:
-    """Links with the rigid ones made so: stiff beside the elastic ones, whatever they are made of themselves.
+    """Links, of which the rigid ones are made far stiffer than the elastic ones, whatever their material.
 
     Also what steps allow of those that they hold back.
 
@@ -54,8 +63,8 @@ def made_rigid(
             highest = min(highest, MOUNTED * _mounted(link, *soft))
         if link.fit is not None:
             if in_steps:
-                borne, h = borne_rotation(scene.analysis.rho_inf, stiff=True), time_grid(scene).step
-                limits[key] = StepLimit(highest, turning.get(link.name, np.inf), borne, h, h)
+                stable, h = stable_rotation(scene.analysis.rho_inf, stiff=True), time_grid(scene).step
+                limits[key] = StepLimit(highest, turning.get(link.name, np.inf), stable, h, h)
                 highest = limits[key].frequency
             else:
                 highest = min(highest, _beside(link, elastic))
@@ -173,7 +182,7 @@ def _mounts(scene: Scene) -> tuple[float, float]:
     for limit in scene.limits.values():
         (about if isinstance(limit, AngleLimit) else along).append(limit.stiffness)
     for name, drive in scene.driven_joints.items():
-        slides = scene.joints[name].kind == "prismatic"
+        slides = driven_travel(scene, name)
         (along if slides else about).append(drive.shaft_stiffness or 0.0)
     return max(along), max(about)
 

@@ -17,13 +17,13 @@ from kedfem.arrays import Float, Int
 from kedfem.dynamics.history import Forcing
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
-from kedfem.dynamics.joints.constraint_matrices import joint_rows
+from kedfem.dynamics.joints.constraint_matrices import constraint_matrices
 from kedfem.dynamics.joints.ports import Rotation, port_columns
 from kedfem.dynamics.loads import Pattern, applied
 from kedfem.dynamics.matrices.closed import closed
 from kedfem.dynamics.matrices.substructure import Substructure, factored, mass_matrix
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.rigid_elements import RigidElements, unit_loads_on, with_elements
+from kedfem.dynamics.rigid_elements import RigidElements
 from kedfem.dynamics.stepping.state import Nodal
 from kedfem.links.record import Link, Matrix
 from kedfem.links.reduced import rigid_modes
@@ -39,7 +39,7 @@ Turning = Callable[[Nodal], Nodal]
 
 @dataclass(frozen=True, slots=True)
 class StressModes:
-    """What the loads of the rigid-body motion can do to one link.
+    """Stress modes of one link: its stresses under the loads of the rigid-body motion.
 
     states : (m, n, d) g_i, without rigid motion, orthonormal in strain energy [1/√J times a state's unit]
     k : (m, z) their stress stiffness, entries of one sparsity pattern or all n² of dense matrices [N/m, times 1/√J]
@@ -84,7 +84,7 @@ class Stiffening:
 
     def over(self, forcing: Sequence[Forcing], motion: RigidMotion) -> list[Forcing]:
         """The same over the times of a motion with the factors s_i of the stress modes."""
-        rows = joint_rows(self.joints, motion, self.parts[0].attachment.unknowns)
+        rows = constraint_matrices(self.joints, motion, self.parts[0].attachment.unknowns)
         loads = [F @ each.R for F, each in zip(self._loads(forcing, motion), forcing, strict=True)]
         forces = closed(self.parts, [each.R for each in forcing], rows).forces(loads)
         return [
@@ -97,10 +97,9 @@ class Stiffening:
         F = [each.F for each in forcing]
         for k, link, loads, body in self.turned:
             F[k] = applied(link, loads, motion, body)
-        if self.elements is None:
-            return F
-        _, forces = self.elements.over(motion)
-        return [with_elements(k, each, self.elements, forces) for k, each in enumerate(F)]
+        for k, more in self.elements.loads(motion) if self.elements else ():
+            F[k] = F[k] + more
+        return F
 
     def turnings(self, forcing: Sequence[Forcing], motion: RigidMotion) -> list[Turning]:
         """g → k g P of all links at the first time of a motion."""
@@ -126,12 +125,12 @@ def stiffening(model: Model, elements: RigidElements | None = None) -> Stiffenin
     Raises
     ------
     SolveError
-        If nothing holds a link.
+        If a link is not supported.
     """
     parts = [factored(link, joint, 0.0, 1.0) for link, joint in zip(model.links, model.joints, strict=True)]
     modes = [
         _no_modes(link) if link.fit is not None
-        else stress_modes(link, part, loads, [] if elements is None else unit_loads_on(k, link, elements))
+        else stress_modes(link, part, loads, [] if elements is None else elements.unit_loads(k))
         for k, (link, part, loads) in enumerate(zip(model.links, parts, model.loads, strict=True))
     ]  # fmt: skip
     every = enumerate(zip(model.links, model.loads, model.bodies, strict=True))

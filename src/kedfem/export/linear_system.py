@@ -22,7 +22,7 @@ from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.probes import probe_channels
 from kedfem.results.recorded import Recorded, drive_prefix
-from kedfem.scene import Motor, Scene, time_grid
+from kedfem.scene import Motor, Scene, driven_travel, time_grid
 
 FORMAT = "kedfem state space 1"
 # of a link's size: displacements from whose differences outputs are; exact where these are linear
@@ -87,7 +87,7 @@ def state_space(
     ----------
     modes : vibrations that are kept, beside motions without strain
     at : time at which the drive is at the position [s]
-    free : whether the drives let go of their joints, and their torques or forces are inputs; else they hold them
+    free : whether the drives release their joints, and their torques or forces are inputs; else they hold them
     """
     _require(scene, modes, at, free)
     scene, assembly = assembled(scene)
@@ -129,11 +129,12 @@ def _require(scene: Scene, modes: int, at: float, free: bool) -> None:
 def _let_go(scene: Scene) -> tuple[Scene, tuple[_Element, ...]]:
     """A scene whose drives have become motors that exert nothing."""
     elements, motors = [], dict(scene.motors)
-    for joint in scene.driven_joints:
-        turns = scene.joints[joint].kind != "prismatic"
+    for joint, drive in scene.driven_joints.items():
+        turns = not driven_travel(scene, joint)
         channel = drive_prefix(scene, joint).removesuffix("/")
         element = _Element(f"drive of {joint}", channel, turns)
-        motors[element.motor] = Motor.model_validate({"joint": joint, "torque" if turns else "force": 0.0})
+        given = {"joint": joint, "about": drive.about, "along": drive.along, "torque" if turns else "force": 0.0}
+        motors[element.motor] = Motor.model_validate({key: x for key, x in given.items() if x is not None})
         elements.append(element)
     return scene.model_copy(update={"drive": None, "drives": {}, "motors": motors}), tuple(elements)
 
@@ -211,7 +212,7 @@ def _history(link: Link, R: Float[np.ndarray, "c d d"], field: str, x: Float[np.
 
 
 def _idle(space: StateSpace) -> tuple[str, ...]:
-    """Warnings of inputs that do nothing, as loads on a link that the drive holds."""
+    """Warnings of inputs that do nothing, as loads on a link that the drive prescribes."""
     size, units = np.abs(space.B).max(axis=0, initial=0.0), np.array(space.input_units)
     least = np.array([NOTHING * size[units == unit].max() for unit in units])
     return tuple(

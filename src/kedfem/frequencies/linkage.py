@@ -1,4 +1,4 @@
-"""Natural frequencies of a scene's linkage frozen at positions over a turn of its drive: table and plots."""
+"""Natural frequencies of a scene's linkage frozen at positions over a revolution of its drive: table and plots."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -40,11 +40,11 @@ BUCKLED = "frequencies: links buckle by the stresses of motion between {:.4g} an
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What is asked for.
+    """Options of an analysis of natural frequencies.
 
     modes : frequencies at each position
-    positions : over the last turn of a drive that goes on turning, else over the whole time; without a drive one
-    free : whether the drives let go of their joints; else they hold them
+    positions : over the last revolution of a drive that goes on turning, else over the whole time; without a drive one
+    free : whether the drives release their joints; else they hold them
     harmonics : of the drive whose crossings are looked for
     shapes : lowest mode shapes that are drawn, at the position whose first frequency is the lowest
     """
@@ -58,7 +58,7 @@ class Wanted:
 
 @dataclass(frozen=True, slots=True)
 class Frequencies:
-    """Of a linkage frozen at P positions.
+    """Natural frequencies of a linkage frozen at P positions.
 
     time : (P,) [s]; angle : (P,) drive angle [rad] or travel [m] there, of one that goes on turning from its first turn
     values : (P, f) natural frequencies in rising order [Hz], NaN where there are fewer
@@ -89,7 +89,7 @@ def frequencies_folder(scene: Scene) -> FilePath:
 def frequencies(
     scene: Scene, wanted: Wanted, folder: FilePath | None = None, watch: Watch = lambda stage, done, total: None
 ) -> Frequencies:
-    """Natural frequencies of a scene's linkage over a turn, or over the whole run; all links unreduced.
+    """Natural frequencies of a scene's linkage over a revolution, or over the whole run; all links unreduced.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def frequencies(
 
 
 def _without_drives(scene: Scene) -> Scene:
-    """The scene whose drives have let go of their joints."""
+    """The scene whose drives have released their joints."""
     return scene.model_copy(update={"drive": None, "drives": {}})
 
 

@@ -40,11 +40,12 @@ FROM_FILE = "frequencies: how far off they are by the mesh is not known, as one 
 class Part:
     """A link on its own.
 
-    held : what holds it, in words
+    held : its support, in words
     folder : where its frequencies go
     allowed : relative error of frequencies, as far as the mesh is open
-    finer : it with elements smaller by a factor; None of a mesh from a file
     open : whether the mesh was left open
+    given : its shape and mesh
+    remade : it, with another mesh
     """
 
     name: str
@@ -53,8 +54,9 @@ class Part:
     held: tuple[str, ...]
     folder: FilePath
     allowed: float
-    finer: Callable[[float], "Part"] | None
     open: bool
+    given: LinkScene
+    remade: Callable[[LinkScene], "Part"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,14 +102,8 @@ def part_from_file(file: FilePath, given: LinkScene, material: Material, faces: 
     words = tuple(each if isinstance(each, str) else each.label for each in faces)
     solid = getattr(given.shape, "solid", None)
     stem = file.stem if solid is None else f"{file.stem}-{solid}"
-
-    def finer(factor: float) -> Part:
-        return part_from_file(file, refined(given, factor), material, faces)
-
-    return Part(
-        file.name, link, support, words, file.with_name(f"{stem}-frequencies"), USUAL,
-        finer if refinable(given) else None, "mesh" not in given.model_fields_set,
-    )  # fmt: skip
+    folder, remade = file.with_name(f"{stem}-frequencies"), partial(part_from_file, file, material=material, faces=faces)
+    return Part(file.name, link, support, words, folder, USUAL, "mesh" not in given.model_fields_set, given, remade)
 
 
 def _facets(link: Link, face: str | ChosenFace) -> Int[np.ndarray, " f"]:
@@ -129,7 +125,7 @@ def link_of_scene(scene: Scene, name: str, joints: Sequence[str] = ()) -> Part:
 
     Parameters
     ----------
-    joints : each holds as if its other link were fixed; one with a drive does not let it turn
+    joints : each constrains the link as if its other link were fixed; one with a drive constrains the rotation too
     """
     require_elastic(scene.links, name)
     for joint in joints:
@@ -139,12 +135,13 @@ def link_of_scene(scene: Scene, name: str, joints: Sequence[str] = ()) -> Part:
     support = together(link, [held_at(scene, joint, link, _turns(scene, joint)) for joint in joints])
     folder = frequencies_folder(scene)
 
-    def finer(factor: float) -> Part:
-        return link_of_scene(with_links(scene, {name: refined(given, factor)}), name, joints)
+    def remade(given: LinkScene) -> Part:
+        return link_of_scene(with_links(scene, {name: given}), name, joints)
 
+    left_open = scene.analysis.accuracy != "quick" and "mesh" not in given.model_fields_set
     return Part(
-        name, link, support, tuple(joints), folder.with_name(f"{folder.name}-{name}"), allowed_error(scene),
-        finer if refinable(given) else None, scene.analysis.accuracy != "quick" and "mesh" not in given.model_fields_set,
+        name, link, support, tuple(joints), folder.with_name(f"{folder.name}-{name}"), allowed_error(scene), left_open,
+        given, remade,
     )  # fmt: skip
 
 
@@ -163,7 +160,7 @@ def _check(scene: Scene, name: str, joint: str) -> None:
 
 
 def _turns(scene: Scene, joint: str) -> Float[np.ndarray, "r 3"]:
-    """Directions about which a joint holds a link."""
+    """Directions about which a joint constrains a link."""
     of = scene.joints[joint]
     if of.kind == "weld" or joint in scene.driven_joints:
         return np.eye(3)
@@ -192,10 +189,17 @@ def part_frequencies(
     if part.support.clamped.all():
         raise SceneError("--hold: must leave something of the part that can move, got all of it")
     watch("frequencies", 0, 0)
-    solved, errors = _solved(part, count), np.zeros(0)
-    if part.finer:
-        solved, errors = resolved(solved, _finer, _finer if part.open else None, part.allowed)
-    warnings = mesh_warning(errors, part.allowed, "take a finer mesh") if part.finer else (FROM_FILE,)
+
+    def solved_with(part: Part) -> _Solved:
+        return _Solved(part, link_modes(part.link, part.support, count))
+
+    def smaller(made: _Solved, factor: float) -> _Solved:
+        return solved_with(made.part.remade(refined(made.part.given, factor)))
+
+    solved, errors = solved_with(part), np.zeros(0)
+    if refinable(part.given):
+        solved, errors = resolved(solved, smaller, smaller if part.open else None, part.allowed)
+    warnings = mesh_warning(errors, part.allowed, "take a finer mesh") if refinable(part.given) else (FROM_FILE,)
     part, modes = solved.part, solved.modes
     with claimed(folder or part.folder) as target:
         write_part_frequencies(target / "frequencies.csv", modes.frequencies)
@@ -209,7 +213,6 @@ def part_frequencies(
 class _Solved:
     part: Part
     modes: Modes
-    count: int
 
     @property
     def frequencies(self) -> Float[np.ndarray, " f"]:
@@ -218,16 +221,6 @@ class _Solved:
     @property
     def unknowns(self) -> int:
         return self.part.link.unknowns
-
-
-def _solved(part: Part, count: int) -> _Solved:
-    return _Solved(part, link_modes(part.link, part.support, count), count)
-
-
-def _finer(solved: _Solved, factor: float) -> _Solved:
-    if not solved.part.finer:
-        raise ValueError("a mesh from a file is not made finer")
-    return _solved(solved.part.finer(factor), solved.count)
 
 
 def _shapes(part: Part, modes: Modes, count: int) -> list[Shape]:

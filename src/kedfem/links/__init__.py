@@ -1,1 +1,1 @@
-"""Links: scalar functions times R³, with constant mass and stiffness; the only room that speaks to scikit-fem."""
+"""Links: scalar functions times R³, with constant mass and stiffness; the only package that uses scikit-fem."""

@@ -115,7 +115,7 @@ def touched(scene: Scene, name: str) -> tuple[tuple[tuple[float, float, float], 
 
 
 def parted(scene: Scene, name: str, link: Link) -> Segments:
-    """A link as the dynamics takes it: whole with a rigid-body frame, else in segments with co-rotational ones.
+    """A link for the dynamics: whole with a rigid-body frame, else divided into segments with co-rotational frames.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def _ends(scene: Scene, name: str, link: Link) -> Float[np.ndarray, "p 3"]:
 
 
 def most_segments(scene: Scene, name: str) -> int:
-    """How many segments of a solid or plane link do not soften it: none shorter than the link is wide."""
+    """The largest number of segments that do not soften a solid or plane link: none shorter than the link is wide."""
     link = bare_link(scene, name)
     return most_slices(link.X, along(link, _ends(scene, name, link)))
 

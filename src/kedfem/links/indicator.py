@@ -1,4 +1,4 @@
-"""How far a mesh is from the exact stress: the indicator of Zienkiewicz and Zhu (1987), element by element.
+"""The error of stresses in each element: the indicator of Zienkiewicz and Zhu (1987).
 
 The stress that is recovered at the nodes, averaged there and interpolated by the shape functions, is nearer to the exact
 one than the element's own. Their difference in the energy norm, of the whole, is the mesh's error in that norm:

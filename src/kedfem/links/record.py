@@ -1,4 +1,4 @@
-"""The one record that every link has, whatever its model: the whole solver rests on it.
+"""The record of a link, the same for all models; the solver uses nothing else of a link.
 
 A link is a scalar function space {N_a} with a vector at each function. Its state is an array (n, d), its mass scalar
 matrices, its stiffness K0 constant in the link frame: [KED, eqs. (9)(11)-(14)]. d is 3, but for plane links, which know
@@ -67,7 +67,7 @@ class BeamElement:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """A part of a segment's strain energy, ½ gᵀ K0 g, seen from a frame that follows a part of the segment's shape.
+    """A part of a segment's strain energy, ½ gᵀ K0 g, in a frame fitted to a part of the segment's shape.
 
     fit : (n, 3) weights of the frame's rotation: that of Σ x_a ⊗ fit_a
     K0 : (dn, dn) [N/m]
@@ -221,6 +221,8 @@ def in_space(link: Link, rows: Float[np.ndarray, "*k d"]) -> Float[np.ndarray, "
 
 def mass_times(mass: Mass, u: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "n d"]:
     """M u for a state u, component by component: M = m ⊗ I3, [KED, eqs. (9)(11)]."""
+    if all(m is mass[0] for m in mass):
+        return np.asarray(mass[0] @ u)
     out = np.empty_like(u)
     for k, m in enumerate(mass):
         out[:, k] = m @ np.ascontiguousarray(u[:, k])

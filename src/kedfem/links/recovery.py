@@ -1,4 +1,4 @@
-"""What a link's state means at a point and at its nodes: displacement weights and stresses in link axes.
+"""Displacements and stresses of a link from its state, at points and at nodes, in link axes.
 
 Stress = elasticity : sym(gradient), and the gradient is again scalar: d (n, n) matrices serve all of it.
 Gradients are taken at the superconvergent (reduced) Gauss points, extended linearly to the nodes and averaged there.

@@ -1,4 +1,4 @@
-"""Where stress is not what it seems: at sharp re-entrant edges it grows with every refinement of the mesh."""
+"""Singular stress: at sharp re-entrant edges the stress grows with every refinement of the mesh."""
 
 import numpy as np
 

@@ -1,10 +1,11 @@
-"""Solid links of hexahedra or tetrahedra: six scalar forms, and all else follows.
+"""Solid links of hexahedra or tetrahedra: mass and stiffness from six scalar forms.
 
 The only wall to scikit-fem, with `surface`.
 [KED, eqs. (4), (9), (11), (13)]; the same functions interpolate geometry and displacement (isoparametric).
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations_with_replacement
 from typing import Any
 
@@ -22,12 +23,44 @@ from kedfem.scene import Material
 QUADRATURE_ORDER = {8: 3, 10: 5, 20: 5, 27: 5}
 
 
+class HexS2(skfem.ElementHexS2):  # type: ignore[misc]
+    """Evaluated once at the same points: scikit-fem asks for every function at them again and again."""
+
+    def lbasis(self, X: Float[np.ndarray, "3 q"], i: int) -> tuple[np.ndarray, np.ndarray]:
+        """The i-th function and its gradient in the reference element."""
+        return _serendipity(X.tobytes(), X.shape, i)
+
+
+@lru_cache(maxsize=400)
+def _serendipity(points: bytes, shape: tuple[int, ...], i: int) -> tuple[np.ndarray, np.ndarray]:
+    found: tuple[np.ndarray, np.ndarray] = skfem.ElementHexS2().lbasis(np.frombuffer(points).reshape(shape), i)
+    read_only(*found)
+    return found
+
+
+class MappingOnce(skfem.MappingIsoparametric):  # type: ignore[misc]
+    """Inverts its gradient once at the same points: scikit-fem asks for it for every function."""
+
+    _last: tuple[Any, Any, np.ndarray] = (None, None, np.zeros(0))
+
+    def invDF(self, X: np.ndarray, tind: np.ndarray | None = None) -> np.ndarray:
+        """∂ξ/∂x, (3, 3, e, q)."""
+        if X is not self._last[0] or tind is not self._last[1]:
+            self._last = X, tind, super().invDF(X, tind)
+        return self._last[2]
+
+
 @dataclass(repr=False)
 class MeshHexS2(skfem.MeshHex1):  # type: ignore[misc]
     """20-node hexahedra whose geometry is serendipity too, which scikit-fem has not: on its 27-node geometry the
     20 functions would not hold x, y, z themselves, and a rigid turn would cause strain."""
 
-    elem: type[skfem.Element] = skfem.ElementHexS2
+    elem: type[skfem.Element] = HexS2
+
+    def _mapping(self) -> skfem.MappingIsoparametric:
+        if not hasattr(self, "_cached_mapping"):
+            self._cached_mapping = MappingOnce(self, self.elem(), self.bndelem)
+        return self._cached_mapping
 
 
 MESHES = {8: skfem.MeshHex1, 10: skfem.MeshTet2, 20: MeshHexS2, 27: skfem.MeshHex2}
@@ -59,16 +92,16 @@ class Pattern:
     """The one sparsity pattern of all scalar matrices of a basis: where each entry of each element goes.
 
     indices, indptr : CSR structure
-    slot : of each local entry, in scikit-fem's order
+    slot : of each local entry, column by column, rows one after the other, of all elements
     """
 
     indices: Int[np.ndarray, " nnz"]
     indptr: Int[np.ndarray, " n1"]
     slot: Int[np.ndarray, " k"]
 
-    def assembled(self, form: skfem.BilinearForm, basis: skfem.Basis) -> sp.csr_array:
-        """A scalar form as a sparse array, entries that happen to vanish kept."""
-        data = np.bincount(self.slot, weights=form.coo_data(basis).data, minlength=len(self.indices))
+    def assembled(self, local: Float[np.ndarray, "e m m"]) -> sp.csr_array:
+        """The matrices of all elements as one sparse array, entries that happen to vanish kept."""
+        data = np.bincount(self.slot, weights=local.transpose(2, 1, 0).ravel(), minlength=len(self.indices))
         n = len(self.indptr) - 1
         return sp.csr_array((data, self.indices, self.indptr), shape=(n, n))
 
@@ -84,15 +117,15 @@ def pattern(basis: skfem.Basis) -> Pattern:
 
 def scalar_mass(basis: skfem.Basis, on: Pattern, density: float) -> sp.csr_array:
     """Scalar Gram matrix m_ab = ∫ ρ N_a N_b det(J), [KED, eqs. (9)(11)] [kg]."""
-    return on.assembled(skfem.BilinearForm(lambda u, v, _: density * u * v), basis)
+    N = np.stack([np.asarray(shape[0]) for shape in basis.basis], axis=1) * np.sqrt(density * basis.dx)[:, None]
+    return on.assembled(N @ N.transpose(0, 2, 1))
 
 
 def gradient_products(basis: skfem.Basis, on: Pattern) -> dict[tuple[int, int], sp.csr_array]:
     """The scalar matrices D_ij = ∫ ∂_i N_a ∂_j N_b, i ≤ j, all on one sparsity pattern [m; in a plane: -]."""
-    return {
-        (i, j): on.assembled(skfem.BilinearForm(lambda u, v, _, i=i, j=j: v.grad[i] * u.grad[j]), basis)
-        for i, j in combinations_with_replacement(range(basis.mesh.dim()), 2)
-    }
+    axes, root = (range(basis.mesh.dim()), np.sqrt(basis.dx)[:, None])  # on both: D_ii is symmetric to the bit
+    dN = [np.stack([np.asarray(shape[0].grad)[k] for shape in basis.basis], axis=1) * root for k in axes]
+    return {(i, j): on.assembled(dN[i] @ dN[j].transpose(0, 2, 1)) for i, j in combinations_with_replacement(axes, 2)}
 
 
 def elastic_stiffness(D: dict[tuple[int, int], sp.csr_array], lame: tuple[float, float]) -> sp.csr_array:

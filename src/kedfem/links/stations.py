@@ -117,8 +117,8 @@ def _check_apart(link: Link, where: str, weights: list[Float[np.ndarray, " n"]])
         return
     more = "more basis functions" if link.Q is not None else "two elements along the line at least"
     raise MeshError(
-        f"{where}: link '{link.name}' must be able to bend along its line in {len(weights)} ways, as many as there are "
-        f"stations on it, got {determined}: give it {more}"
+        f"{where}: link '{link.name}' must have {len(weights)} independent deflections along its line, as many as there "
+        f"are stations on it, got {determined}: give it {more}"
     )
 
 

@@ -1,4 +1,4 @@
-"""Stress stiffness: what a stress σ in a link does to small displacements that turn its parts.
+"""Stress stiffness: the stiffness that a stress σ adds for small rotations of a link's parts.
 
 k_ab = ∫ ∇N_a · σ ∇N_b dV is a scalar matrix, the same for all components of a state, as the mass is. It is linear in the
 state that σ comes from. Σ_b k_ab X_b is that state's internal force K0 g: a link that turns by θ has
@@ -62,7 +62,7 @@ def _meshed(link: Link, on: Pattern, g: Float[np.ndarray, "n d"]) -> sp.csr_arra
     """Of a solid or plane link, at the Gauss points of K0."""
     (lam, mu), basis = link.lame, link.basis
     shapes: list[skfem.DiscreteField] = [shape[0] for shape in basis.basis]
-    local = np.empty((len(shapes), len(shapes), basis.nelems))
+    local = np.empty((basis.nelems, len(shapes), len(shapes)))
     for first in range(0, basis.nelems, ELEMENTS):
         e = slice(first, first + ELEMENTS)
         dN = np.stack([np.asarray(shape.grad)[:, e] for shape in shapes])  # (a, i, e, q)
@@ -73,9 +73,8 @@ def _meshed(link: Link, on: Pattern, g: Float[np.ndarray, "n d"]) -> sp.csr_arra
         flux = np.einsum("ijeq,bjeq->beiq", stress, dN, optimize=True)
         rows = dN.transpose(2, 0, 1, 3).reshape(flux.shape[1], len(shapes), -1)
         columns = flux.transpose(1, 0, 2, 3).reshape(rows.shape)
-        local[:, :, e] = (rows @ columns.transpose(0, 2, 1)).transpose(1, 2, 0)
-    data = np.bincount(on.slot, weights=local.ravel(), minlength=len(on.indices))
-    return sp.csr_array((data, on.indices, on.indptr), shape=(link.n, link.n))
+        local[e] = rows @ columns.transpose(0, 2, 1)
+    return on.assembled(local)
 
 
 def _beam(link: Link, g: Float[np.ndarray, "n d"]) -> sp.csr_array:

@@ -1,4 +1,4 @@
-"""Meshes of links: hexahedra (8, 20, 27 nodes), tetrahedra (10), quadrilaterals (9); no other room speaks to gmsh."""
+"""Meshes of links: hexahedra (8, 20, 27 nodes), tetrahedra (10), quadrilaterals (9); the only package that uses gmsh."""
 
 from typing import TYPE_CHECKING, Any
 

@@ -1,4 +1,4 @@
-"""Any solid filled with 10-node tetrahedra, nodes on the CAD model's own faces: what is left where nothing sweeps."""
+"""Tetrahedral meshes of any solid, with 10 nodes and on the CAD model's faces: for parts that cannot be swept."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -27,7 +27,7 @@ _COUNT = 1200
 _TURN = np.pi / 6  # that an element's edge turns along a curved face, where the least size lets it
 _FINEST = 4.0  # the size over the least size that curvature asks for
 _PLENTY = 45_000  # unknowns above which a part whose size nobody gave is meshed coarser
-_MOST = 90_000  # unknowns to which finer fillets may bring it
+MOST_UNKNOWNS = 90_000  # unknowns to which finer fillets may bring it
 _STEPS = 5  # times that it is
 _COARSEST = 4.0  # the most by which it may be: curvature and the finest size follow
 _BAD = 0.03  # scaled Jacobian below which curved elements are optimised, else straightened, and other settings tried
@@ -89,8 +89,8 @@ def _with_hollows(
         return found
     least, angle = min(_BAD, _least_jacobian(found)), sizing.hollow
     while angle < USUAL:
-        mesh = _best_of_settings(gmsh, solid, replace(sizing, hollow=angle), coarser, complaints, _MOST)
-        ratio = 1.0 if mesh is None or sizing.size is not None else 3 * len(mesh.points) / _MOST
+        mesh = _best_of_settings(gmsh, solid, replace(sizing, hollow=angle), coarser, complaints, MOST_UNKNOWNS)
+        ratio = 1.0 if mesh is None or sizing.size is not None else 3 * len(mesh.points) / MOST_UNKNOWNS
         if mesh is not None and ratio <= 1 and _least_jacobian(mesh) >= least:
             found = mesh
             break

@@ -1,4 +1,4 @@
-"""Fillets and free bores of a solid that is filled with tetrahedra, finer than the rest: stress is highest there."""
+"""Smaller tetrahedra at the fillets and free bores of a solid, where stress is highest."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,4 +1,4 @@
-"""Work of libraries in processes of their own: what they write stays there, where they break down or hang is an error."""
+"""Calls of libraries in processes of their own: their output is suppressed, and crashes or hangs become errors."""
 
 import atexit
 import os
@@ -45,7 +45,7 @@ class _Worker:
         from joblib.externals.loky import ProcessPoolExecutor
 
         with suppress(IndexError):
-            return _idle.pop()
+            return IDLE_WORKERS.pop()
         return cls(ProcessPoolExecutor(max_workers=1))
 
     def rest(self) -> None:
@@ -53,14 +53,14 @@ class _Worker:
 
         By loky's own `timeout` the next process would begin while loky looks at none, and its end would not be seen.
         """
-        _idle.append(self)
+        IDLE_WORKERS.append(self)
         timer = Timer(IDLE, self._left)
         timer.daemon = True
         timer.start()
 
     def _left(self) -> None:
         with suppress(ValueError):  # it has work again
-            _idle.remove(self)
+            IDLE_WORKERS.remove(self)
             self.end()
 
     def end(self) -> None:
@@ -69,12 +69,12 @@ class _Worker:
         self.executor.shutdown(kill_workers=True)
 
 
-_idle: list[_Worker] = []
-atexit.register(_idle.clear)  # while loky still reports their end: later, it would write of an error
+IDLE_WORKERS: list[_Worker] = []
+atexit.register(IDLE_WORKERS.clear)  # while loky still reports their end: later, it would write of an error
 _busy: list[_Worker] = []
 
 
-def apart(where: str, words: tuple[str, str], seconds: float, work: Callable[..., T], *given: Any) -> T:
+def in_own_process(where: str, words: tuple[str, str], seconds: float, work: Callable[..., T], *given: Any) -> T:
     """What a function returns in a process of its own: libraries break down or hang on some files.
 
     Nothing that they write reaches the terminal. The process is ended after work that raises: what a damaged file leaves
@@ -143,7 +143,7 @@ def limited(folder: str, seconds: float, work: Callable[..., T], *given: Any) ->
 
 
 def side_by_side(works: Mapping[str, Callable[[], T]]) -> dict[str, T]:
-    """What functions return that have their work done `apart`: as many at once as there are threads, and memory.
+    """What functions return that have their work done `in_own_process`: as many at once as there are threads, and memory.
 
     Raises
     ------

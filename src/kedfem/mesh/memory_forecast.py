@@ -1,6 +1,8 @@
 """Memory that a link takes, forecast from its number of unknowns, before anything of that size is made."""
 
 import os
+import re
+from pathlib import Path
 
 from kedfem.errors import MeshError
 
@@ -18,13 +20,22 @@ def memory() -> float:
     return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")) if hasattr(os, "sysconf") else 8e9
 
 
+def free_memory() -> float:
+    """Bytes of it that can be had now; all where the system does not say."""
+    try:
+        said = re.search(r"^MemAvailable: +(\d+) kB$", Path("/proc/meminfo").read_text(encoding="ascii"), re.MULTILINE)
+    except OSError:
+        return memory()
+    return 1024.0 * float(said[1]) if said else memory()
+
+
 def least_bytes(unknowns: float, factored: bool = True, plane: bool = False) -> tuple[float, float]:
     """Bytes of a link's matrices, and of their factor; parameters as of `check_room`."""
     return LINK_BYTES * unknowns, FACTOR_BYTES * unknowns**1.5 * (PLANE_FILL if plane else 1.0) * factored
 
 
 def check_room(where: str, unknowns: float, factored: bool = True, plane: bool = False) -> None:
-    """Refuse a link that this machine's memory cannot hold: the least that its matrices and their factor take.
+    """Refuse a link that the free memory cannot hold: the least that its matrices and their factor take.
 
     Parameters
     ----------
@@ -34,11 +45,16 @@ def check_room(where: str, unknowns: float, factored: bool = True, plane: bool =
     plane : whether it is a plane mesh
     """
     kept, factor = least_bytes(unknowns, factored, plane)
-    if kept + factor > memory():
+    free = free_memory()
+    if kept + factor > free:
+        fits = unknowns
+        while sum(least_bytes(fits, factored, plane)) > free:
+            fits *= 0.95
         raise MeshError(
-            f"{where}: must fit in this machine's memory of {memory() / 1e9:.3g} GB, got about {unknowns:,.0f} unknowns, "
+            f"{where}: must fit in the free memory of {free / 1e9:.3g} GB, got about {unknowns:,.0f} unknowns, "
             f"which take at least {(kept + factor) / 1e9:,.3g} GB (matrices {kept / 1e9:,.3g}, their factor "
-            f"{factor / 1e9:,.3g}); take larger elements (mesh.size, mesh.elements, mesh.unknowns)"
+            f"{factor / 1e9:,.3g}); take larger elements (mesh.size, mesh.elements, mesh.unknowns): at most about "
+            f"{float(f'{fits:.2g}'):,.0f} unknowns would fit"
         )
 
 

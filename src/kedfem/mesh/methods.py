@@ -20,7 +20,7 @@ from kedfem.mesh.elements.hexahedra import SolidMesh, frame_along, placed, quadr
 from kedfem.mesh.elements.quality import mesh_quality
 from kedfem.mesh.elements.tetrahedra import FORMS
 from kedfem.mesh.filling import filled_mesh, subdivided_mesh, tetrahedron_size
-from kedfem.mesh.isolated import LONGEST, PART, apart
+from kedfem.mesh.isolated import LONGEST, PART, in_own_process
 from kedfem.mesh.layered.layers import layered_mesh
 from kedfem.mesh.swept.blends import points_in_file, swept_without_blends
 from kedfem.mesh.swept.blocks import block_mesh
@@ -75,7 +75,7 @@ def cad_mesh(
         name, shape.model_dump(mode="json"), link.mesh.model_dump(mode="json"), link.element, kept_whole,
     ]  # fmt: skip
     key = sha256(json.dumps(described).encode() + contents([file])).hexdigest()
-    made = partial(apart, keys.file, PART, LONGEST, made_mesh, keys, name, link, shape, file, kept_whole)
+    made = partial(in_own_process, keys.file, PART, LONGEST, made_mesh, keys, name, link, shape, file, kept_whole)
     mesh: SolidMesh = kept("mesh", key, made, itself, itself)
     return mesh
 

@@ -22,7 +22,7 @@ SYSTEM_PACKAGES = {
     "libXft.so.2": "libxft2", "libfontconfig.so.1": "libfontconfig1", "libXinerama.so.1": "libxinerama1",
     "libX11.so.6": "libx11-6", "libgomp.so.1": "libgomp1",
 }  # fmt: skip
-_QUAD4 = 3  # gmsh's number of the 4-node quadrilateral
+QUAD4 = 3  # gmsh's number of the 4-node quadrilateral
 _one_at_a_time = threading.RLock()
 
 
@@ -105,7 +105,7 @@ def touching(bounds: Sequence[set[int]], alike: Callable[[int, int], bool] = lam
 def quadrilaterals(gmsh: ModuleType) -> tuple[Float[np.ndarray, "n 2"], Int[np.ndarray, "e 4"]] | None:
     """Nodes and cells of the plane mesh in gmsh's model; None if triangles are left."""
     kinds, _, nodes = gmsh.model.mesh.getElements(2)
-    if list(kinds) != [_QUAD4]:
+    if list(kinds) != [QUAD4]:
         return None
     points, tags = numbered_nodes(gmsh)
     used, cells = np.unique(nodes[0], return_inverse=True)

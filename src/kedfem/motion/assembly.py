@@ -1,4 +1,4 @@
-"""Links that are drawn a little apart: the least rigid motions that close all joints, and the scene drawn so."""
+"""Assembly of links that are given slightly apart: the smallest rigid motions that close all joints."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ from kedfem.errors import MotionError
 from kedfem.motion.closed import Shift, closed_scene
 from kedfem.motion.constraints import GAP, ConstraintEquation, Rows, stacked
 from kedfem.motion.joint_equations import GROUND, scene_centre
-from kedfem.motion.linkage import passive_rows, scene_size
+from kedfem.motion.linkage import scene_size, undriven_rows
 from kedfem.motion.newton import cross_matrix, rotation
 from kedfem.motion.period import over_one_period
 from kedfem.motion.released_motions import RANK_TOLERANCE
@@ -71,7 +71,7 @@ def _closed(scene: Scene) -> tuple[Scene, Assembly]:
     """
     if not any(joint.open for joint in scene.joints.values()):
         return scene, Assembly()
-    rows, size = passive_rows(scene), scene_size(scene)
+    rows, size = undriven_rows(scene), scene_size(scene)
     misfits = _misfits(scene, rows)
     if too_far := [name for name, misfit in misfits.items() if misfit > MOST * size]:
         wanted = f"must be one point for both links, up to 1 % of the linkage's size {size:.6g} [m]"

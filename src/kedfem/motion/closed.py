@@ -1,4 +1,4 @@
-"""A scene drawn anew after small rigid motions of its links: everything on a link goes with it."""
+"""The scene after small rigid motions of its links have closed the joints: everything on a link moves with it."""
 
 import math
 from collections.abc import Mapping

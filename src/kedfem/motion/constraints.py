@@ -108,7 +108,7 @@ def coupled(row: ConstraintEquation, *others: tuple[float, ConstraintEquation]) 
 
 
 def free_rows(kind: str, name: str, i: int, j: int, point: Vector, axis: Vector | None) -> list[ConstraintEquation]:
-    """Rows of what a joint releases, as `joint_rows` holds the rest; i is the body that moves.
+    """Rows of the motions that a joint releases, which `joint_rows` does not constrain; i is the body that moves.
 
     Their rates: of a hinge (ω_i − ω_j) · axis, of a slide (v_i − v_j) · axis. Of balls and crosses they are cosines.
     """

@@ -11,10 +11,10 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.motion.constraints import perpendiculars
-from kedfem.motion.joint_equations import moving_pair, unit
+from kedfem.motion.joint_equations import coordinate_axis, ordered, unit
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
-from kedfem.scene import Joint, Scene
+from kedfem.scene import Joint, Scene, driven_travel
 
 Vector = Float[np.ndarray, "3"]
 TURNS = ("revolute", "cylindrical", "screw", "planar")
@@ -58,6 +58,15 @@ def coordinates(scene: Scene, linkage: Linkage) -> list[Coordinate]:
     return [each for name, joint in scene.joints.items() for each in _of(name, joint, linkage)]
 
 
+def driven_name(scene: Scene, joint: str) -> str | None:
+    """Name of the coordinate that a joint's drive prescribes; None without one, and of a direction in a plane."""
+    drive = scene.driven_joints.get(joint)
+    if drive is None or drive.along is not None:
+        return None
+    name = "travel" if driven_travel(scene, joint) else "angle"
+    return name if drive.about is None else f"{name}_about_{drive.about}"
+
+
 def counted_on(angle: Float[np.ndarray, "T c"], before: Float[np.ndarray, " c"] | None) -> Float[np.ndarray, "T c"]:
     """Angles beyond ±π, from the last ones of the time before on [rad]."""
     if before is None:
@@ -66,12 +75,11 @@ def counted_on(angle: Float[np.ndarray, "T c"], before: Float[np.ndarray, " c"] 
 
 
 def _of(name: str, joint: Joint, linkage: Linkage) -> list[Coordinate]:
-    one, other = moving_pair(joint)
+    one, other = ordered(joint)
     body, against = linkage.bodies.index(one), linkage.bodies.index(other)
     at, none = np.asarray(joint.at), np.zeros(3)
     if joint.axes is not None:
-        first = unit(joint.axes[joint.links.index(one)])
-        second = unit(joint.axes[joint.links.index(other)])
+        first, second = (coordinate_axis(joint, link) for link in (one, other))
         return [  # the cross bears both axes: one's arm is seen to turn about the other's
             Coordinate(name, f"angle_about_{other}", "angle", body, against, at, second, first),
             Coordinate(name, f"angle_about_{one}", "angle", against, body, at, first, second),
@@ -84,9 +92,7 @@ def _of(name: str, joint: Joint, linkage: Linkage) -> list[Coordinate]:
     if joint.kind in TURNS:
         out.append(Coordinate(name, "angle", "angle", body, against, at, axis, e1))
     if joint.kind in TRAVELS:
-        back = joint.kind == "slot" and one != joint.links[0]
-        line = (against, body) if back else (body, against)
-        out.append(Coordinate(name, "travel", "length", *line, at, axis, none))
+        out.append(Coordinate(name, "travel", "length", body, against, at, axis, none))
     if joint.kind == "planar":
         out += [Coordinate(name, f"travel_{k}", "length", body, against, at, e, none) for k, e in ((1, e1), (2, e2))]
     return out

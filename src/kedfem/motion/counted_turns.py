@@ -1,4 +1,4 @@
-"""Turns that are counted from one time point to the next: laws over an angle know it only to within half a turn."""
+"""Angles counted from one time point to the next, which laws over an angle need beyond half a revolution."""
 
 from collections.abc import Iterator
 
@@ -7,7 +7,7 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.errors import MotionError
 from kedfem.motion.constraints import perpendiculars
-from kedfem.motion.joint_equations import joint_axis, moving_pair
+from kedfem.motion.joint_equations import coordinate_axis, ordered
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path, place_on
 from kedfem.scene import AngleLimit, Scene, TorsionSpring, corotational, path_parameter, time_grid
@@ -24,47 +24,60 @@ def require_counted(scene: Scene, link: Linkage, along: Path) -> None:
     """
     if link.drive is None:
         return
-    counting = sorted(set(_counting(scene)))
+    counting = sorted(set(_counting(scene)), key=str)
     grid = time_grid(scene)
     tau = path_parameter(scene, grid.step * np.arange(grid.steps + 1 if counting else 1))[0]
     faults = []
-    for where, joint in counting:
-        most = float(np.abs(np.diff(turn_of(scene, link, along, joint, tau))).max(initial=0.0))
+    for where, joint, about in counting:
+        most = float(np.abs(np.diff(turn_of(scene, link, along, joint, tau, about))).max(initial=0.0))
         if most > MOST:
             faults.append(
-                f"{where}: joint {joint!r} must turn by less than {np.degrees(MOST):.0f} deg between time points, so "
+                f"{where}: joint {joint!r} must rotate by less than {np.degrees(MOST):.0f} deg between time points, so "
                 f"that its turns can be counted, got {np.degrees(most):.4g} deg: take {most / MOST:.2g} times as many"
             )
     if faults:
         raise MotionError("\n".join(faults))
 
 
-def _counting(scene: Scene) -> Iterator[tuple[str, str]]:
-    """What counts turns of joints, by place, and these: laws, and with co-rotational frames gears and threads."""
+def _counting(scene: Scene) -> Iterator[tuple[str, str, str | None]]:
+    """What counts turns of joints, by place: these, and of a universal one the link about whose axis.
+
+    Laws do, and with co-rotational frames gears and threads.
+    """
     for name, spring in scene.springs.items():
         if isinstance(spring, TorsionSpring):
-            yield f"springs.{name}", spring.joint
+            yield f"springs.{name}", spring.joint, spring.about
     for name, motor in scene.motors.items():
         if motor.torque is not None:
-            yield f"motors.{name}", motor.joint
+            yield f"motors.{name}", motor.joint, motor.about
     for name, limit in scene.limits.items():
         if isinstance(limit, AngleLimit):
-            yield f"limits.{name}", limit.joint
+            yield f"limits.{name}", limit.joint, limit.about
     if corotational(scene):
         for name, gear in scene.gears.items():
-            turning = [joint for joint in gear.joints if scene.joints[joint].kind != "prismatic"]
-            yield from ((f"gears.{name}", joint) for joint in turning)
-        yield from ((f"joints.{name}", name) for name, joint in scene.joints.items() if joint.kind == "screw")
+            turning = (joint for joint, turns in zip(gear.joints, gear.turning, strict=True) if turns)
+            yield from ((f"gears.{name}", joint, None) for joint in turning)
+        yield from ((f"joints.{name}", name, None) for name, joint in scene.joints.items() if joint.kind == "screw")
 
 
-def turn_of(scene: Scene, link: Linkage, along: Path, name: str, tau: Float[np.ndarray, " T"]) -> Float[np.ndarray, " T"]:
-    """Turn of a joint about its axis at places of the path, counted along it [rad]; its grid is fine enough for that."""
+def turn_of(
+    scene: Scene, link: Linkage, along: Path, name: str, tau: Float[np.ndarray, " T"], about: str | None = None
+) -> Float[np.ndarray, " T"]:
+    """Turn of a joint about its axis at places of the path, counted from the reference position [rad].
+
+    The grid of the path is fine enough for that.
+
+    Parameters
+    ----------
+    about : of a universal joint, the link about whose axis it is
+    """
     joint = scene.joints[name]
-    i, j = (link.bodies.index(each) for each in moving_pair(joint)[:2])
-    b = joint_axis(joint)
-    a = perpendiculars(b)[0]
+    one, other = ordered(joint, about)
+    i, j, b = link.bodies.index(one), link.bodies.index(other), coordinate_axis(joint, about)
+    a = perpendiculars(b)[0] if about is None else coordinate_axis(joint, one)
     u, x, y = along.R[:, i] @ a, along.R[:, j] @ a, along.R[:, j] @ np.cross(b, a)
     turn = np.unwrap(np.arctan2((u * y).sum(axis=1), (u * x).sum(axis=1)))
+    turn -= 2 * np.pi * np.round(turn[np.abs(along.phi).argmin()] / (2 * np.pi))
     k, s, turns = place_on(along, tau)
     there = np.minimum(k + 1, len(turn) - 1)
     return np.asarray(turn[k] + s * (turn[there] - turn[k]) + turns * (turn[-1] - turn[0]))

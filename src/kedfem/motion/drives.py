@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.scene import MotionLaw, Scene, drive_angle
+from kedfem.scene import MotionLaw, Scene, drive_angle, driven_travel
 
 Driven = tuple[Float[np.ndarray, "T D"], Float[np.ndarray, "T D"], Float[np.ndarray, "T D"]]
 STEP = np.radians(12.0)  # of a drive between grid points of a path [rad], of a slide in lengths of the linkage
@@ -17,8 +17,8 @@ class Drives:
     """What is driven.
 
     joints : names
-    units : of each drive: 1 of a hinge [rad], the linkage's size of a slide [m]
-    turning : whether it is a hinge
+    units : of each drive: 1 of an angle [rad], the linkage's size of a travel [m]
+    turning : whether it prescribes an angle
     laws : their motions over time; not needed where there is only one drive
     """
 
@@ -60,6 +60,6 @@ class Drives:
 def drives(scene: Scene, size: float) -> Drives:
     """The drives of a scene, its linkage of some size [m]."""
     driven = scene.driven_joints
-    turning = tuple(scene.joints[name].kind != "prismatic" for name in driven)
+    turning = tuple(not driven_travel(scene, name) for name in driven)
     units = tuple(1.0 if turns else size for turns in turning)
     return Drives(tuple(driven), units, turning, tuple(each.motion for each in driven.values()))

@@ -10,7 +10,7 @@ from kedfem.arrays import Float
 from kedfem.errors import MotionError
 from kedfem.motion.constraints import ANGLE, cross
 from kedfem.motion.joint_equations import joint_axis, joint_free_rows, moving_pair
-from kedfem.motion.linkage import Linkage, drawn_jacobian, resting_jacobian
+from kedfem.motion.linkage import Linkage, reference_jacobian, resting_jacobian
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.released_motions import RANK_TOLERANCE
 from kedfem.scene import Scene
@@ -62,7 +62,7 @@ def initial_twists(scene: Scene, linkage: Linkage) -> tuple[Float[np.ndarray, "B
         given = scene.analysis.initial_speeds
         other = [row for name, joint in scene.joints.items() for row in joint_free_rows(scene, name, linkage.bodies)
                  if name not in given or (row.kind == ANGLE and joint.kind not in TURNING)]  # fmt: skip
-        q = free @ _least(A / sizes[:, None] @ free, b / sizes, drawn_jacobian(other, bodies, size) @ free)
+        q = free @ _least(A / sizes[:, None] @ free, b / sizes, reference_jacobian(other, bodies, size) @ free)
         _check_reached(asked, A @ q, size)
         twists[1:] = (q * column).reshape(-1, 6)
     v, omega = twists[:, :3], twists[:, 3:]

@@ -6,7 +6,8 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.motion.constraints import ANGLE, GAP, ConstraintEquation, coupled, free_rows, joint_rows, travel_row, turn_row
-from kedfem.scene import Joint, Scene
+from kedfem.scene import Joint, Scene, driven_travel
+from kedfem.scene.records.points import XYZ
 
 GROUND = "ground"
 PLANE = "the plane"
@@ -59,19 +60,61 @@ def moving_pair(joint: Joint) -> tuple[str, str]:
     return (other, one) if one == GROUND else (one, other)
 
 
-def coordinate_row(scene: Scene, name: str, bodies: tuple[str, ...], turns: bool | None = None) -> ConstraintEquation:
-    """Turn or travel of a joint; if not said which, the turn of all but slides."""
-    joint = scene.joints[name]
-    i, j = (bodies.index(link) for link in moving_pair(joint))
-    if joint.kind != "prismatic" if turns is None else turns:
-        return turn_row(name, i, j, joint_axis(joint))
-    return travel_row(name, i, j, np.asarray(joint.at) - scene_centre(scene), joint_axis(joint))
+def ordered(joint: Joint, about: str | None = None) -> tuple[str, str]:
+    """The links i and j of a joint whose coordinates are of i against j: j is the second, or the ground.
+
+    Of a slot i has the pin and j the line.
+
+    Parameters
+    ----------
+    about : of a universal joint, the link that is j instead
+    """
+    first, second = joint.links
+    if about is not None:
+        return (first if about == second else second), about
+    return (second, first) if first == GROUND and joint.kind != "slot" else (first, second)
+
+
+def coordinate_axis(joint: Joint, about: str | None = None, along: XYZ | None = None) -> Float[np.ndarray, "3"]:
+    """Unit vector that a joint's coordinate is about or along, fixed in the second of its `ordered` links.
+
+    Parameters
+    ----------
+    about : of a universal joint, the link about whose axis the other's is seen to rotate, as the cross has both
+    along : of a planar joint, a direction in its plane
+    """
+    if about is not None and joint.axes is not None:
+        return unit(joint.axes[joint.links.index(about)])
+    return joint_axis(joint) if along is None else unit(along)
+
+
+def coordinate_row(
+    scene: Scene, name: str, bodies: tuple[str, ...], turns: bool, about: str | None = None, along: XYZ | None = None
+) -> ConstraintEquation:
+    """Turn or travel of a joint; about and along as of `coordinate_axis`."""
+    joint, axis = scene.joints[name], coordinate_axis(scene.joints[name], about, along)
+    one, other = ordered(joint, about)
+    i, j = bodies.index(one), bodies.index(other)
+    if about is not None:
+        return ConstraintEquation(ANGLE, i, j, coordinate_axis(joint, one), axis, name)
+    if turns:
+        return turn_row(name, i, j, axis)
+    return travel_row(name, i, j, np.asarray(joint.at) - scene_centre(scene), axis)
+
+
+def driven_row(scene: Scene, name: str, bodies: tuple[str, ...]) -> ConstraintEquation:
+    """Turn or travel that the drive of a joint prescribes."""
+    drive = scene.driven_joints[name]
+    return coordinate_row(scene, name, bodies, not driven_travel(scene, name), drive.about, drive.along)
 
 
 def gear_row(scene: Scene, name: str, bodies: tuple[str, ...]) -> ConstraintEquation:
     """Gears: coordinate of the second joint less ratio · that of the first; the greater coefficient is one."""
     gear, where = scene.gears[name], f"gears.{name}"
-    first, second = (replace(coordinate_row(scene, each, bodies), joint=where) for each in gear.joints)
+    first, second = (
+        replace(coordinate_row(scene, each, bodies, turns), joint=where)
+        for each, turns in zip(gear.joints, gear.turning, strict=True)
+    )
     if second.kind == ANGLE and abs(gear.transmission) > 1:
         return coupled(first, (-1 / gear.transmission, second))
     return coupled(second, (-gear.transmission, first))

@@ -1,4 +1,4 @@
-"""The linkage as rigid bodies and constraint rows; its mobility and redundancy in the reference position.
+"""The linkage as rigid bodies and constraint equations; its mobility and redundancy in the reference position.
 
 With co-rotational frames motions may be left free. In the rigid-body motion the joints that bear them stay in the
 reference position while the drive moves the rest; without a drive it rests.
@@ -18,6 +18,7 @@ from kedfem.motion.drives import Drives, drives
 from kedfem.motion.joint_equations import (
     GROUND,
     coordinate_row,
+    driven_row,
     gear_row,
     joint_free_rows,
     joint_points,
@@ -30,7 +31,7 @@ from kedfem.motion.redundancy import LOOSER, Looser, would_move
 from kedfem.motion.released_motions import RANK_TOLERANCE, Drawn, free_motions, listed, null_space, planar, rank, span
 from kedfem.motion.released_motions import remedy as held_by
 from kedfem.motion.values import Poses, features, jacobian
-from kedfem.scene import Scene, corotational_links, plane_scene
+from kedfem.scene import Scene, corotational_links, driven_travel, plane_scene
 
 # by so much less counts each further joint motion, so that rounding chooses none that is to be held
 FIRST = 1e-6
@@ -76,8 +77,13 @@ class Linkage:
         return tuple(sorted({self.joints[k] for k in pivot[rank:]}))
 
 
+def body_names(scene: Scene) -> tuple[str, ...]:
+    """The ground and all links, in the order of their numbers in a linkage."""
+    return GROUND, *scene.links
+
+
 def linkage(scene: Scene) -> Linkage:
-    """Rows of all joints and of the drive, with mobility checked where the scene is drawn.
+    """Rows of all joints and of the drive, with mobility checked in the reference position.
 
     Raises
     ------
@@ -93,8 +99,7 @@ def linkage(scene: Scene) -> Linkage:
     if any(joint.open for joint in scene.joints.values()):
         raise ValueError("a scene whose links are drawn apart must be assembled first")
     rows, driven = _all_rows(scene)
-    bodies, size = (GROUND, *scene.links), scene_size(scene)
-    every = stacked(rows)
+    bodies, size, every = body_names(scene), scene_size(scene), stacked(rows)
     several = blocks(every, len(bodies), size) if driven and len(bodies) > MANY else None
     free = 0
     if not driven:
@@ -102,11 +107,11 @@ def linkage(scene: Scene) -> Linkage:
         every_part = parts(stacked(held), [row.joint for row in held], len(bodies))
         free = 6 * (len(bodies) - 1) - sum(part.rank(rest, size) for part in every_part)
     elif several is None or not _well_driven(every, several, size):
-        drawn = drawn_linkage(scene, rows)
+        drawn = reference_linkage(scene, rows)
         if plane_scene(scene):
             across = _across(drawn, bodies)
             rows = rows + across
-            drawn = planar(drawn_linkage(scene, rows) if across else drawn)
+            drawn = planar(reference_linkage(scene, rows) if across else drawn)
         free = _check_mobility(scene, drawn)
         rows = rows + _holding(scene, drawn, free)
         every = stacked(rows)
@@ -132,35 +137,35 @@ def _well_driven(rows: Rows, plan: Blocks, size: float) -> bool:
 
 def _all_rows(scene: Scene) -> tuple[list[ConstraintEquation], Drives]:
     """All rows of joints, couplings and drives, and these."""
-    driven, bodies = drives(scene, scene_size(scene)), (GROUND, *scene.links)
-    driving = [replace(coordinate_row(scene, name, bodies), drive=k) for k, name in enumerate(driven.joints)]
-    return passive_rows(scene) + driving, driven
+    driven, bodies = drives(scene, scene_size(scene)), body_names(scene)
+    driving = [replace(driven_row(scene, name, bodies), drive=k) for k, name in enumerate(driven.joints)]
+    return undriven_rows(scene) + driving, driven
 
 
-def drawn_linkage(scene: Scene, rows: list[ConstraintEquation] | None = None) -> Drawn:
-    """A scene's linkage, of all its rows if none are given, to first order where it is drawn; nothing is refused."""
-    bodies, size, rows = (GROUND, *scene.links), scene_size(scene), rows or _all_rows(scene)[0]
-    J, names = drawn_jacobian(rows, len(bodies), size), tuple(row.joint for row in rows)
+def reference_linkage(scene: Scene, rows: list[ConstraintEquation] | None = None) -> Drawn:
+    """A scene's linkage to first order in the reference position, with all its rows unless given; nothing is refused."""
+    bodies, size, rows = body_names(scene), scene_size(scene), rows or _all_rows(scene)[0]
+    J, names = reference_jacobian(rows, len(bodies), size), tuple(row.joint for row in rows)
     moves = np.array([row.drive is not None for row in rows], bool)
     return Drawn(J, names, moves, bodies[1:], scene.joints, scene_centre(scene), size)
 
 
-def passive_rows(scene: Scene) -> list[ConstraintEquation]:
+def undriven_rows(scene: Scene) -> list[ConstraintEquation]:
     """Rows of joints and couplings, without the drives'."""
-    bodies, centre = (GROUND, *scene.links), scene_centre(scene)
+    bodies, centre = body_names(scene), scene_centre(scene)
     rows = [row for name in scene.joints for row in rows_of(scene, name, bodies, centre)]
     return rows + [gear_row(scene, name, bodies) for name in scene.gears]
 
 
 def looser_rows(scene: Scene, drawn: Drawn) -> Looser:
-    """Rows that joints would have if they were of a kind that holds less; driven joints are left as they are."""
+    """Rows that joints would have if they were of a kind that constrains less; driven joints are left as they are."""
     bodies = (GROUND, *drawn.links)
     out = {}
     every = sorted(scene.joints.items(), key=lambda each: GROUND in each[1].links)  # bearings stay, if they can
     for name, joint in every:
         for kind in LOOSER.get(joint.kind, ()) if name not in scene.driven_joints else ():
             rows = rows_of(scene, name, bodies, drawn.centre, kind)
-            out[name, kind] = drawn_jacobian(rows, len(bodies), drawn.size)
+            out[name, kind] = reference_jacobian(rows, len(bodies), drawn.size)
     return out
 
 
@@ -175,7 +180,7 @@ def scene_size(scene: Scene) -> float:
     return float(max((np.linalg.norm(points - point, axis=1).max() for point in points), default=0.0)) or 1.0
 
 
-def drawn_jacobian(rows: list[ConstraintEquation], bodies: int, size: float) -> Float[np.ndarray, "m k"]:
+def reference_jacobian(rows: list[ConstraintEquation], bodies: int, size: float) -> Float[np.ndarray, "m k"]:
     """Row derivatives in the reference position, lengths divided by `size`."""
     return resting_jacobian(stacked(rows), bodies, size)
 
@@ -194,7 +199,7 @@ def _check_mobility(scene: Scene, drawn: Drawn) -> int:
         moves = would_move(drawn, looser_rows(scene, drawn))
         raise MotionError(
             f"{driven}: its drive must be able to move the linkage, got a structure without any mobility "
-            f"({f'it would move {moves}' if moves else 'the joints hold every link'}; "
+            f"({f'it would move {moves}' if moves else 'the joints constrain every link'}; "
             "is an axis askew, or one joint too many?)"
         )
     if mobility < drives:
@@ -228,7 +233,7 @@ def _at_reference(scene: Scene) -> str:
     if len(scene.driven_joints) != 1:
         return ""
     (name,) = scene.driven_joints
-    return "drive travel 0 mm, " if scene.joints[name].kind == "prismatic" else "drive angle 0 deg, "
+    return "drive travel 0 mm, " if driven_travel(scene, name) else "drive angle 0 deg, "
 
 
 def _other_drives(scene: Scene, drawn: Drawn) -> list[str]:
@@ -237,7 +242,9 @@ def _other_drives(scene: Scene, drawn: Drawn) -> list[str]:
     out = []
     for name, joint in scene.joints.items():
         if joint.kind in {"revolute", "prismatic"} and name not in scene.driven_joints:
-            row = drawn_jacobian([coordinate_row(scene, name, bodies)], len(bodies), drawn.size)
+            row = reference_jacobian(
+                [coordinate_row(scene, name, bodies, joint.kind == "revolute")], len(bodies), drawn.size
+            )
             if rank(np.concatenate([drawn.J[~drawn.driven], row])) == drawn.J.shape[1]:
                 out.append(name)
     return out
@@ -269,7 +276,7 @@ def _most_changed(
     """As many rows as there are motions: those that these change most, of equal ones the first."""
     if not motions.shape[1]:
         return []
-    change = drawn_jacobian(rows, bodies, size) @ motions
+    change = reference_jacobian(rows, bodies, size) @ motions
     first = 1 - FIRST * np.arange(len(rows))
     _, _, order = scipy.linalg.qr((first[:, None] * change).T, pivoting=True, mode="economic")
     return [rows[k] for k in order[: motions.shape[1]]]
@@ -283,7 +290,7 @@ def _free_rows(
     for kind, group in groupby(joint_free_rows(scene, name, bodies), key=lambda row: row.kind):
         rows = list(group)
         if len(rows) > 1:
-            change = drawn_jacobian(rows, len(bodies), size) @ motions
+            change = reference_jacobian(rows, len(bodies), size) @ motions
             along = np.array([row.b if kind == GAP else np.cross(row.a, row.b) for row in rows])
             U = np.linalg.svd(along.T @ change)[0]
             i, j, a, kept = rows[0].i, rows[0].j, rows[0].a, U.T[: len(rows)]

@@ -1,10 +1,10 @@
-"""What a linkage can do, holds twice, and comes close to: in words that name links and joints."""
+"""Mobility of a linkage in words: free motions, redundant equations and dead points, by names of links and joints."""
 
 from dataclasses import dataclass
 
 from kedfem.motion.dead_point import DeadPoint, nearest_dead_point
 from kedfem.motion.joint_equations import PLANE
-from kedfem.motion.linkage import Linkage, drawn_linkage, looser_rows
+from kedfem.motion.linkage import Linkage, looser_rows, reference_linkage
 from kedfem.motion.path import Path
 from kedfem.motion.redundancy import Redundant, redundancy, redundant, remedy
 from kedfem.motion.released_motions import FreeMotion, free_motions, in_plane, planar, rank
@@ -38,7 +38,7 @@ class Mobility:
 
 def mobility(scene: Scene, link: Linkage, along: Path) -> Mobility:
     """Degrees of freedom, redundant equations, free motions and the nearest dead point of a linkage."""
-    drawn = drawn_linkage(scene)
+    drawn = reference_linkage(scene)
     looser = looser_rows(scene, drawn)
     if plane := plane_scene(scene):
         looser = {key: in_plane(rows) for key, rows in looser.items()}

@@ -34,10 +34,10 @@ def cross_matrix(w: Inexact[np.ndarray, "... 3"]) -> Inexact[np.ndarray, "... 3 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What the rows shall be at T time points.
+    """The required values of the rows at T time points.
 
     q : (T, D) values of the drives [rad or m]
-    near : (T, A) turns of the angle rows, to within half a turn [rad]
+    near : (T, A) turns of the angle rows, to within half a revolution [rad]
     over : (T, m) what rows have gathered over whole periods of the path, to be added; None: nothing
     """
 
@@ -151,7 +151,7 @@ def orthonormal(R: Float[np.ndarray, "... 3 3"]) -> Float[np.ndarray, "... 3 3"]
 
 
 def closed(link: Linkage, poses: Poses, aim: Target, iterations: int) -> Poses:
-    """Poses after so many steps of Newton at most, towards those at which all rows vanish."""
+    """Poses after at most so many Newton steps towards those at which all rows vanish."""
     for _ in range(iterations):
         f = features(link.rows, poses, aim.near)
         rest = scaled(link, link.rows, remainder(link.rows, f, aim))

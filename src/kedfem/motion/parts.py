@@ -1,4 +1,4 @@
-"""Parts of a linkage that can be examined one by one: closed loops that share a joint, and single joints.
+"""Independent parts of a linkage: closed loops that share a joint, and single joints.
 
 Relative motions at the joints of a tree are free of each other, so constraints lose rank only within parts whose bodies
 are joined by closed loops: the biconnected components of the graph of bodies and constraints. The rank of all

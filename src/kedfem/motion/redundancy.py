@@ -1,4 +1,4 @@
-"""Joint equations that repeat what others hold: which, in which directions, and what would do without them.
+"""Redundant joint equations: which they are, in which directions, and which kinds of joints would avoid them.
 
 A dependent set of rows bears forces in balance with one another without any load: self-stress, the vectors λ with
 Jᵀ λ = 0. What these do at a joint is what the joint holds redundantly, whichever rows are struck out; statics of rigid
@@ -24,19 +24,19 @@ Looser = Mapping[tuple[str, str], Float[np.ndarray, "m k"]]
 
 @dataclass(frozen=True, slots=True)
 class Redundant:
-    """Joints that hold the same things redundantly, and what: ``force along z, moments about x and y``."""
+    """Joints with the same redundant constraints, and which: ``force along z, moments about x and y``."""
 
     joints: tuple[str, ...]
     words: str
 
 
 def redundancy(drawn: Drawn) -> int:
-    """Number of rows that others imply."""
+    """Number of redundant rows."""
     return len(drawn.J) - rank(drawn.J)
 
 
 def redundant(drawn: Drawn) -> list[Redundant]:
-    """What each joint holds redundantly, joints of the same words together."""
+    """The redundant constraints of each joint; joints with equal ones together."""
     stress = null_space(drawn.J.T)
     by_words: dict[str, list[str]] = {}
     for name in dict.fromkeys(drawn.rows):
@@ -79,7 +79,7 @@ def changed(drawn: Drawn, joint: str, rows: Float[np.ndarray, "m k"]) -> Drawn:
 
 
 def without_redundancy(drawn: Drawn, looser: Looser) -> tuple[list[tuple[str, str]], int]:
-    """Joints to be made of another kind, one after the other, that take redundant rows off and free no motion.
+    """Joints to replace by another kind, one after the other, which removes redundant rows and releases no motion.
 
     Each time the one that takes most off. Returns them, and the number of redundant rows that then are left.
     """
@@ -99,7 +99,7 @@ def without_redundancy(drawn: Drawn, looser: Looser) -> tuple[list[tuple[str, st
 
 
 def remedy(drawn: Drawn, looser: Looser) -> str:
-    """How to do without redundant rows, in words."""
+    """A remedy for redundant rows, in words."""
     done, left = without_redundancy(drawn, looser)
     if not done:
         couplings = [name for name in _undriven(drawn) if "." in name]
@@ -110,7 +110,7 @@ def remedy(drawn: Drawn, looser: Looser) -> str:
 
 
 def would_move(drawn: Drawn, looser: Looser) -> str:
-    """What would let the drives move a structure: one joint of another kind, or one joint less; in words."""
+    """A change with which the drives could move a structure, in words: one joint of another kind, or one joint less."""
     kinds: dict[str, list[str]] = {}
     for (joint, kind), rows in looser.items():
         if _moves(changed(drawn, joint, rows)):

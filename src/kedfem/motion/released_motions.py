@@ -1,4 +1,4 @@
-"""What a linkage may still do in the reference position, in words that name links and joints."""
+"""Free motions of a linkage in the reference position, in words that name links and joints."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -159,7 +159,7 @@ def of_joints(names: list[str] | tuple[str, ...], last: str = "and") -> str:
 
 @dataclass(frozen=True, slots=True)
 class FreeMotion:
-    """Motions that only some links make.
+    """A free motion in which only some links move.
 
     links : that move
     joints : that work
@@ -178,7 +178,7 @@ class FreeMotion:
 
 
 def free_motions(drawn: Drawn) -> list[FreeMotion]:
-    """What joints and drives release, sorted by the smallest groups of links that can do it alone."""
+    """Motions that joints and drives release, sorted by the smallest groups of links that can move alone."""
     return [_described(drawn, links, basis) for links, basis in _groups(drawn, null_space(drawn.J))]
 
 
@@ -239,12 +239,12 @@ def _alone(drawn: Drawn, link: str, joints: tuple[str, ...], basis: Basis) -> tu
         kinds = {drawn.joints[name].kind for name in still}
         which = f"both {kinds.pop()}" if len(kinds) == 1 and len(still) == 2 else "on one line"
         return f"{words}, the line through {of_joints(still)} ({which})", tuple(still)
-    return words + (f" at joint {at} ({drawn.joints[at].kind})" if at else ", held by no joint"), ()
+    return words + (f" at joint {at} ({drawn.joints[at].kind})" if at else ", constrained by no joint"), ()
 
 
 def remedy(motion: FreeMotion) -> str:
-    """How a free motion is usually done away with."""
+    """The usual remedy for a free motion."""
     if motion.spin:
         return f"make joint {listed(motion.spin, 'or')} universal"
     drive = f"drive joint {listed(motion.drivable, 'or')}, or " if motion.drivable else ""
-    return f"{drive}hold {listed(motion.links)} by a further joint"
+    return f"{drive}constrain {listed(motion.links)} by a further joint"

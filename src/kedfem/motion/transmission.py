@@ -30,7 +30,7 @@ class Transmission:
     coupler, driven : names
     body, output : their numbers
     near, far : drawn points of the coupler: where it drives, and its other joint [m]
-    hub, axis : drawn point and direction of the driven link's joint with the ground
+    pivot, axis : drawn point and direction of the driven link's joint with the ground
     turns : whether that is a hinge, else a slide
     """
 
@@ -40,7 +40,7 @@ class Transmission:
     output: int
     near: Float[np.ndarray, "3"]
     far: Float[np.ndarray, "3"]
-    hub: Float[np.ndarray, "3"]
+    pivot: Float[np.ndarray, "3"]
     axis: Float[np.ndarray, "3"]
     turns: bool
 
@@ -50,7 +50,7 @@ class Transmission:
         along /= np.linalg.norm(along, axis=1, keepdims=True)
         if not self.turns:
             return np.asarray(np.arcsin(np.clip(np.abs(along @ self.axis), 0.0, 1.0)))
-        arm = motion.R[:, self.output] @ (self.hub - self.near)
+        arm = motion.R[:, self.output] @ (self.pivot - self.near)
         arm -= np.outer(arm @ self.axis, self.axis)
         arm /= np.linalg.norm(arm, axis=1, keepdims=True)
         moves = cross(np.broadcast_to(self.axis, arm.shape), arm)
@@ -88,12 +88,12 @@ def _on(
     (joint,) = held.values()
     if joint.kind not in {"revolute", "prismatic"} or joint.axis is None:
         return
-    axis, hub = unit(joint.axis), np.asarray(joint.at)
-    arm = np.cross(axis, hub - near)
+    axis, pivot = unit(joint.axis), np.asarray(joint.at)
+    arm = np.cross(axis, pivot - near)
     if joint.kind == "revolute" and np.linalg.norm(arm) <= SAME * linkage.size:
         return
     bodies = (linkage.bodies.index(coupler), linkage.bodies.index(output))
-    yield Transmission(coupler, output, *bodies, near, far, hub, axis, joint.kind == "revolute")
+    yield Transmission(coupler, output, *bodies, near, far, pivot, axis, joint.kind == "revolute")
 
 
 def _beyond(scene: Scene, linkage: Linkage, joint: str, link: str) -> str:

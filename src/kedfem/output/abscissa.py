@@ -7,7 +7,7 @@ import numpy as np
 
 from kedfem.arrays import Float
 
-TICKS = (1, 2, 5, 10, 15, 30, 45, 60, 90, 180)  # steps of degrees that read well; beyond, whole turns
+TICKS = (1, 2, 5, 10, 15, 30, 45, 60, 90, 180)  # steps of degrees that read well; beyond, whole revolutions
 MOST_TICKS = 13
 
 

@@ -1,4 +1,4 @@
-"""What links bear, in frames of the animation: masses that they carry as balls, springs between them."""
+"""Masses and springs on links in frames of the animation, and where they are attached."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The files of a run beside its rows and frames: stress envelope, table, plots and the picture of the highest stress."""
+"""Files that follow from a finished run: stress envelope, table, plots, and the picture of the highest stress."""
 
 from collections.abc import Sequence
 from dataclasses import replace

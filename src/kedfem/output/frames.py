@@ -9,7 +9,6 @@ import numpy as np
 
 from kedfem.arrays import Float, Int
 from kedfem.dynamics.history import LinkMoment, Snapshot
-from kedfem.dynamics.joints.constraint_joints import ordered
 from kedfem.dynamics.model import Model
 from kedfem.links.beams.spatial_recovery import drawn
 from kedfem.links.record import Link, in_space
@@ -17,7 +16,7 @@ from kedfem.links.recovery import StressRecovery, extreme_stresses, nodal_state,
 from kedfem.mesh.cad.sides import boundary_sides, side_corners
 from kedfem.mesh.elements.shape_functions import HEX8
 from kedfem.motion.constraints import perpendiculars
-from kedfem.motion.joint_equations import joint_axis
+from kedfem.motion.joint_equations import coordinate_axis, ordered
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.output.attached import (
@@ -33,7 +32,7 @@ from kedfem.output.attached import (
 )
 from kedfem.output.fields import DRIVE_FORCE, DRIVE_TORQUE, FORCE, MOMENT, JointField, LinkField, RigidField
 from kedfem.results.recorded import drive_effort
-from kedfem.scene import Scene
+from kedfem.scene import Scene, driven_travel
 
 Place = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]
 Rows = Mapping[str, Float[np.ndarray, "T c"]]
@@ -138,13 +137,13 @@ def _blocks(model: Model, snapshot: Snapshot, deformation_scale: float) -> list[
         z = slider.axis
         x, y = perpendiculars(z)
         frame = np.array([1.5 * z, y, x])  # longer along the guide
-        points = place + BLOCK * _width(link) / 2 * HEX8 @ frame
+        points = place + BLOCK * width_across(link) / 2 * HEX8 @ frame
         cell = np.arange(8)[None]
         out.append(unstressed(slider.name, "hexahedron", cell, points, np.tile(moved, (8, 1))))
     return out
 
 
-def _width(link: Link) -> float:
+def width_across(link: Link) -> float:
     """Of a link across its length: of its section, else of all of it [m]."""
     whole = link.full or link
     if whole.section is not None:
@@ -234,16 +233,18 @@ def joint_field(scene: Scene, linked: Linkage, motion: RigidMotion, rows: Rows, 
     force, moment, push, torque = np.zeros((4, len(names), 3))
     for n, name in enumerate(names):
         joint = scene.joints[name]
-        i, j = (linked.bodies.index(link) for link in ordered(joint))
+        i = linked.bodies.index(ordered(joint)[0])
         points[n] = motion.p[k, i] + motion.R[k, i] @ joint.at
         force[n] = rows[f"joints/{name}/force"][k]
         moment[n] = rows.get(f"joints/{name}/moment", np.zeros((k + 1, 3)))[k]
-        if name in scene.driven_joints:
+        if (drive := scene.driven_joints.get(name)) is not None:
             key, what, _ = drive_effort(scene, name)
+            j = linked.bodies.index(ordered(joint, drive.about)[1])
             if (found := rows.get(key)) is not None:
-                (push if what == "force" else torque)[n] = found[k] * (motion.R[k, j] @ joint_axis(joint))
+                axis = motion.R[k, j] @ coordinate_axis(joint, drive.about, drive.along)
+                (push if what == "force" else torque)[n] = found[k] * axis
     vectors = {FORCE: force, MOMENT: moment}
-    slides = {scene.joints[name].kind == "prismatic" for name in scene.driven_joints}
+    slides = {driven_travel(scene, name) for name in scene.driven_joints}
     vectors |= {DRIVE_FORCE: push} if True in slides else {}
     vectors |= {DRIVE_TORQUE: torque} if False in slides else {}
     return JointField(tuple(names), points, vectors)

@@ -1,4 +1,4 @@
-"""Where springs that have a joint instead of two points are drawn: coils along slides, windings about hinges."""
+"""Shapes of springs of a joint in pictures: coils along slides, windings about hinges."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.motion.joint_equations import joint_axis, moving_pair
+from kedfem.motion.joint_equations import coordinate_axis, moving_pair, ordered
 from kedfem.output.springs import WIDTH, Shape, spring_shape, winding_shape
 from kedfem.scene import Joint, LineSpring, Scene, SpringEnd, TorsionSpring
 
@@ -78,11 +78,12 @@ def _along(
     link, other = moving_pair(joint)
     side = 1.0 if spring.free < 0.0 else -1.0
     stops = [x.range for x in scene.limits.values() if x.kind == "travel" and x.joint == spring.joint]
-    ways = [MARGIN * max(side * end for end in each) for each in stops]
-    length = max([ALONG * size, *(way for way in ways if np.isfinite(way))])
-    far = np.asarray(joint.at) + side * length * joint_axis(joint)
+    lengths = [MARGIN * max(side * end for end in each) for each in stops]
+    length = max([ALONG * size, *(each for each in lengths if np.isfinite(each))])
+    axis = coordinate_axis(joint, along=spring.along)
+    far = np.asarray(joint.at) + side * length * axis
     ends = SpringEnd(link=link, at=joint.at), SpringEnd(link=other, at=(far[0], far[1], far[2]))
-    _, inner = _around(joint, X, *sorted((0.0, side * length)))
+    _, inner = _around(joint, axis, X, *sorted((0.0, side * length)))
     return ends, inner if inner < ROUND * size else 0.0
 
 
@@ -92,28 +93,30 @@ def hinge_springs(scene: Scene, X: Mapping[str, Points], size: float) -> dict[st
     for name, spring in scene.springs.items():
         if isinstance(spring, TorsionSpring):
             joint, radius, most = scene.joints[spring.joint], WIDTH * size, SHAFT * size
-            reach, _ = _around(joint, X, -most, most, within=1.5 * radius)
+            axis = coordinate_axis(joint, spring.about)
+            reach, _ = _around(joint, axis, X, -most, most, within=1.5 * radius)
             if reach == most:
                 reach = ROUND * size
-                inner = _around(joint, X, -reach, reach)[1]
+                inner = _around(joint, axis, X, -reach, reach)[1]
                 radius = max(radius, MARGIN * inner if inner < reach else 0.0)
-            shape = winding_shape(radius, reach + 0.4 * radius, joint_axis(joint))
-            out[name] = DrawnWinding(moving_pair(joint)[0], joint.at, shape)
+            shape = winding_shape(radius, reach + 0.4 * radius, axis)
+            out[name] = DrawnWinding(ordered(joint, spring.about)[0], joint.at, shape)
     return out
 
 
 def _around(
-    joint: Joint, X: Mapping[str, Points], low: float, high: float, within: float = np.inf
+    joint: Joint, axis: Float[np.ndarray, "3"], X: Mapping[str, Points], low: float, high: float, within: float = np.inf
 ) -> tuple[float, float]:
-    """How far the links of a joint reach along its axis, and across it, from its point between two places on the axis.
+    """How far the links of a joint reach along an axis, and across it, from its point between two places on the axis.
 
     Parameters
     ----------
+    axis : (3,) unit vector
     low, high : the places; what is beyond them is taken there for the first, and is left out for the second [m]
     within : how far from the axis what counts for the first is, unless the nearest is farther [m]
     """
     points = np.concatenate([np.asarray(joint.at)[None], *(X[name] for name in joint.links if name in X)])
-    arms, axis = points - np.asarray(joint.at), joint_axis(joint)
+    arms = points - np.asarray(joint.at)
     along = arms @ axis
     across = np.linalg.norm(arms - along[:, None] * axis, axis=1)
     near = across <= max(within, across[1:].min(initial=np.inf) * 1.5 if len(across) > 1 else 0.0)

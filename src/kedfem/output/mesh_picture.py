@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from kedfem.arrays import Float, Int
-from kedfem.links.surfaces.part_candidates import Offer
+from kedfem.links.surfaces.part_candidates import PartCandidate
 from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.mesh.cad.sides import owned_sides
 from kedfem.mesh.elements.shape_functions import QUAD9, TRI6, shape_functions
@@ -57,7 +57,7 @@ def drawn(mesh: SolidMesh) -> Drawn:
 
 
 def write_mesh_picture(
-    meshes: Sequence[tuple[str, SolidMesh]], png: Path, title: str, found: Sequence[Offer] = ()
+    meshes: Sequence[tuple[str, SolidMesh]], png: Path, title: str, found: Sequence[PartCandidate] = ()
 ) -> None:
     """Draw meshes side by side, one alone with the histogram of its quality.
 
@@ -84,7 +84,7 @@ def write_mesh_picture(
         draw_apart("mesh_rendering.py", (given, Path(png)), (len(meshes),), "the mesh: must be one")
 
 
-def _numbers(mesh: SolidMesh, found: Sequence[Offer]) -> dict[str, np.ndarray]:
+def _numbers(mesh: SolidMesh, found: Sequence[PartCandidate]) -> dict[str, np.ndarray]:
     """Where the numbers of faces may stand: on a plane at one place, else on any side of an element; and normals."""
     places, numbers, normals = [], [], []
     for each in found:

@@ -9,7 +9,7 @@ from kedfem.output.fields import DISPLACEMENT, DRIVE_FORCE, DRIVE_TORQUE, FORCE,
 from kedfem.output.stress_files import ENVELOPE, KINDS
 from kedfem.results import Peak, Results, replacing
 from kedfem.results.table import drive_heading
-from kedfem.scene import Scene
+from kedfem.scene import Scene, driven_travel
 
 STATE = "paraview.py"
 ARROW = 0.2  # of the mechanism's size: the longest arrow
@@ -102,7 +102,7 @@ def write_state(scene: Scene, results: Results, peak: Peak | None, folder: Path)
 def _arrows(scene: Scene, results: Results) -> str:
     """Arrows of forces of joints and of efforts of drives, the longest of each a share of the mechanism's size."""
     forces = [f"joints/{name}/force" for name in scene.joints]
-    slides = {scene.joints[name].kind == "prismatic" for name in scene.driven_joints}
+    slides = {driven_travel(scene, name) for name in scene.driven_joints}
     drives = {
         array: [name for name in results.channels if name.startswith("drive/") and name.endswith(f"/{what}")]
         for array, what, there in ((DRIVE_FORCE, "force", True), (DRIVE_TORQUE, "torque", False))
@@ -110,7 +110,7 @@ def _arrows(scene: Scene, results: Results) -> str:
     }
     out = []
     for (array, names), colour in zip({FORCE: forces, **drives}.items(), COLOURS, strict=False):
-        values = [results.channels[name][1] for name in names if name in results.channels]
+        values = [results.largest_rows(name)[2] for name in names if name in results.channels]
         largest = max((float(np.linalg.norm(x, axis=1).max()) for x in values), default=0.0)
         if largest > 0:
             title, size = array if array != FORCE else f"joint {FORCE}", {"largest": largest, "share": ARROW}

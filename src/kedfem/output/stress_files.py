@@ -28,37 +28,35 @@ class Extremes:
     """The envelope as files have it.
 
     found : per link or segment
-    when : (2, T) time and drive at every step
     near : per link or segment what each point is near to, in words; empty where stress is what it seems
     drive : the drive's position with its unit, e.g. "drive angle [rad]"
     """
 
     found: Sequence[LinkEnvelope]
-    when: Float[np.ndarray, "2 T"]
     near: Sequence[Sequence[str]]
     drive: str
 
     def columns(self) -> Columns:
         """Of all points of all links: stresses, time and drive of each; nan of rigid links."""
         stress = np.concatenate([each.stress for each in self.found], axis=1)
-        step = np.concatenate([each.step for each in self.found], axis=1)
+        when = np.concatenate([each.when for each in self.found], axis=2)
         what, _, unit = self.drive.partition(" [")
         out: Columns = {}
         for k, name in enumerate(KINDS):
             none = np.isnan(stress[k])
             out[f"{name} stress [Pa]"] = stress[k]
             phrases = f"time of {name} stress [s]", f"{what} of {name} stress [{unit}"
-            for phrase, values in zip(phrases, self.when, strict=True):
-                out[phrase] = np.where(none, np.nan, values[np.where(none, 0, step[k])])
+            for phrase, values in zip(phrases, when[:, k], strict=True):
+                out[phrase] = np.where(none, np.nan, values)
         return out
 
 
 def write_envelope(folder: Path, extremes: Extremes, table: bool) -> None:
     """Highest stresses at every point and when they occur, on the undeformed links: for ParaView, and as CSV if asked."""
     near = [word for each in extremes.near for word in each]
-    doubts = {"depends on mesh or joint": np.array([float(bool(word)) for word in near])}
+    singular = {"depends on mesh or joint": np.array([float(bool(word)) for word in near])}
     recoveries, columns = [each.recovery for each in extremes.found], extremes.columns()
-    _write_field(folder / ENVELOPE, recoveries, columns | doubts)
+    _write_field(folder / ENVELOPE, recoveries, columns | singular)
     if table:
         _write_table(folder / POINTS, recoveries, columns, {"near": near})
 

@@ -1,4 +1,4 @@
-"""From where a linkage is seen in a picture."""
+"""The direction of view in which a picture shows a linkage."""
 
 from dataclasses import dataclass
 from itertools import product

@@ -56,15 +56,16 @@ def write_points(path: Path, parts: Sequence[tuple[str, Points, Cells]], values:
     names = list(dict.fromkeys(name for name, *_ in parts))
     link = [np.full(len(of), names.index(name), np.int32) for name, _, (_, of) in parts]
     whole = _together([(points, cells) for _, points, cells in parts])
+    fields = {name: x.astype(np.float32) for name, x in values.items()}
     with replacing(path) as part:
-        write_vtu(part, *whole, point_data=dict(values), cell_data={"link": link})
+        write_vtu(part, *whole, point_data=fields, cell_data={"link": link})
         complete(part, "".join(_number(f"link {name}", k) for k, name in enumerate(names)))
 
 
 def write_cells(path: Path, parts: Sequence[tuple[Points, Cells]], name: str, values: Sequence[np.ndarray]) -> None:
     """Elements in the reference position, points and cells of each part, with one value each, called `name`."""
     with replacing(path) as part:
-        write_vtu(part, *_together(parts), cell_data={name: list(values)})
+        write_vtu(part, *_together(parts), cell_data={name: [x.astype(np.float32) for x in values]})
 
 
 def _together(parts: Sequence[tuple[Points, Cells]]) -> tuple[Points, list[Cells]]:
@@ -103,7 +104,7 @@ def _sections(fields: Sequence[Block]) -> dict[str, list[np.ndarray]]:
     every = [getattr(field, "section", None) for field in fields]
     if not any(every):
         return {}
-    rows = [np.array(section or (0, 0, 0), float) for section in every]
+    rows = [np.array(section or (0, 0, 0), np.float32) for section in every]
     return {SECTION: [np.tile(row, (len(field.cells), 1)) for row, field in zip(rows, fields, strict=True)]}
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from kedfem.output.abscissa import abscissa
 from kedfem.results import Peak
-from kedfem.scene import Scene, drive_angle, time_grid
+from kedfem.scene import Scene, drive_angle, driven_travel, time_grid
 
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
 
@@ -85,7 +85,7 @@ def clock(scene: Scene, frozen: bool = False) -> str:
     if len(scene.driven_joints) != 1 or not (frozen or _keeps_on(scene)):
         return "time"
     (name,) = scene.driven_joints
-    return "drive travel" if scene.joints[name].kind == "prismatic" else "drive angle"
+    return "drive travel" if driven_travel(scene, name) else "drive angle"
 
 
 def _keeps_on(scene: Scene) -> bool:

@@ -57,8 +57,8 @@ def facts(results: Results, highest: Peak | None, moment: Callable[[float, float
         ("Largest elastic displacement", "probes/", ("/displacement", "/deflection")),
     ):
         if found := _largest(results, beginning, endings):
-            name, value, unit, at = found
-            message = f"{name}, {moment(float(results.time[at]), float(results.angle[at]))}"
+            name, value, unit, when = found
+            message = f"{name}, {moment(*when)}"
             out.append(Fact(what, with_prefix(value, unit), message))
     if results.fatigue is not None and (spot := results.fatigue.worst) is not None:
         message = f"link {spot.link}; life {life_of(spot.damage, results.fatigue)}"
@@ -70,16 +70,20 @@ def facts(results: Results, highest: Peak | None, moment: Callable[[float, float
     return out
 
 
-def _largest(results: Results, beginning: str, endings: tuple[str, ...]) -> tuple[str, float, str, int] | None:
-    """What the channel is, largest magnitude, unit and row among channels of elastic links, or of rigid ones."""
+def _largest(
+    results: Results, beginning: str, endings: tuple[str, ...]
+) -> tuple[str, float, str, tuple[float, float]] | None:
+    """What the channel is, largest magnitude, unit, time and drive among channels of elastic links, or of rigid ones."""
     found = None
-    for name, (channel, values) in results.channels.items():
-        if not (name.startswith(beginning) and name.endswith(endings) and len(values)) or "rigid_" in name:
+    for name in results.channels:
+        if not (name.startswith(beginning) and name.endswith(endings)) or "rigid_" in name:
             continue
+        channel, (time, angle, values) = results.channels[name][0], results.largest_rows(name)
         size = np.linalg.norm(values, axis=1)
         if np.isfinite(size).any() and (found is None or np.nanmax(size) > found[1]):
             k = int(np.nanargmax(size))
-            found = channel.description.partition(";")[0] or name, float(size[k]), channel.unit, k
+            what, when = channel.description.partition(";")[0] or name, (float(time[k]), float(angle[k]))
+            found = what, float(size[k]), channel.unit, when
     return found
 
 
@@ -147,7 +151,7 @@ def frequencies_table(found: Summary) -> Table:
         met = [f"{k}: {_rpm(slow, fast)}" for m, k, slow, fast in found.crossings if m == mode]
         ends = (with_prefix(x, "Hz").replace(" ", "\u00a0") for x in (low, high))
         rows.append((str(mode), *ends, "; ".join(met) or "none"))
-    held = "let go of" if found.free else "hold"
+    held = "release" if found.free else "hold"
     message = f"The mechanism frozen at {found.positions} positions, drives {held} their joints."
     if found.still:
         message += f" {found.still} motions without strain are left out."

@@ -104,7 +104,7 @@ class _Made:
         """A node with a link's surface in the reference position, and its motion."""
         import pygltflib as g
 
-        X, moves = surface.points[0], _moves(surface)
+        X, moves = surface.points[0], placed_shape(surface)
         if surface.spring and surface.placements:
             X = moves.own
         attributes = g.Attributes(
@@ -178,7 +178,7 @@ class _Made:
 
 
 @dataclass(frozen=True, slots=True)
-class _Moves:
+class PlacedShape:
     """How a node moves: x = p + R (scale * own)."""
 
     own: Float[np.ndarray, "n 3"]
@@ -187,20 +187,20 @@ class _Moves:
     scale: Float[np.ndarray, "f 3"]
 
 
-def _moves(surface: Surface) -> _Moves:
+def placed_shape(surface: Surface) -> PlacedShape:
     """Of a rigid link its placements; a spring is stretched along z, on which it lies in its own axes."""
     X, count = surface.points[0], len(surface.placements)
     p = np.array([placed.p for placed in surface.placements]).reshape(count, 3)
     R = np.array([placed.R for placed in surface.placements]).reshape(count, 3, 3)
     if not surface.spring:
-        return _Moves(X, p, R, np.ones((count, 3)))
+        return PlacedShape(X, p, R, np.ones((count, 3)))
     axes = np.linalg.svd(_along(surface.points)[None])[2][[1, 2, 0]].T
     axes[:, 0] *= np.linalg.det(axes)
     lengths = [float(np.ptp(points @ axes[:, 2])) for points in surface.points]
     scale = np.ones((count, 3))
     scale[:, 2] = np.array(lengths[1:]) / lengths[0]
     centres = np.array([points.mean(axis=0) for points in surface.points[1:]]).reshape(count, 3)
-    return _Moves((X - X.mean(axis=0)) @ axes, p + np.einsum("fij,fj->fi", R, centres), R @ axes, scale)
+    return PlacedShape((X - X.mean(axis=0)) @ axes, p + np.einsum("fij,fj->fi", R, centres), R @ axes, scale)
 
 
 def _along(every: Sequence[Float[np.ndarray, "n 3"]]) -> Float[np.ndarray, "3"]:

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from kedfem.arrays import Float
 from kedfem.errors import KedfemError, OutputError
-from kedfem.loads import loads_of, summaries
+from kedfem.loads import loads_of, summaries, thinned
 from kedfem.output.derived import PICTURE, REPORT
 from kedfem.output.words import with_prefix
 from kedfem.report.animated import Animated, animated
@@ -95,8 +96,10 @@ def _content(results: Results, folder: Path, missing: list[str]) -> dict[str, An
     elif results.status in {"interrupted", "abandoned", "running"}:
         late = "highest stresses, estimated errors and timing are found at the end of a run"
         missing.append(f"{late}, which this is not")
+    if results.every > 1 and len(results.time) and not results.largest:
+        missing.append(f"largest values are those of rows, of one step in {results.every}, as the run was killed")
 
-    moment = partial(_moment, scene, results)
+    moment = partial(instant_in_words, scene, results)
     loads, polars = _loads(scene, results, folder, missing)
     picture = folder / PICTURE
     return {
@@ -135,10 +138,10 @@ def _frequencies(results: Results, folder: Path, missing: list[str]) -> dict[str
     return {"tables": [frequencies_table(found)], "pictures": pictures}
 
 
-def _moment(scene: Mapping[str, Any], results: Results, time: float, angle: float) -> str:
+def instant_in_words(scene: Mapping[str, Any], results: Results, time: float, angle: float) -> str:
     """A time, with the drive's position if there is one drive; of several results have that of the first alone."""
     caption = f"t = {with_prefix(time, 's')}"
-    if bool(scene.get("drive")) + len(scene.get("drives") or ()) != 1:
+    if bool(scene.get("drive")) + len(scene.get("drives") or ()) != 1 or np.isnan(angle):
         return caption
     return f"{caption}, {results.drive.name.replace('_', ' ')} {with_prefix(angle, results.drive.unit)}"
 
@@ -177,10 +180,21 @@ def _moving(
 
 def _frames(scene: Mapping[str, Any], results: Results, shown: Animated, highest: Peak | None) -> Sequence[str]:
     """What each frame is; after the last one links are in the reference position, and no instant."""
-    angles = np.interp(shown.times, results.time, results.angle) if len(results.time) else 0 * shown.times
-    captions = [_moment(scene, results, float(t), float(x)) for t, x in zip(shown.times, angles, strict=True)]
+    angles = _angles(results, shown.times)
+    captions = [instant_in_words(scene, results, float(t), float(x)) for t, x in zip(shown.times, angles, strict=True)]
     stresses = ", with the highest stress of each point over all steps" if highest else ""
     return [*captions, f"links in the reference position{stresses}"]
+
+
+def _angles(results: Results, times: Float[np.ndarray, " f"]) -> Float[np.ndarray, " f"]:
+    """The drive's position in each frame; nan between rows, where some were left out."""
+    if not len(results.time):
+        return 0 * times
+    angles = np.asarray(np.interp(times, results.time, results.angle))
+    if results.every == 1 or len(results.time) < 2:
+        return angles
+    apart = np.abs(times[:, None] - results.time).min(axis=1)
+    return np.asarray(np.where(apart < 1e-3 * np.diff(results.instants[:2]), angles, np.nan))
 
 
 def _marks(scene: Mapping[str, Any], highest: Peak | None) -> list[Mark]:
@@ -198,6 +212,9 @@ def _marks(scene: Mapping[str, Any], highest: Peak | None) -> list[Mark]:
 def _loads(raw: Mapping[str, Any], results: Results, folder: Path, missing: list[str]) -> tuple[list[Table], list[Curve]]:
     """Tables of loads, and polar diagrams of those of bearings."""
     if not len(results.time):
+        return [], []
+    if left := thinned(results):
+        missing.append(f"loads of joints are left out: results {left}")
         return [], []
     try:
         scene = scene_from(raw, folder.parent)

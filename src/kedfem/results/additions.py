@@ -1,4 +1,4 @@
-"""What is added to a results file after its rows, and read from it: verdict, peaks, damage, notes, warnings, timing.
+"""Entries of a results file that are written after its rows: status, peaks, damage, notes, warnings, timing.
 
 All files are whole; an OutputError says that a file cannot be written.
 """

@@ -1,4 +1,4 @@
-"""The energy of a run, kept account of step by step.
+"""The energy account of a run, kept step by step.
 
 With the absolute rate R0' + δ' the general equation, [KED, eq. (20)], says exactly
 
@@ -33,10 +33,10 @@ from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.dynamics.stiffening import Stiffening, StressModes, Turning
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.balance import Balance, Flow, Stress, fields_of, flow, prescribed_fields, stress
-from kedfem.results.forces.constraint_forces import row_work
+from kedfem.results.forces.constraint_forces import joint_spring_work
+from kedfem.results.forces.damping_work import PreviousPoint, damping_work, previous_of, products
 from kedfem.results.forces.force_elements import Measured
 from kedfem.results.forces.moments import Constants, RigidRates, constants, rates_of_bodies
-from kedfem.results.forces.resistance import Last, last_of, products, resistance
 from kedfem.results.records import Channel
 
 Rows = Float[np.ndarray, "T c"]
@@ -99,7 +99,7 @@ class Account:
         self._next = -1
         self._sums: _Sums | None = None
         self._start = self._stored = 0.0
-        self._last: list[Last | None] = [None] * len(self._groups)
+        self._last: list[PreviousPoint | None] = [None] * len(self._groups)
         self._springs: tuple[float, np.ndarray, np.ndarray] | None = None
         self._largest = np.zeros(4)
 
@@ -126,7 +126,7 @@ class Account:
         """Energies and sums of one more block."""
         flow, taken = self._flows(block)
         strain = np.sum([link.strain for link in block.links], axis=0)
-        springs = row_work(block, self._springs) if self.model.rows else None
+        springs = joint_spring_work(block, self._springs) if self.model.rows else None
         pushed = np.zeros(len(block))
         if springs is not None:
             # what springs push is no support's work: they store it or take it
@@ -203,9 +203,9 @@ class Account:
         found = flow(of, fields_of(of, links, made, turns, rows_work), at.of(bodies, of[0].k))
         if not self.model.damping.present:
             return found, 0.0
-        last = self._last[k] or last_of(motion.t, at, of, links, made, 0)
-        lost = resistance(of, links, made, turns, (motion.t, at), last)
-        self._last[k] = last_of(motion.t, at, of, links, made, -1)
+        last = self._last[k] or previous_of(motion.t, at, of, links, made, 0)
+        lost = damping_work(of, links, made, turns, (motion.t, at), last)
+        self._last[k] = previous_of(motion.t, at, of, links, made, -1)
         return found, np.stack([lost.dissipated, lost.drag], axis=1)
 
 
@@ -220,7 +220,7 @@ def energy_channels(account: Account) -> list[tuple[Channel, Callable[[Block], R
 
 
 def balance_warning(found: Balance) -> tuple[str, ...]:
-    """A warning where the integration loses or makes energy."""
+    """A warning where the time integration loses or creates energy."""
     if found.energy <= UNBALANCED:
         return ()
     return (

@@ -120,7 +120,7 @@ def fields_of(
 
 
 def prescribed_fields(of: Sequence[Constants], forces: Sequence[Field]) -> Fields:
-    """Of rigid links that the drive carries along; their supports give what their motion asks for, M R0'' − P."""
+    """Of rigid links that the drive prescribes; their supports give what their motion asks for, M R0'' − P."""
     S, T = len(of), len(forces[0])
     rows = np.zeros((3, of[0].fit.m, S, T))
     for i, (x, F) in enumerate(zip(of, forces, strict=True)):
@@ -163,7 +163,7 @@ def _work(y: Float[np.ndarray, "k1 k S T"], rates: Float[np.ndarray, "k1 k S T"]
 
 @dataclass(frozen=True, slots=True)
 class Balance:
-    """The residual at worst, of the largest energy that is exchanged.
+    """The largest residual of the energy account, relative to the largest energy exchanged.
 
     energy : of the integration [-]
     neglected : energy that the neglected turning of K exchanges [-]

@@ -1,4 +1,4 @@
-"""What a block of rows must be before it is written."""
+"""Checks of a block of rows before it is written."""
 
 from collections.abc import Mapping, Sequence
 

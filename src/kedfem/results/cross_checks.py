@@ -1,4 +1,4 @@
-"""Two independent accounts of one effort, compared over a run: elastic against rigid links, drives against energy.
+"""Two independent computations of one effort, compared over a run: elastic against rigid links, drives against energy.
 
 They cost a few sums a step; where motions are free, which rigid links hold in the reference position, there is nothing
 to compare.
@@ -16,10 +16,10 @@ from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
 from kedfem.motion.linkage import Linkage
 from kedfem.results.audit import Account
-from kedfem.results.forces.loads import joint_rate
+from kedfem.results.forces.loads import drive_rate
 from kedfem.results.recorded import Rows, drive_effort
 from kedfem.results.records import Channel
-from kedfem.scene import Scene, without_vibration
+from kedfem.scene import Scene, driven_travel, without_vibration
 
 # c and the mean of e − r may be off by this part; runs of examples/ and tests stay below 0.2, a missing effort gives 1
 CONTRADICTION = 0.5
@@ -77,7 +77,7 @@ class CrossChecks:
         joints do.
     """
 
-    REMEMBERED = ("pairs", "_last", "_work", "_left", "exchanged", "_rounding")
+    REMEMBERED = ("pairs", "_last", "_work", "unbalanced", "exchanged", "_rounding")
 
     def __init__(self, scene: Scene, linkage: Linkage, channels: Sequence[Channel], account: Account) -> None:
         known = {each.name: each for each in channels}
@@ -88,12 +88,12 @@ class CrossChecks:
             if rigid is not None and "without what is along" not in rigid.description:
                 columns = [each.columns.index(x) for x in rigid.columns]
                 self.pairs.append(_Pair(name, rigid.name, columns, each.unit))
-        self.drives = {drive_effort(scene, name)[0]: scene.joints[name] for name in scene.driven_joints}
+        self.scene, self.drives = scene, {drive_effort(scene, name)[0]: name for name in scene.driven_joints}
         self.account = account
         all_known = bool(self.drives) and known.keys() >= self.drives.keys()
         self.worked = all_known and not without_vibration(scene)  # else there is no account of energy
         self._last: tuple[float, float] | None = None
-        self._work, self._left = 0.0, 0.0
+        self._work, self.unbalanced = 0.0, 0.0
         self.exchanged = 0.0  # largest energy or work so far [J]
         self._rounding = 0.0  # work of the largest drive effort on what RESTING allows [J]
 
@@ -104,7 +104,7 @@ class CrossChecks:
             each.add(values[each.elastic][:, each.columns], values[each.rigid])
         if not self.worked:
             return
-        rates = {effort: joint_rate(x, self.linkage, motion) for effort, x in self.drives.items()}
+        rates = {effort: drive_rate(self.scene, x, self.linkage, motion) for effort, x in self.drives.items()}
         power = np.sum([values[effort][:, 0] * rate for effort, rate in rates.items()], axis=0)
         t0, before = self._last or (float(motion.t[0]), float(power[0]))
         h = np.diff(motion.t, prepend=t0)
@@ -112,10 +112,10 @@ class CrossChecks:
         left = work - self.account.rows(block)["driven"][:, 0]
         exchanged = [values["energy/strain"], values["energy/kinetic"], values["energy/work"], work]
         for effort, x in self.drives.items():
-            arm = self.size if x.kind == "prismatic" else 1.0
+            arm = self.size if driven_travel(self.scene, x) else 1.0
             self._rounding = max(self._rounding, RESTING * arm * float(np.abs(values[effort]).max()))
         self._last, self._work = (float(motion.t[-1]), float(power[-1])), float(work[-1])
-        self._left = max(self._left, float(np.abs(left).max()))
+        self.unbalanced = max(self.unbalanced, float(np.abs(left).max()))
         self.exchanged = max(self.exchanged, *(float(np.ptp(x, axis=0).max()) for x in exchanged))
 
     @property
@@ -125,7 +125,7 @@ class CrossChecks:
         Where all rests, of the least that a drive's effort would exchange if anything moved.
         """
         scale = max(self.exchanged, self._rounding)
-        return self._left / scale if scale else 0.0
+        return self.unbalanced / scale if scale else 0.0
 
     def warnings(self) -> tuple[str, ...]:
         """Efforts that contradict each other."""

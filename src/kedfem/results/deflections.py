@@ -57,8 +57,8 @@ def _along(R: Float[np.ndarray, "T 3 3"], drawn: Drawn, now: Rows) -> Float[np.n
     half = a + b
     half /= np.linalg.norm(half, axis=1)[:, None]
     eye = np.eye(3)
-    flip = 2 * half[:, :, None] * half[:, None, :] - eye  # half a turn about the middle of both
-    turn = 2 * a[:, :, None] * a[:, None, :] - eye  # after half a turn about the first: the least turn
+    flip = 2 * half[:, :, None] * half[:, None, :] - eye  # half a revolution about the middle of both
+    turn = 2 * a[:, :, None] * a[:, None, :] - eye  # after half a revolution about the first: the least turn
     return np.asarray(flip @ turn @ R)
 
 

@@ -18,7 +18,7 @@ CUBIC = 3
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A channel of several runs at the rows of the first that lie within all.
+    """A channel of several runs at the rows of one of them that lie within all.
 
     values : runs × (T, c) [unit of the channel]
     peaks : (runs,) largest magnitude; of stress channels of the von Mises stress
@@ -34,8 +34,14 @@ class Difference:
     at: Float[np.ndarray, " runs"]
 
 
+def sparsest(runs: Sequence[Results]) -> int:
+    """The run at whose rows all are compared: the first; where some left out rows, the one with the longest gaps."""
+    gaps = [float(np.ptp(run.time)) / max(len(run.time) - 1, 1) if run.every > 1 else 0.0 for run in runs]
+    return int(np.argmax(gaps))
+
+
 def common_abscissa(runs: Sequence[Results], over: Over | None) -> tuple[Over, Float[np.ndarray, " T"]]:
-    """What runs are compared over, and the rows of the first run that lie within all of them.
+    """What runs are compared over, and the rows of one run, `sparsest`, that lie within all of them.
 
     Over the drive where it keeps on in one direction in every run, and moves otherwise over time in some; else over time.
 
@@ -52,8 +58,8 @@ def common_abscissa(runs: Sequence[Results], over: Over | None) -> tuple[Over, F
     every = [_along(run, over) for run in runs]
     low, high = max(x.min() for x in every), min(x.max() for x in every)
     slack = SAME * (high - low)
-    first = np.sort(every[0])
-    inside = first[(first >= low - slack) & (first <= high + slack)]
+    at = np.sort(every[sparsest(runs)])
+    inside = at[(at >= low - slack) & (at <= high + slack)]
     if not high > low or len(inside) <= CUBIC:
         raise ValueError(f"runs that share a stretch of {'the drive' if over == 'drive' else 'time'}")
     return over, np.clip(inside, low, high)
@@ -71,9 +77,9 @@ def _rising(x: Float[np.ndarray, " n"]) -> bool:
 
 def _moved_alike(runs: Sequence[Results]) -> bool:
     """Whether the drives of all runs are at the same places at the same times, as far as they go."""
-    first = runs[0]
+    first = runs[sparsest(runs)]
     size = float(np.ptp(first.angle)) or 1.0
-    for run in runs[1:]:
+    for run in (run for run in runs if run is not first):
         t = first.time[(first.time >= run.time[0]) & (first.time <= run.time[-1])]
         if not len(t):
             return False
@@ -101,17 +107,27 @@ def _smooth(x: Float[np.ndarray, " n"], y: Float[np.ndarray, "n c"], at: Float[n
 def differences(runs: Sequence[Results], over: Over, at: Float[np.ndarray, " T"]) -> list[Difference]:
     """Of all channels that every run has with the same columns, in the first one's order; rounding is left out."""
     out, highest = [], largest_by_unit(runs[0].channels.values())
+    thinned = any(run.every > 1 for run in runs)
     for name in in_common(runs):
         channel, _ = runs[0].channels[name]
         values = tuple(_smooth(_along(run, over), run.channels[name][1], at) for run in runs)
         sizes = [magnitude(channel, x) for x in values]
-        peaks = np.array([float(np.max(x, initial=0.0)) for x in sizes])
+        between = [_largest(run, channel, over, at) if thinned else 0.0 for run in runs]
+        peaks = np.array([float(np.max(x, initial=most)) for x, most in zip(sizes, between, strict=True)])
         if peaks.max() <= NOTHING * highest.get(channel.unit, 0.0) or not peaks[0]:
             continue
         off = [magnitude(channel, x - values[0]) / peaks[0] for x in values]
         most, rms = np.array([x.max() for x in off]), np.array([np.sqrt(np.mean(x**2)) for x in off])
         out.append(Difference(channel, values, peaks, most, rms, np.array([at[x.argmax()] for x in off])))
     return out
+
+
+def _largest(run: Results, channel: Channel, over: Over, at: Float[np.ndarray, " T"]) -> float:
+    """The largest of all time points of a run on a stretch, where runs are not compared at each."""
+    time, angle, values = run.largest_rows(channel.name)
+    x = time if over == "time" else angle
+    sizes = magnitude(channel, values)[(x >= at[0]) & (x <= at[-1])]
+    return float(np.max(sizes, initial=0.0))
 
 
 def in_common(runs: Sequence[Results]) -> list[str]:

@@ -15,6 +15,13 @@ LOCK = ".kedfem.lock"
 DATA = "data"  # the extra with xarray, pandas and what they write files with
 
 
+def unwritable(path: Path, error: OSError | RuntimeError) -> OutputError:
+    """Why a results file cannot be written, as the user reads it."""
+    if isinstance(error, BlockingIOError):
+        return OutputError(f"{path}: must not be in use, got another run that is writing it")
+    return OutputError(f"{path}: must be a file that can be written, got {reason(error)}")
+
+
 def reason(error: OSError | RuntimeError) -> str:
     """What the system (or HDF5, which also raises RuntimeError) reported, in one line and without paths."""
     reason = error.strerror if isinstance(error, OSError) else None

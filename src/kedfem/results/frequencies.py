@@ -19,7 +19,7 @@ class Summary:
     """Natural frequencies of a linkage in short.
 
     scene : its text; none of a scene made in Python
-    positions, free, still : how many; whether drives let go of their joints; motions without strain
+    positions, free, still : how many; whether drives release their joints; motions without strain
     lowest, highest : of each mode over all positions [Hz]
     speed : of the drive [rpm]; 0 of one that does not go on turning
     crossings : mode, harmonic of the drive, slowest and fastest speed at which they meet [rpm]

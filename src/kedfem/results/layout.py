@@ -6,19 +6,23 @@ checks nothing: their digest is stored beside them.
 
 from collections.abc import Iterable, Iterator, Mapping
 from hashlib import sha256
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from kedfem.arrays import Float, UInt8
+from kedfem.results.files import unwritable
 
 FORMAT = 3  # version of the file's layout
 CACHED = 2**18  # bytes of chunks of each series: some chunks; HDF5 would hold 8 MB of each that is open
 # rows of a chunk: tens of kilobytes for the widest channel, little waste for the shortest run
 CHUNK_ROWS = 512
+MANY, MOST_CHUNK_ROWS = 100_000, 4096  # rows from which on chunks are larger, as HDF5 keeps a list of them; and how large
 PEAKS, WARNINGS, TIMING, FATIGUE = "peaks", "warnings", "timing", "fatigue"
 ADDED = (PEAKS, WARNINGS, TIMING, FATIGUE)  # groups that come after the rows
+BETWEEN, LARGEST = "steps between rows", "largest_rows"  # a note, and an attribute of channels, of files without all
 OF_CHANNELS, OF_NOTES = "digest_of_channels", "digest_of_notes"
 CHECKSUM = 4  # bytes of a chunk
 
@@ -30,6 +34,19 @@ def opened(path: Path, mode: str, locking: bool | str = "best-effort") -> Any:
     return h5py.File(path, mode, locking=locking, libver=("v108", "v110"), rdcc_nbytes=CACHED)
 
 
+def refuse_another_run(path: Path) -> None:
+    """OutputError where a run is at work on a file, which is only replaced when none is."""
+    try:
+        if path.is_dir():
+            raise IsADirectoryError(21, "a folder of that name")
+        if path.exists():
+            opened(path, "r").close()
+    except (BlockingIOError, IsADirectoryError) as error:
+        raise unwritable(path, error) from error
+    except OSError:
+        return  # not readable as results: it will be replaced
+
+
 def opened_to_read(path: Path) -> Any:
     """The file, whether or not a run is writing it."""
     try:
@@ -38,11 +55,22 @@ def opened_to_read(path: Path) -> Any:
         return opened(path, "r")  # HDF5 wants equal locking flags where the run is this same process
 
 
-def new_rows(file: Any, name: str, width: tuple[int, ...]) -> Any:
+def installed_version() -> str:
+    """The version of kedfem, or ``unknown`` where it runs without being installed."""
+    try:
+        return metadata.version("kedfem")
+    except metadata.PackageNotFoundError:
+        return "unknown"
+
+
+def chunk_rows(expected: int) -> int:
+    """Rows of a chunk where so many are expected: of few no more than they are, of very many more at a time."""
+    return CHUNK_ROWS if CHUNK_ROWS <= expected <= MANY else min(max(expected, 1), MOST_CHUNK_ROWS)
+
+
+def new_rows(file: Any, name: str, width: tuple[int, ...], chunk: int = CHUNK_ROWS) -> Any:
     """An empty dataset of rows that can grow, with checksums."""
-    return file.create_dataset(
-        name, (0, *width), "f8", maxshape=(None, *width), chunks=(CHUNK_ROWS, *width), fletcher32=True
-    )
+    return file.create_dataset(name, (0, *width), "f8", maxshape=(None, *width), chunks=(chunk, *width), fletcher32=True)
 
 
 def write_facts(item: Any, facts: Mapping[str, Any]) -> None:

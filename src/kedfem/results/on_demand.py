@@ -38,7 +38,7 @@ class OnDemand(Mapping[str, Series]):
     scene: str
     known: Mapping[str, Channel]
     count: int
-    _kept: dict[str, Float[np.ndarray, "n c"]] = field(default_factory=dict, repr=False)
+    cached: dict[str, Float[np.ndarray, "n c"]] = field(default_factory=dict, repr=False)
 
     def __getitem__(self, name: str) -> Series:
         """A channel with its rows.
@@ -49,12 +49,12 @@ class OnDemand(Mapping[str, Series]):
             The file is not there any more, corrupt, or that of another run.
         """
         channel = self.known[name]
-        values = self._kept.pop(name, None)
-        self._kept[name] = self._read(channel) if values is None else values
-        size = sum(x.nbytes for x in self._kept.values())
-        while size > KEPT and len(self._kept) > 1:
-            size -= self._kept.pop(next(iter(self._kept))).nbytes
-        return channel, self._kept[name]
+        values = self.cached.pop(name, None)
+        self.cached[name] = self._read(channel) if values is None else values
+        size = sum(x.nbytes for x in self.cached.values())
+        while size > KEPT and len(self.cached) > 1:
+            size -= self.cached.pop(next(iter(self.cached))).nbytes
+        return channel, self.cached[name]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.known)

@@ -1,4 +1,4 @@
-"""Probes: what points of links do. Elastic and total motion, deflection of a link in its own frame, stress."""
+"""Probes: elastic and total motion, deflection and stress at points of links."""
 
 from collections.abc import Callable
 

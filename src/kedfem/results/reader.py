@@ -8,7 +8,18 @@ from kedfem.errors import OutputError
 from kedfem.results import on_demand
 from kedfem.results.additions import read_account, read_fatigue, read_peaks
 from kedfem.results.files import reason
-from kedfem.results.layout import FORMAT, all_rows, opened, opened_to_read, read_facts, read_text, sealed, series
+from kedfem.results.layout import (
+    BETWEEN,
+    FORMAT,
+    LARGEST,
+    all_rows,
+    opened,
+    opened_to_read,
+    read_facts,
+    read_text,
+    sealed,
+    series,
+)
 from kedfem.results.records import ANGLE, TIME, TRAVEL, Channel, Results, Status
 
 WANTED = "a results file of kedfem"
@@ -104,15 +115,18 @@ def _results(file: Any, path: Path) -> Results:
     large = 8 * n * sum(len(channel.columns) for channel in known.values()) > on_demand.AT_ONCE
     later = on_demand.OnDemand(path, scene, known, n) if large and facts["status"] != "running" else None
     warnings, seconds = read_account(file)
+    notes, with_largest = read_facts(file["notes"]), [name for name in known if LARGEST in file[name].attrs]
     return Results(
         time=all_rows(time, n), angle=all_rows(drive, n),
         channels=later or {name: (channel, on_demand.rows_of(file[name], channel, n)) for name, channel in known.items()},
         status=_status(facts["status"]), scene_json=scene,
-        scene_toml=None if toml is None else read_text(toml), notes=read_facts(file["notes"]),
+        scene_toml=None if toml is None else read_text(toml), notes=notes,
         reason=facts["reason"], version=facts["kedfem_version"],
         drive=replace(position, description=read_facts(drive)["description"]), peaks=read_peaks(file),
         warnings=warnings, seconds=seconds,
         links={name: read_facts(group) for name, group in file["notes"].items()}, fatigue=read_fatigue(file),
+        every=int(notes.get(BETWEEN, 1)),
+        largest={name: file[name].attrs[LARGEST].reshape(-1, 2 + len(known[name].columns)) for name in with_largest},
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""A channel and where its rows come from, and what the position of a drive is called."""
+"""A channel with the function that makes its rows, and names of the drive's channels."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -9,7 +9,7 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
 from kedfem.results.records import ANGLE, TRAVEL, Channel
-from kedfem.scene import Scene
+from kedfem.scene import Scene, driven_travel
 
 Rows = Float[np.ndarray, "T c"]
 T = TypeVar("T")
@@ -43,7 +43,7 @@ def drive_prefix(scene: Scene, driven: str) -> str:
 
 def drive_effort(scene: Scene, driven: str, rigid: str = "") -> tuple[str, str, str]:
     """Name of the channel of what the drive of a joint exerts, or `rigid_` links would ask of it; quantity and unit."""
-    quantity, unit = ("force", "N") if scene.joints[driven].kind == "prismatic" else ("torque", "N m")
+    quantity, unit = ("force", "N") if driven_travel(scene, driven) else ("torque", "N m")
     return f"{drive_prefix(scene, driven)}{rigid}{quantity}", quantity, unit
 
 
@@ -52,7 +52,7 @@ def drive_channel(scene: Scene) -> Channel:
     names = list(scene.driven_joints)
     if not names:
         return ANGLE
-    channel = TRAVEL if scene.joints[names[0]].kind == "prismatic" else ANGLE
+    channel = TRAVEL if driven_travel(scene, names[0]) else ANGLE
     if len(names) == 1:
         return channel
     text = f"{channel.description}, of {names[0]}, the first of {len(names)} drives"

@@ -177,6 +177,9 @@ class Results:
         [kg]`, `centre of mass [m]` in the reference position, `inertia [kg m^2]` about it: xx, yy, zz, xy, yz, zx; of
         an elastic run
     fatigue : damage, of a whole run of a scene that asks for it
+    every : rows are those of each so many time points of the run, and of the last one
+    largest : name of a channel → rows (k, 2 + columns) of time, drive and values, among which are those in which a
+        column, or the length of all of them, is largest of all time points; empty where all of these are rows
     """
 
     time: Float[np.ndarray, " n"]
@@ -194,6 +197,24 @@ class Results:
     seconds: Mapping[str, float] = field(default_factory=dict)
     links: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     fatigue: Fatigue | None = None
+    every: int = 1
+    largest: Mapping[str, Float[np.ndarray, "k r"]] = field(default_factory=dict)
+
+    @property
+    def instants(self) -> Float[np.ndarray, " T"]:
+        """All time points of the run, whether or not they are rows [s]."""
+        if self.every == 1 or len(self.time) < 2:
+            return self.time
+        steps = round((self.time[-1] - self.time[0]) / float(self.notes["step [s]"]))
+        return np.linspace(self.time[0], self.time[-1], steps + 1)
+
+    def largest_rows(
+        self, name: str
+    ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"], Float[np.ndarray, "k c"]]:
+        """Time, drive and values of rows of a channel among which its largest values of all time points are."""
+        if (found := self.largest.get(name)) is not None:
+            return found[:, 0], found[:, 1], found[:, 2:]
+        return self.time, self.angle, self.channels[name][1]
 
     def to_xarray(self) -> Any:
         """All channels as an xarray.DataTree, which is laid out as the file: `tree["joints/B/force"].sel(xyz="x")`.
@@ -228,5 +249,6 @@ def rounding(results: Results) -> dict[str, float]:
     joints = json.loads(results.scene_json).get("joints", {}).values()
     places = [each["at"] for each in joints if each.get("at")]
     size = float(np.linalg.norm(np.ptp(places, axis=0))) if places else 0.0
-    highest = largest_by_unit(results.channels.values(), size)
+    every = ((channel, results.largest_rows(name)[2]) for name, (channel, _) in results.channels.items())
+    highest = largest_by_unit(every, size)
     return {unit: NOTHING * value for unit, value in highest.items()}

@@ -30,7 +30,7 @@ def write_csv(results: Results, path: Path) -> None:
     """
     with text_file(Path(path)) as file:
         if results.status != "complete":
-            file.write(f"# not a whole run: {results.status} after {len(results.time)} steps\n")
+            file.write(f"# not a whole run: {results.status} after {len(results.instants)} steps\n")
         parts = range(0, len(results.time), ROWS)
         write_numbers(file, header(results), (columns_of(results, slice(k, k + ROWS)) for k in parts))
 

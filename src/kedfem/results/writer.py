@@ -1,7 +1,6 @@
 """Writing a results file while the analysis runs."""
 
 from collections.abc import Mapping, Sequence
-from importlib import metadata
 from pathlib import Path
 from shutil import copyfile
 from types import TracebackType
@@ -14,14 +13,19 @@ from kedfem.errors import OutputError, SolveError
 from kedfem.folders import own_part
 from kedfem.results.blocks import not_finite, require_channels
 from kedfem.results.dimensions import lay_dimensions
-from kedfem.results.files import ready_folder, reason, require_space
+from kedfem.results.files import ready_folder, require_space, unwritable
 from kedfem.results.layout import (
     ADDED,
+    BETWEEN,
     CHUNK_ROWS,
     FORMAT,
+    LARGEST,
+    chunk_rows,
+    installed_version,
     new_rows,
     opened,
     read_facts,
+    refuse_another_run,
     seal,
     series,
     write_facts,
@@ -29,16 +33,9 @@ from kedfem.results.layout import (
 )
 from kedfem.results.reader import read_results
 from kedfem.results.records import ANGLE, TIME, Channel
+from kedfem.results.thinning import Rows, Thinning
 
 SPARE_SPACE = 1_000_000  # bytes kept for HDF5's own tables and for the last words of an interrupted run
-
-
-def installed_version() -> str:
-    """The version of kedfem, or ``unknown`` where it runs without being installed."""
-    try:
-        return metadata.version("kedfem")
-    except metadata.PackageNotFoundError:
-        return "unknown"
 
 
 class ResultsWriter:
@@ -52,6 +49,8 @@ class ResultsWriter:
     scene_json, scene_toml : the scene, stored in the file
     notes : facts about the run, stored as attributes; those about a link, by their names, as attributes of a group
     drive : name and unit of the drive's position
+
+    Attributes: `thinning`, which time points become rows; `rows`, how many are in the file.
 
     Raises
     ------
@@ -85,7 +84,7 @@ class ResultsWriter:
         self.run, self._before = "", 0
         self.path = Path(path)
         self.channels = tuple(channels)
-        self.rows = 0
+        self.rows, self._chunk, self.thinning = 0, CHUNK_ROWS, Thinning(self.channels)
         self._scene = {"json": scene_json} | ({} if scene_toml is None else {"toml": scene_toml})
         self._notes = {name: fact for name, fact in notes.items() if not isinstance(fact, Mapping)}
         self._links = {name: facts for name, facts in notes.items() if isinstance(facts, Mapping)}
@@ -93,19 +92,32 @@ class ResultsWriter:
         self._published = False
         self._file: Any = None
 
-    def of_run(self, run: str, rows: int) -> Self:
+    def of_run(self, run: str, steps: int) -> Self:
         """The same writer, of a run with a name that no other one has.
 
         Parameters
         ----------
-        rows : how many rows of a file of that run to keep, and to go on after; 0 begins a new file
+        steps : time points of that run whose rows are kept, and after which it goes on; 0 begins a new file
         """
-        self.run, self._before = run, rows
+        self.run, self._before = run, steps
+        return self
+
+    def thinned(self, every: int, steps: int) -> Self:
+        """The same writer, which writes the rows of each so many time points alone, the first and the last among them.
+
+        For each channel it also writes what is largest of all.
+
+        Parameters
+        ----------
+        steps : time points that are expected: by them space is laid out
+        """
+        self.thinning.every, self._chunk = every, chunk_rows(-(-steps // every) + 1)
+        self._notes |= {BETWEEN: every} if every > 1 else {}
         return self
 
     def __enter__(self) -> Self:
         ready_folder(self.path.parent)
-        self._refuse_another_run()
+        refuse_another_run(self.path)
         try:
             require_space(self.path.parent, SPARE_SPACE)
             if self._before:
@@ -115,7 +127,7 @@ class ResultsWriter:
             self._lay_out()
         except OSError as error:
             self._discard()
-            raise self._fault(error) from error
+            raise unwritable(self.path, error) from error
         except OutputError:
             self._discard()
             raise
@@ -127,7 +139,7 @@ class ResultsWriter:
         angle: Float[np.ndarray, " b"],
         values: Mapping[str, Float[np.ndarray, "b c"]],
     ) -> None:
-        """Write rows at the end and bring them to the disk.
+        """Take the next time points: write their rows at the end, and bring them to the disk.
 
         Parameters
         ----------
@@ -150,18 +162,28 @@ class ResultsWriter:
             if row:
                 self.append(time[:row], angle[:row], {name: block[:row] for name, block in values.items()})
             raise SolveError(message)
+        every = {**values, self.drive.name: angle, TIME.name: time}
+        chosen, last = self.thinning.chosen(every, (TIME.name, self.drive.name))
         try:
-            require_space(self.path.parent, self._block_space(len(time)))
-            for name, block in (*values.items(), (self.drive.name, angle), (TIME.name, time)):
-                rows = self._file[name]
-                rows.resize(self.rows + len(time), axis=0)
-                rows[self.rows :] = np.reshape(block, (len(time), *rows.shape[1:]))
-            self._file.flush()
-            self.rows += len(time)
+            self._write(chosen)
             if not self._published:
                 self._publish()
         except (OSError, RuntimeError) as error:
-            raise self._fault(error) from error
+            raise unwritable(self.path, error) from error
+        self.thinning.last = last
+
+    def _write(self, rows: Rows) -> None:
+        """More rows of all channels, those of time last."""
+        count = len(rows.get(TIME.name, ()))
+        if not count:
+            return
+        require_space(self.path.parent, self._block_space(count))
+        for name, block in rows.items():
+            found = self._file[name]
+            found.resize(self.rows + count, axis=0)
+            found[self.rows :] = np.reshape(block, (count, *found.shape[1:]))
+        self._file.flush()
+        self.rows += count
 
     def note(self, notes: Mapping[str, str | float]) -> None:
         """Store more facts about the run, e.g. what is known only at its end."""
@@ -169,7 +191,7 @@ class ResultsWriter:
             write_facts(self._file["notes"], notes)
             seal(self._file)
         except OSError as error:
-            raise self._fault(error) from error
+            raise unwritable(self.path, error) from error
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -183,19 +205,7 @@ class ResultsWriter:
                 self._discard()
         except (OSError, RuntimeError) as fault:
             if kind is None:
-                raise self._fault(fault) from fault
-
-    def _refuse_another_run(self) -> None:
-        """An older file is only replaced when no run is at work on it."""
-        try:
-            if self.path.is_dir():
-                raise IsADirectoryError(21, "a folder of that name")
-            if self.path.exists():
-                opened(self.path, "r").close()
-        except (BlockingIOError, IsADirectoryError) as error:
-            raise self._fault(error) from error
-        except OSError:
-            return  # not readable as results: it will be replaced
+                raise unwritable(self.path, fault) from fault
 
     def _lay_out(self) -> None:
         """The empty file: scene, notes, one extendable dataset per channel with its units and dimensions."""
@@ -210,7 +220,7 @@ class ResultsWriter:
             write_facts(notes.create_group(name), facts)
         for index, channel in enumerate((TIME, self.drive, *self.channels)):
             width = (len(channel.columns),) if len(channel.columns) > 1 else ()
-            rows = new_rows(self._file, channel.name, width)
+            rows = new_rows(self._file, channel.name, width, self._chunk)
             said = {"unit": channel.unit, "frame": channel.frame, "description": channel.description}
             write_facts(rows, said | {"columns": list(channel.columns) or [channel.name], "index": index})
         lay_dimensions(self._file, self.drive, self.channels)
@@ -222,31 +232,33 @@ class ResultsWriter:
         require_space(self.path.parent, self.path.stat().st_size + SPARE_SPACE)
         copyfile(self.path, self._part)
         self._file = opened(self._part, "r+")
+        self.thinning.steps = self._before
+        kept = self.thinning.rows
         found = series(self._file)
         names = {f"/{each.name}" for each in (TIME, self.drive, *self.channels)}
         own = read_facts(self._file).get("run") == self.run and set(found) == names
-        if not own or len(before.time) < self._before:
-            wanted = f"{self.path}: must hold the {self._before} rows of the run to be resumed"
+        if not own or len(before.time) < kept:
+            wanted = f"{self.path}: must hold the {kept} rows of the run to be resumed"
             raise OutputError(f"{wanted}, got another run's or fewer; run without --resume")
         for name in ADDED:
             self._file.pop(name, None)
         for name in found:
-            self._file[name].resize(self._before, axis=0)
+            self._file[name].resize(kept, axis=0)
         write_facts(self._file["notes"], self._notes)
         write_facts(self._file, {"status": "running", "reason": ""})
         seal(self._file)
-        self.rows = self._before
+        self.rows = kept
         self._publish()
 
     def _block_space(self, length: int) -> int:
         """Bytes that a block of rows may add, in whole chunks."""
         width = 2 + sum(len(channel.columns) for channel in self.channels)
-        return 8 * width * CHUNK_ROWS * (length // CHUNK_ROWS + 2) + SPARE_SPACE
+        return 8 * width * self._chunk * (length // self._chunk + 2) + SPARE_SPACE
 
     def _publish(self) -> None:
         """Put the new file in the old one's place; closed meanwhile: not every system renames open files."""
         self._file.close()
-        self._refuse_another_run()
+        refuse_another_run(self.path)
         self._part.replace(self.path)
         self._published = True
         self._file = opened(self.path, "r+")
@@ -255,8 +267,15 @@ class ResultsWriter:
         """Close the file, all channels cut to the rows that were written whole."""
         if not self._file:  # stopped while it was being put in place
             self._file = opened(self.path, "r+")
+        try:
+            self._write(self.thinning.last or {})
+        except (OSError, RuntimeError, OutputError):
+            if status == "complete":
+                raise
         for channel in (TIME, self.drive, *self.channels):
             self._file[channel.name].resize(self.rows, axis=0)
+        for name, rows in self.thinning.largest.items():
+            write_facts(self._file[name], {LARGEST: rows.ravel()})
         write_facts(self._file, {"reason": why, "status": status})
         seal(self._file)
         if self._published:
@@ -270,9 +289,3 @@ class ResultsWriter:
         if self._file:
             self._file.close()
         self._part.unlink(missing_ok=True)
-
-    def _fault(self, error: OSError | RuntimeError) -> OutputError:
-        """The fault as the user reads it."""
-        if isinstance(error, BlockingIOError):
-            return OutputError(f"{self.path}: must not be in use, got another run that is writing it")
-        return OutputError(f"{self.path}: must be a file that can be written, got {reason(error)}")

@@ -12,11 +12,19 @@ from kedfem.scene.questions.laws import (
     load_factor,
     path_parameter,
 )
-from kedfem.scene.questions.modelling import corotational, corotational_links, link_frames, moving_grounds
+from kedfem.scene.questions.modelling import corotational, corotational_links, driven_travel, link_frames, moving_grounds
 from kedfem.scene.questions.planes import plane_scene, spatial_beams
-from kedfem.scene.questions.timing import TimeGrid, cycle, time_grid, turn_steps, without_vibration
+from kedfem.scene.questions.timing import TimeGrid, cycle, states_step, time_grid, turn_steps, without_vibration
 from kedfem.scene.read.files import part_geometry
-from kedfem.scene.read.scenes import face_from, link_from, material_from, read_keys, read_scene, scene_from
+from kedfem.scene.read.scenes import (
+    face_from,
+    link_from,
+    material_from,
+    read_keys,
+    read_scene,
+    refuse_few_rows,
+    scene_from,
+)
 from kedfem.scene.records.analysis import Analysis, Animation, InitialMotion, Output, Probe
 from kedfem.scene.records.curves import Curve, Factor, ForceCurve, PullCurve, TorqueCurve
 from kedfem.scene.records.drives import (

@@ -1,4 +1,4 @@
-"""What is swept: keys of a scene, dotted, with their values, as ``drive.speed=500rpm:4000rpm:50``; all points."""
+"""Axes of a sweep: keys of a scene, dotted, with their values, as ``drive.speed=500rpm:4000rpm:50``; all points."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
@@ -13,7 +13,7 @@ from kedfem.errors import SceneError, Where, place
 from kedfem.scene import Scene
 from kedfem.scene.checks.hints import below, known_keys, marks, models
 from kedfem.scene.records.curves import Curve
-from kedfem.scene.records.drives import EitherSpeed
+from kedfem.scene.records.drives import EitherSpeed, prescribes_travel
 from kedfem.scene.records.units import NUMBER, UNIT, UNREADABLE, Quantity, unit_registry
 from kedfem.scene.records.wording import nearest, shown
 
@@ -124,10 +124,13 @@ def _with_unit(axis: Axis, raw: Mapping[str, Any]) -> Axis:
 
 def _speed_unit(where: Where, raw: Mapping[str, Any]) -> str:
     """The unit of a drive's or a joint's speed, by the kind of its joint; empty where the joint is not known."""
-    at = where[:1] if where[0] == "drive" else where[:2]
-    joint = where[-1] if where[0] == "analysis" else _item(_at(raw, at), "joint")
-    kind = _item(_at(raw, ("joints", joint)), "kind")
-    return "" if kind is None else "m/s" if kind in {"prismatic", "cylindrical"} else "rad/s"
+    starts = where[0] == "analysis"
+    drive = {} if starts else _at(raw, where[:1] if where[0] == "drive" else where[:2])
+    kind = _item(_at(raw, ("joints", where[-1] if starts else _item(drive, "joint"))), "kind")
+    if kind is None:
+        return ""
+    slides = prescribes_travel(kind, _item(drive, "coordinate"), _item(drive, "along"))
+    return "m/s" if slides or (starts and kind == "cylindrical") else "rad/s"
 
 
 def _at(raw: Any, where: Where) -> Any:

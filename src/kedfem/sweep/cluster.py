@@ -7,7 +7,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from kedfem.errors import OutputError
-from kedfem.results.writer import installed_version
+from kedfem.results.layout import installed_version
 
 PATIENCE = 10  # s, in which a scheduler must answer
 

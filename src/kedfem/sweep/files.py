@@ -11,11 +11,10 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from kedfem.dynamics.system.period.map import Carried
+from kedfem.dynamics.system.period.map import StateArrays
 from kedfem.results import replacing
-from kedfem.results.layout import opened
+from kedfem.results.layout import installed_version, opened
 from kedfem.results.table import write_rows
-from kedfem.results.writer import installed_version
 from kedfem.sweep.axes import Axis
 from kedfem.sweep.points import MAGNITUDE, Row
 
@@ -33,7 +32,7 @@ def kept_row(folder: FilePath, identity: str) -> Row | None:
     return None if row.status == "failed" else row
 
 
-def kept_state(folder: FilePath, identity: str) -> Carried | None:
+def kept_state(folder: FilePath, identity: str) -> StateArrays | None:
     """The state with which the steady motion of a finished point begins; None if there is none."""
     try:
         with np.load(folder / STATES / f"{identity}.npz", allow_pickle=False) as file:
@@ -42,7 +41,7 @@ def kept_state(folder: FilePath, identity: str) -> Carried | None:
         return None
 
 
-def keep_state(folder: FilePath, identity: str, state: Carried) -> None:
+def keep_state(folder: FilePath, identity: str, state: StateArrays) -> None:
     """Put the state with which a steady motion begins on the disk, whole or not at all."""
     with replacing(folder / STATES / f"{identity}.npz") as part, part.open("wb") as file:
         np.savez(file, **state)
@@ -58,7 +57,7 @@ def write_table(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row]) -> No
     """One line a point: values of the keys, how it ended, extremes of every column."""
     units = column_units(rows)
     header = [f"{axis.key} [{axis.unit}]" if axis.unit else axis.key for axis in axes]
-    header += ["status", "settled", "change of the last turn"]
+    header += ["status", "settled", "change of the last revolution"]
     header += [f"{name} {kind} [{'s' if kind == 'when' else unit}]" for name, unit in units.items() for kind in KINDS]
 
     def line(k: int, row: Row) -> list[object]:

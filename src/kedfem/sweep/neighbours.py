@@ -1,4 +1,4 @@
-"""What points of a sweep have of one another: the steady motion that was found before, and the modes of reduced links.
+"""Sharing between points of a sweep: the steady motion found before, and the modes of reduced links.
 
 A steady motion is looked for where that of the point before was found. Points follow along the first key in the order of
 its values, as long as the others are the same. Of motions that are not linear several may be steady at one speed; which

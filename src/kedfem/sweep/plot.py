@@ -43,7 +43,7 @@ def write_plot(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row], edges:
     order = np.argsort(numbers)
     loose = np.array([rows[k].settled == "no" for k in order])
     bands = unstable_bands(numbers, rows, range(len(rows)), edges)
-    title = f"Largest over the last turns of each run, over {axes[0].key}"
+    title = f"Largest over the last revolutions of each run, over {axes[0].key}"
     title += ("; rings: not settled" if loose.any() else "") + ("; red: unstable" if bands else "")
     with figure_saved(path, title) as figure:
         panes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]

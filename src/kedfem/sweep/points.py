@@ -1,4 +1,4 @@
-"""One point of a sweep: the scene with its values, its run, the row that it leaves: extremes of the last turns."""
+"""One point of a sweep: the scene with its values, its run, the row that it leaves: extremes of the last revolutions."""
 
 import json
 import math
@@ -18,7 +18,7 @@ from kedfem.accuracy.prepared import Neighbours
 from kedfem.accuracy.trials import Stage
 from kedfem.analysis import analyse
 from kedfem.arrays import Float
-from kedfem.dynamics.system.period.map import Carried
+from kedfem.dynamics.system.period.map import StateArrays
 from kedfem.errors import KedfemError, SceneError, Where, place
 from kedfem.motion.assembly import assembled
 from kedfem.results import Results
@@ -26,7 +26,7 @@ from kedfem.resume import origin
 from kedfem.scene import Scene, scene_from, time_grid, turn_steps
 from kedfem.sweep.axes import Value, with_values
 
-SETTLED = 0.01  # what the last two turns may differ by
+SETTLED = 0.01  # what the last two revolutions may differ by
 NOTHING = 1e-6  # of the largest channel with the same unit: what is rounding in a channel that should be zero
 MAGNITUDE = "magnitude"
 SUMS = "energy/"  # channels that add up over the run: they have no extremes of a turn
@@ -80,7 +80,7 @@ class Job:
     folder: FilePath | None = None
     ends: tuple[Mapping[Where, Value], ...] = ()
     follows: bool = False
-    near: Carried | None = None
+    near: StateArrays | None = None
 
     def scene(self) -> Scene:
         """The scene of this point; a SceneError has all its faults."""
@@ -97,11 +97,11 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """What a point leaves.
+    """The row of one point of a sweep.
 
     status : ``complete``, ``doubtful`` or ``failed``
     message : why it failed or is doubtful, else empty
-    change : between the last two turns, relative; nan if there were none
+    change : between the last two revolutions, relative; nan if there were none
     seconds : that the run took
     extremes : name of a column → unit, (maximum, minimum, root of the mean square, time [s] of the largest magnitude)
     begun : the state with which its steady motion begins, if the next point is to follow it; not part of its text
@@ -112,11 +112,11 @@ class Row:
     change: float = math.nan
     seconds: float = 0.0
     extremes: Mapping[str, tuple[str, Extreme]] = field(default_factory=dict)
-    begun: Carried | None = field(default=None, compare=False, repr=False)
+    begun: StateArrays | None = field(default=None, compare=False, repr=False)
 
     @property
     def settled(self) -> str:
-        """``yes``, ``no``, or ``unknown`` where there were no two turns."""
+        """``yes``, ``no``, or ``unknown`` where there were no two revolutions."""
         return "unknown" if math.isnan(self.change) else "yes" if self.change <= SETTLED else "no"
 
     def text(self) -> str:
@@ -169,6 +169,7 @@ def _ran(job: Job) -> Row:
         folder = job.folder or FilePath(stack.enter_context(TemporaryDirectory(prefix="kedfem-sweep-")))
         update: dict[str, Any] = {"folder": str(folder.absolute())}
         if job.folder is None:
+            update["every"] = 1  # extremes are of all steps
             update |= dict.fromkeys(("csv", "parquet", "plots", "picture", "report"), False)
             update["animation"] = None
         output = scene.output.model_copy(update=update)
@@ -246,7 +247,7 @@ def columns(results: Results, some: np.ndarray) -> Iterator[tuple[str, str, Floa
 def change(results: Results, turn: float) -> float:
     """By how much the largest magnitudes of the last turn [s] differ from those of the turn before, relative, at worst.
 
-    Channels that are nothing beside others of the same unit are left out; nan where there are no two turns.
+    Channels that are nothing beside others of the same unit are left out; nan where there are no two revolutions.
     """
     end = float(results.time[-1])
     half = 0.5 * float(results.time[-1] - results.time[-2])

@@ -8,10 +8,10 @@ from itertools import islice
 from pathlib import Path as FilePath
 from typing import Any
 
-from kedfem.errors import KedfemError, OutputError, SceneError
+from kedfem.errors import Fault, KedfemError, OutputError, SceneError
 from kedfem.processes import BLAS_THREADS, end_with_parent
 from kedfem.results import claimed
-from kedfem.scene import scene_from
+from kedfem.scene import Scene, scene_from
 from kedfem.scene.questions.timing import scene_speed
 from kedfem.stepping import Watch
 from kedfem.sweep.axes import Axis, with_values
@@ -27,7 +27,7 @@ ONE_THREAD = dict.fromkeys((*BLAS_THREADS, "NUMBA_NUM_THREADS"), "1")
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """How a sweep is done.
+    """Options of a sweep.
 
     last : turns of the drive whose extremes count
     workers : processes; as many as this one may use cores if None
@@ -47,7 +47,7 @@ class Asked:
 
 @dataclass(frozen=True, slots=True)
 class Swept:
-    """What a sweep leaves: a row for each point, in the order of the axes' values.
+    """The outcome of a sweep: a row for each point, in the order of the axes' values.
 
     before : rows that an earlier sweep had finished
     planned : the point by whose plan all were run; None if there was none
@@ -91,6 +91,7 @@ def sweep(
         analysis = {**base.raw.get("analysis", {}), "accuracy": "quick"}
         base = replace(base, raw={**base.raw, "analysis": analysis})
     scene = scene_from(base.raw, base.folder, stem=base.stem)  # its own faults are not those of points
+    _refuse_thinned(scene, asked)
     if asked.edges is not None:
         refuse_without_growth(scene, axes[0], asked.edges)
     if asked.follow:
@@ -127,6 +128,13 @@ def sweep(
             if asked.edges is not None:
                 write_edges(target / "edges.csv", axes, found)
     return Swept(target, tuple(axes), tuple(every), point.before, planned, tuple(found))
+
+
+def _refuse_thinned(scene: Scene, asked: Asked) -> None:
+    """Files that stay have the rows in which the sweep looks for extremes."""
+    if asked.keep and scene.output.every > 1:
+        message = "must be 1 for files that stay (--keep): a sweep finds extremes in the rows of all steps"
+        raise SceneError([Fault(("output", "every"), f"{message}, got {scene.output.every}")])
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""What a check shows: what would be modelled, how it moves, what it would cost."""
+"""Tables of `kedfem check`: the model, how it moves, and what a run would cost."""
 
 from dataclasses import replace
 from pathlib import Path as FilePath
@@ -16,6 +16,8 @@ from kedfem.accuracy.singular import SingularPasses
 from kedfem.arrays import Float
 from kedfem.dynamics.force_elements import force_elements
 from kedfem.dynamics.history import Snapshot
+from kedfem.dynamics.joints.constraint_ports import element_joint
+from kedfem.dynamics.rigid_elements import links_of
 from kedfem.dynamics.stepping.cost import Cost, estimated_cost, tried_cost
 from kedfem.dynamics.system.steps import Steps
 from kedfem.errors import KedfemError
@@ -94,10 +96,12 @@ def forecast(ready: Prepared) -> tuple[Cost, KedfemError | None]:
     except KedfemError as error:
         return estimated_cost(scene, model), error
     frames = len(frame_steps(scene)) if seen else 0
-    return replace(cost, steps=cost.steps + frames * _frame(ready, recoveries, seen[-1])) if frames else cost, None
+    return replace(
+        cost, steps=cost.steps + frames * seconds_of_frame(ready, recoveries, seen[-1])
+    ) if frames else cost, None
 
 
-def _frame(ready: Prepared, recoveries: list[StressRecovery], now: Snapshot) -> float:
+def seconds_of_frame(ready: Prepared, recoveries: list[StressRecovery], now: Snapshot) -> float:
     """Seconds that a frame of the animation takes."""
     with TemporaryDirectory() as folder:
         for k in range(2):  # the first time prepares
@@ -109,13 +113,13 @@ def _frame(ready: Prepared, recoveries: list[StressRecovery], now: Snapshot) -> 
 
 def resolution_table(found: Resolution, scene: Scene) -> Table:
     """First frequency of the linkage against step and drive."""
-    span = "over the last turn" if turn_steps(scene) else "over the analysis"
+    span = "over the last revolution" if turn_steps(scene) else "over the analysis"
     low, high = found.first.min(), found.first.max()
     return facts("First frequency (drive held, of what the loads excite)", [
         (span, f"{low:.4g} Hz" if high < 1.001 * low else f"{low:.4g} to {high:.4g} Hz"),
         ("steps in a period", f"{found.steps_per_period:.3g} at least"),
         *((f"met by harmonic {each.harmonic}", f"{each.frequency:.4g} Hz, near {np.degrees(each.angle) % 360:.0f}°")
-          for each in found.meetings),
+          for each in found.resonances),
     ])  # fmt: skip
 
 
@@ -125,14 +129,14 @@ def _motion(ready: Prepared) -> Table:
     drive = f"{of_joints(names)}, {_over(ready)}" if names else "none: the mechanism moves by itself"
     table = facts("Rigid motion", [("drive", drive), *_initial_speeds(ready)])
     for k, name in enumerate(ready.linkage.bodies[1:] if names else (), start=1):
-        words = _moves(along.R[:, k], along.p[:, k], ready.linkage.size)
+        words = motion_in_words(along.R[:, k], along.p[:, k], ready.linkage.size)
         table.add_row(f"link {name}", words)
     if names and ready.linkage.mobility:
         table.caption = "by the drives alone: free motions are held in the reference position here"
     return table
 
 
-def _moves(R: Float[np.ndarray, "T 3 3"], p: Float[np.ndarray, "T 3"], size: float) -> str:
+def motion_in_words(R: Float[np.ndarray, "T 3 3"], p: Float[np.ndarray, "T 3"], size: float) -> str:
     """How far a link turns, or slides where it does not turn, in words.
 
     Parameters
@@ -141,15 +145,15 @@ def _moves(R: Float[np.ndarray, "T 3 3"], p: Float[np.ndarray, "T 3"], size: flo
     size : of the linkage [m]
     """
     if np.abs(R - np.eye(3)).max() > STILL:
-        return _turns(R)
+        return rotation_in_words(R)
     slid = float(np.linalg.norm(p, axis=1).max())
     if slid <= STILL * size:
         return "does not move"
     return f"slides up to {with_prefix(slid, 'm')} from the reference position"
 
 
-def _turns(R: Float[np.ndarray, "T 3 3"]) -> str:
-    """How far a link turns on its way, in words; about one axis its angle is counted on, beyond half a turn too."""
+def rotation_in_words(R: Float[np.ndarray, "T 3 3"]) -> str:
+    """How far a link turns on its way, in words; about one axis its angle is counted on, beyond half a revolution too."""
     from scipy.spatial.transform import Rotation
 
     start = Rotation.from_matrix(R[0]).as_rotvec()
@@ -161,9 +165,9 @@ def _turns(R: Float[np.ndarray, "T 3 3"]) -> str:
     else:
         angles = np.degrees(np.cumsum(np.vstack([start, steps]) @ axes[0]))
         if (whole := (np.ptp(angles) + NEARLY) // 360) >= 1:
-            return "turns a full revolution" if whole == 1 else f"turns {whole:.0f} full revolutions"
+            return "rotates a full revolution" if whole == 1 else f"rotates {whole:.0f} full revolutions"
         turned = float(np.abs(angles).max())
-    return f"turns up to {turned:.4g}° from the reference position"
+    return f"rotates up to {turned:.4g}° from the reference position"
 
 
 def _over(ready: Prepared) -> str:
@@ -174,13 +178,14 @@ def _over(ready: Prepared) -> str:
     revolutions = along.period / (2 * np.pi)
     if len(link.drives) > 1:
         return f"repeats every {with_prefix(along.period, 's')}"
-    return "repeats every revolution" if round(revolutions) == 1 else f"repeats every {revolutions:.4g} turns"
+    return "repeats every revolution" if round(revolutions) == 1 else f"repeats every {revolutions:.4g} revolutions"
 
 
 def _force_elements(ready: Prepared) -> Table:
     """Motors, springs and limits: where they act and by which law."""
-    scene = ready.scene
-    force_elements(scene, ready.model)  # refused where they do not fit
+    scene, parts = ready.scene, links_of(ready.model, ready.linkage.bodies)
+    for name, element in force_elements(scene):  # refused where they do not fit
+        element_joint(scene, name, element, *parts)
     return facts("Motors, springs and limits" if scene.limits else "Motors and springs", [
         *((name, f"motor on joint {each.joint}", _curve_words(each.curve, "N m" if each.torque else "N"))
           for name, each in scene.motors.items()),

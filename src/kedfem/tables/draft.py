@@ -12,7 +12,7 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.errors import SceneError
-from kedfem.mesh.cad.assembly import AssemblySolid, Meeting, assembly_solids, meetings
+from kedfem.mesh.cad.assembly import AssemblyJoint, AssemblySolid, assembly_joints, assembly_solids
 from kedfem.scene import GROUND, ChosenFace, link_from, scene_from
 from kedfem.scene.read.including import toml_string
 
@@ -61,7 +61,7 @@ def draft_scene(assembly: Path, folder: Path, scale: float | None) -> str:
 def scene_text(solids: Sequence[AssemblySolid], file: str, scale: float | None) -> str:
     """A scene with a link for each solid of a file; joints where they meet, ground and drive as a comment."""
     names = link_names([solid.name for solid in solids])
-    found = meetings(solids)
+    found = assembly_joints(solids)
     ground = ground_solid(solids, found)
     found = sorted(found, key=lambda each: _order(each, ground, solids))
     links = (_link(name, solid, file, scale) for name, solid in zip(names, solids, strict=True))
@@ -90,7 +90,7 @@ def link_names(names: Sequence[str]) -> list[str]:
     return found
 
 
-def ground_solid(solids: Sequence[AssemblySolid], found: Sequence[Meeting]) -> int | None:
+def ground_solid(solids: Sequence[AssemblySolid], found: Sequence[AssemblyJoint]) -> int | None:
     """The solid that may be the frame: one of a frame's name, else the largest of those in a closed loop.
 
     Only of those that meet others; None without such: in an open chain any may be.
@@ -103,10 +103,10 @@ def ground_solid(solids: Sequence[AssemblySolid], found: Sequence[Meeting]) -> i
     return max(named or looped, key=lambda i: solids[i].extent, default=None)
 
 
-def _order(meeting: Meeting, ground: int | None, solids: Sequence[AssemblySolid]) -> tuple[bool, bool, float]:
+def _order(found: AssemblyJoint, ground: int | None, solids: Sequence[AssemblySolid]) -> tuple[bool, bool, float]:
     """Hinges of the ground first, that of the shortest link before others: it may be the crank."""
-    others = [solids[i].extent for i in meeting.solids if i != ground]
-    return meeting.ball, ground not in meeting.solids, min(others)
+    others = [solids[i].extent for i in found.solids if i != ground]
+    return found.ball, ground not in found.solids, min(others)
 
 
 def _link(name: str, solid: AssemblySolid, file: str, scale: float | None) -> str:
@@ -127,7 +127,7 @@ def _as_frame(table: str, name: str) -> str:
     return phrase + "".join(f"# {line}\n" for line in table.splitlines())
 
 
-def _joints(found: Sequence[Meeting], names: Sequence[str], ground: int | None) -> Iterator[str]:
+def _joints(found: Sequence[AssemblyJoint], names: Sequence[str], ground: int | None) -> Iterator[str]:
     """The joints' tables and a drive's, all as comments."""
     if not found:
         none = "No pin in a bore, no bores in a line, no ball in its socket"
@@ -143,37 +143,37 @@ def _joints(found: Sequence[Meeting], names: Sequence[str], ground: int | None) 
         yield '\n#[drive]\n#joint = "J1"\n#motion = { kind = "ramp", speed = "60 rpm", time = "0.1 s" }\n'
 
 
-def _joint(name: str, meeting: Meeting, names: Sequence[str], ground: int | None, several: int) -> str:
+def _joint(name: str, found: AssemblyJoint, names: Sequence[str], ground: int | None, several: int) -> str:
     """A joint's table, as a comment."""
-    links = [_quoted(GROUND if i == ground else names[i]) for i in meeting.solids]
+    links = [_quoted(GROUND if i == ground else names[i]) for i in found.solids]
     lines = [
         f"[joints.{name}]",
-        f'kind = "{"spherical" if meeting.ball else "revolute"}"',
+        f'kind = "{"spherical" if found.ball else "revolute"}"',
         f"links = [{', '.join(links)}]",
-        f"at = [{', '.join(_quoted(_mm(x)) for x in meeting.at)}]",
+        f"at = [{', '.join(_quoted(_mm(x)) for x in found.at)}]",
     ]
-    if not meeting.ball:
-        lines.append(f"axis = {_axis(meeting.faces[0].direction)}")
+    if not found.ball:
+        lines.append(f"axis = {_axis(found.faces[0].direction)}")
     chosen = [
-        f"{link} = {ChosenFace(cylinder=2 * face.radius, axis=_xyz(face.direction), near=_xyz(meeting.at)).label}"
-        for i, link, face in zip(meeting.solids, links, meeting.faces, strict=True)
-        if meeting.hidden[meeting.solids.index(i)] and i != ground
+        f"{link} = {ChosenFace(cylinder=2 * face.radius, axis=_xyz(face.direction), near=_xyz(found.at)).label}"
+        for i, link, face in zip(found.solids, links, found.faces, strict=True)
+        if found.hidden[found.solids.index(i)] and i != ground
     ]
     if chosen:
         lines.append(f"faces = {{ {', '.join(chosen)} }}  # else the bore about the same axis")
-    phrase = _in_words(meeting, [names[i] for i in meeting.solids])
+    phrase = _in_words(found, [names[i] for i in found.solids])
     if several > 1:
         phrase += _SEVERAL.format(several=several)
     return f"\n# {phrase}\n" + "".join(f"#{line}\n" for line in lines)
 
 
-def _in_words(meeting: Meeting, links: Sequence[str]) -> str:
+def _in_words(found: AssemblyJoint, links: Sequence[str]) -> str:
     """What meets: ``bore of radius 6 mm of rod, pin of radius 6 mm of crank, together along 10 mm``."""
-    faces = [_face(face.inward, face.kind, face.radius) for face in meeting.faces]
+    faces = [_face(face.inward, face.kind, face.radius) for face in found.faces]
     phrase = ", ".join(f"{face} of {link}" for face, link in zip(faces, links, strict=True))
-    if meeting.ball:
+    if found.ball:
         return phrase
-    where = ": their pin is not drawn" if meeting.pinless else f", together along {_mm(meeting.share)}"
+    where = ": their pin is not drawn" if found.pinless else f", together along {_mm(found.share)}"
     return phrase + where
 
 

@@ -8,9 +8,10 @@ from rich.text import Text
 
 from kedfem.accuracy.frequencies import error_words
 from kedfem.frequencies import Crossing, Frequencies, PartFrequencies
-from kedfem.kinematics import Moved, first_largest
+from kedfem.kinematics import KinematicsRun, first_largest
 from kedfem.load_cases import LoadCases
 from kedfem.loads import Loads
+from kedfem.motion.coordinates import driven_name
 from kedfem.output.words import NOTHING, clock, moment, number_in, with_prefix
 from kedfem.results.kinematic import transmission_key
 from kedfem.results.records import largest_by_unit
@@ -27,7 +28,7 @@ SHORT = {
 }  # fmt: skip
 
 
-def kinematics_tables(scene: Scene, moved: Moved) -> list[Table]:
+def kinematics_tables(scene: Scene, moved: KinematicsRun) -> list[Table]:
     """Coordinates of joints, transmission angles, forces of joints and drive, and the seconds spent."""
     angles = [*left("coupler", "drives"), *right("from", "to", "furthest from 90°", f"at {clock(scene)}")]
     forces = [*left("of"), *right("largest", f"at {clock(scene)}")]
@@ -45,19 +46,19 @@ def seconds_table(of: str, seconds: Mapping[str, float]) -> Table:
     return facts(f"{of}; seconds", ((stage, f"{each:.2f}") for stage, each in seconds.items()))
 
 
-def _coordinates(scene: Scene, moved: Moved) -> Iterator[tuple[str, ...]]:
+def _coordinates(scene: Scene, moved: KinematicsRun) -> Iterator[tuple[str, ...]]:
     for each in moved.recorded.coordinates:
         values = moved.results.channels[f"joints/{each.joint}/{each.name}"][1][:, 0]
         low, high = float(values.min()), float(values.max())
         shown = _length if each.kind == "length" else _degrees
         words = [shown(x) for x in (low, high, high - low)]
         driven, links = "", scene.joints[each.joint].links
-        if each.joint in scene.driven_joints:  # between moving links it is easily taken the other way round
+        if driven_name(scene, each.joint) == each.name:  # between moving links it is easily taken the other way round
             driven = " (driven)" if "ground" in links else f" of {links[0]} against {links[1]} (driven)"
         yield each.joint, each.name.replace("_", " ") + driven, *words
 
 
-def _transmissions(scene: Scene, moved: Moved) -> Iterator[tuple[str, ...]]:
+def _transmissions(scene: Scene, moved: KinematicsRun) -> Iterator[tuple[str, ...]]:
     for each in moved.recorded.transmissions:
         values = moved.results.channels[transmission_key(each.coupler)][1][:, 0]
         k = first_largest(np.abs(values - np.pi / 2))
@@ -65,7 +66,7 @@ def _transmissions(scene: Scene, moved: Moved) -> Iterator[tuple[str, ...]]:
         yield each.coupler, each.driven, *words, _at(scene, moved, k)
 
 
-def _forces(scene: Scene, moved: Moved) -> Iterator[tuple[str, ...]]:
+def _forces(scene: Scene, moved: KinematicsRun) -> Iterator[tuple[str, ...]]:
     """Largest sizes; what statics do not determine is not there."""
     found = {name: x for name, x in moved.results.channels.items() if "/rigid_" in name}
     highest = largest_by_unit(found.values())
@@ -79,7 +80,7 @@ def _forces(scene: Scene, moved: Moved) -> Iterator[tuple[str, ...]]:
         yield of, *words
 
 
-def _at(scene: Scene, moved: Moved, k: int) -> str:
+def _at(scene: Scene, moved: KinematicsRun, k: int) -> str:
     return moment(scene, float(moved.results.time[k]), float(moved.results.angle[k]))
 
 
@@ -173,7 +174,7 @@ def _range(x: Crossing, speed: float) -> str:
 
 
 def part_tables(found: PartFrequencies) -> list[Table]:
-    """Frequencies of a single link; what it is and what holds it."""
+    """Frequencies of a single link; what it is and its support."""
     part, still = found.part, found.still
     held = f"held at {', '.join(part.held)}" if part.held else "free"
     left_out = f"{still} motions without strain, at 0 Hz, are left out" if still else ""

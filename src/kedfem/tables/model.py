@@ -10,7 +10,7 @@ from kedfem.accuracy.sizes import Sizes
 from kedfem.arrays import Float
 from kedfem.dynamics.model import Model, mesh_methods, segments
 from kedfem.links.record import Link
-from kedfem.links.surfaces.part_candidates import Offer
+from kedfem.links.surfaces.part_candidates import PartCandidate
 from kedfem.mesh import QuadMesh, SolidMesh, mesh_quality
 from kedfem.mesh.cad.words import direction_in_words
 from kedfem.mesh.places import in_mm
@@ -81,8 +81,8 @@ def link_tables(model: Model) -> list[Table]:
     joined = f"{model.unknowns} unknowns in all, {model.coordinates} generalised coordinates once joined"
     caption = f"{joined}; mass: with what is attached; quality: worst scaled Jacobian"
     columns = [*left("link", "kind"), *right("elements", "unknowns", "mass", "quality")]
-    ways = ((name, Text(method)) for name, method in mesh_methods(model).items())
-    return [listed("Links", columns, rows, caption=caption), facts("Meshes of parts from CAD", ways)]
+    methods = ((name, Text(method)) for name, method in mesh_methods(model).items())
+    return [listed("Links", columns, rows, caption=caption), facts("Meshes of parts from CAD", methods)]
 
 
 def _mass(*parts: Link) -> str:
@@ -112,7 +112,7 @@ def mobility_table(scene: Scene, link: Linkage, found: Mobility, works: bool = F
     twice = f"{found.redundancy} of them redundant" if found.redundancy else "none redundant"
     table.add_row("joint equations", f"{found.equations}, {twice}")
     for each in found.redundant:
-        table.add_row(f"held redundantly at {of_joints(each.joints)}", each.words)
+        table.add_row(f"constrained redundantly at {of_joints(each.joints)}", each.words)
     if found.redundancy:
         table.add_row("without these", found.remedy)
     if found.free:
@@ -149,7 +149,7 @@ def _apart(link: Linkage, x: float) -> str:
     return f"{np.degrees(x):.2g}°" if link.drives.turning[0] else with_prefix(x, "m")
 
 
-def mesh_tables(name: str, mesh: SolidMesh, found: Sequence[Offer]) -> list[Table]:
+def mesh_tables(name: str, mesh: SolidMesh, found: Sequence[PartCandidate]) -> list[Table]:
     """A part on its own: how it was meshed, its faces that a joint can sit on, the quality of its elements."""
     quality = mesh_quality(mesh)
     sides = mesh.points.max(axis=0) - mesh.points.min(axis=0)
@@ -168,7 +168,7 @@ def mesh_tables(name: str, mesh: SolidMesh, found: Sequence[Offer]) -> list[Tabl
     return [table, _surfaces(found), bars]
 
 
-def _surfaces(found: Sequence[Offer]) -> Table:
+def _surfaces(found: Sequence[PartCandidate]) -> Table:
     """What a joint can sit on, by the numbers in the picture."""
     caption = (
         "mm; numbers as in the picture; what a joint finds that is put there, of round faces about their axis. "

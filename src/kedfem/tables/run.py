@@ -1,4 +1,4 @@
-"""What was chosen for a run, and what it found: largest values, stresses, errors, balance, seconds."""
+"""Tables of a run: what was chosen, largest values, stresses, errors, energy balance, seconds."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -55,7 +55,7 @@ def _step(scene: Scene) -> str:
 
 
 def _chosen(link: LinkScene) -> str:
-    """Fidelity and mesh in words."""
+    """Model and mesh in words."""
     sizes = ((key, value) for key, value in link.mesh if value is not None)
     if link.model == "rigid":
         return "rigid"
@@ -80,7 +80,7 @@ def reduction_table(reduction: Reduction) -> Table:
 
 def run_tables(scene: Scene, done: Run) -> list[Table]:
     """Largest values of every channel, the highest stress of every link, and the seconds spent."""
-    count = len(done.results.time)
+    count = len(done.results.instants)
     taken = f"{count} positions" if without_vibration(scene) else f"{count - 1} steps"
     return [
         *([chosen_table(done.plan)] if done.plan else []),
@@ -99,12 +99,13 @@ def channel_table(scene: Scene, done: Run) -> Table:
     columns = [*left("channel", "component"), *right("largest", clock(scene), no_wrap=True)]
     table = listed(Text(scene.title or "Largest values"), columns)
     least = rounding(done.results)
-    for channel, values in done.results.channels.values():
+    for name, (channel, _) in done.results.channels.items():
+        time, angle, values = done.results.largest_rows(name)
         k, component, value = largest_of(channel, values)
         if abs(value) <= least[channel.unit]:
             table.add_row(channel.name, "", "≈ 0", "")
             continue
-        at = moment(scene, float(done.results.time[k]), float(done.results.angle[k]))
+        at = moment(scene, float(time[k]), float(angle[k]))
         table.add_row(channel.name, component, with_prefix(value, channel.unit), at)
     return table
 

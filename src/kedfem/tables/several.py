@@ -86,7 +86,7 @@ def _study_row(row: Measured, study: Study) -> tuple[str, ...]:
         raise ValueError(f"{row.variant.name} was not run")
     v, s = row.variant, row.seconds
     tolerance = f"{v.tolerance:.0e}".replace("e-0", "e-") if v.tolerance else "-"
-    model = v.fidelity.name, f"{v.fineness:g}", f"{v.steps}", tolerance
+    model = v.model_kind.name, f"{v.fineness:g}", f"{v.steps}", tolerance
     times = (_seconds(s.preparation), _seconds(s.stepping), _seconds(s.whole))
     below = row.error <= study.floor
     found = f"≤ {percent(study.floor)}" if below else percent(row.error)
@@ -111,7 +111,7 @@ def sweep_tables(done: Swept) -> tuple[list[Table], list[str]]:
         sizes = {k: largest(row, name) for k, row in enumerate(done.rows) if name in row.extremes}
         at = max(sizes, key=sizes.__getitem__)
         table.add_row(Text(name), f"{sizes[at]:.4g}", units[name], Text(_place(done, at)))
-    return [table], [*_failures(done, failed), *_doubts(done)]
+    return [table], [*_failures(done, failed), *_warnings(done)]
 
 
 def _place(done: Swept, k: int) -> str:
@@ -134,14 +134,14 @@ def _failures(done: Swept, failed: list[int]) -> list[str]:
     return [*lines, f"{more} more points failed; sweep.csv has their messages"] if more > 0 else lines
 
 
-def _doubts(done: Swept) -> list[str]:
+def _warnings(done: Swept) -> list[str]:
     loose = [k for k, row in enumerate(done.rows) if row.settled == "no"]
     lines = []
     if loose:
         worst = max(loose, key=lambda k: done.rows[k].change)
         lines.append(
-            f"{len(loose)} of {len(done.rows)} points have not settled: their last two turns differ by more than 1 %, by "
-            f"{100 * done.rows[worst].change:.2g} % at {_place(done, worst)}; raise analysis.revolutions"
+            f"{len(loose)} of {len(done.rows)} points have not settled: their last two revolutions differ by more than "
+            f"1 %, by {100 * done.rows[worst].change:.2g} % at {_place(done, worst)}; raise analysis.revolutions"
         )
     if doubtful := sum(row.status == "doubtful" for row in done.rows):
         lines.append(f"{doubtful} points are doubtful: their results mean nothing; sweep.csv says why")

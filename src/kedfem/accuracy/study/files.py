@@ -21,7 +21,7 @@ def written(row: Measured) -> tuple[str, ...]:
     """One variant; numbers have the digits that give back the same float."""
     v, s = row.variant, row.seconds
     tolerance = "" if v.tolerance is None else repr(v.tolerance)
-    model = (v.fidelity.name, repr(v.fineness), str(v.steps), tolerance)
+    model = (v.model_kind.name, repr(v.fineness), str(v.steps), tolerance)
     if s is None:
         return (*model, *[""] * 9, row.note)
     times = (repr(s.preparation), repr(s.stepping), repr(s.whole), str(s.runs))
@@ -40,7 +40,7 @@ def write_study(study: Study, path: Path, machine: str) -> None:
 
 
 def write_study_plot(study: Study, path: Path, machine: str) -> None:
-    """Time against error, one marker per fidelity; the front is drawn and its points are named."""
+    """Time against error, one marker for each kind of model; the front is drawn and its points are named."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -49,9 +49,9 @@ def write_study_plot(study: Study, path: Path, machine: str) -> None:
     axes = figure.add_subplot()
     ran = [row for row in study.rows if row.seconds]
     least = _least(study, ran)
-    names = dict.fromkeys(row.variant.fidelity.name for row in ran)
+    names = dict.fromkeys(row.variant.model_kind.name for row in ran)
     for marker, name in zip(cycle(MARKERS), names, strict=False):
-        points = [_point(row, least) for row in ran if row.variant.fidelity.name == name]
+        points = [_point(row, least) for row in ran if row.variant.model_kind.name == name]
         axes.plot(*zip(*points, strict=True), marker, label=name, markersize=7, alpha=0.75)
     front = sorted(((_point(row, least), row) for row in ran if row.front), key=lambda pair: pair[0])
     axes.plot(*zip(*(point for point, _ in front), strict=True), color="0.2", linewidth=1.0, zorder=1)

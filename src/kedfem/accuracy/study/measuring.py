@@ -154,7 +154,7 @@ class _Bench:
         ready = meshed(scene, self.stage)
         if variant.tolerance is not None:
             cost = estimated_cost(scene, ready.model)
-            full = replace(variant, fidelity=replace(variant.fidelity, reduced=False), tolerance=None)
+            full = replace(variant, model_kind=replace(variant.model_kind, reduced=False), tolerance=None)
             self.in_full[full] = perf_counter() - begun + cost.factor + cost.steps
             chosen = [name for name, link in scene.links.items() if link.reduced]
             found = reduced(ready, chosen, variant.tolerance, stage=self.stage)
@@ -166,12 +166,12 @@ class _Bench:
     def expected(self, variant: Variant) -> float:
         """Seconds that a variant may take, judged by the most similar one that ran; infinite without one."""
         ran = (row for row in self.rows.values() if row.seconds)
-        alike = [row for row in ran if row.variant.fidelity == variant.fidelity]
+        alike = [row for row in ran if row.variant.model_kind == variant.model_kind]
         if not alike:
             return self.in_full.get(variant, float("inf"))
         row = max(alike, key=lambda row: (row.variant.fineness <= variant.fineness, row.variant.fineness))
         seconds, before = row.seconds or Seconds(0.0, 0.0, 0.0, 0), row.variant
-        more = (variant.fineness / before.fineness) ** exponent(self.scene, variant.fidelity)
+        more = (variant.fineness / before.fineness) ** exponent(self.scene, variant.model_kind)
         steps = variant.steps / before.steps
         tighter = 1.5 if (variant.tolerance or 1.0) < 0.5 * (before.tolerance or 1.0) else 1.0
         stepping = seconds.stepping * steps * (more**1.2 if variant.tolerance is None else tighter**2)
@@ -203,8 +203,8 @@ def studied(
     bench.run(first[0])  # libraries are loaded and the inner loop compiled before the clock runs
     bench.rows.clear()
     for variant in first:
-        reduced_one = replace(variant.fidelity, reduced=True)
-        if variant.fidelity.reduced or reduced_one not in [each.fidelity for each in first]:
+        reduced_one = replace(variant.model_kind, reduced=True)
+        if variant.model_kind.reduced or reduced_one not in [each.model_kind for each in first]:
             bench.run(variant)
     reference = _reference(bench, quick)
     further = [*first, *([] if quick else further_variants(scene, reference))]
@@ -219,9 +219,9 @@ def studied(
 
 
 def _unbuildable(bench: _Bench, variant: Variant) -> bool:
-    """Whether the same fidelity failed already: one row says why."""
+    """Whether the same kind of model failed already: one row says why."""
     failed = [row for row in bench.rows.values() if not row.seconds and not row.note.startswith("left out")]
-    return any(row.variant.fidelity == variant.fidelity for row in failed)
+    return any(row.variant.model_kind == variant.model_kind for row in failed)
 
 
 def _reference(bench: _Bench, quick: bool) -> Variant:
@@ -241,7 +241,7 @@ def _reference(bench: _Bench, quick: bool) -> Variant:
         note = next(iter(bench.rows.values())).note
         late = f"most: must leave time for a run, got {bench.most:g} s"
         raise SceneError(late if note.startswith("left out") else note)
-    return max(ran, key=lambda v: first_variants(bench.scene).index(v) if v.fidelity.rigid is None else -1)
+    return max(ran, key=lambda v: first_variants(bench.scene).index(v) if v.model_kind.rigid is None else -1)
 
 
 def _compared(bench: _Bench, reference: Variant) -> Study:

@@ -1,4 +1,4 @@
-"""What a study of speed against error tries: fidelities, finenesses of the mesh, tolerances of modes, steps."""
+"""What a study of speed against error tries: kinds of models, finenesses of the mesh, tolerances of modes, steps."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -11,7 +11,7 @@ TIGHT = 3e-5  # tolerance of a reduced reference
 
 
 @dataclass(frozen=True, slots=True)
-class Fidelity:
+class ModelKind:
     """How the links of a variant are modelled.
 
     family : of all links that have a shape and are not rigid in the scene
@@ -38,7 +38,7 @@ class Variant:
     tolerance : of the reduction, if there is one
     """
 
-    fidelity: Fidelity
+    model_kind: ModelKind
     fineness: float = 1.0
     steps: int = 1
     tolerance: float | None = None
@@ -47,15 +47,15 @@ class Variant:
     def name(self) -> str:
         """In words."""
         functions = "" if self.tolerance is None else f", reduction {self.tolerance:.0e}"
-        return f"{self.fidelity.name}, mesh × {self.fineness:g}, steps × {self.steps}{functions}"
+        return f"{self.model_kind.name}, mesh × {self.fineness:g}, steps × {self.steps}{functions}"
 
 
-def fidelities(scene: Scene) -> list[Fidelity]:
+def model_kinds(scene: Scene) -> list[ModelKind]:
     """Those that all links' shapes allow, cheapest family first; the best one also with the driven link rigid."""
     each = [families(link) for link in _shaped(scene)]
     kinds: tuple[Family, ...] = ("beam", "plane", "solid")
     common = [family for family in kinds if each and all(family in f for f in each)]
-    out = [Fidelity(family, reduced) for family in common for reduced in (False, True)[: 1 + (family != "beam")]]
+    out = [ModelKind(family, reduced) for family in common for reduced in (False, True)[: 1 + (family != "beam")]]
     pair = scene.joints[scene.driven].links if scene.driven else ()
     driven = next((name for name in pair if name in scene.links), None)
     if driven and len(each) > 1 and scene.links[driven] in _shaped(scene):
@@ -69,9 +69,9 @@ def _shaped(scene: Scene) -> list[LinkScene]:
 
 def varied(scene: Scene, variant: Variant) -> Scene:
     """The scene as a variant has it, checked like any other."""
-    fidelity = variant.fidelity
+    model_kind = variant.model_kind
     links = {
-        name: of_family(link, "rigid") if name == fidelity.rigid else _modelled(link, variant)
+        name: of_family(link, "rigid") if name == model_kind.rigid else _modelled(link, variant)
         for name, link in scene.links.items() if link.shape is not None and link.model != "rigid"
     }  # fmt: skip
     keys = {"accuracy": "quick", "reduction_tolerance": variant.tolerance or scene.analysis.reduction_tolerance}
@@ -83,7 +83,7 @@ def varied(scene: Scene, variant: Variant) -> Scene:
 
 def _modelled(link: LinkScene, variant: Variant) -> LinkScene:
     """A link of a family, with its own mesh where it is of that family already."""
-    family, reduced = variant.fidelity.family, variant.fidelity.reduced
+    family, reduced = variant.model_kind.family, variant.model_kind.reduced
     if link.model != family:
         link = of_family(link, family, reduced)
     link = link.model_copy(update={"reduction": "modal" if reduced else "none"})
@@ -91,18 +91,18 @@ def _modelled(link: LinkScene, variant: Variant) -> LinkScene:
 
 
 def first_variants(scene: Scene) -> list[Variant]:
-    """Every fidelity with the scene's own mesh, step and tolerance."""
-    return [_with_tolerance(Variant(each), scene.analysis.reduction_tolerance) for each in fidelities(scene)]
+    """Every kind of model with the scene's own mesh, step and tolerance."""
+    return [_with_tolerance(Variant(each), scene.analysis.reduction_tolerance) for each in model_kinds(scene)]
 
 
 def reference_variant(scene: Scene, fineness: float, steps: int) -> Variant:
     """The best that is run: the last family; reduced very closely where that helps."""
-    best = [each for each in fidelities(scene) if each.rigid is None][-1]
+    best = [each for each in model_kinds(scene) if each.rigid is None][-1]
     return _with_tolerance(Variant(best, fineness, steps), TIGHT)
 
 
 def _with_tolerance(variant: Variant, tolerance: float) -> Variant:
-    return replace(variant, tolerance=tolerance if variant.fidelity.reduced else None)
+    return replace(variant, tolerance=tolerance if variant.model_kind.reduced else None)
 
 
 def coarser(variant: Variant) -> Iterator[tuple[str, float, Variant]]:
@@ -119,9 +119,9 @@ def further_variants(scene: Scene, reference: Variant) -> list[Variant]:
     out: list[Variant] = []
     more = [s for s in STEPS if 1 < s <= reference.steps]
     for first in first_variants(scene):
-        if first.fidelity.rigid is not None:  # its error is not that of mesh, step or modes
+        if first.model_kind.rigid is not None:  # its error is not that of mesh, step or modes
             continue
-        finest = reference.fineness if first.fidelity.family == reference.fidelity.family else FINENESS[-1]
+        finest = reference.fineness if first.model_kind.family == reference.model_kind.family else FINENESS[-1]
         finer = [f for f in FINENESS if 1.0 < f <= finest]
         out += [replace(first, fineness=f) for f in finer]
         out += [replace(first, steps=s) for s in more]
@@ -136,7 +136,7 @@ def further_variants(scene: Scene, reference: Variant) -> list[Variant]:
     return list(dict.fromkeys(out))
 
 
-def exponent(scene: Scene, fidelity: Fidelity) -> float:
+def exponent(scene: Scene, model_kind: ModelKind) -> float:
     """How the unknowns of a variant grow with the fineness of its mesh."""
     fixed = all(isinstance(link.shape, MeshFile) for link in _shaped(scene))
-    return 0.0 if fixed else {"beam": 1.0, "plane": 2.0, "solid": 3.0}.get(fidelity.family, 0.0)
+    return 0.0 if fixed else {"beam": 1.0, "plane": 2.0, "solid": 3.0}.get(model_kind.family, 0.0)

@@ -1,4 +1,4 @@
-"""What the interface knows of a joint on one link, and of joints that cut a shared point."""
+"""Joints as the interface sees them: port weights on one link, and joints that cut a shared point."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

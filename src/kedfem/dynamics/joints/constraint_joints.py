@@ -7,7 +7,7 @@ them what the joint constrains.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,15 +19,16 @@ from kedfem.links.record import Link
 from kedfem.links.stations import Stations
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface
 from kedfem.motion.constraints import CONSTRAINED, perpendiculars
-from kedfem.motion.joint_equations import joint_axis, unit
-from kedfem.scene import GROUND, Joint, Scene, enforced_by_equations, moving_grounds
+from kedfem.motion.joint_equations import coordinate_axis, ordered, unit
+from kedfem.scene import Joint, Scene, driven_travel, enforced_by_equations, moving_grounds
+from kedfem.scene.records.points import XYZ
 
 Ports = Float[np.ndarray, "p 3"]
 
 
 @dataclass(frozen=True, slots=True)
 class Side:
-    """What a joint has on one of its links; all in the link frame, in the reference position.
+    """The side of a joint on one of its links; all in the link frame, in the reference position.
 
     body : number in the linkage
     points : (p, 3) its ports in the reference position, the first at X₀ of the coupling surface [m]
@@ -57,7 +58,7 @@ class ConstraintJoint:
 
     name, at : of the joint, (3,) [m] in the reference position
     bodies : numbers of links i and j in the linkage; directions are fixed in j
-    sides : what it has on both, None where a link has no unknowns (the ground, what the drive carries)
+    sides : what it has on both, None where a link has no unknowns (the ground, what the drive prescribes)
     axis : (3,) of the joint, in the reference position
     constraints : what it constrains, and laws beside; ends of their terms are 0 and 1, its sides
     plus : other joints whose constraints these are combined with, each with its coefficient: gears
@@ -96,22 +97,16 @@ def direction(term: Term) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"
 
 
 def needs_rows(scene: Scene, name: str) -> bool:
-    """Whether a joint is enforced by constraint equations: where shared port points cannot say what it holds."""
+    """Whether a joint is enforced by constraint equations: where shared port points cannot express it."""
     if name in scene.driven_joints and name in moving_grounds(scene).values():
         return False
     return enforced_by_equations(scene, name)
 
 
-def ordered(joint: Joint) -> tuple[str, str]:
-    """The links i and j of a joint enforced by constraint equations: j is the second, or the ground."""
-    first, second = joint.links
-    return (second, first) if first == GROUND and joint.kind != "slot" else (first, second)
-
-
 def bore_axis(joint: Joint, link: str) -> Float[np.ndarray, "3"] | None:
     """Direction of the bore or journal that a joint looks for on a link; None where any face may be its surface."""
     if joint.axes is not None:
-        return unit(joint.axes[joint.links.index(link)])
+        return coordinate_axis(joint, link)
     if joint.axis is None or joint.kind in {"prismatic", "planar", "slot"}:
         return None
     return unit(joint.axis)
@@ -124,7 +119,7 @@ def constrained(scene: Scene, name: str) -> tuple[Constraint, ...]:
     for n in map("xyz".index, gaps):
         found.append((bushing(joint, n, turning=False), (Term(record.GAP, 0, 1, at, at, frame[n]),)))
     if joint.kind == "universal":
-        one, other = (np.asarray(bore_axis(joint, link)) for link in ordered(joint))
+        one, other = (coordinate_axis(joint, link) for link in ordered(joint))
         found.append((bushing(joint, 2, turning=True), (Term(record.TURN, 0, 1, one, one, other),)))
     for n in map("xyz".index, turns):
         law = bushing(joint, n, turning=True)
@@ -135,17 +130,29 @@ def constrained(scene: Scene, name: str) -> tuple[Constraint, ...]:
     if (drive := scene.driven_joints.get(name)) is not None:
         number, shaft = list(scene.driven_joints).index(name), drive.shaft_stiffness
         law = Driven(number) if shaft is None else Spring(shaft, drive.shaft_damping, drive=number)
-        found.append((law, (coordinate(joint),)))
+        found.append((law, (driven_coordinate(scene, name),)))
     return tuple(Constraint(name, terms, law, linear=True) for law, terms in found)
 
 
-def coordinate(joint: Joint, factor: float = 1.0, turns: bool | None = None) -> Term:
-    """Turn or travel of a joint; if not said which, the turn of all but slides."""
-    axis, at = joint_axis(joint), np.asarray(joint.at)
-    if joint.kind != "prismatic" if turns is None else turns:
+def coordinate(
+    joint: Joint, factor: float = 1.0, *, turns: bool, about: str | None = None, along: XYZ | None = None
+) -> Term:
+    """Angle or travel of a joint between the ends of its `ordered` links; about and along as of `coordinate_axis`."""
+    axis, at = coordinate_axis(joint, about, along), np.asarray(joint.at)
+    if about is not None:
+        arm = coordinate_axis(joint, ordered(joint, about)[0])
+        return Term(record.ANGLE, 0, 1, arm, arm, axis, factor)
+    if turns:
         across = perpendiculars(axis)[0]
         return Term(record.ANGLE, 0, 1, across, across, axis, factor)
     return Term(record.GAP, 0, 1, at, at, axis, factor)
+
+
+def driven_coordinate(scene: Scene, name: str) -> Term:
+    """Angle or travel that the drive of a joint prescribes, between the joint's ends."""
+    joint, drive = scene.joints[name], scene.driven_joints[name]
+    term = coordinate(joint, turns=not driven_travel(scene, name), about=drive.about, along=drive.along)
+    return term if ordered(joint, drive.about) == ordered(joint) else replace(term, i=1, j=0)
 
 
 def bushing(joint: Joint, axis: int, turning: bool) -> Law:
@@ -166,12 +173,12 @@ def joint_frame(joint: Joint) -> Float[np.ndarray, "3 3"]:
 
 
 def in_plane(gap: Float[np.ndarray, "*r 3"], turn: Float[np.ndarray, "*r 3"]) -> Bool[np.ndarray, "*r"]:
-    """Which directions say something of links that move in a plane z = constant."""
+    """Directions whose constraints are not trivial for links that move in a plane z = constant."""
     return np.asarray((np.abs(gap[..., :2]).max(axis=-1) > 1e-9) | (np.abs(turn[..., 2]) > 1e-9))
 
 
 def surface_ports(surface: CouplingSurface, link: Link, where: str) -> Ports:
-    """Port points of a coupling surface: its middle, and one off it in each direction that it knows.
+    """Port points of a coupling surface: its middle, and one off it in each direction with a gradient.
 
     Raises
     ------
@@ -183,6 +190,7 @@ def surface_ports(surface: CouplingSurface, link: Link, where: str) -> Ports:
     known = [k for k in range(link.d) if surface.spread[k] > 0]
     if len(known) < link.d - 1:
         raise MeshError(
-            f"{where}: must sit on a bore or a face of link '{link.name}', got a coupling surface that knows no turn"
+            f"{where}: must sit on a bore or a face of link '{link.name}', got a coupling surface "
+            "whose points do not determine a rotation"
         )
     return np.array([surface.origin, *(surface.origin + 2 * surface.spread[k] * surface.directions[k] for k in known)])

@@ -1,4 +1,4 @@
-"""Constraints of joints as rows over time: C(t) from the rigid motion, and what one time point needs of it."""
+"""Constraint matrices C(t) of joints over time, from the rigid-body motion."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ REPEATED = 1e-10  # of a row on ports: what is left on the interface unknowns if
 
 
 @dataclass(frozen=True, slots=True)
-class JointRows:
+class ConstraintMatrices:
     """Rows e = C z of all joints at T time points, z the interface unknowns.
 
     entries : (T, n) of C, row by row [-, 1/m]
@@ -38,21 +38,25 @@ class JointRows:
         return sp.csr_array((self.entries[k], self.columns, self.row_at), (len(self.stiffness), self.unknowns))
 
 
-def joint_rows(joints: Sequence[ConstraintJoint], motion: RigidMotion, unknowns: int) -> JointRows | None:
+def constraint_matrices(
+    joints: Sequence[ConstraintJoint], motion: RigidMotion, unknowns: int
+) -> ConstraintMatrices | None:
     """Rows of all joints, on so many interface unknowns, at the times of a motion; None without any."""
     if not joints:
         return None
     every = [(joint, _columns(joint)) for joint in joints]
     width = [np.full(len(joint.constraints), len(columns)) for joint, columns in every]
-    entries = [rows_over(joint, motion, columns).reshape(len(motion.t), -1) for joint, columns in every]
+    entries = [gradients_over_time(joint, motion, columns).reshape(len(motion.t), -1) for joint, columns in every]
     columns = np.concatenate([np.tile(columns, len(joint.constraints)) for joint, columns in every])
     laws = [each.law for joint in joints for each in joint.constraints]
     stiffness = np.array([law.stiffness if isinstance(law, Spring) else np.inf for law in laws])
     row_at = np.append(0, np.cumsum(np.concatenate(width)))
-    return JointRows(np.concatenate(entries, axis=1), row_at, columns, unknowns, stiffness)
+    return ConstraintMatrices(np.concatenate(entries, axis=1), row_at, columns, unknowns, stiffness)
 
 
-def rows_over(joint: ConstraintJoint, motion: RigidMotion, columns: Int[np.ndarray, " c"]) -> Float[np.ndarray, "T r c"]:
+def gradients_over_time(
+    joint: ConstraintJoint, motion: RigidMotion, columns: Int[np.ndarray, " c"]
+) -> Float[np.ndarray, "T r c"]:
     """Gradients of a joint's constraints, with those that they are combined with, on the interface unknowns given."""
     T, r = len(motion.t), len(joint.constraints)
     C, size = np.zeros((T, r, len(columns))), np.zeros((T, r))
@@ -60,7 +64,9 @@ def rows_over(joint: ConstraintJoint, motion: RigidMotion, columns: Int[np.ndarr
         ends, pushed = (end_on(each, 0, each.at), end_on(each, 1, each.at)), np.zeros((2, 2, T, r, 3))
         for n, constraint in enumerate(each.constraints):
             for term in constraint.terms:
-                for side, (_, _, force, moment) in enumerate(exerted(term, ends, motion, None)):
+                sides = term.i, term.j
+                acting = exerted(term, (ends[term.i], ends[term.j]), motion, None)
+                for side, (_, _, force, moment) in zip(sides, acting, strict=True):
                     pushed[side, :, :, n] += share * term.factor * force, share * term.factor * moment
         for end, (force, moment) in zip(ends, pushed, strict=True):
             if len(end.columns):

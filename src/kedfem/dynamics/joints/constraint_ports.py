@@ -14,7 +14,6 @@ from kedfem.dynamics.joints.constraint_joints import (
     coordinate,
     direction,
     in_plane,
-    ordered,
     surface_ports,
 )
 from kedfem.dynamics.joints.places import on_part, part_surface, slider_axis
@@ -23,7 +22,7 @@ from kedfem.links.point_rows import point_rows, require_on_axis
 from kedfem.links.record import Link
 from kedfem.links.stations import Stations, stations
 from kedfem.links.surfaces.coupling_surfaces import port_weights, rigid_link_surface
-from kedfem.motion.joint_equations import joint_axis
+from kedfem.motion.joint_equations import joint_axis, ordered
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import rigid_motion, seen_from
@@ -42,27 +41,31 @@ class LinkageLayout:
     slots: Mapping[str, tuple[float, float] | Stations]
 
 
-FINER = 8  # looks between two points of a path, for how far pins go along slots
+FINER = 8  # positions examined between two points of a path, for how far pins go along slots
 
 
 def gear_joint(scene: Scene, name: str, links: dict[str, Link], layout: LinkageLayout) -> ConstraintJoint:
     """The constraint of a pair of gears: motion of the second joint less its transmission times that of the first."""
     gear, key = scene.gears[name], f"gears.{name}"
+    each_turns = zip(gear.joints, gear.turning, strict=True)
+    terms = (coordinate(scene.joints[x], turns=turns) for x, turns in each_turns)
     first, second = (
-        row_joint(scene, each, links, layout, (Constraint(key, (coordinate(scene.joints[each]),), Held(), linear=True),))
-        for each in gear.joints
+        constraint_joint(scene, each, links, layout, (Constraint(key, (term,), Held(), linear=True),))
+        for each, term in zip(gear.joints, terms, strict=True)
     )
     return replace(second, name=key, plus=((-gear.transmission, first),))
 
 
-def row_joint(
-    scene: Scene, name: str, links: dict[str, Link], layout: LinkageLayout, only: tuple[Constraint, ...] | None = None
-) -> ConstraintJoint:
+def constraint_joint(
+    scene: Scene, name: str, links: dict[str, Link], layout: LinkageLayout,
+    only: tuple[Constraint, ...] | None = None, about: str | None = None,
+) -> ConstraintJoint:  # fmt: skip
     """A joint enforced by constraint equations, still without the interface unknowns.
 
     Parameters
     ----------
     only : constraints in place of what the joint has
+    about : as of `ordered`
 
     Raises
     ------
@@ -70,7 +73,7 @@ def row_joint(
         If it finds no coupling surface or line on one of its links.
     """
     joint = scene.joints[name]
-    i, j = ordered(joint)
+    i, j = ordered(joint, about)
     first, second = (_side(scene, name, on, links, layout) for on in (i, j))
     here = [link for link in links.values() if link.name in (i, j)]
     planar = bool(here) and all(link.planar for link in here)  # a slider on the ground is of no plane
@@ -85,7 +88,8 @@ def element_joint(
 ) -> ConstraintJoint:
     """The two sides of a spring, motor or limit, as a joint without rows: on those of its joint, or at two points."""
     if not isinstance(element, LineSpring) or element.between is None:
-        return replace(row_joint(scene, str(element.joint), links, layout, ()), name=name)
+        about = getattr(element, "about", None)
+        return replace(constraint_joint(scene, str(element.joint), links, layout, (), about), name=name)
     one, other = (
         _point_side(f"{name}.between[{k}].at", scene, end.link, np.asarray(end.at), links, layout)
         for k, end in enumerate(element.between)
@@ -118,7 +122,7 @@ def _slider_side(scene: Scene, on: str, at: Float[np.ndarray, "3"], layout: Link
 def _point_side(
     where: str, scene: Scene, on: str, at: Float[np.ndarray, "3"], links: dict[str, Link], layout: LinkageLayout
 ) -> Side | None:  # fmt: skip
-    """A point of a link; nothing on the ground and on what the drive carries."""
+    """A point of a link; nothing on the ground and on what the drive prescribes."""
     if (rider := _slider_side(scene, on, at, layout)) or all(link.name != on for link in links.values()):
         return rider
     key, rows = on_part(links, on, at, lambda link: point_rows(link, where, at))

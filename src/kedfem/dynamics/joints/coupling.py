@@ -16,10 +16,10 @@ from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side, need
 from kedfem.dynamics.joints.constraint_ports import (
     LinkageLayout,
     can_be_bars,
+    constraint_joint,
     element_joint,
     gear_joint,
     rigid_points,
-    row_joint,
 )
 from kedfem.dynamics.joints.independent import independent
 from kedfem.dynamics.joints.places import part_surface, slider_axis
@@ -68,7 +68,7 @@ def _selected(ports: Sequence[_Port], unknowns: int) -> sp.csr_array:
 
 @dataclass(frozen=True, slots=True)
 class Joined:
-    """All joints of a scene: what each link has of them, and those enforced by constraint equations."""
+    """All joints of a scene: attachments to each link, and joints enforced by constraint equations."""
 
     attachments: dict[str, Attachment]
     rows: tuple[ConstraintJoint, ...]
@@ -95,7 +95,7 @@ def joined(
     sliders = {name: axis for name in scene.links if (axis := slider_axis(scene, name)) is not None}
     first_of: dict[str, int] = {name: k for k, name in enumerate(sliders)}
     unknowns = len(sliders)
-    held_by_rows = [row_joint(scene, name, links, layout) for name in scene.joints if needs_rows(scene, name)]
+    held_by_rows = [constraint_joint(scene, name, links, layout) for name in scene.joints if needs_rows(scene, name)]
     geared = [gear_joint(scene, name, links, layout) for name in scene.gears]
     acting = [
         element_joint(scene, f"{kind}.{name}", element, links, layout)
@@ -186,7 +186,7 @@ def _mixed(
 
 
 def _components(scene: Scene, name: str, joint: Joint, held: list[Link]) -> list[int]:
-    """Which of a port's components the joint holds: of a beam (u, v, ψ) a pin leaves ψ free."""
+    """Which of a port's components the joint constrains: of a beam (u, v, ψ) a pin releases ψ."""
     turning = name in scene.driven_joints or joint.kind in {"weld", "prismatic"}
     if not any(link.planar for link in held):
         return [0, 1, 2]
@@ -199,7 +199,7 @@ def _components(scene: Scene, name: str, joint: Joint, held: list[Link]) -> list
 
 
 def _lies_across(joint: Joint, points: Float[np.ndarray, "p 3"]) -> bool:
-    """Whether the points of a slide lie across its direction: what holds them sideways would not hold their rotation."""
+    """Whether the points of a slide lie across its direction: sideways constraints then leave its rotation free."""
     if joint.kind != "prismatic" or len(points) < 2:
         return False
     axis, away = joint_axis(joint), points - points.mean(axis=0)

@@ -95,7 +95,7 @@ def _port_forces(
     -------
     (h, q) μ from λ, (h, o) μ from p of the rows' own unknowns, and (h, r) the μ that neither equation sees
     """
-    determined = np.setdiff1d(np.arange(B.shape[1]), riding)  # what holds a slider is left open
+    determined = np.setdiff1d(np.arange(B.shape[1]), riding)  # supports of a slider are not determined
     G = sp.vstack([L.T, B.T.tocsr()[determined]], format="csr")
     of_G = list(blocks(G))
     parts = []

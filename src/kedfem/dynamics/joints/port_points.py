@@ -5,7 +5,7 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
-from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, holds, is_flat
+from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, determines_gradient, is_flat
 from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.joint_equations import joint_axis
 from kedfem.scene import Joint, Scene
@@ -47,7 +47,7 @@ def port_points(
                   for c, s in ((1, 0), (-0.5, 0.9), (-0.5, -0.9))]  # fmt: skip
         points += _points_off(surface.origin, surfaces, [surface.directions[2]])
     for link, s in surfaces.items():
-        if not all(holds(s, d) for d in directions):
+        if not all(determines_gradient(s, d) for d in directions):
             raise MeshError(f"joints.{name}: {_unheld(links[link], joint.kind)}")
     return np.array(points)
 
@@ -81,7 +81,7 @@ def _plane_points(
     narrow = min(surfaces.values(), key=lambda surface: float(surface.spread[1]))
     along = joint_axis(joint) if joint.kind == "prismatic" else narrow.directions[0]
     for link, surface in surfaces.items():
-        if not holds(surface, along):
+        if not determines_gradient(surface, along):
             raise MeshError(
                 f"joints.{name}: must sit on a bore of link '{link}', or on an edge along its direction "
                 f"({along[0]:.3g}, {along[1]:.3g}, 0), got an edge across that: give the link a bore there"
@@ -94,7 +94,7 @@ def _points_off(
 ) -> list[Float[np.ndarray, "3"]]:
     """A point off the centre in each direction that all coupling surfaces know, as far as the first coupling surface is
     wide there."""
-    known = [d for d in directions if all(holds(surface, d) for surface in surfaces.values())]
+    known = [d for d in directions if all(determines_gradient(surface, d) for surface in surfaces.values())]
     first = next(iter(surfaces.values()))
     return [centre + 2 * _spread_along(first, d) * d for d in known]
 

@@ -9,7 +9,7 @@ from kedfem.links.surfaces.rigid_coupling import with_rigid_coupling
 from kedfem.scene import Scene
 
 
-def with_stiff_ports(scene: Scene, links: Mapping[str, Link]) -> dict[str, Link]:
+def with_rigid_couplings(scene: Scene, links: Mapping[str, Link]) -> dict[str, Link]:
     """Links, or their segments, whose coupling surfaces of joints with rigid couplings keep their shape.
 
     A coupling surface of several joints is made stiff once; beams and rigid links need nothing.

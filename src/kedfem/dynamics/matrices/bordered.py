@@ -20,7 +20,7 @@ Flat = Float[np.ndarray, " _"]
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class ConstraintTerms:
     """What constraints and laws ask of one solution.
 
     C : (r, k) gradients by interface unknowns

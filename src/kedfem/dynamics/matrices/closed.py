@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.joints.constraint_matrices import JointRows
+from kedfem.dynamics.joints.constraint_matrices import ConstraintMatrices
 from kedfem.dynamics.matrices.profile import Profile, profile_of
 from kedfem.dynamics.matrices.substructure import Substructure
 from kedfem.dynamics.system.arrays import Bodies, Constraints, ends_of, flat, groups
@@ -43,10 +43,10 @@ class Closed:
             If something is free to move.
         """
         from kedfem.dynamics.matrices.closed_kernel import closed_over
-        from kedfem.dynamics.system.reference import Handed
+        from kedfem.dynamics.system.reference import RecordAddress
 
         v = np.concatenate([x.reshape(len(x), -1) @ part.Y for x, part in zip(loads, self.parts, strict=True)], axis=1)
-        out, records = np.empty_like(v), [Handed(x) for x in (self.bodies, self.of, _room(self.bodies, self.of))]
+        out, records = np.empty_like(v), [RecordAddress(x) for x in (self.bodies, self.of, _room(self.bodies, self.of))]
         closed_over(*records, self.R, self.C, self.compliance, v, out)
         if not np.isfinite(out).all():
             raise SolveError("joints: the joints' common system must be definite, got one that lets links move freely")
@@ -61,7 +61,7 @@ class Closed:
 
 
 def closed(
-    parts: Sequence[Substructure], R: Sequence[Float[np.ndarray, "T _ _"]], rows: JointRows | None = None
+    parts: Sequence[Substructure], R: Sequence[Float[np.ndarray, "T _ _"]], rows: ConstraintMatrices | None = None
 ) -> Closed:
     """A linkage with its joints closed: A g = r + Wᵀ λ, R W g = B z, and joint forces in balance, Σ Bᵀ R λ = 0.
 
@@ -74,7 +74,7 @@ def closed(
     """
     joints, T = [part.attachment for part in parts], len(R[0])
     if rows is None:
-        rows = JointRows(np.zeros((T, 0)), np.zeros(1, int), np.zeros(0, int), joints[0].unknowns, np.zeros(0))
+        rows = ConstraintMatrices(np.zeros((T, 0)), np.zeros(1, int), np.zeros(0, int), joints[0].unknowns, np.zeros(0))
     coupled = [rows.columns[first:last] for first, last in pairwise(rows.row_at)]
     made = profile_of([joint.columns for joint in joints], coupled, rows.unknowns)
     order = [first + np.argsort(made.number[c]) for first, c in zip(rows.row_at[:-1], coupled, strict=True)]

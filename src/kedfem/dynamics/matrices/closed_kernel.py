@@ -1,4 +1,4 @@
-"""A linkage at rest with its joints closed, at many times: solved as a step's interface is; compiled by numba."""
+"""Static forces at the interface points of a linkage with closed joints, at many times; compiled by numba."""
 
 from kedfem.compiled import compiled
 from kedfem.dynamics.system.algebra_kernel import copied, frame_copied

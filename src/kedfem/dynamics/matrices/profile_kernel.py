@@ -1,4 +1,4 @@
-"""L D Lᵀ of a matrix of unknowns and multipliers that is kept by its profile, and solutions with it; numba compiles it.
+"""L D Lᵀ factor of a matrix of unknowns and multipliers, stored by its profile, and solutions; compiled by numba.
 
 Rows stand one after the other, each from its first column to its diagonal. Pivots of unknowns are positive, those of
 multipliers negative in any order in which a constraint follows all unknowns that it couples.

@@ -86,7 +86,7 @@ def substructure(
 def _stiffness(F: Float[np.ndarray, "c c"], anchored: int) -> Float[np.ndarray, "c c"]:
     """F⁻¹ = B⁻ᵀ J B⁻¹, F = B J Bᵀ, J = 1 of the ports and −1 of the last, the anchors, that are let go.
 
-    A link that is stiff near its ports, as beams in space are in their hubs, is 1e6 times as stiff there as it is heavy.
+    A link that is stiff near its ports, as a beam in space at its rigid nodes, is 1e6 times as stiff there as heavy.
     Of that, B⁻¹ has the square root: joint forces keep four digits that an inverse by elimination would lose.
     """
     p = len(F) - anchored
@@ -112,7 +112,8 @@ def _held(link: Link, joint: Attachment, c_M: float, c_K: float) -> Substructure
     kappa = np.full(len(anchors), ANCHORAGE * c_K * mean)
     springs = sp.coo_array((kappa, (anchors, anchors)), shape=link.K0.shape)
     A = sp.csr_array(effective_matrix(link, c_M, c_K) + springs)
-    factor = _Dense(A, link.name) if link.full is not None else Cholesky(A, f"links.{link.name}")
+    X = link.X if link.kind == "solid" else None
+    factor = _Dense(A, link.name) if link.full is not None else Cholesky(A, f"links.{link.name}", X)
     made = substructure(
         link, joint, lambda r: factor.solve(r.ravel()).reshape(r.shape), factor.solve_many, anchors, kappa
     )

@@ -1,4 +1,4 @@
-"""A model whose large links are reduced in the first modes that come: good enough to precondition with, not to answer."""
+"""A coarse model with a few modes for each large link, for preconditioning only."""
 
 import numpy as np
 

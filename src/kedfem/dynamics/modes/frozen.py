@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.matrices.bordered import Asked
+from kedfem.dynamics.matrices.bordered import ConstraintTerms
 from kedfem.dynamics.modes.lanczos import Block, lanczos
 from kedfem.dynamics.modes.preloads import with_preloads
 from kedfem.dynamics.stepping.scheme import generalised_alpha
@@ -177,25 +177,25 @@ class Frozen:
         return out
 
 
-def asked(now: Instant) -> Asked:
+def asked(now: Instant) -> ConstraintTerms:
     """What joints, drives and force laws ask of a small motion about a position: laws with their tangents there."""
     z = np.zeros((3, now.of.system.unknowns))
     C, e = now.gradients(z[0]), now.coordinates(z)
     hard, stiffness = now.hard(C), now.forces(e)[:, 1]
     kept = hard | ((stiffness != 0.0) & (sizes(C) > 0.0))
     compliance = np.where(hard, 0.0, 1 / np.where(stiffness != 0.0, stiffness, 1.0))[kept]
-    return Asked(C[kept], np.zeros(len(compliance)), compliance, z[0])
+    return ConstraintTerms(C[kept], np.zeros(len(compliance)), compliance, z[0])
 
 
 def require_drive(scene: Scene, free: bool) -> None:
-    """A drive, where one is to let go of its joint.
+    """A drive, where one is to release its joint.
 
     Raises
     ------
     SceneError
     """
     if free and scene.driven is None:
-        raise SceneError("--free: must be combined with a drive that lets go, got a scene without one: leave it out")
+        raise SceneError("--free: must be combined with a drive to release, got a scene without one: leave it out")
 
 
 def tangent_warning(system: System, what: str) -> tuple[str, ...]:

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.modes.frozen import Frozen
 from kedfem.dynamics.stepping.state import Rayleigh
+from kedfem.dynamics.system.starts.deflected import as_work
 from kedfem.dynamics.system.starts.linear_equations import LinearEquations
 from kedfem.errors import SolveError
 from kedfem.links.record import Link
@@ -77,7 +77,7 @@ def linear_model(
     count = len(loads) + len(elements)
     r, f = np.zeros((len(x), count)), np.zeros((len(rest), count))
     for n, each in enumerate(loads):
-        r[:, n] = _on_coordinates(frozen, each)
+        r[:, n] = as_work(frozen.of, each)
     f[:, len(loads) :] = C[list(elements)].T.toarray()
     Mx = frozen.momentum(x)
     z = (omega**2 + frozen.shift) * _answers(balance, Mx, np.zeros((len(f), len(omega))))[1]
@@ -92,11 +92,6 @@ def linear_model(
         omega, gamma + turned.T @ (rates[:, None] * turned), x.T @ r + z.T @ f,
         shapes, frozen.per_link(answer), turned[list(elements)], C[list(elements)] @ answered,
     )  # fmt: skip
-
-
-def _on_coordinates(frozen: Frozen, forces: Sequence[Float[np.ndarray, "n d"]]) -> Float[np.ndarray, " N"]:
-    every = zip(frozen.of.parts, forces, strict=True)
-    return np.concatenate([work_on(part, each).ravel() for part, each in every])
 
 
 def _answers(

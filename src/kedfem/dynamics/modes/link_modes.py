@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from kedfem.arrays import Bool, Float, Int
 from kedfem.dynamics.elastic_model import with_scene_body
 from kedfem.dynamics.joints.places import surface_of
-from kedfem.dynamics.joints.rigid_couplings import with_stiff_ports
+from kedfem.dynamics.joints.rigid_couplings import with_rigid_couplings
 from kedfem.dynamics.matrices.cholesky import Cholesky
 from kedfem.dynamics.matrices.substructure import mass_matrix
 from kedfem.dynamics.modes.frozen import FIRST, NEAR, RIGID_MOTIONS, Modes
@@ -32,7 +32,7 @@ HOLDS = 1e-7  # of the firmest hold on a rigid-body motion: less is rounding
 
 @dataclass(frozen=True, slots=True)
 class Support:
-    """What holds a link.
+    """The support of a link.
 
     rows : (m, dn) of which each vanishes: G
     clamped : (n,) functions without unknowns
@@ -97,7 +97,7 @@ def single_link(scene: Scene, name: str) -> Link:
     SceneError
         If a body does not fit it.
     """
-    links = with_stiff_ports(scene, {name: bare_link(scene, name)})
+    links = with_rigid_couplings(scene, {name: bare_link(scene, name)})
     for key, body in scene.bodies.items():
         if body.link == name:
             links[name] = with_scene_body(scene, f"bodies.{key}", body, links)[1]

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from kedfem.arrays import Float
-from kedfem.dynamics.matrices.bordered import Asked
+from kedfem.dynamics.matrices.bordered import ConstraintTerms
 from kedfem.dynamics.system.record import Constraint
 from kedfem.dynamics.system.starts.coordinate_rates import coordinate, moved_by
 from kedfem.dynamics.system.starts.instant import Instant
@@ -17,7 +17,7 @@ from kedfem.dynamics.system.starts.instant import Instant
 ROUNDING = 1e-12  # of the largest eigenvalue of a law's second derivatives
 
 
-def with_preloads(now: Instant, asked: Asked) -> Asked:
+def with_preloads(now: Instant, asked: ConstraintTerms) -> ConstraintTerms:
     """Springs along the directions in which each law's force changes, beside what is asked of a small motion."""
     none = np.zeros((3, now.of.system.unknowns))
     forces = now.forces(now.coordinates(none))[:, 0]
@@ -33,7 +33,7 @@ def with_preloads(now: Instant, asked: Asked) -> Asked:
             stiffness.append(values[some])
     more = 1 / np.concatenate(stiffness)
     target, compliance = np.append(asked.target, 0 * more), np.append(asked.compliance, more)
-    return Asked(sp.vstack(rows, format="csr"), target, compliance, asked.known)
+    return ConstraintTerms(sp.vstack(rows, format="csr"), target, compliance, asked.known)
 
 
 def _second_derivatives(now: Instant, each: Constraint) -> tuple[list[int], Float[np.ndarray, "m m"]]:

@@ -1,6 +1,6 @@
 """Modes for reduced links: what the loads of this scene excite, and no more.
 
-At some instants of the motion the linkage stands still in thought. Its static deflection under P − M R0'' there, and the
+At some instants of the motion the linkage is frozen. Its static deflection under P − M R0'' there, and the
 vibration modes that this deflection excites (Lanczos steps K⁻¹ M on the whole linkage, drive held), are what its links do
 later. Taken apart into scalar components and sorted by strain energy, the first few of them make the basis.
 """
@@ -13,7 +13,7 @@ import scipy.sparse as sp
 
 from kedfem.arrays import Float
 from kedfem.dynamics.joints.attachments import Attachment
-from kedfem.dynamics.joints.constraint_matrices import joint_rows
+from kedfem.dynamics.joints.constraint_matrices import constraint_matrices
 from kedfem.dynamics.matrices.closed import closed
 from kedfem.dynamics.matrices.substructure import Substructure, factored
 from kedfem.dynamics.model import Model
@@ -131,7 +131,7 @@ def _krylov(model: Model, parts: Sequence[Substructure], motion: RigidMotion, le
     All times go level by level, so that their solves go together.
     """
     forcing = forcings(model, motion)
-    frozen = closed(parts, [x.R for x in forcing], joint_rows(model.rows, motion, model.interface_unknowns))
+    frozen = closed(parts, [x.R for x in forcing], constraint_matrices(model.rows, motion, model.interface_unknowns))
     static = frozen.deflections([x.F @ x.R for x in forcing])
     found = [_Krylov(model, [x[t] for x in static], levels) for t in range(len(motion.t))]
     growing = np.ones(len(found), bool)

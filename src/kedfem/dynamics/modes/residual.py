@@ -1,4 +1,4 @@
-"""The residual of a reduced model in the full equation, and the deflection that would answer it."""
+"""The residual of a reduced model in the unreduced equation, and the static deflection that it causes."""
 
 from collections.abc import Sequence
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.history import LinkMoment, Snapshot
-from kedfem.dynamics.joints.constraint_matrices import joint_rows
+from kedfem.dynamics.joints.constraint_matrices import constraint_matrices
 from kedfem.dynamics.joints.ports import add_port_forces
 from kedfem.dynamics.matrices.closed import closed
 from kedfem.dynamics.matrices.substructure import Substructure
@@ -40,7 +40,7 @@ def residual_deflections(
     if not every:
         return []
     R = [np.stack([x.states[k].R for x in snapshots]) for k in range(len(parts))]
-    frozen = closed(parts, R, joint_rows(full.rows, joined(motions), full.interface_unknowns))
+    frozen = closed(parts, R, constraint_matrices(full.rows, joined(motions), full.interface_unknowns))
     found = frozen.deflections([np.stack(each) for each in zip(*every, strict=True)])
     return [[x[t] for x in found] for t in range(len(snapshots))]
 

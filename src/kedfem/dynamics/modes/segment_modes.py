@@ -48,13 +48,10 @@ def segment_basis(
     Basis
         Weights are what the loss of each function costs the deflections, of their strain-energy norm.
     """
-    modes = rigid_modes(link)
-    deflections = [_relative(link, modes, x) for x in deflections]
-    of_ports = *_answers(link, joint, part, deflections), *_turned_ports(link, joint, part, deflections)
-    shapes = _shapes(link, [*of_ports, *deflections])
+    g = _relative(link, np.stack([x.ravel() for x in deflections], axis=1))
+    S = _shapes(link, np.concatenate([_answers(link, joint, part, g), _turned_ports(link, joint, part, g), g], axis=1))
     rigid = mass_orthonormal(link, rigid_functions(link))
     H = energy_product(link)
-    S = np.concatenate(list(shapes), axis=1)
     S = S - rigid @ (rigid.T @ np.asarray(link.mass[0] @ S))
     functions = orthonormal(S, H, 1e-13)[0][:, :CANDIDATES]
     r, f, d = rigid.shape[1], functions.shape[1], link.d
@@ -69,21 +66,20 @@ def segment_basis(
     return Basis(np.concatenate([rigid, functions @ kept], axis=1), functions @ others, np.sqrt(losses / whole))
 
 
-def _relative(link: Link, modes: Float[np.ndarray, "k r"], g: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "n d"]:
-    """A deflection without the segment's mean rigid motion."""
+def _relative(link: Link, g: Float[np.ndarray, "k c"]) -> Float[np.ndarray, "k c"]:
+    """Deflections without the segment's mean rigid motion."""
+    modes = rigid_modes(link)
     M = np.stack([mass_times(link.mass, x.reshape(link.n, link.d)).ravel() for x in modes.T], axis=1)
-    return np.asarray(g - (modes @ np.linalg.solve(modes.T @ M, M.T @ g.ravel())).reshape(g.shape))
+    return np.asarray(g - modes @ np.linalg.solve(modes.T @ M, M.T @ g))
 
 
 def _answers(
-    link: Link, joint: Attachment, part: Substructure, deflections: Sequence[Float[np.ndarray, "n d"]]
-) -> list[Float[np.ndarray, "n d"]]:
+    link: Link, joint: Attachment, part: Substructure, deflections: Float[np.ndarray, "k c"]
+) -> Float[np.ndarray, "k a"]:
     """Static answers of a segment to forces at its ports that hold each other, each of a small strain energy."""
     g = _free(link, part, port_columns(joint, link.n), np.arange(len(joint.keep)))
-    energy = np.sqrt(np.maximum(np.einsum("kc,kc->c", g, np.asarray(link.K0 @ g)), 0.0))
-    whole = np.sqrt(sum(float(np.vdot(x, link.K0 @ x.ravel())) for x in deflections)) or 1.0
-    scaled = g / np.where(energy > 0, energy, 1.0) * (UNIT * whole)
-    return [x.reshape(link.n, link.d) for x in scaled.T]
+    energy, whole = (np.sqrt(np.maximum((x * np.asarray(link.K0 @ x)).sum(axis=0), 0.0)) for x in (g, deflections))
+    return np.asarray(g / np.where(energy > 0, energy, 1.0) * (UNIT * (np.linalg.norm(whole) or 1.0)))
 
 
 def _free(
@@ -98,17 +94,16 @@ def _free(
 
 
 def _turned_ports(
-    link: Link, joint: Attachment, part: Substructure, deflections: Sequence[Float[np.ndarray, "n d"]]
-) -> list[Float[np.ndarray, "n d"]]:
+    link: Link, joint: Attachment, part: Substructure, deflections: Float[np.ndarray, "k c"]
+) -> Float[np.ndarray, "k a"]:
     """How cuts and joints strain a segment that sees their turns w as small: by ½ w × (w × r) at their points r.
 
     Neighbours with other turns share the points of a cut; what one takes for a turn is a stretch for the other.
     """
     W, rigid = port_columns(joint, link.n), rigid_modes(link)
     port = joint.keep // link.d
-    g = np.stack([x.ravel() for x in deflections], axis=1)
-    values, modes = W.T @ g, W.T @ rigid
-    out = []
+    values, modes = W.T @ deflections, W.T @ rigid
+    out = [np.zeros((link.unknowns, 0))]
     for group in _groups(joint, link.d):
         here = np.flatnonzero(np.isin(port, group))
         answers = _free(link, part, W, here)
@@ -118,19 +113,19 @@ def _turned_ports(
         # how the group moves as a whole, and so turns
         moved = np.linalg.lstsq(modes[here], values[here], rcond=1e-9)[0][link.d if link.d == 2 else 3 :]
         arms = joint.points[port[here]] - joint.points[group].mean(axis=0)
-        e = np.eye(3)[joint.keep[here] % link.d]
-        needed = np.stack([_shortened(w, arms, e, link.d) for w in moved.T], axis=1)
+        needed = _shortened(moved, arms, np.eye(3)[joint.keep[here] % link.d])
         c = np.linalg.lstsq(np.concatenate([W[:, here].T @ answers, modes[here]], axis=1), needed, rcond=1e-9)[0]
-        out.append(answers @ c[: answers.shape[1]])
-    return [x.reshape(link.n, link.d) for each in out for x in each.T]
+        U, size, _ = np.linalg.svd(c[: answers.shape[1]], full_matrices=False)
+        out.append(answers @ (U * size))  # as many, with the sum of squares of all
+    return np.concatenate(out, axis=1)
 
 
 def _shortened(
-    turns: Float[np.ndarray, " r"], arms: Float[np.ndarray, "q 3"], e: Float[np.ndarray, "q 3"], d: int
-) -> Float[np.ndarray, " q"]:
-    """½ w × (w × r) along each component; turns in the order of `rigid_modes`: about z, x, y."""
-    w = np.array([0.0, 0.0, turns[0]]) if d == 2 else np.array([turns[1], turns[2], turns[0]])
-    return np.asarray((np.cross(w, np.cross(w, arms)) / 2 * e).sum(axis=1))
+    turns: Float[np.ndarray, "r c"], arms: Float[np.ndarray, "q 3"], e: Float[np.ndarray, "q 3"]
+) -> Float[np.ndarray, "q c"]:
+    """½ w × (w × r) along each component; turns in the order of `rigid_modes`: about z, x, y; in a plane about z."""
+    w = np.roll(np.pad(turns, ((0, 3 - len(turns)), (0, 0))), -1, axis=0)
+    return np.asarray(((arms @ w) * (e @ w) - (arms * e).sum(axis=1)[:, None] * (w**2).sum(axis=0)) / 2)
 
 
 def _groups(joint: Attachment, d: int) -> list[Int[np.ndarray, " p"]]:
@@ -140,14 +135,13 @@ def _groups(joint: Attachment, d: int) -> list[Int[np.ndarray, " p"]]:
     return [*named, *(cuts[k : k + d] for k in range(0, len(cuts), d))]
 
 
-def _shapes(link: Link, deflections: Sequence[Float[np.ndarray, "n d"]]) -> Float[np.ndarray, "m n d"]:
-    """Principal deflections by strain energy, as large as they are together."""
-    g = np.stack([x.ravel() for x in deflections])
-    G = g @ np.asarray(link.K0 @ g.T)
+def _shapes(link: Link, g: Float[np.ndarray, "k c"]) -> Float[np.ndarray, "n md"]:
+    """Components of the principal deflections by strain energy, as large as they are together, side by side."""
+    G = g.T @ np.asarray(link.K0 @ g)
     values, vectors = np.linalg.eigh((G + G.T) / 2)
     values, vectors = values[::-1][:SHAPES], vectors[:, ::-1][:, :SHAPES]
-    kept = values > SEEN * values[0]
-    return np.asarray((vectors[:, kept].T @ g).reshape(-1, link.n, link.d))
+    shapes = (vectors[:, values > SEEN * values[0]].T @ g.T).reshape(-1, link.n, link.d)
+    return np.concatenate(list(shapes), axis=1)
 
 
 def _eliminated(
@@ -167,27 +161,35 @@ def _eliminated(
     """
     f, d = C.shape[1:]
     least = HELD * _smallest(np.concatenate([rigid, ports], axis=1))
-    target = np.asarray(K @ C.reshape(len(C), -1).T)  # forces of the deflections
     Z, gone, losses = np.eye(f), [], []
-    before = float(np.vdot(C.reshape(len(C), -1).T, target))
+    flexibility, now = np.linalg.inv(K).reshape(f, d, f, d), C.transpose(1, 2, 0)  # of what is left, 0 along what is gone
     while Z.shape[1] > 1:
-        k, T = Z.shape[1], np.kron(Z, np.eye(d))
-        flexibility = np.linalg.inv(T.T @ K @ T)
-        now = (flexibility @ (T.T @ target)).reshape(k, d, -1)
-        trace = np.einsum("akbk->ab", flexibility.reshape(k, d, k, d))
-        cheapest = scipy.linalg.eigh(np.einsum("adm,bdm->ab", now, now), (trace + trace.T) / 2)[1]
+        needed = Z.T @ np.einsum("adm,bdm->ab", now, now) @ Z
+        trace = Z.T @ np.einsum("akbk->ab", flexibility) @ Z
+        cheapest = Z @ scipy.linalg.eigh(needed, (trace + trace.T) / 2)[1]
         for q in (cheapest / np.linalg.norm(cheapest, axis=0)).T:
-            rest = Z @ scipy.linalg.null_space(q[None])
+            rest = Z @ scipy.linalg.null_space((q @ Z)[None])
             if _smallest(np.concatenate([rigid, ports @ rest], axis=1)) >= least:
                 break
         else:
             break
-        T = np.kron(rest, np.eye(d))
-        after = float(np.vdot(x := T.T @ target, np.linalg.solve(T.T @ K @ T, x)))
-        gone.append(Z @ q)
-        losses.append(max(before - after, 0.0))
-        Z, before = rest, after
+        flexibility, now, loss = _held(flexibility, now, q)
+        gone.append(q)
+        losses.append(loss)
+        Z = rest
     return Z, np.array(gone[::-1]).reshape(-1, f).T, np.array(losses[::-1])
+
+
+def _held(
+    flexibility: Float[np.ndarray, "f d f d"], now: Float[np.ndarray, "f d m"], q: Float[np.ndarray, " f"]
+) -> tuple[Float[np.ndarray, "f d f d"], Float[np.ndarray, "f d m"], float]:
+    """Flexibility and deflections once a mode is held at zero, and the strain energy that this costs them: J(q)."""
+    f, d = flexibility.shape[:2]
+    response = np.tensordot(flexibility, q, axes=(2, 0))  # to forces on the mode, (f, d, d)
+    L = np.linalg.cholesky(np.tensordot(q, response, axes=1))  # of F(q)
+    response = np.linalg.solve(L, response.reshape(f * d, d).T).T.reshape(f, d, d)
+    force = np.linalg.solve(L, np.tensordot(q, now, axes=1))
+    return flexibility - np.tensordot(response, response, axes=(2, 2)), now - response @ force, float((force**2).sum())
 
 
 def _smallest(values: Float[np.ndarray, "p c"]) -> float:

@@ -1,4 +1,4 @@
-"""A linkage frozen at a position whose links are stiffened by the stresses of its motion, and feel that they turn.
+"""Natural frequencies of a linkage frozen at a position, with geometric stiffening and the inertia of rotation.
 
 A link that turns at Ω sees δ = R y with M (y'' + 2 Ω̃ y' + Ω̃² y) + (K0 + k ⊗ P) y = 0 (`dynamics.stiffening`). What is
 symmetric of it stays, K0 + k ⊗ P + M Ω̃² with the link's own Ω; the gyroscopic 2 M Ω̃ y' is left out. A bar on a hinge
@@ -17,7 +17,7 @@ from kedfem.dynamics.matrices.substructure import mass_matrix
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.frozen import Frozen, Modes, UnstableError
 from kedfem.dynamics.rigid_body import forcings
-from kedfem.dynamics.rigid_elements import RigidElements, rigid_elements_of
+from kedfem.dynamics.rigid_elements import RigidElements, rigid_elements
 from kedfem.dynamics.stiffening import stiffening
 from kedfem.dynamics.system.record import System
 from kedfem.errors import SceneError, SolveError
@@ -46,7 +46,7 @@ class Stiffened:
     Raises
     ------
     SolveError
-        If nothing holds a link.
+        If a link is not supported.
     """
 
     def __init__(
@@ -128,7 +128,7 @@ def frozen_linkage(
     Parameters
     ----------
     count : vibrations that are wanted
-    free : whether the drives have let go of their joints in the system
+    free : whether the drives have released their joints in the system
 
     Raises
     ------
@@ -145,11 +145,11 @@ def frozen_linkage(
         )
     driven = elastic_model(scene, linkage, along=along)
     _refuse_prescribed(driven, free)
-    return Stiffened(system, driven, count, released, rigid_elements_of(scene, driven, along))
+    return Stiffened(system, driven, count, released, rigid_elements(scene, linkage, along, driven))
 
 
 def _refuse_prescribed(driven: Model, free: bool) -> None:
-    """Refuse to let go of rigid links that a drive carries: the forces of their joints, which stiffen them, are unknown.
+    """Refuse to release rigid links that a drive prescribes: the forces of their joints, which stiffen them, are unknown.
 
     Raises
     ------
@@ -158,6 +158,6 @@ def _refuse_prescribed(driven: Model, free: bool) -> None:
     if free and driven.prescribed:
         names = ", ".join(each.link.name for each in driven.prescribed)
         raise SceneError(
-            "--free: must be left out with analysis.stiffening where the drive carries rigid links, whose stresses are "
-            f"not known, got {names}: take model = 'beam' or 'solid' for it"
+            "--free: must be left out with analysis.stiffening where the drive prescribes rigid links, whose stresses "
+            f"are not known, got {names}: take model = 'beam' or 'solid' for it"
         )

@@ -1,1 +1,1 @@
-"""The march: generalised-α, its start, its steps, levels of steps side by side, the monolithic step, what it costs."""
+"""Time integration: generalised-α, its start, its steps, extrapolation levels, and the forecast of its time."""

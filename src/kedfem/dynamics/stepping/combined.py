@@ -1,4 +1,4 @@
-"""States of levels in time combined, at the times that all of them have."""
+"""States of several extrapolation levels combined, at the times that all levels have."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,4 +1,4 @@
-"""What a run will cost: from a few real steps of its own solver; of large models from the sizes alone."""
+"""Forecast of the time of a run: from a few real steps of its own solver, for large models from their sizes alone."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -23,8 +23,10 @@ LOOP = 5e-5  # the same where all links are small: one compiled loop, recording 
 ARRAY_PASSES = 60  # arrays of a link read or written in a step beside the solve
 RUN_BYTES = 1e7  # beside libraries, of the smallest runs
 TRIED = 60_000  # unknowns of a model, of solids, that is factored (in seconds) only to try its steps
-FIRST, MORE, MOST = (4, 4, 16_384)  # steps that are tried: a few, then so many times as many until they take ENOUGH more
-ENOUGH = 0.5  # seconds
+# steps that are tried: a few, then so many times as many until they take ENOUGH [s] more, and twice as long in all: work
+# that is done once, as for modes of an envelope, takes about as long as the start and would count as a cost of each step
+FIRST, MORE, MOST = (4, 4, 16_384)
+ENOUGH = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +120,7 @@ def tried_cost(scene: Scene, model: Model, run: Callable[[Scene, list[Steps]], N
     few = tried = min(FIRST, total)
     seconds(few)  # compiled code is loaded
     once = took = seconds(few)
-    while tried < min(MOST, total) and took - once < ENOUGH:  # beside what a start takes
+    while tried < min(MOST, total) and took - once < max(ENOUGH, once):
         tried = min(MORE * tried, MOST, total)
         took = seconds(tried)
     step = max(took - once, 0.0) / (tried - few) if tried > few else once / few

@@ -1,4 +1,4 @@
-"""Levels in time: the same motion in steps of h, h/2 (and h/4) side by side, combined state by state at common times.
+"""Extrapolation levels: the same motion in steps of h, h/2 (and h/4), combined state by state at common times.
 
 The error of a step of generalised-α has an expansion in powers of h, c₂ h² + c₃ h³ + c₄ h⁴ …
 (docs/theory/time-integration.md), where numerical damping alone makes c₃,
@@ -33,7 +33,7 @@ from kedfem.dynamics.stepping.start import started
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.steps import Steps
 from kedfem.errors import SolveError
-from kedfem.mesh.memory_forecast import memory
+from kedfem.mesh.memory_forecast import free_memory, memory
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import joined as motions_joined
@@ -71,10 +71,11 @@ def level_steps(scene: Scene, model: Model) -> list[Steps]:
     from kedfem.dynamics.stepping.cost import factor_bytes
 
     need = factor_bytes(model)
-    if need > memory():
+    if need > (free := free_memory()):
+        fits = float(f"{model.unknowns * (free / need) ** (1 / 1.5):.2g}")
         raise SolveError(
-            f"links: must have factors that fit in this machine's memory of {memory() / 1e9:.3g} GB, got "
-            f"{model.unknowns:,} unknowns in all, whose factors take about {need / 1e9:.3g} GB; take larger elements"
+            f"links: must have factors that fit in the free memory of {free / 1e9:.3g} GB, got {model.unknowns:,} "
+            f"unknowns in all, whose factors take about {need / 1e9:.3g} GB; take larger elements: {fits:,.0f} would fit"
         )
     levels, fit = scene.analysis.extrapolation_levels or 1, most_levels(model)
     if levels > max(fit, 1):

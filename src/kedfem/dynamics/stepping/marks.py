@@ -1,4 +1,4 @@
-"""Where a march stands, so that it can be stored and gone on with: the last blocks of its levels and what was before."""
+"""Marks of a march, from which it can be resumed: the last blocks of its levels and their state before."""
 
 from copy import deepcopy
 from dataclasses import dataclass, field

@@ -51,7 +51,7 @@ class Scheme:
         return np.array([self.a1, self.gamma / self.beta - 1, self.h * (self.gamma / (2 * self.beta) - 1)])
 
 
-def borne_rotation(rho_inf: float, stiff: bool = False) -> float:
+def stable_rotation(rho_inf: float, stiff: bool = False) -> float:
     """The rotation in a step [rad] up to which numerical damping takes vibration from links that no step resolves.
 
     Parameters

@@ -1,10 +1,10 @@
-"""The solver of a scene: which one marches its steps, and how many time points it keeps together."""
+"""The solver of a scene: which one takes its steps, and how many time points form a block."""
 
 from collections.abc import Sequence
 
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_body import POINTS, drive_range
-from kedfem.dynamics.rigid_elements import rigid_elements_of
+from kedfem.dynamics.rigid_elements import rigid_elements
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stiffening import Stiffening, stiffening
 from kedfem.dynamics.system.steps import Steps, scene_system
@@ -39,13 +39,8 @@ def stresses_of(scene: Scene, model: Model) -> Stiffening | None:
         return None
     if not (scene.springs or scene.motors):
         return stiffening(model)
-    return stiffening(model, rigid_elements_of(scene, model, path(linkage(scene), *drive_range(scene))))
-
-
-def stresses_in(solvers: Sequence[Steps]) -> Stiffening | None:
-    """Stress modes that solvers have, if geometric stiffening counts."""
-    found: Stiffening | None = solvers[0].stiffening
-    return found
+    rigid = linkage(scene)
+    return stiffening(model, rigid_elements(scene, rigid, path(rigid, *drive_range(scene)), model))
 
 
 def eased_warning(solvers: Sequence[Steps]) -> tuple[str, ...]:
@@ -54,13 +49,13 @@ def eased_warning(solvers: Sequence[Steps]) -> tuple[str, ...]:
     if not eased:
         return ()
     return (
-        f"the iterations of {eased} steps converged to a hundred times the tolerance only (stiff springs or hubs): take "
-        "a smaller step to see whether results change",
+        f"the iterations of {eased} steps converged to a hundred times the tolerance only (stiff springs, or ends and "
+        "corners of beams in space): take a smaller step to see whether results change",
     )
 
 
 def unstable_balance(solvers: Sequence[Steps]) -> str:
-    """Why positions are none that a mechanism stays in; empty if it does in those that were examined."""
+    """Why the balance in some positions is unstable; empty if it is stable in those that were examined."""
     found = [each for solver in solvers for each in solver.unstable]
     if not found:
         return ""
@@ -72,7 +67,7 @@ def unstable_balance(solvers: Sequence[Steps]) -> str:
 
 
 def unstable_balance_warning(solvers: Sequence[Steps]) -> tuple[str, ...]:
-    """What the user should know of that."""
+    """A warning about that."""
     why = unstable_balance(solvers)
     return (f"{why}; take smaller loads, stiffer links or springs, or kind = 'transient' with damping",) if why else ()
 

@@ -1,4 +1,4 @@
-"""How the elastic motion begins: at rest, quasi-static, from loads that are let go, or in its steady state."""
+"""Initial states of the elastic motion: at rest, quasi-static, released from initial forces, or steady."""
 
 import numpy as np
 
@@ -62,7 +62,7 @@ def period_map(scene: Scene, linkage: Linkage, along: Path, model: Model, solver
 
 
 def begun(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> State:
-    """As `started`, of a motion that begins as it is told to; of a steady one the search for it begins there."""
+    """The initial state that the scene asks for, as `started`; the search for a steady motion begins there."""
     return solver.start(motion_of(scene, linkage, along), initial_rates(scene, linkage, model))
 
 

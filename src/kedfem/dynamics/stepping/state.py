@@ -1,4 +1,4 @@
-"""Nodal states of links, and what damps them."""
+"""Rayleigh damping of links, which acts on their co-rotated deformation."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""How stiff a rigid link with a co-rotational frame may be beside a time step: it gives to forces that it passes on."""
+"""The largest stiffness of a rigid link with a co-rotational frame that a time step allows."""
 
 from dataclasses import dataclass, replace
 
@@ -13,7 +13,7 @@ class StepLimit:
 
     highest : that it has in steps however short [rad/s]
     turning : how fast it turns at most [rad/s]; inf where that is not known beforehand
-    borne : rotation in a step at which numerical damping holds stiff vibration down [rad]
+    stable_rotation : rotation in a step at which numerical damping holds stiff vibration down [rad]
     step : h [s]
     longest : the longest of several steps whose results are compared: it decides for all of them whether the link turns
         little, so that what it gives falls with the square of the step [s]
@@ -21,14 +21,14 @@ class StepLimit:
 
     highest: float
     turning: float
-    borne: float
+    stable_rotation: float
     step: float
     longest: float
 
     @property
     def turns_little(self) -> bool:
         """Whether it may be FIRM."""
-        return self.turning * self.longest <= self.borne
+        return self.turning * self.longest <= self.stable_rotation
 
     @property
     def frequency(self) -> float:

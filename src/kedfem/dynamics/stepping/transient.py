@@ -73,9 +73,9 @@ def transient(
                     yield Block(first + k, part.part(0, failed.taken), links, multipliers=multipliers)
                 if isinstance(failed, LeftLineError):
                     raise SolveError(failed.said) from None
-                at = _moment(linkage, part, failed.taken)
+                at = instant_in_words(linkage, part, failed.taken)
                 raise SolveError(_stuck(first + k + failed.taken, at, failed, solver)) from None
-            yield from _finite(linkage, Block(first + k, part, links, multipliers=multipliers))
+            yield from finite_part(linkage, Block(first + k, part, links, multipliers=multipliers))
     _marched(solver, state)
 
 
@@ -96,11 +96,11 @@ def _positions(scene: Scene, linkage: Linkage, along: Path, model: Model, solver
             else:
                 state = quasi_static_position(of, motion_at, t, near=state, like=shared)
         except NoBalanceError as failed:
-            raise SolveError(_unbalanced(scene, _moment(linkage, motion, 0), failed.moves)) from None
+            raise SolveError(_unbalanced(scene, instant_in_words(linkage, motion, 0), failed.moves)) from None
         if k in looked_at and (found := stability(of, motion_at, state, at_rest, shared)) and found.least < UNSTABLE:
-            solver.unstable.append(f"{_moment(linkage, motion, 0)} (link '{found.moves}')")
+            solver.unstable.append(f"{instant_in_words(linkage, motion, 0)} (link '{found.moves}')")
         links, multipliers = solver.first(state, forcing, motion_at, shared)
-        yield from _finite(linkage, Block(k, motion, links, multipliers=multipliers))
+        yield from finite_part(linkage, Block(k, motion, links, multipliers=multipliers))
 
 
 def _unbalanced(scene: Scene, moment: str, moves: str) -> str:
@@ -156,7 +156,7 @@ def snapshots(scene: Scene, linkage: Linkage, along: Path, model: Model, solver:
         yield from (block.at(k) for k in range(len(block)))
 
 
-def _moment(linkage: Linkage, motion: RigidMotion, k: int) -> str:
+def instant_in_words(linkage: Linkage, motion: RigidMotion, k: int) -> str:
     """A time point in words, with the angle or travel of the drive if there is one."""
     if len(linkage.drives) != 1:
         return f"t = {motion.t[k]:.6g} s"
@@ -165,7 +165,7 @@ def _moment(linkage: Linkage, motion: RigidMotion, k: int) -> str:
     return f"t = {motion.t[k]:.6g} s, {turn if linkage.drives.turning[0] else f'drive travel {1e3 * x:.6g} mm'}"
 
 
-def _finite(linkage: Linkage, block: Block) -> Iterator[Block]:
+def finite_part(linkage: Linkage, block: Block) -> Iterator[Block]:
     """The block, up to where a displacement is not finite any more, or beyond all measure."""
     ends = [(link.g.max(axis=(1, 2)), link.g.min(axis=(1, 2))) for link in block.links]
     fine = np.all([(high < BEYOND) & (low > -BEYOND) for high, low in ends], axis=0)
@@ -175,5 +175,5 @@ def _finite(linkage: Linkage, block: Block) -> Iterator[Block]:
     if k < len(block):
         raise SolveError(
             f"analysis: the elastic motion must stay finite, got none at step {block.step + k}, "
-            f"{_moment(linkage, block.motion, k)}"
+            f"{instant_in_words(linkage, block.motion, k)}"
         )

@@ -1,4 +1,4 @@
-"""Products and turns of a body's coordinates and of its interface points, compiled by numba."""
+"""Products and rotations of a body's coordinates and of its interface points, compiled by numba."""
 
 from kedfem.compiled import inner
 

@@ -1,4 +1,4 @@
-"""What a step works with, constant: numbers of the scheme, bodies, ends and constraints as flat arrays with names.
+"""Constant arrays of a step, as named tuples: coefficients of the scheme, bodies, ends and constraints.
 
 Bodies are solved in coordinates in which their mass is one, component first: all x, then all y. Arrays hold all bodies
 one after the other; `at` says where each begins.

@@ -1,4 +1,4 @@
-"""What one body does in a step, compiled by numba: its right-hand side, its internal force, and its end of the step.
+"""One body in a step, compiled by numba: its right-hand side, its internal force, and its state at the end.
 
 Of body i: coordinates `at[i]:at[i + 1]`, component first; mass one. Rotations act on components.
 """
@@ -51,7 +51,7 @@ def rigid_frame_end(c, bodies, i, R, F, g, Ag, state, history, t, work):  # type
     else:
         mass_times(bodies.mass, bodies, i, u, Mg)
         momentum = state.momentum[3 * first : 3 * last]
-        carried_on(c, Mg, momentum)
+        newmark_advanced(c, Mg, momentum)
         copied(momentum[N : 2 * N], history.Mv[t, first:last])
         turned_back(R, d, Mg, u)
         copied(u, Mg)
@@ -65,7 +65,7 @@ def rigid_frame_end(c, bodies, i, R, F, g, Ag, state, history, t, work):  # type
         damped = state.damped[3 * first : 3 * last]
         for x in range(N):
             u[x] = c.alpha * Mg[x] + c.beta * Ag[x]
-        carried_on(c, u, damped)
+        newmark_advanced(c, u, damped)
         if not bodies.dense[i]:
             copied(u, history.Cg[t, first:last])
         for x in range(N):
@@ -75,7 +75,7 @@ def rigid_frame_end(c, bodies, i, R, F, g, Ag, state, history, t, work):  # type
 
 
 @inner
-def carried_on(c, x, state):  # type: ignore[no-untyped-def]
+def newmark_advanced(c, x, state):  # type: ignore[no-untyped-def]
     """Newmark's formulas for any quantity from x at the end of the step; state (3N,) has it and its rates."""
     n0, n1, n2 = c.acceleration
     N, late, early = len(x), c.late, c.early
@@ -139,7 +139,7 @@ def mass_damped(c, bodies, i, R, u, state, trial, work):  # type: ignore[no-unty
         work.y[x] *= c.alpha
     damped = trial.damped[3 * first : 3 * last]
     copied(state.damped[3 * first : 3 * last], damped)
-    carried_on(c, work.y[:N], damped)
+    newmark_advanced(c, work.y[:N], damped)
     turned(R, d, damped[N : 2 * N], work.turned[:N])
     for x in range(N):
         trial.f[first + x] += work.turned[x]
@@ -205,7 +205,7 @@ def own_end(c, bodies, i, R, F, u, state, trial, history, t, work):  # type: ign
     moved_to(c, first, last, u[first:last], F, state, history, t)
     if not bodies.dense[i]:
         mass_times(bodies.mass, bodies, i, u[first:last], work.y)
-        carried_on(c, work.y[:N], state.momentum[3 * first : 3 * last])
+        newmark_advanced(c, work.y[:N], state.momentum[3 * first : 3 * last])
     copied(trial.f[first:last], state.f[first:last])
     if bodies.rigid[i]:
         unforeseen(bodies, i, trial, work)

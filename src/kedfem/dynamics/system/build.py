@@ -1,4 +1,4 @@
-"""From a scene and its elastic model to a system: what each joint constrains and releases, force elements on coordinates.
+"""The system of a scene and its elastic model: constraints of joints, and force elements with their coordinates.
 
 What a kind of joint constrains stands with the joint (`joints.constraint_joints.constrained`); gears, springs, motors and
 limits are laws on the same coordinates.
@@ -7,14 +7,13 @@ limits are laws on the same coordinates.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.elastic_model import elastic_model
-from kedfem.dynamics.force_elements import law_of, on_hinge
-from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, coordinate, ordered
+from kedfem.dynamics.force_elements import Element, force_elements, law_of, places, term_of
+from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.system import record
 from kedfem.dynamics.system.ends import corners, end_on, rigid_end, same_end
@@ -24,7 +23,6 @@ from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.scene import Scene
 
-ELEMENTS = ("springs", "motors", "limits")  # sections of a scene
 Vector = Float[np.ndarray, "3"]
 
 
@@ -72,13 +70,15 @@ class _Builder:
     ends: list[End] = field(default_factory=list)
     constraints: list[Constraint] = field(default_factory=list)
 
+    def __post_init__(self) -> None:
+        self.elements = dict(force_elements(self.scene))
+
     def joint(self, joint: ConstraintJoint) -> None:
         """What a joint constrains, a pair of gears couples, a spring, motor or limit acts on."""
-        kind, _, name = joint.name.rpartition(".")
-        if kind == "rigid":
+        if joint.name.startswith("rigid."):
             self.bars(joint)
-        elif kind in ELEMENTS:
-            self.element(joint, getattr(self.scene, kind)[name])
+        elif joint.name in self.elements:
+            self.element(joint, self.elements[joint.name])
         for n, each in enumerate(joint.constraints):
             others = ((share, other, other.constraints[n].terms) for share, other in joint.plus)
             terms = [
@@ -101,26 +101,16 @@ class _Builder:
             self.add(joint.name, [long, Term(record.DISTANCE, ground, ground, a, b, zero, -1.0)], Held(), joint)
 
     def between_prescribed(self, known: set[str]) -> None:
-        """Springs, motors and limits between the ground and what drives carry: no unknowns, but hubs bear them."""
-        for kind in ELEMENTS:
-            for name, element in getattr(self.scene, kind).items():
-                if f"{kind}.{name}" in known:
-                    continue
-                points = getattr(element, "between", None)
-                links = [end.link for end in points] if points else ordered(self.scene.joints[str(element.joint)])
-                i, j = (self.linkage.bodies.index(link) for link in links)
-                none = ConstraintJoint(f"{kind}.{name}", np.zeros(3), (i, j), (None, None))
-                self.element(none, element)
+        """Springs, motors and limits between the ground and prescribed bodies; drive joints bear their forces."""
+        for name, element in self.elements.items():
+            if name not in known:
+                i, j = (self.linkage.bodies.index(link) for link, _ in places(self.scene, element))
+                self.element(ConstraintJoint(name, np.zeros(3), (i, j), (None, None)), element)
 
-    def element(self, joint: ConstraintJoint, element: Any) -> None:
+    def element(self, joint: ConstraintJoint, element: Element) -> None:
         """The law of a spring, motor or limit on its coordinate, which its links' own motion shows."""
-        if (between := getattr(element, "between", None)) is not None:
-            i, j = (self.end(joint, k, np.asarray(end.at)) for k, end in enumerate(between))
-            a, a_j = (self.ends[n].origin for n in (i, j))
-            term = Term(record.DISTANCE, i, j, a, a_j, np.zeros(3))
-        else:
-            made = self.scene.joints[str(element.joint)]
-            term = self.numbered(coordinate(made, turns=on_hinge(element)), joint, np.asarray(made.at))
+        i, j = (self.end(joint, k, at) for k, (_, at) in enumerate(places(self.scene, element)))
+        term = replace(term_of(self.scene, element, self.ends[i], self.ends[j]), i=i, j=j)
         self.constraints.append(Constraint(joint.name, (term,), law_of(element), linear=False))
 
     def add(self, name: str, terms: Sequence[Term], law: Law, *joints: ConstraintJoint) -> None:

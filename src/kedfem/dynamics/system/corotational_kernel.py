@@ -1,4 +1,4 @@
-"""Bodies with one frame that follows them, compiled by numba: their internal force, and its end of the step.
+"""Bodies with one co-rotational frame in a step, compiled by numba: internal force, and state at the end.
 
 Without any, K may be None: nothing of this is compiled then.
 """

@@ -66,7 +66,7 @@ def end_of(side: Side, joint: ConstraintJoint) -> End:
 
 
 def end_on(joint: ConstraintJoint, side: int, at: Vector) -> End:
-    """What a joint has on one of its links; a point of it where that has no unknowns."""
+    """The end of a joint on one of its links; a point of it where that has no unknowns."""
     found = joint.sides[side]
     return rigid_end(joint.bodies[side], at) if found is None else end_of(found, joint)
 
@@ -85,7 +85,7 @@ def line_weights(end: End, motion: RigidMotion) -> Float[np.ndarray, "T p"]:
 
 
 def left_line(system: System, end: int, t: float) -> str:
-    """What is wrong where a pin slides beyond the line of an end."""
+    """The message where a pin slides beyond the line of an end."""
     name = next(each.name for each in system.constraints if any(term.j == end for term in each.terms))
     carrier = system.model.links[system.model.bodies.index(system.ends[end].body)].name
     s = line_of(system.ends[end]).stations.s

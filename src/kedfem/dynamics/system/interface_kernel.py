@@ -3,7 +3,7 @@
     (Σ Bᵀ R S Rᵀ B) Δz = Σ Bᵀ R (Yᵀ Rᵀ r − S w₀) + known + Cᵀ m,   C Δz + m / κ = target
 
 κ is infinite of a constraint; of a force law it is its tangent, so that it is exact however stiff. A part σ < κ of each
-is put into the matrix, as in `dynamics.interface`. Both are solved for at once, from one matrix by its profile:
+is put into the matrix, as in `dynamics.matrices.bordered`. Both are solved for at once, from one matrix by its profile:
 
     [H + Σ σ cᵀ c, Cᵀ; C, −1/κ] (Δz, −m) = (right, target)
 

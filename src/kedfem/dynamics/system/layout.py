@@ -225,13 +225,13 @@ def factored(links: Sequence[Link], joints: Sequence[Attachment], c: Coefficient
 def is_large(link: Link) -> bool:
     """Whether a body keeps a sparse factor and nodal coordinates: elements with frames of their own never do.
 
-    Beams in space with rigid-body frames do, however small: in coordinates in which mass is one their stiff hubs, which
-    have next to none, would be 1e11 times as stiff as they bend.
+    Beams in space with rigid-body frames do, however small: in coordinates in which mass is one their rigid nodes, which
+    have next to no mass, would be 1e11 times as stiff as they bend.
     """
     if frame_of(link) == record.TANGENTIAL or link.element is not None:
         return False
-    hubs = link.kind == "spatial_beam" and link.full is None and link.fit is None
-    return link.unknowns > SMALL or hubs
+    rigid_nodes = link.kind == "spatial_beam" and link.full is None and link.fit is None
+    return link.unknowns > SMALL or rigid_nodes
 
 
 def profile(system: System) -> Profile:

@@ -7,7 +7,6 @@ from typing import cast
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.force_element import stiffness_factors
 from kedfem.dynamics.matrices.dense import rows_of, work_over_time
 from kedfem.dynamics.rigid_body import forcing_of, forcings
 from kedfem.dynamics.stepping.scheme import Scheme
@@ -16,7 +15,7 @@ from kedfem.dynamics.system.ends import left_line, line_weights
 from kedfem.dynamics.system.forces.stresses import NO_TERMS, Stressed, stressed
 from kedfem.dynamics.system.forces.turning_loads import turning
 from kedfem.dynamics.system.layout import TOLERANCE, as_arrays, coefficients, factored
-from kedfem.dynamics.system.record import System, is_affine, without_unknowns
+from kedfem.dynamics.system.record import System, is_affine, stiffness_factors, without_unknowns
 from kedfem.dynamics.system.sparse import Part, solver
 from kedfem.dynamics.system.state import Driving, History, State, copied, empty_history, empty_trial, room
 from kedfem.errors import SolveError
@@ -48,7 +47,7 @@ class Ready:
 
 
 class ConvergenceError(SolveError):
-    """Iterations of a step that do not converge, not in parts either.
+    """Iterations of a step that do not converge, even if the step is divided.
 
     state, history : what was reached before that step
     taken : steps before it
@@ -134,7 +133,7 @@ def march(
     LeftLineError
         If a pin slides beyond the line of its slot.
     """
-    from kedfem.dynamics.system.reference import handed
+    from kedfem.dynamics.system.reference import by_address
 
     constraints = of.constraints
     if between is None or not halvings:
@@ -145,12 +144,12 @@ def march(
     history = empty_history(T, of.bodies, of.constraints, along.F)
     trial, work = empty_trial(of.bodies, of.ends, constraints, state), room(of.bodies)
     solved, marched = solver(of.parts, of.bodies.at, trial), compiled_steps(of)
-    constant, rooms = [handed(x) for x in (of.c, of.bodies, *related)], [handed(x) for x in (trial, work)]
+    constant, rooms = [by_address(x) for x in (of.c, of.bodies, *related)], [by_address(x) for x in (trial, work)]
     while done < T:
         left = _since(along, done), History(*(x[done:] for x in history))
         with solved.watched():
-            now, rows = handed(left[0]), handed(left[1])
-            taken, worst = marched(*constant, now, handed(state), *rooms, rows, solved)
+            now, rows = by_address(left[0]), by_address(left[1])
+            taken, worst = marched(*constant, now, by_address(state), *rooms, rows, solved)
         solved.check()
         done += int(taken)
         if done < T:

@@ -1,4 +1,4 @@
-"""Measures of one end against another that are no products of their directions; compiled by numba.
+"""Rotation vectors, tilts and distances from lines between two ends, compiled by numba.
 
 Rotation vectors and how they change: with R = Q_jᵀ Q_i = exp [θ]× and w the rate of rotation of i against j, seen from j,
 

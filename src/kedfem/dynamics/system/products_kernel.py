@@ -1,6 +1,6 @@
-"""Products of bodies' mass and stiffness with vectors, and what sparse bodies do while their interface points are held.
+"""Products of bodies' mass and stiffness with vectors, and solutions of sparse bodies; compiled by numba.
 
-Arrays of the latter are found by their addresses: each body has its own, as factors are too large for copies in one.
+Arrays of sparse bodies are found by their addresses: each body has its own, as factors are too large for copies in one.
 Without any sparse body, their addresses and mass may be None: nothing of this is compiled then.
 """
 

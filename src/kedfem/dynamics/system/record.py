@@ -1,6 +1,6 @@
 """The record of a system: ends of constraints on bodies, coordinates, and the laws that these obey."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -81,10 +81,19 @@ Law = Held | Driven | Spring | Curve | Stop
 
 
 def law_at(law: Law, t: Times, phi: Times) -> Law:
-    """A law as it is at one time (1,) and angle of the drive (1,)."""
+    """A law at one time (1,) and angle of the drive (1,)."""
     if isinstance(law, Spring) and law.factor is not None:
         return replace(law, stiffness=law.stiffness * float(law.factor(t, phi)[0]), factor=None)
     return law
+
+
+def stiffness_factors(every: Sequence[Factor | None], t: Times, phi: Times) -> Float[np.ndarray, "T A"]:
+    """What the stiffness of each law is multiplied by over time; one where it has no factor."""
+    out = np.ones((len(t), len(every)))
+    for i, factor in enumerate(every):
+        if factor is not None:
+            out[:, i] = factor(t, phi)
+    return out
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +111,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class End:
-    """What a constraint or force law has on one body: a point, and the orientation of the surface there.
+    """The end of a constraint or force law on one body: a point, and the orientation of the surface there.
 
     body : number in the linkage
     form : RIGID: moves with the rigid-body motion; POINT: no orientation of its own; PLANAR_BEAM: (u, v, ψ) of a node;
@@ -216,5 +225,5 @@ def rotation_term(i: int, j: int, frame: Float[np.ndarray, "3 3"], n: int, law: 
 
 
 def without_unknowns(system: System, each: Constraint) -> bool:
-    """Whether both ends move as prescribed: what a law exerts then bears on hubs alone."""
+    """Whether both ends move as prescribed: what a law exerts then acts on drive joints alone."""
     return all(system.ends[n].form == RIGID for term in each.terms for n in (term.i, term.j))

@@ -1,7 +1,7 @@
 """Records handed to compiled functions by address: one pointer instead of all arrays. Arrays, too.
 
 numba takes a named tuple apart into its arrays, and each array into seven numbers, at every call: with all records of
-a system 1,100 arguments, which cost more to compile and to call than what is done with them. `handed(record)` lays
+a system 1,100 arguments, which cost more to compile and to call than what is done with them. `by_address(record)` lays
 these numbers out once, as numba keeps a named tuple in memory; in compiled code `x.name` of it is the array.
 
 What is handed on must be kept as long as the function runs.
@@ -76,15 +76,15 @@ def _length(kind: Any) -> int:
 
 
 @unbox(Reference)
-def _unboxed(kind: Reference, handed: Any, c: Any) -> Any:
+def _unboxed(kind: Reference, given: Any, c: Any) -> Any:
     del kind
-    address = c.pyapi.object_getattr_string(handed, "address")
+    address = c.pyapi.object_getattr_string(given, "address")
     place = c.pyapi.long_as_voidptr(address)
     c.pyapi.decref(address)
     return NativeValue(place)
 
 
-class Handed:
+class RecordAddress:
     """A named tuple of arrays, numbers and tuples of them, as compiled code finds it."""
 
     __slots__ = ("_numba_type_", "address", "numbers", "record")
@@ -118,7 +118,7 @@ def _lay_out(x: Any, numbers: list[int]) -> None:
         numbers.append(int(x))
 
 
-def handed(record: Any) -> Any:
+def by_address(record: Any) -> Any:
     """What compiled functions are given for a record; None stays None.
 
     Of bodies and ends without what none of them has: what that needs is not compiled, but in loops for all scenes.
@@ -126,7 +126,7 @@ def handed(record: Any) -> Any:
     if record is None:
         return None
     unused = () if compiles_for_all() else _unused(record)
-    return Handed(record._replace(**dict.fromkeys(unused)) if unused else record)
+    return RecordAddress(record._replace(**dict.fromkeys(unused)) if unused else record)
 
 
 def _unused(record: Any) -> list[str]:

@@ -1,4 +1,4 @@
-"""What a step does with a body that has a rigid-body frame, beginning and end, and the interface's end of a step."""
+"""Begin and end of a step for a body with a rigid-body frame, and for the interface; compiled by numba."""
 
 from kedfem.compiled import inner
 from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, ports_turned, product

@@ -1,4 +1,4 @@
-"""Large bodies of a system: a sparse factor seen from interface points, solved between what is compiled of a step.
+"""Large bodies of a system, with sparse factors that are solved between the compiled parts of a step.
 
 Their coordinates are nodal rows, component first, so that their mass is not one. What a compiled step asks of them, once
 a step or a pass of those with frames of their own, is Ã⁻¹ r of its right-hand side: by compiled triangular solves,

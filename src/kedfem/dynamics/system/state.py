@@ -1,4 +1,4 @@
-"""What changes as a system moves: its state, histories, and what a step works on; these empty."""
+"""Variables of a system: its state, histories and the work arrays of a step, and functions that make them empty."""
 
 from collections import namedtuple
 

@@ -9,7 +9,7 @@ again. A linear system is done after one: `linear_kernel`.
 import numpy as np
 
 from kedfem.compiled import compiled, inner
-from kedfem.dynamics.anderson_kernel import mixed
+from kedfem.dynamics.anderson_kernel import accelerated
 from kedfem.dynamics.beams_kernel import begun, ended
 from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, product, turned, turned_back
 from kedfem.dynamics.system.bodies_kernel import internal_forces, orientation, own_end, residual
@@ -139,7 +139,7 @@ def passes(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type
             if settled:
                 state.counts[:] = 0.0  # what is kept of rounding would be much of the next step
         if not settled:
-            mixed(memory, state.counts, iteration, trial.change)
+            accelerated(memory, state.counts, iteration, trial.change)
         taken(c, bodies, trial)
         if not np.isfinite(size) or size > 1e30:
             break

@@ -38,7 +38,7 @@ from kedfem.dynamics.system.starts.instant import Instant, renumbered
 from kedfem.dynamics.system.starts.internal_forces import own
 from kedfem.dynamics.system.state import History, State, empty_history
 from kedfem.links.stations import Stations
-from kedfem.motion.linkage import linkage
+from kedfem.motion.linkage import body_names, linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import Scene, corotational
 
@@ -118,7 +118,7 @@ class Steps:
 
             self.oracle = Monolithic(system, scheme)
         self.elements = bool(scene.motors or scene.springs or scene.limits)
-        bodies = linkage(scene).bodies
+        bodies = body_names(scene)
         self.riders = {bodies.index(x.name): (x.carrier, x.weights) for x in system.model.sliders}
         joints = list(zip(model.links, model.joints, system.model.joints, strict=True))
         self._inverse = [
@@ -270,7 +270,7 @@ def _as_history(of: Ready, state: State, motion: RigidMotion) -> History:
 def _deformed(now: Instant, state: State, out: History) -> None:
     """Deformations, orientations and energies of a history of one time point, as co-rotational frames see them."""
     of = now.of
-    for k, each in enumerate(now.inside(state.u, state.v)):
+    for k, each in enumerate(now.internal_states(state.u, state.v)):
         link, here = of.system.model.links[k], own(of, k)
         g = each.frames[0].g if each.frames else each.g
         out.g[0, here] = coordinates(link, of.parts[k], g).ravel()

@@ -1,4 +1,4 @@
-"""Geometric stiffening of bodies with rigid-body frames, compiled by numba: k g P is taken from their right-hand side.
+"""Geometric stiffening of bodies with rigid-body frames, compiled by numba: k g P is part of the right-hand side.
 
 Without any, `of` may be None: nothing of this is compiled then.
 """

@@ -1,4 +1,4 @@
-"""Loads that turn with bodies in a step, compiled by numba; `turning_loads` has the formulas."""
+"""Loads that rotate with bodies in a step, compiled by numba; `forces.turning_loads` has the formulas."""
 
 import numpy as np
 

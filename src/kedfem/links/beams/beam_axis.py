@@ -18,14 +18,14 @@ class Axis:
     frame : (s, 4, 3) position [m], tangent, directions of the section's y and z
     node : (s,) number of the station's node, ascending, but for the last of a closed line, which is the first again
     cells : (e, m) stations of each element, ends first
-    hub : (k,) which nodes carry a full affine field: where segments meet and at the ends
+    rigid_node : (k,) which nodes carry a full affine field: where segments meet and at the ends
     up : what the section's z is near to; None where `line_axes` chooses
     """
 
     frame: Float[np.ndarray, "s 4 3"]
     node: Int[np.ndarray, " s"]
     cells: Int[np.ndarray, "e m"]
-    hub: Bool[np.ndarray, " k"]
+    rigid_node: Bool[np.ndarray, " k"]
     up: Float[np.ndarray, "3"] | None = None
 
 
@@ -50,8 +50,8 @@ def straight_axis(points: Float[np.ndarray, "p 3"], elements: int, nodes: int, u
     node = (steps * np.arange(count)[:, None] + np.arange(steps + 1)).ravel()
     first = ((steps + 1) * np.arange(count)[:, None] + (nodes - 1) * np.arange(elements)).ravel()
     many = count * steps + (not closes(points))
-    hub = np.arange(many) % steps == 0
-    return Axis(np.concatenate(segments), node % many, line_cells(first, nodes), hub, up)
+    rigid_node = np.arange(many) % steps == 0
+    return Axis(np.concatenate(segments), node % many, line_cells(first, nodes), rigid_node, up)
 
 
 def smooth_axis(points: Float[np.ndarray, "p 3"], elements: int, nodes: int, up: Float[np.ndarray, "3"] | None) -> Axis:

@@ -81,9 +81,9 @@ def space_segments(link: Link, axis: Axis, material: Material) -> Segments:
 def _space_part(link: Link, axis: Axis, cell: Int[np.ndarray, " m"], material: Material) -> Link:
     stations = np.sort(cell)
     node = np.arange(len(stations))
-    hub = axis.hub[axis.node[stations]]
+    rigid_node = axis.rigid_node[axis.node[stations]]
     section = section_of(link)
-    own = Axis(axis.frame[stations], node, np.searchsorted(stations, cell)[None], hub)
+    own = Axis(axis.frame[stations], node, np.searchsorted(stations, cell)[None], rigid_node)
     part = spatial_beam_link(link.name, own, section, material)
     x, order = own.frame[own.cells[0]][:, [0, 2, 3]], own.node[own.cells[0]]
     rigidity = rigidities(section, material.youngs_modulus, material.shear_modulus)

@@ -1,4 +1,4 @@
-"""An element of a beam in space whose strains are changes of the metric of its axis and directors: exact for any turn.
+"""Elements of beams in space whose strains are changes of the metric of axis and directors: exact for any rotation.
 
 Node a has the gradient functions g_k, in the reference position X_k, and turns by the rotation Q_a nearest to them, Σ
 g_k ⊗ X_k = Q_a U;
@@ -25,7 +25,7 @@ from kedfem.links.record import BeamElement, read_only
 # of κ G A l: as stiff as sections are against leaning, so that A fits them turned by any angle
 SECTION_STIFF = 1.0
 # of E I / l, besides, at ends and corners, which joints strain
-HUB_STIFF = 1000.0
+RIGID_NODE_STIFF = 1000.0
 Vectors = Float[np.ndarray, "*b _ 3"]
 Column = Float[np.ndarray, "*b _"]
 
@@ -61,7 +61,7 @@ def beam_element(
     tangents[:, first], gradients[np.arange(len(node)), gradient] = D, 1.0
     lengths = weights * det_J
     shear = rigidity[1:3].max() * parent_weights(m) / 2 * lengths.sum()
-    stiff = SECTION_STIFF * shear + (count == 3) * HUB_STIFF * rigidity[3:5].max() / lengths.sum()
+    stiff = SECTION_STIFF * shear + (count == 3) * RIGID_NODE_STIFF * rigidity[3:5].max() / lengths.sum()
     stiffness = np.concatenate([np.outer(lengths, rigidity).ravel(), stiff[node[pairs[:, 0]]]])
     made = BeamElement(tangents, gradients, node, X[gradient], x[:, 1:].copy(), N, D, bend, pairs, stiffness,
                        np.zeros(len(stiffness)), np.zeros((len(stiffness), 3 * len(X))),

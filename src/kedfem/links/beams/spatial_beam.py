@@ -15,8 +15,8 @@ from kedfem.links.beams.section import Section
 from kedfem.links.record import Link, mass_constants, read_only
 from kedfem.scene import Material
 
-HUB_STIFFNESS = 100.0  # of E A L: a corner gives EI/(100 E A L²) of what the beam does
-HUB_INERTIA = 1e-3  # of a cube's, along the axis: a hub needs some there, where the section has none
+RIGID_NODE_STIFFNESS = 100.0  # of E A L: a corner gives EI/(100 E A L²) of what the beam does
+RIGID_NODE_INERTIA = 1e-3  # of a cube's, along the axis: a rigid node needs some there, where the section has none
 STRAIGHT = 1e-9  # of tangents: rounding
 T, N1, N2, N1_S, N2_S = range(5)  # the fields x', n1, n2, n1', n2'
 
@@ -125,16 +125,16 @@ def space_mass(x: Float[np.ndarray, "m 3 3"], section: Section) -> Float[np.ndar
 
 
 def spatial_beam_link(
-    name: str, axis: Axis, section: Section, material: Material, hubs_stiff: float = HUB_STIFFNESS
+    name: str, axis: Axis, section: Section, material: Material, node_stiffness: float = RIGID_NODE_STIFFNESS
 ) -> Link:
     """The record of a beam in space.
 
-    Ends and corners are hubs: four functions {1, x, y, z}, a full affine field, whose gradient each segment reads along
-    its own directions, p = G n1, q = G n2, and whose strain is made stiff: a small rigid cube.
+    Ends and corners are rigid cross-section nodes with four functions {1, x, y, z}: a full affine field, whose gradient
+    each segment reads along its own directions, p = G n1, q = G n2, and whose strain is stiff: a small rigid cube.
 
     Parameters
     ----------
-    hubs_stiff : of E A L |sym G|²
+    node_stiffness : of E A L |sym G|²
     """
     X, one, triples = functions(axis)
     x, cells, n = axis.frame[:, [0, 2, 3]], axis.cells, len(X)
@@ -144,11 +144,12 @@ def spatial_beam_link(
     K = assembled([space_stiffness(x[c], rigidity) for c in cells], dofs(by_station), 9 * len(x))
     vectors = sp.csr_array(sp.kron(triples, sp.eye_array(3)))
     cube = np.sqrt(section.area) * min(section.second_moment, section.second_moment_z)
-    hubs = hub_functions(one)
-    lumped = _diagonal(hubs[:, 0], HUB_INERTIA * material.density * cube, n)
+    rigid_nodes = rigid_node_functions(one)
+    lumped = _diagonal(rigid_nodes[:, 0], RIGID_NODE_INERTIA * material.density * cube, n)
     m = sp.csr_array(triples.T @ m @ triples + lumped)
     K0 = sp.csr_array(
-        vectors.T @ K @ vectors + hub_stiffness(X, hubs, hubs_stiff * rigidity[0] * length_of(axis.frame[:, 0], cells))
+        vectors.T @ K @ vectors
+        + rigid_node_stiffness(X, rigid_nodes, node_stiffness * rigidity[0] * length_of(axis.frame[:, 0], cells))
     )
     mass = (m, m, m)
     m1, mX = mass_constants(mass, one, X)
@@ -168,7 +169,7 @@ def _link_axes(axis: Axis) -> Float[np.ndarray, "3 3"]:
 
 
 def functions(axis: Axis) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, " n"], sp.csr_array]:
-    """Functions of all nodes in turn, (1, y, z) or at a hub (1, x, y, z) in the directions of its first station.
+    """Functions of all nodes in turn, (1, y, z) or at a rigid one (1, x, y, z) in the directions of its first station.
 
     Returns
     -------
@@ -176,13 +177,13 @@ def functions(axis: Axis) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "
     triples : (3s, n) values of (x, n1, n2), and so of (u, p, q), at every station
     """
     first = np.unique(axis.node, return_index=True)[1]
-    count = np.where(axis.hub, 4, 3)
+    count = np.where(axis.rigid_node, 4, 3)
     start = np.concatenate([[0], count.cumsum()])
     X, one = np.empty((start[-1], 3)), np.zeros(start[-1])
     one[start[:-1]] = 1.0
     triples = sp.lil_array((3 * len(axis.node), start[-1]))
     for k, s in enumerate(first):
-        X[start[k] : start[k + 1]] = axis.frame[s] if axis.hub[k] else axis.frame[s, [0, 2, 3]]
+        X[start[k] : start[k + 1]] = axis.frame[s] if axis.rigid_node[k] else axis.frame[s, [0, 2, 3]]
     for s, k in enumerate(axis.node):
         own = slice(start[k] + 1, start[k + 1])
         triples[3 * s, start[k]] = 1.0
@@ -192,25 +193,25 @@ def functions(axis: Axis) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "
     return X, one, sp.csr_array(triples)
 
 
-def hub_functions(one: Float[np.ndarray, " n"]) -> Int[np.ndarray, "h 3"]:
-    """Numbers of the three gradient functions of every hub."""
+def rigid_node_functions(one: Float[np.ndarray, " n"]) -> Int[np.ndarray, "h 3"]:
+    """Numbers of the three gradient functions of every rigid cross-section node."""
     start = np.append(np.flatnonzero(one), len(one))
-    hub = start[:-1][np.diff(start) == 4]
-    return np.asarray(hub[:, None] + np.arange(1, 4))
+    node = start[:-1][np.diff(start) == 4]
+    return np.asarray(node[:, None] + np.arange(1, 4))
 
 
-def hub_stiffness(X: Float[np.ndarray, "n 3"], hubs: Int[np.ndarray, "h 3"], k: float) -> sp.csr_array:
-    """k |sym G|² of every hub's gradient G, (3n, 3n) [N m]; no turn strains it."""
+def rigid_node_stiffness(X: Float[np.ndarray, "n 3"], rigid_nodes: Int[np.ndarray, "h 3"], k: float) -> sp.csr_array:
+    """k |sym G|² of every rigid cross-section node's gradient G, (3n, 3n) [N m]; no turn strains it."""
     blocks = []
-    for hub in hubs:
+    for node in rigid_nodes:
         pairs = [(i, j) for i in range(3) for j in range(i, 3)]
         rows = np.zeros((6, 3, 3))
         for row, (i, j) in zip(rows, pairs, strict=True):
-            row[i] += X[hub[j]] / (2 if i == j else np.sqrt(2))
-            row[j] += X[hub[i]] / (2 if i == j else np.sqrt(2))
+            row[i] += X[node[j]] / (2 if i == j else np.sqrt(2))
+            row[j] += X[node[i]] / (2 if i == j else np.sqrt(2))
         B = rows.reshape(6, 9)
         blocks.append(k * B.T @ B)
-    return assembled(blocks, dofs(hubs), 3 * len(X))
+    return assembled(blocks, dofs(rigid_nodes), 3 * len(X))
 
 
 def length_of(stations: Float[np.ndarray, "s 3"], cells: Int[np.ndarray, "e m"]) -> float:

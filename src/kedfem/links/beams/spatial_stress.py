@@ -11,13 +11,13 @@ import scipy.sparse as sp
 from kedfem.arrays import Float
 from kedfem.links.beams.beam import assembled, dofs, parent_nodes, parent_weights, shape_functions
 from kedfem.links.beams.spatial_beam import (
-    HUB_STIFFNESS,
     N1_S,
     N2_S,
+    RIGID_NODE_STIFFNESS,
     fields,
-    hub_functions,
     length_of,
     metric,
+    rigid_node_functions,
     rigidities,
     section_strains,
     space_strains,
@@ -29,7 +29,7 @@ def spatial_stress_stiffness(link: Link, g: Float[np.ndarray, "n 3"]) -> sp.csr_
     """k (n, n) of the stresses in a state g of a full beam in space.
 
     Section forces at the Gauss points of K0, with what an axial force does to a section that turns along the beam, E I ε;
-    the sections' own stresses at the nodes; the hubs' stresses.
+    the sections' own stresses at the nodes; the stresses of rigid cross-section nodes.
     """
     if link.triples is None:
         raise TypeError(f"links.{link.name}: is not a beam in space")
@@ -37,7 +37,7 @@ def spatial_stress_stiffness(link: Link, g: Float[np.ndarray, "n 3"]) -> sp.csr_
     state = np.asarray(link.triples @ g).reshape(-1, 3, 3)
     blocks = [_element(link, frame[c], state[c]) for c in link.cells]
     k = sp.csr_array(link.triples.T @ assembled(blocks, dofs(link.cells), 3 * len(frame)) @ link.triples)
-    return sp.csr_array(k + _hubs(link, frame, g))
+    return sp.csr_array(k + _rigid_nodes(link, frame, g))
 
 
 def _element(link: Link, x: Float[np.ndarray, "m 3 3"], u: Float[np.ndarray, "m 3 3"]) -> Float[np.ndarray, "k k"]:
@@ -65,9 +65,9 @@ def _element(link: Link, x: Float[np.ndarray, "m 3 3"], u: Float[np.ndarray, "m 
     return out
 
 
-def _hubs(link: Link, frame: Float[np.ndarray, "s 3 3"], g: Float[np.ndarray, "n 3"]) -> sp.csr_array:
-    """Stresses of the hubs, stiffness times sym G, between their gradient functions."""
-    stiffness = HUB_STIFFNESS * link.E * section_of(link).area * length_of(frame[:, 0], link.cells)
-    hubs = hub_functions(link.one)
-    H = np.einsum("hac,hbc->hab", link.X[hubs], g[hubs])
-    return assembled(list(stiffness * (H + H.transpose(0, 2, 1)) / 2), hubs, link.n)
+def _rigid_nodes(link: Link, frame: Float[np.ndarray, "s 3 3"], g: Float[np.ndarray, "n 3"]) -> sp.csr_array:
+    """Stresses of the rigid cross-section nodes, stiffness times sym G, between their gradient functions."""
+    stiffness = RIGID_NODE_STIFFNESS * link.E * section_of(link).area * length_of(frame[:, 0], link.cells)
+    rigid_nodes = rigid_node_functions(link.one)
+    H = np.einsum("hac,hbc->hab", link.X[rigid_nodes], g[rigid_nodes])
+    return assembled(list(stiffness * (H + H.transpose(0, 2, 1)) / 2), rigid_nodes, link.n)

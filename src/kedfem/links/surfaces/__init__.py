@@ -1,1 +1,1 @@
-"""Surfaces of links: what they offer to joints, how joints find and hold them, messages where nothing is found."""
+"""Surfaces of links: candidates for joints, selection of facets, coupling surfaces, messages where none is found."""

@@ -1,4 +1,4 @@
-"""What a link offers to joints: bores, journals, balls, plane faces; by name if its faces have names, else as they fit.
+"""Candidate surfaces for joints on a link: bores, journals, balls, plane faces; by name, or by geometry.
 
 For messages, and for bores whose axis nobody gives.
 """

@@ -1,4 +1,4 @@
-"""Faces of a link that joints choose by what they are, found among its surfaces before it is reduced or divided."""
+"""Faces of a link that a joint chooses by their properties, found before the link is reduced or divided."""
 
 from collections.abc import Sequence
 from dataclasses import replace

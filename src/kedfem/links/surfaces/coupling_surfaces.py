@@ -9,14 +9,14 @@ from scipy.linalg import qr
 from kedfem.arrays import Float, Int
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
-from kedfem.links.surfaces.facet_selection import named_facets, picked
+from kedfem.links.surfaces.facet_selection import named_facets, selected_facets
 from kedfem.links.surfaces.missing import in_its_plane, not_touching
 from kedfem.links.surfaces.surface import PLANE_TOLERANCE, boundary, flat_face, smooth_face, surface_quadrature
 
 
 @dataclass(frozen=True, slots=True)
 class CouplingSurface:
-    """The surface of a link that a joint holds, seen through its affine fit.
+    """The surface of a link that a joint acts on, with the affine fit of its displacement.
 
     u(x) = fit[0] @ u + (x − origin) · (fit[1:] @ u): value and gradient of the affine field closest, area-weighted,
     to the displacement u of the surface. The weights are scalars, so they commute with every rotation.
@@ -47,20 +47,20 @@ def port_weights(surface: CouplingSurface, points: Float[np.ndarray, "p 3"]) -> 
     return np.asarray(surface.fit[0] + (points - surface.origin) @ surface.fit[1:])
 
 
-def holds(surface: CouplingSurface, direction: Float[np.ndarray, "3"]) -> bool:
-    """Whether the affine fit knows how the displacement changes along a direction (a flat face: not its normal)."""
+def determines_gradient(surface: CouplingSurface, direction: Float[np.ndarray, "3"]) -> bool:
+    """Whether the affine fit has a gradient along a direction (of a flat face not along its normal)."""
     known = surface.spread > PLANE_TOLERANCE * max(surface.spread[0], 1e-300)
     return bool(np.linalg.norm(surface.directions[~known] @ direction) < 1e-6)
 
 
 def is_flat(surface: CouplingSurface) -> bool:
     """Whether the coupling surface is a plane face, of a plane link a straight edge, of a spatial beam a section between
-    its hubs."""
+    its rigid nodes."""
     return bool(surface.spread[0] > 0 and surface.spread[surface.dimensions - 1] == 0)
 
 
 def face_normal(surface: CouplingSurface) -> Float[np.ndarray, "3"]:
-    """Direction across a flat coupling surface, along which its affine fit knows nothing."""
+    """Direction across a flat coupling surface, along which its affine fit has no gradient."""
     return np.asarray(surface.directions[surface.dimensions - 1])
 
 
@@ -89,7 +89,7 @@ def joint_surface(
         return _node_surface(link, where, point)
     if link.kind == "spatial_beam":
         return _section_surface(link, where, point)
-    facets = named_facets(link, where, faces) if faces else picked(link, where, point, axis)
+    facets = named_facets(link, where, faces) if faces else selected_facets(link, where, point, axis)
     return facet_surface(link, facets)
 
 
@@ -123,7 +123,7 @@ def face_surface(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Coupl
 
 
 def same_face(link: Link, surface: CouplingSurface) -> CouplingSurface | None:
-    """What another segment of a link has of a plane face, None if it has none of it.
+    """The part of a plane face that another segment of the link has, None without any.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ def _node_surface(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Coup
 
 
 def _section_surface(link: Link, where: str, point: Float[np.ndarray, "3"]) -> CouplingSurface:
-    """The section at a node of a spatial beam: between its hubs it does not know how a field changes along the axis.
+    """The section at a node of a spatial beam; between rigid nodes it does not show how a field changes along the axis.
 
     Its spread is of the link's size, not the section's: ports are part of it apart, and the nearer they were, the less
     could be determined of the section's turn from their difference.

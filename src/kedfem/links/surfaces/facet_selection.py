@@ -1,4 +1,4 @@
-"""Which facets of a meshed link a joint sits on: faces by name, else what lies about its point and axis."""
+"""Selection of the facets of a meshed link for a joint: faces by name, else what lies about its point and axis."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -12,7 +12,7 @@ from kedfem.errors import MeshError
 from kedfem.links.record import Link, read_only
 from kedfem.links.surfaces.candidates import round_candidates
 from kedfem.links.surfaces.missing import ambiguous, in_its_plane, not_touching
-from kedfem.links.surfaces.round_surfaces import Round, ball, nearest_rounds, rounds
+from kedfem.links.surfaces.round_surfaces import RoundSurface, ball, nearest_round_surfaces, round_surfaces
 from kedfem.links.surfaces.surface import CYLINDER_TOLERANCE, flat_face
 
 Facets = Int[np.ndarray, " f"]
@@ -42,8 +42,8 @@ def named_facets(link: Link, where: str, faces: Sequence[str]) -> Facets:
     return facets
 
 
-def picked(link: Link, where: str, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"] | None) -> Facets:
-    """As `_picked`; of a mesh that has been asked for the same before what was found then.
+def selected_facets(link: Link, where: str, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"] | None) -> Facets:
+    """As `_selected_facets`; of a mesh that has been asked for the same before what was found then.
 
     A joint is looked for on the same mesh some dozen times in a run: by every model that choices and estimates make.
     """
@@ -52,12 +52,14 @@ def picked(link: Link, where: str, point: Float[np.ndarray, "3"], axis: Float[np
     key = link.kind, axis is None, *(crc32(np.ascontiguousarray(x, float).tobytes()) for x in given)
     before = _FOUND.setdefault(link.basis, {})
     if key not in before:
-        before[key] = _picked(link, where, point, axis)
+        before[key] = _selected_facets(link, where, point, axis)
         read_only(before[key])
     return before[key]
 
 
-def _picked(link: Link, where: str, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"] | None) -> Facets:
+def _selected_facets(
+    link: Link, where: str, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"] | None
+) -> Facets:
     """A ball if no axis is given; else a bore about the axis (or one of the link's), a journal, a flat face.
 
     A MeshError says that there is none, or that it cannot be determined which.
@@ -66,9 +68,9 @@ def _picked(link: Link, where: str, point: Float[np.ndarray, "3"], axis: Float[n
     if axis is None and link.d == 3 and len(found := ball(link, point)):
         return found
     axes = np.eye(3)[2:] if link.kind == "plane" else link.axes.T if axis is None else (axis,)
-    about = [rounds(link, seen, each) for each in axes]
+    about = [round_surfaces(link, seen, each) for each in axes]
     if axis is None and link.d == 3 and not any(each.inward for found in about for each in found):
-        about += [rounds(link, seen, each) for each in _own_axes(link, seen)]
+        about += [round_surfaces(link, seen, each) for each in _own_axes(link, seen)]
     if bores := _first([[each for each in found if each.inward] for found in about]):
         return _told(link, where, seen, bores)
     journals = _first([[each for each in found if not each.inward] for found in about])
@@ -81,14 +83,14 @@ def _picked(link: Link, where: str, point: Float[np.ndarray, "3"], axis: Float[n
     raise MeshError(not_touching(link, where, point, axis))
 
 
-def _first(several: Iterable[list[Round]]) -> list[Round]:
+def _first(several: Iterable[list[RoundSurface]]) -> list[RoundSurface]:
     """The first that are any."""
     return next((found for found in several if found), [])
 
 
-def _told(link: Link, where: str, point: Float[np.ndarray, "3"], found: list[Round]) -> Facets:
+def _told(link: Link, where: str, point: Float[np.ndarray, "3"], found: list[RoundSurface]) -> Facets:
     """The facets of the one that a joint sits on, or of several that one pin fits; MeshError if they differ in radius."""
-    chosen = nearest_rounds(found, link.d == 2)
+    chosen = nearest_round_surfaces(found, link.d == 2)
     size = [each.radius for each in chosen]
     if max(size) - min(size) > CYLINDER_TOLERANCE * max(size):
         raise MeshError(ambiguous(link, where, point, chosen))

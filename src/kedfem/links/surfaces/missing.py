@@ -1,4 +1,4 @@
-"""What to say where a joint finds nothing on a link, or too much: what is near, in which direction, in which units."""
+"""Messages where a joint finds no surface on a link, or several: what is near, in which direction, in which units."""
 
 from collections.abc import Sequence
 from operator import itemgetter
@@ -8,7 +8,7 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.links.record import Link
 from kedfem.links.surfaces.candidates import Candidate, candidates, distance
-from kedfem.links.surfaces.round_surfaces import Round
+from kedfem.links.surfaces.round_surfaces import RoundSurface
 
 MOST = 3  # bores, journals and balls in a message; of faces the nearest alone
 SMALL = 0.1  # [m]: shorter lengths are reported in millimetres
@@ -44,7 +44,7 @@ def not_touching(link: Link, where: str, point: Vector, axis: Vector | None = No
     return "; ".join([text, *(hint for hint in hints if hint)])
 
 
-def ambiguous(link: Link, where: str, point: Vector, found: Sequence[Round]) -> str:
+def ambiguous(link: Link, where: str, point: Vector, found: Sequence[RoundSurface]) -> str:
     """The message that a joint could sit on several bores or journals."""
     each = ", ".join(
         f"{'bore' if x.inward else 'journal'} of radius {length(x.radius)}, {length(x.low)} to {length(x.high)} along it"

@@ -1,4 +1,4 @@
-"""What a part on its own offers to joints: bores, journals, balls, plane faces, and what a joint finds at each."""
+"""Candidate surfaces for joints on a part alone, and the faces that a joint at each of them selects."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from kedfem.arrays import Float, Int
 from kedfem.errors import MeshError
 from kedfem.links.record import Link, LinkFace
 from kedfem.links.solid import link_faces, solid_basis, vtk_cells
-from kedfem.links.surfaces.facet_selection import picked
+from kedfem.links.surfaces.facet_selection import selected_facets
 from kedfem.links.surfaces.round_surfaces import CLOSED
 from kedfem.links.surfaces.surface import flat_face, middle_facet, surface_quadrature
 from kedfem.mesh import SolidMesh
@@ -22,7 +22,7 @@ MOSTLY = 0.5  # of a face's sides: so many found are the face
 
 
 @dataclass(frozen=True, slots=True)
-class Offer:
+class PartCandidate:
     """A face that a joint can sit on, by its number in the table and the picture.
 
     kind : one of KINDS
@@ -47,7 +47,7 @@ class Offer:
         return f"{others} instead" if others else "by faces only"
 
 
-def offers(mesh: SolidMesh) -> list[Offer]:
+def part_candidates(mesh: SolidMesh) -> list[PartCandidate]:
     """The faces of a meshed part that a joint can sit on, round ones first, those of a kind by area."""
     link = _surface_of(mesh)
     rows = []
@@ -59,7 +59,7 @@ def offers(mesh: SolidMesh) -> list[Offer]:
     listed, out = [each for _, _, each in rows], []
     for number, (k, area, each) in enumerate(rows, start=1):
         found = _found(link, KINDS[k], each, listed)
-        out.append(Offer(number, each.face, KINDS[k], _point(link, each), found, -area))
+        out.append(PartCandidate(number, each.face, KINDS[k], _point(link, each), found, -area))
     return out
 
 
@@ -99,7 +99,7 @@ def _found(link: Link, kind: str, each: LinkFace, listed: Sequence[LinkFace]) ->
     axis = each.face.direction if each.face.kind == "cylinder" else None
     facets: Int[np.ndarray, " f"]
     try:
-        facets = flat_face(link, point) if kind == "plane" else picked(link, "part", point, axis)
+        facets = flat_face(link, point) if kind == "plane" else selected_facets(link, "part", point, axis)
     except MeshError:
         return ()
     shares = (np.isin(other.facets, facets).mean() for other in listed)

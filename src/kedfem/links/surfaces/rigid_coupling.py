@@ -1,4 +1,4 @@
-"""Rigid couplings: coupling surfaces that keep their shape, as a bore does about a pressed-in pin.
+"""Rigid couplings: coupling surfaces that keep their shape, such as a bore about a pressed-in pin.
 
 What of a coupling surface's displacement is not rigid costs energy: what it is off the affine field through a few of its
 nodes, and what that field is off the rigid motion nearest to it. The link's K0 gets the matrix of that: symmetric, the
@@ -17,7 +17,7 @@ from kedfem.links.surfaces.coupling_surfaces import CouplingSurface
 from kedfem.links.surfaces.surface import surface_quadrature
 
 #: κ in E per radius of the surface. The shape's error falls with 1/STIFF, rounding grows with it: here a bore deforms by
-#: 5e-4 of what an averaged one does, deflections are within 2e-4 of those about rigid pins (docs/ports.md).
+#: 5e-4 of what a distributing one does, deflections are within 2e-4 of those about rigid pins (docs/ports.md).
 STIFF = 1e3
 FLAT = 1e-5  # of the radius: what a coupling surface's nodes leave a plane by
 EQUAL = 1e-6  # of the largest distance: rounding does not choose between nodes

@@ -29,7 +29,7 @@ DOMED = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Round:
+class RoundSurface:
     """Facets on a closed cylinder about an axis: of all bores of one radius, which one pin goes through, or of a journal.
 
     low, high : where it begins and ends along the axis, from the joint's point [m]
@@ -52,7 +52,7 @@ class Round:
         return LEVEL * (self.high - self.low + self.radius)
 
 
-def rounds(link: Link, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"]) -> list[Round]:
+def round_surfaces(link: Link, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"]) -> list[RoundSurface]:
     """All closed cylinders about an axis through a point, as far as they are near it along the axis.
 
     Facets may be flat, seven or more of them around; a prism of fewer sides is none.
@@ -77,7 +77,7 @@ def rounds(link: Link, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3
             for piece in [same] if inward else _pieces(link, facets, same):
                 if np.linalg.norm(r[piece].mean(axis=(0, 1))) < CLOSED * mean[piece].min():
                     low, high = float(along[piece].min()), float(along[piece].max())
-                    found.append(Round(facets[piece], float(mean[piece].mean()), inward, low, high))
+                    found.append(RoundSurface(facets[piece], float(mean[piece].mean()), inward, low, high))
     return [each for each in found if each.gap <= FAR * (each.high - each.low + each.radius)]
 
 
@@ -95,7 +95,7 @@ def _pieces(link: Link, facets: Int[np.ndarray, " f"], which: Int[np.ndarray, " 
     return [which[label == k] for k in range(label.max() + 1)]
 
 
-def nearest_rounds(found: list[Round], flat: bool) -> list[Round]:
+def nearest_round_surfaces(found: list[RoundSurface], flat: bool) -> list[RoundSurface]:
     """Those of some bores, or of some journals, that a joint sits on: several only where it cannot be determined.
 
     One whose extent contains the joint's point, of bores the narrowest; else the nearest along the axis.

@@ -1,4 +1,4 @@
-"""The solids of an assembly, and where they meet as joints: a pin in a bore, two bores in a line, a ball in its seat."""
+"""The solids of an assembly, and joints where they meet: a pin in a bore, two bores in line, a ball in its socket."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ from kedfem.mesh.cad.faces import one_surface
 from kedfem.mesh.cad.file import cad_file
 from kedfem.mesh.cad.model import all_solids
 from kedfem.mesh.cad.solids import CadFace, Solid
-from kedfem.mesh.isolated import LONGEST, PART, apart
+from kedfem.mesh.isolated import LONGEST, PART, in_own_process
 from kedfem.mesh.session import gmsh_model
 
 # of a cylinder's full turn: a joint finds no less of it by itself (links/surfaces/round_surfaces.py); keyways are less
@@ -49,7 +49,7 @@ def assembly_solids(path: Path, scale: float | None) -> list[AssemblySolid]:
     MeshError
         The file cannot be read, or one of its solids is not one to mesh.
     """
-    return apart(path.name, PART, LONGEST, _read, path, scale)
+    return in_own_process(path.name, PART, LONGEST, _read, path, scale)
 
 
 def _read(path: Path, scale: float | None) -> list[AssemblySolid]:
@@ -83,7 +83,7 @@ def _round_face(parts: list[CadFace]) -> CadFace | None:
 
 
 @dataclass(frozen=True, slots=True)
-class Meeting:
+class AssemblyJoint:
     """Round faces of two solids that meet, and the joint that they may be.
 
     solids : indices, the one with the hole first; of two bores in the assembly's order
@@ -110,7 +110,7 @@ class Meeting:
         return self.faces[0].inward and self.faces[1].inward
 
 
-def meetings(solids: Sequence[AssemblySolid]) -> list[Meeting]:
+def assembly_joints(solids: Sequence[AssemblySolid]) -> list[AssemblyJoint]:
     """All joints that an assembly suggests: of two solids one for each common axis or centre.
 
     Two bores of one radius in a line suggest one where neither has a pin in it.
@@ -120,15 +120,15 @@ def meetings(solids: Sequence[AssemblySolid]) -> list[Meeting]:
     return [each for each in found if not each.pinless or not any(id(face) in filled for face in each.faces)]
 
 
-def _of_two(solids: Sequence[AssemblySolid], pair: tuple[int, int]) -> list[Meeting]:
-    """The meetings of two solids, on each axis those of the longest overlap together."""
+def _of_two(solids: Sequence[AssemblySolid], pair: tuple[int, int]) -> list[AssemblyJoint]:
+    """The possible joints of two solids, on each axis those of the longest overlap together."""
     one, other = pair
-    several: list[list[Meeting]] = []
+    several: list[list[AssemblyJoint]] = []
     for a in solids[one].rounds:
         for b in solids[other].rounds:
             in_b = b.inward and not a.inward
             order, faces = ((other, one), (b, a)) if in_b else ((one, other), (a, b))
-            if (met := _meeting(solids, order, faces)) is None:
+            if (met := _assembly_joint(solids, order, faces)) is None:
                 continue
             same = next((group for group in several if _same_axis(group[0].faces[0], met.faces[0])), None)
             if same is None:
@@ -138,21 +138,23 @@ def _of_two(solids: Sequence[AssemblySolid], pair: tuple[int, int]) -> list[Meet
     return [_together(group) for group in several]
 
 
-def _meeting(solids: Sequence[AssemblySolid], pair: tuple[int, int], faces: tuple[CadFace, CadFace]) -> Meeting | None:
-    """Two round faces, the first a hole, as a meeting; None if they do not meet."""
+def _assembly_joint(
+    solids: Sequence[AssemblySolid], pair: tuple[int, int], faces: tuple[CadFace, CadFace]
+) -> AssemblyJoint | None:
+    """Two round faces, the first a hole, as a joint; None if they do not meet."""
     hole, pin = faces
     if not hole.inward or not _fits(hole, pin):
         return None
     near = ASIDE * hole.radius + abs(hole.radius - pin.radius)
     if hole.kind == "sphere":
         met = not pin.inward and np.linalg.norm(pin.centre - hole.centre) <= near
-        return Meeting(pair, faces, hole.centre, np.nan, (False, False)) if met else None
+        return AssemblyJoint(pair, faces, hole.centre, np.nan, (False, False)) if met else None
     share, middle = _overlap(hole, pin)
     least = -GAP * hole.radius if pin.inward else LEAST * min(hole.length, pin.length)
     if share < least or not _parallel(hole, pin) or _beside(hole, pin) > near:
         return None
     hidden = not pin.inward and any(each.inward and _same_axis(pin, each) for each in solids[pair[1]].rounds)
-    return Meeting(pair, faces, hole.centre + middle * hole.direction, share, (False, hidden))
+    return AssemblyJoint(pair, faces, hole.centre + middle * hole.direction, share, (False, hidden))
 
 
 def _fits(hole: CadFace, pin: CadFace) -> bool:
@@ -161,8 +163,8 @@ def _fits(hole: CadFace, pin: CadFace) -> bool:
     return hole.kind == pin.kind and least * hole.radius <= pin.radius <= most * hole.radius
 
 
-def _together(group: list[Meeting]) -> Meeting:
-    """One of several meetings on an axis: the longest, in the middle of those of its radius, as of a fork's two eyes."""
+def _together(group: list[AssemblyJoint]) -> AssemblyJoint:
+    """One of several joints on an axis: the longest, in the middle of those of its radius, as of a fork's two eyes."""
     longest = max(group, key=lambda each: 0.0 if each.ball else each.share)
     hole = longest.faces[0]
     alike = [each for each in group if abs(each.faces[0].radius - hole.radius) <= SAME * hole.radius]

@@ -1,4 +1,4 @@
-"""What form a piece of surface has: a plane, a cylinder, a sphere or another, found from places and normals on it."""
+"""The form of a face, fitted to points and normals on it: a plane, a cylinder, a sphere or another."""
 
 from dataclasses import dataclass
 from typing import Literal

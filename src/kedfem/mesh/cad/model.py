@@ -183,7 +183,7 @@ def _body(gmsh: ModuleType, tag: int, texts: list[Body]) -> Body | None:
     if not likely:
         return None
     corners = np.array([_corner_mean(gmsh, face) for face in faces])
-    found = [body for body in likely if _alike(corners, body.corners)]
+    found = [body for body in likely if same_shape(corners, body.corners)]
     sure = found and all(body.faces == found[0].faces and body.name == found[0].name for body in found)
     return found[0] if sure else None
 
@@ -195,7 +195,7 @@ def _corner_mean(gmsh: ModuleType, face: int) -> Float[np.ndarray, "3"]:
     return np.mean(points, axis=0) if points else np.full(3, np.nan)
 
 
-def _alike(corners: Float[np.ndarray, "f 3"], text: Float[np.ndarray, "f 3"]) -> bool:
+def same_shape(corners: Float[np.ndarray, "f 3"], text: Float[np.ndarray, "f 3"]) -> bool:
     """Whether two sets of points are the same but for place and unit; at most one may have no corners."""
     known = np.isfinite(corners).all(axis=1) & np.isfinite(text).all(axis=1)
     if known.sum() < max(len(known) - 1, 1):

@@ -1,4 +1,4 @@
-"""What the meshing methods know of a solid from CAD, and what they are asked for."""
+"""Records for the meshing methods: a solid from CAD with its faces, and the element sizes asked for."""
 
 from dataclasses import dataclass
 from typing import Literal

@@ -1,4 +1,4 @@
-"""What the text of a CAD file says and gmsh does not pass on: the file's unit, names of bodies and of faces."""
+"""Facts in the text of a CAD file that gmsh does not return: the unit, names of bodies and of faces."""
 
 import re
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Faces of a part in a designer's words: a bore, a fillet, a drafted or conical face, and where it is."""
+"""Descriptions of faces in a designer's words: a bore, a fillet, a drafted or conical face, and where it is."""
 
 import re
 from collections.abc import Iterable
@@ -9,7 +9,7 @@ from kedfem.arrays import Float
 from kedfem.mesh.cad.solids import CadFace
 from kedfem.mesh.places import in_mm
 
-_CLOSED = 0.9  # of a full turn: cylinders with keyways are bores and journals still
+_CLOSED = 0.9  # of a full revolution: cylinders with keyways are bores and journals still
 _QUARTER = 100.0  # [deg] that a fillet between two walls turns, at the most
 _EIGHTH = 0.02  # of a ball's area: how far the rounded corner between three walls may be off an eighth of it
 _PART = 0.3  # of a ball's area: less is called a part of it

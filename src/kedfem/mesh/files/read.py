@@ -15,7 +15,7 @@ from kedfem.mesh.cad.sides import boundary_sides, side_corners, side_normals
 from kedfem.mesh.elements.hexahedra import CELL_TYPES, Face, SolidMesh, without_spare_nodes
 from kedfem.mesh.elements.mixed import one_kind, triangles
 from kedfem.mesh.files.raw import CORNERS, RawMesh, read_mesh
-from kedfem.mesh.isolated import MESH_FILE, READING, apart
+from kedfem.mesh.isolated import MESH_FILE, READING, in_own_process
 from kedfem.scene.records.shapes import MESH_ENDINGS
 from kedfem.store import contents, itself, kept
 
@@ -45,7 +45,7 @@ def mesh_from_file(where: str, path: Path, scale: float) -> SolidMesh:
         No such file, not readable, other cells, coordinates that are not finite, nodes that do not exist, several
         pieces that share no nodes.
     """
-    raw = _read(where, path)
+    raw = raw_of_file(where, path)
     points = np.asarray(raw.points, dtype=float)
     if points.ndim != 2 or points.shape[1] != 3:
         raise MeshError(f"{where}: must have nodes of three coordinates, got shape {points.shape} in {path}")
@@ -61,7 +61,7 @@ def mesh_from_file(where: str, path: Path, scale: float) -> SolidMesh:
     return mesh
 
 
-def _read(where: str, path: Path) -> RawMesh:
+def raw_of_file(where: str, path: Path) -> RawMesh:
     """What the file holds, read in a process of its own and kept between runs."""
     wanted = f"must be a mesh file ({', '.join(MESH_ENDINGS)})"
     if not path.is_file():
@@ -72,7 +72,7 @@ def _read(where: str, path: Path) -> RawMesh:
 
     def read() -> RawMesh:
         try:
-            return apart(f"{where}: {path}", MESH_FILE, READING, read_mesh, path)
+            return in_own_process(f"{where}: {path}", MESH_FILE, READING, read_mesh, path)
         except MeshError as error:
             if str(error).startswith(where):
                 raise

@@ -17,12 +17,12 @@ from kedfem.mesh.layered.division import plan_size
 from kedfem.mesh.layered.partition import Plan
 from kedfem.mesh.layered.plan_mesh import PlanMesh, plan_mesh
 from kedfem.mesh.layered.sections import plan_of_slabs
-from kedfem.mesh.layered.shares import GOOD, SHARES, not_too_bad
+from kedfem.mesh.layered.size_trials import GOOD, SHARES, not_too_bad
 
 _GAIN = 0.03  # of scaled Jacobian that more elements must bring
 _ALONG = 1e-5  # sine of the angle that a face may be off the direction, or off being at right angles to it
 # unknowns, ten times those above which tetrahedra are taken: not worth meshing to see it
-_FAR_TOO_MANY = 1_500_000
+FAR_TOO_MANY = 1_500_000
 _UNKNOWNS_EACH = 24  # of a 27-node hexahedron in a large mesh
 _SAMPLES = np.linspace(0.0, 1.0, 7)
 
@@ -145,7 +145,7 @@ def _check_count(
     """Refuse, before they are made, far more elements than anybody would take, unless a size is asked for."""
     material = np.stack([region.material for region in plan.regions])[flat.regions]
     unknowns = _UNKNOWNS_EACH * float((material @ layers).sum())
-    if sizing.size is None and sizing.across <= 2 and unknowns > _FAR_TOO_MANY:
+    if sizing.size is None and sizing.across <= 2 and unknowns > FAR_TOO_MANY:
         raise TooManyError(
             f"{solid.name}: {words}: about {unknowns / 1e6:.2g} million unknowns, "
             "since a small step or wall asks for elements as small"

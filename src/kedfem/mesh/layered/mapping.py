@@ -75,9 +75,9 @@ def _is_even_ring(plan: Plan, region: Region) -> bool:
     """Whether a region between two loops is nearly as wide everywhere."""
     outer, inner = (loop_samples(plan.curves, loop) for loop in region.loops)
     across = np.linalg.norm(outer[:, None] - inner, axis=2)
-    ways = np.concatenate([across.min(axis=1), across.min(axis=0)])
+    widths = np.concatenate([across.min(axis=1), across.min(axis=0)])
     lengths = [sum(plan.curves[i].length for i, _ in loop) for loop in region.loops]
-    return bool(ways.max() < _UNEVEN * ways.min() and lengths[0] < 4 * lengths[1])
+    return bool(widths.max() < _UNEVEN * widths.min() and lengths[0] < 4 * lengths[1])
 
 
 def _is_round(plan: Plan, region: Region) -> bool:

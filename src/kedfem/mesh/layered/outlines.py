@@ -16,7 +16,7 @@ from kedfem.mesh.layered.division import plan_size
 from kedfem.mesh.layered.partition import Plan
 from kedfem.mesh.layered.plan_mesh import PlanMesh, plan_mesh
 from kedfem.mesh.layered.sections import laid_over
-from kedfem.mesh.layered.shares import first_good
+from kedfem.mesh.layered.size_trials import first_good
 from kedfem.mesh.memory_forecast import check_count, check_size, size_key
 from kedfem.mesh.planar.areas import Quads
 from kedfem.mesh.session import gmsh_model
@@ -109,7 +109,7 @@ def _plan(where: str, outline: Outline) -> Iterator[Plan]:
     extent = float(np.linalg.norm(np.ptp(outline.corners, axis=0)))
     with gmsh_model() as gmsh:
         try:
-            plan = laid_over(gmsh, [[(2, _drawn(gmsh, outline, 1 / extent))]], np.eye(3), extent, _FLAT)
+            plan = laid_over(gmsh, [[(2, surface_of(gmsh, outline, 1 / extent))]], np.eye(3), extent, _FLAT)
         except Exception as error:  # gmsh raises nothing more special
             raise MeshError(
                 f"{where}.shape: must be an area, got none from OpenCASCADE: {error}; change the outline"
@@ -117,7 +117,7 @@ def _plan(where: str, outline: Outline) -> Iterator[Plan]:
         yield plan
 
 
-def _drawn(gmsh: ModuleType, outline: Outline, factor: float) -> int:
+def surface_of(gmsh: ModuleType, outline: Outline, factor: float) -> int:
     """The area inside an outline as a face of gmsh's model, all lengths multiplied: tolerances are absolute."""
     occ = gmsh.model.occ
     corners = [occ.addPoint(x, y, 0) for x, y in factor * outline.corners]

@@ -1,4 +1,4 @@
-"""Plates before they have a third dimension: quadrilaterals with a thickness, and where they lie in the scene."""
+"""Plates as plane meshes of quadrilaterals with a thickness, and their place in the scene."""
 
 from dataclasses import dataclass, replace
 

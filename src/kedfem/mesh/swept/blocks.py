@@ -9,7 +9,7 @@ from kedfem.mesh.cad.solids import OtherMethodError, Sizing, Solid
 from kedfem.mesh.elements.hexahedra import SolidMesh, without_spare_nodes
 from kedfem.mesh.elements.quality import mesh_quality
 from kedfem.mesh.elements.shape_functions import HEX27, node_numbers
-from kedfem.mesh.layered.shares import not_too_bad
+from kedfem.mesh.layered.size_trials import not_too_bad
 from kedfem.mesh.session import gmsh_copy, gmsh_options, numbered_nodes
 
 _HEX27 = 12  # gmsh's number of the 27-node hexahedron

@@ -8,14 +8,14 @@ from types import ModuleType
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.mesh.cad.looks import OFF, Frame, Looks, common_axes, looks
+from kedfem.mesh.cad.face_samples import OFF, FaceSamples, Frame, common_axes, face_samples
 from kedfem.mesh.cad.solids import CadFace, OtherMethodError, Sizing, Solid
 from kedfem.mesh.elements.hexahedra import SolidMesh, in_layers, without_spare_nodes
 from kedfem.mesh.layered.division import plan_size
 from kedfem.mesh.layered.partition import Plan
 from kedfem.mesh.layered.plan_mesh import plan_mesh
 from kedfem.mesh.layered.sections import check_volume, laid_over, plan_axes, reporting, section
-from kedfem.mesh.layered.shares import sized
+from kedfem.mesh.layered.size_trials import sized
 from kedfem.mesh.session import boundary, gmsh_copy
 
 _SAMPLES = np.linspace(0, 1, 9)  # along each edge
@@ -71,7 +71,7 @@ def path_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
     """A solid that one section sweeps from end to end, a `Method`: bent bars and pipes, elbows, ring segments.
 
     The section is meshed as the plan of a layer is; along the path elements are as long, or two and a half times as
-    long where no size is asked for, and 20 to a turn.
+    long where no size is asked for, and 20 to a revolution.
     """
     legs = path(gmsh, solid)
     if not any(leg.radius for leg in legs):
@@ -144,7 +144,7 @@ def path(gmsh: ModuleType, solid: Solid) -> tuple[Leg, ...]:
     From the end on, the faces that meet it must all run along a line square to it, or turn about an axis in its plane, up
     to one more such plane; from there the faces behind go on, to the other end.
     """
-    every = looks(gmsh, solid)
+    every = face_samples(gmsh, solid)
     planes = sorted((face for face in solid.faces if face.kind == "plane"), key=lambda face: face.area)
     for end in planes[:_ENDS]:
         if legs := _walked(gmsh, solid, every, end):
@@ -152,7 +152,7 @@ def path(gmsh: ModuleType, solid: Solid) -> tuple[Leg, ...]:
     raise OtherMethodError(f"{solid.name}: no plane end sweeps it along lines and arcs to another end")
 
 
-def _walked(gmsh: ModuleType, solid: Solid, every: dict[int, Looks], end: CadFace) -> tuple[Leg, ...]:
+def _walked(gmsh: ModuleType, solid: Solid, every: dict[int, FaceSamples], end: CadFace) -> tuple[Leg, ...]:
     """The legs from one end on, if they lead past all faces to another end; else none."""
     legs: tuple[Leg, ...] = ()
     frame, left = Frame(end.centre, plan_axes(-end.direction)), set(every) - {end.tag}
@@ -173,13 +173,13 @@ def _behind(gmsh: ModuleType, edges: set[int], left: set[int]) -> set[int]:
     return {int(face) for edge in edges for face in gmsh.model.getAdjacencies(1, edge)[0]} & left
 
 
-def _is_across(solid: Solid, look: Looks, frame: Frame) -> bool:
+def _is_across(solid: Solid, look: FaceSamples, frame: Frame) -> bool:
     """Whether a face is plane, and square to the path at a frame."""
     off = abs((look.places - (frame.origin - solid.middle) / solid.extent) @ frame.axes[2]).max()
     return look.face.kind == "plane" and bool(max(off, abs(look.normals @ frame.axes[:2].T).max()) < OFF)
 
 
-def _leg(gmsh: ModuleType, solid: Solid, walls: list[Looks], frame: Frame) -> tuple[Leg | None, set[int]]:
+def _leg(gmsh: ModuleType, solid: Solid, walls: list[FaceSamples], frame: Frame) -> tuple[Leg | None, set[int]]:
     """The leg that walls make from a frame on, and the edges where it ends; None if they make none."""
     for leg in _motions(solid, walls, frame):
         slack = OFF * solid.extent / (leg.radius or 1.0)
@@ -194,7 +194,7 @@ def _leg(gmsh: ModuleType, solid: Solid, walls: list[Looks], frame: Frame) -> tu
     return None, set()
 
 
-def _motions(solid: Solid, walls: list[Looks], frame: Frame) -> Iterator[Leg]:
+def _motions(solid: Solid, walls: list[FaceSamples], frame: Frame) -> Iterator[Leg]:
     """The line, or the arcs, on which all walls are swept by what they have in a frame's plane."""
     ahead, own = frame.axes[2], (frame.origin - solid.middle) / solid.extent
     if all(wall.runs_along(ahead) for wall in walls):

@@ -8,7 +8,7 @@ from types import ModuleType
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.mesh.cad.looks import Axis, Frame, Looks, common_axes, looks
+from kedfem.mesh.cad.face_samples import Axis, FaceSamples, Frame, common_axes, face_samples
 from kedfem.mesh.cad.solids import OtherMethodError, Sizing, Solid
 from kedfem.mesh.cad.words import direction_in_words, face_in_words
 from kedfem.mesh.elements.hexahedra import SolidMesh, in_layers, without_spare_nodes
@@ -17,12 +17,12 @@ from kedfem.mesh.layered.division import plan_size
 from kedfem.mesh.layered.partition import Plan, Region
 from kedfem.mesh.layered.plan_mesh import PlanMesh, plan_mesh
 from kedfem.mesh.layered.sections import check_volume, laid_over, reporting, section
-from kedfem.mesh.layered.shares import sized
+from kedfem.mesh.layered.size_trials import sized
 from kedfem.mesh.session import gmsh_copy
 from kedfem.mesh.swept.core import NEAR, core_mesh, core_radius
 
-_ASIDE = 0.7  # [rad] from the start of a full turn to the section: seams of faces are at right angles, mostly
-_FEWEST, _MOST = 12, 20  # elements around a full turn where no size is asked for
+_ASIDE = 0.7  # [rad] from the start of a full revolution to the section: seams of faces are at right angles, mostly
+_FEWEST, _MOST = 12, 20  # elements around a full revolution where no size is asked for
 _RING = 20  # that a ring needs: with 16 its first frequency is 0.6 % too high, with 20 0.2 %
 
 
@@ -53,7 +53,7 @@ def revolution(gmsh: ModuleType, solid: Solid) -> Frame:
 
     An OtherMethodError says what is in the way.
     """
-    every = list(looks(gmsh, solid).values())
+    every = list(face_samples(gmsh, solid).values())
     obstacles: list[tuple[float, str]] = []
     for axis in common_axes(solid, every):
         others = [look.face for look in every if not look.turns_about(axis)]
@@ -66,7 +66,7 @@ def revolution(gmsh: ModuleType, solid: Solid) -> Frame:
     raise OtherMethodError(f"{solid.name}: no solid of revolution, as {reason}")
 
 
-def _framed(gmsh: ModuleType, solid: Solid, every: list[Looks], axis: Axis) -> Frame:
+def _framed(gmsh: ModuleType, solid: Solid, every: list[FaceSamples], axis: Axis) -> Frame:
     """The frame: its axis runs to where more of the volume is, so that it turns with the part."""
     point, along = axis
     reach = np.concatenate([look.places for look in every]) @ along

@@ -28,7 +28,7 @@ ROUNDING = 1e-12  # of τ against a usual step
 
 
 @dataclass(frozen=True, slots=True)
-class Stand:
+class GridPoint:
     """One grid point.
 
     tau : τ there
@@ -48,7 +48,7 @@ class Stand:
     J: Float[np.ndarray, "m k"]
 
 
-def started(link: Linkage) -> Stand:
+def started(link: Linkage) -> GridPoint:
     """The grid point at the reference position."""
     rest = resting_poses(len(link.bodies))
     near = features(link.rows, rest).value[link.rows.angles].T
@@ -58,7 +58,7 @@ def started(link: Linkage) -> Stand:
     return found[0]
 
 
-def continued(link: Linkage, grid: list[Stand], usual: float, end: float) -> list[Stand]:
+def continued(link: Linkage, grid: list[GridPoint], usual: float, end: float) -> list[GridPoint]:
     """Grid points led on to `end`, by usual steps, smaller ones where the linkage comes near a dead point.
 
     Raises
@@ -75,7 +75,7 @@ def continued(link: Linkage, grid: list[Stand], usual: float, end: float) -> lis
     return out
 
 
-def _next(link: Linkage, grid: list[Stand], step: float, ahead: int, usual: float, end: float) -> list[Stand]:
+def _next(link: Linkage, grid: list[GridPoint], step: float, ahead: int, usual: float, end: float) -> list[GridPoint]:
     """The next grid points, the step halved until Newton converges fast and the orientation stays."""
     here = grid[-1]
     left = abs(end - here.tau)
@@ -94,8 +94,12 @@ def _next(link: Linkage, grid: list[Stand], step: float, ahead: int, usual: floa
 
 
 def _settled(
-    link: Linkage, tau: Float[np.ndarray, " T"], guess: Poses, near: Float[np.ndarray, "T A"], before: Stand | None = None
-) -> list[Stand]:
+    link: Linkage,
+    tau: Float[np.ndarray, " T"],
+    guess: Poses,
+    near: Float[np.ndarray, "T A"],
+    before: GridPoint | None = None,
+) -> list[GridPoint]:
     """Grid points next to guesses, up to one that is too far off, converges slowly or lies behind a singular position."""
     rates, jump = link.drives.at(tau)[1:], np.inf if before is None else JUMP
     got = settled(link, Choice(link.rows), guess, target(link, tau, near), rates, (SETTLED, jump))
@@ -111,12 +115,12 @@ def _settled(
     shape, near = shapes(got), factor.f.value[link.rows.angles].T
     turns = turning(link.rows, factor.f, got.first)
     return [
-        Stand(float(tau[k]), shape[:, k], near[k], turns[k], fastest[k], steps[0][k], factor.J[k])
+        GridPoint(float(tau[k]), shape[:, k], near[k], turns[k], fastest[k], steps[0][k], factor.J[k])
         for k in range(len(tau) if good.all() else int(good.argmin()))
     ]
 
 
-def _predicted(grid: list[Stand], step: Float[np.ndarray, " T"]) -> Poses:
+def _predicted(grid: list[GridPoint], step: Float[np.ndarray, " T"]) -> Poses:
     """Poses some steps on: by the quintic through the last two grid points, of the first one by Taylor."""
     here = grid[-1]
     if len(grid) == 1:

@@ -11,7 +11,7 @@ from kedfem.motion.batch import Choice, Moving
 from kedfem.motion.constraints import ANGLE
 from kedfem.motion.linkage import Linkage, resting_poses
 from kedfem.motion.newton import OPEN
-from kedfem.motion.path.continuation import ROUNDING, Stand, continued, quintics, shapes, split, started
+from kedfem.motion.path.continuation import ROUNDING, GridPoint, continued, quintics, shapes, split, started
 from kedfem.motion.path.record import Path
 from kedfem.motion.path.refinement import halved, refined
 from kedfem.motion.path.weakest import checked
@@ -77,7 +77,7 @@ def _followed(link: Linkage, low: float, high: float, period: float) -> Path:
     return refined(link, checked(link, along, factor))
 
 
-def _grid(link: Linkage, low: float, high: float, period: float, step: float) -> tuple[list[Stand], float]:
+def _grid(link: Linkage, low: float, high: float, period: float, step: float) -> tuple[list[GridPoint], float]:
     """Grid points over a range, or over a period if the linkage is back after it, and that period."""
     start = started(link)
     ahead, behind = [start], [start]
@@ -93,8 +93,8 @@ def _grid(link: Linkage, low: float, high: float, period: float, step: float) ->
     return behind[:0:-1] + ahead, np.inf
 
 
-def _turns(link: Linkage, start: Stand, step: float, period: float, end: float) -> list[Stand]:
-    """Turn by turn, until the linkage is back or the end reached; at most so many turns."""
+def _turns(link: Linkage, start: GridPoint, step: float, period: float, end: float) -> list[GridPoint]:
+    """Turn by turn, until the linkage is back or the end reached; at most so many revolutions."""
     out = [start]
     for turn in range(1, MOST_TURNS + 1):
         to = np.sign(end) * min(turn * period, abs(end))
@@ -104,7 +104,7 @@ def _turns(link: Linkage, start: Stand, step: float, period: float, end: float) 
     return out
 
 
-def _returned(link: Linkage, start: Stand, here: Stand) -> bool:
+def _returned(link: Linkage, start: GridPoint, here: GridPoint) -> bool:
     """Whether a linkage is in its first pose again."""
     one = len(link.drives) == 1 and not link.rows.plus
     pairs = zip(split(start.shape[:1]), split(here.shape[:1]), (1.0, link.size), strict=True)

@@ -23,7 +23,7 @@ class Path:
     shape : (3, G, 12 B) R and p of all bodies, ground first, and their two derivatives by τ
     near : (G, A) turns of the angle rows, counted on from the start [rad]
     period : τ after which the linkage returns to its pose; infinite if it does not
-    over : (m,) what the rows gather over a period: gears whose ratio is not quite that of whole turns
+    over : (m,) what the rows gather over a period: gears whose ratio is not quite that of whole revolutions
     weakest : smallest singular value met on the way, relative, and τ there
     rows : those that hold all motions, well conditioned all along
     curve : (G - 1, 6, 12 B) coefficients of the quintics between grid points, of R and p

@@ -227,10 +227,12 @@ def _lines(name: str) -> str:
 
 
 def heading(text: str, channel: Channel | None, results: Results) -> str:
-    """The title, then the channel with its axes and, for a run that did not end, its status."""
+    """The title, then the channel with its axes, which steps have rows, and the status of a run that did not end."""
     below = [channel.name] if channel else []
     if channel and channel.frame:
         below.append(f"{channel.frame} axes")
+    if results.every > 1:
+        below.append(f"one step in {results.every}")
     if results.status != "complete":
         below.append("doubtful" if results.status == "doubtful" else f"not a whole run: {results.status}")
     title = "\n".join(textwrap.wrap(text[:1].upper() + text[1:], 95))

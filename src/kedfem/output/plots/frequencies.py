@@ -1,4 +1,4 @@
-"""Natural frequencies over a turn of the drive, and the Campbell plot, as PNG."""
+"""Natural frequencies over a revolution of the drive, and the Campbell plot, as PNG."""
 
 from pathlib import Path
 
@@ -30,14 +30,14 @@ def write_campbell(
     path: Path, speeds: Float[np.ndarray, " x"], lowest: Float[np.ndarray, "f x"],
     highest: Float[np.ndarray, "f x"], speed: float, harmonics: int,
 ) -> None:  # fmt: skip
-    """Bands of the natural frequencies over a turn [Hz], and the drive's harmonics, over its speeds [rad/s].
+    """Bands of the natural frequencies over a revolution [Hz], and the drive's harmonics, over its speeds [rad/s].
 
     Parameters
     ----------
     speed : that of the scene
     """
     rpm = RPM * speeds
-    title = "Campbell plot: natural frequencies over a turn, harmonics of the drive"
+    title = "Campbell plot: natural frequencies over a revolution, harmonics of the drive"
     with figure_saved(path, title) as figure:
         ax = figure.subplots()
         for k, (least, most) in enumerate(zip(lowest, highest, strict=True)):

@@ -12,7 +12,7 @@ from kedfem.dynamics.model import Model
 from kedfem.errors import SceneError
 from kedfem.motion.period import repeats_after
 from kedfem.results.fatigue.strength import Strength, strength_of, verdict
-from kedfem.results.fatigue.surface import CRITERIA, FINDLEY, LinkFatigue, Look, Period
+from kedfem.results.fatigue.surface import CRITERIA, FINDLEY, LinkFatigue, Period, SurfaceHistory
 from kedfem.results.records import Fatigue, FatigueSpot
 from kedfem.results.stresses.envelope import Envelope
 from kedfem.results.stresses.peaks import drawn_points, places_apart, within
@@ -45,20 +45,20 @@ def fatigue_of(
     asked = scene.fatigue
     if asked is None:
         raise TypeError("fatigue: is not asked for")
-    times = envelope.when()[0]
+    times = envelope.times
     some = 1e-3 * float(times[-1] - times[-2])
     period = Period(length, float(times[-1]), bool(times[-1] - 2 * length > times[0] - some))
     strengths = link_strengths(scene, asked)
-    looks = {
-        k: Look(envelope.recoveries[k], envelope.kept(k), near[k], strengths[link.name], asked, period)
+    surfaces = {
+        k: SurfaceHistory(envelope.recoveries[k], envelope.kept(k), near[k], strengths[link.name], asked, period)
         for k, link in enumerate(model.links)
         if link.name in strengths and not link.rigid
     }
-    fields = {k: look.field() for k, look in looks.items()}
+    fields = {k: surface.field() for k, surface in surfaces.items()}
     nothing = [LinkFatigue(x, *np.full((6, x.points), np.nan)) for x in envelope.recoveries]
-    of = {name: {k: x for k, x in looks.items() if x.name == name} for name in strengths}
+    of = {name: {k: x for k, x in surfaces.items() if x.name == name} for name in strengths}
     spots = {name: _spots(each, fields, asked, period) for name, each in of.items()}
-    repeats = max((look.repeats for look in looks.values()), default=0.0)
+    repeats = max((surface.repeats for surface in surfaces.values()), default=0.0)
     turn = turn_steps(scene)
     elastic = dict.fromkeys(link.name for link in model.links if not link.rigid)
     return Fatigue(
@@ -96,32 +96,32 @@ def _doubt(scene: Scene, period: Period, repeats: float) -> str:
 
 
 def _spots(
-    looks: Mapping[int, Look], fields: Mapping[int, LinkFatigue], asked: Asked, period: Period
+    surfaces: Mapping[int, SurfaceHistory], fields: Mapping[int, LinkFatigue], asked: Asked, period: Period
 ) -> tuple[FatigueSpot, ...]:
     """The places of a link with the highest damage, as pyLife judges them."""
-    if not looks:
+    if not surfaces:
         return ()
-    every = [fields[k] for k in looks]
+    every = [fields[k] for k in surfaces]
     points = np.concatenate([drawn_points(each.recovery) for each in every])
     damage = np.concatenate([each.damage for each in every])
     ranked = damage if np.nanmax(damage, initial=0.0) > 0 else np.concatenate([x.utilisation for x in every])
     found = (within([len(each.damage) for each in every], k) for k in places_apart(points, ranked, MOST))
-    return tuple(_spot(list(looks.values())[part], node, asked, period) for part, node in found)
+    return tuple(_spot(list(surfaces.values())[part], node, asked, period) for part, node in found)
 
 
-def _spot(look: Look, point: int, asked: Asked, period: Period) -> FatigueSpot:
-    place = look.place_of(point)
-    judged = look.judged([place])
+def _spot(surface: SurfaceHistory, point: int, asked: Asked, period: Period) -> FatigueSpot:
+    place = surface.place_of(point)
+    judged = surface.judged([place])
     h = judged.h[0]
-    gradient = 0.0 if look.strength.data.group is None else look.gradient(place, int(np.abs(h).argmax()))
+    gradient = 0.0 if surface.strength.data.group is None else surface.gradient(place, int(np.abs(h).argmax()))
     periods = np.inf if asked.required_life is None else asked.required_life / period.length
-    strength = look.strength.without_mean() if judged.criterion[0] == FINDLEY else look.strength
+    strength = surface.strength.without_mean() if judged.criterion[0] == FINDLEY else surface.strength
     found = verdict(h, strength, gradient, asked.safety_factor, periods)
-    x, y, z = map(float, drawn_points(look.recovery)[point])
+    x, y, z = map(float, drawn_points(surface.recovery)[point])
     return FatigueSpot(
-        look.name, (x, y, z), point, CRITERIA[judged.criterion[0]], found.damage, found.utilisation,
+        surface.name, (x, y, z), point, CRITERIA[judged.criterion[0]], found.damage, found.utilisation,
         float(judged.found[0, 2]), float(judged.found[0, 3]), float(judged.disproportion[0]), found.support,
-        found.cycles, look.near[point],
+        found.cycles, surface.near[point],
     )  # fmt: skip
 
 

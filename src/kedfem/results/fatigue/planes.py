@@ -10,7 +10,7 @@ import numpy as np
 from kedfem.arrays import Float
 
 STEP = 5.0  # degrees between planes: a quarter of a percent of a normal stress at most, half of one of a shear stress
-DIRECTIONS = 12  # of shear on a plane, over half a turn: 0.9 % at most
+DIRECTIONS = 12  # of shear on a plane, over half a revolution: 0.9 % at most
 FEW = 120  # instants of a period by which the direction of shear is chosen
 # of the most sheared plane, and of the normal stress: planes whose shear is more than rounding
 SHEARED, SOME = 0.05, 1e-3

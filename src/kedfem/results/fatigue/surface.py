@@ -43,7 +43,7 @@ class LinkFatigue:
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class DamageAtPoints:
     """Some points of a surface.
 
     found : (k, 4) damage, reversed amplitude, amplitude and mean of its cycle, of the worst plane
@@ -83,7 +83,7 @@ class Period:
         return C, C[-len(times) :] - np.reshape(earlier, (-1, len(times))).T
 
 
-class Look:
+class SurfaceHistory:
     """At one link or segment: its surface, and the history of its stress.
 
     near : what each of its points is near to, in words
@@ -120,7 +120,7 @@ class Look:
         size = max(1, CHUNK // (8 * each * max(len(self.C), len(self.gone))))
         return (slice(k, k + size) for k in range(0, len(self.surface.places), size))
 
-    def judged(self, which: slice | list[int]) -> Judged:
+    def judged(self, which: slice | list[int]) -> DamageAtPoints:
         """Some of the points."""
         A, axes = self.parts[self.surface.places[which]], self.surface.axes[which]
         H = _histories(A, self.C)
@@ -131,7 +131,7 @@ class Look:
         for kind in np.unique(criterion):
             some = criterion == kind
             found[some], h[some] = self._counted(kind, H[some], d[some], axes[some])
-        return Judged(found, apart, criterion, h)
+        return DamageAtPoints(found, apart, criterion, h)
 
     def _criterion(self, apart: Float[np.ndarray, " k"]) -> Int[np.ndarray, " k"]:
         if self.asked.criterion == "auto":

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, in_plane
-from kedfem.dynamics.joints.constraint_matrices import joint_rows
+from kedfem.dynamics.joints.constraint_matrices import constraint_matrices
 from kedfem.dynamics.joints.independent import blocks
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.system.forces.exerted import springs, wrench
@@ -30,7 +30,7 @@ class ConstraintForces:
     def rows(self) -> tuple[Float[np.ndarray, "r k"], Float[np.ndarray, "r n"]]:
         """Rows of all joints in the reference position, and combinations of what holds that say nothing; springs tell."""
         still = resting(1 + max((b for joint in self.model.rows for b in joint.bodies), default=0), np.zeros(1))
-        found = joint_rows(self.model.rows, still, self.model.interface_unknowns)
+        found = constraint_matrices(self.model.rows, still, self.model.interface_unknowns)
         if found is None:
             return np.zeros((0, 0)), np.zeros((0, 0))
         C, holds = found.at(0), np.isinf(found.stiffness)
@@ -99,7 +99,7 @@ class ConstraintWork:
     last: tuple[float, Float[np.ndarray, " s"], Float[np.ndarray, " s"]]
 
 
-def row_work(
+def joint_spring_work(
     block: Block, before: tuple[float, Float[np.ndarray, " s"], Float[np.ndarray, " s"]] | None
 ) -> ConstraintWork | None:
     """Of all springs in joints; None without any.

@@ -3,13 +3,12 @@
 import numpy as np
 
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.joints.constraint_joints import ordered
 from kedfem.dynamics.model import Model, PrescribedBody
 from kedfem.dynamics.system.forces.exerted import effort
 from kedfem.dynamics.system.forces.supports import supports
-from kedfem.motion.joint_equations import joint_axis, moving_pair
+from kedfem.motion.joint_equations import joint_axis, moving_pair, ordered
 from kedfem.results.forces.constraint_forces import of_joint
-from kedfem.results.forces.hub_forces import hub_wrench, partner
+from kedfem.results.forces.drive_joint_forces import drive_joint_wrench, partner
 from kedfem.results.forces.port_forces import Forces, holder, loose, negligible, port_wrench
 from kedfem.results.recorded import Recorded, Rows, drive_effort
 from kedfem.results.records import Channel
@@ -21,9 +20,9 @@ def drive_channels(scene: Scene, model: Model, driven: str, forces: Forces) -> l
     if any(row.name == driven for row in model.rows):
         return [_row_drive(scene, driven)]
     joint = scene.joints[driven]
-    prescribed = next((x for x in model.prescribed if x.hub == driven), None)
+    prescribed = next((x for x in model.prescribed if x.drive_joint == driven), None)
     if prescribed is not None:
-        return _hub_drive(scene, model, prescribed, forces)
+        return _prescribed_drive(scene, model, prescribed, forces)
     name = moving_pair(joint)[0]
     axis, at = joint_axis(joint), np.asarray(joint.at)
     wrench = port_wrench(model, holder(model, name, driven), driven, at, forces)
@@ -31,11 +30,11 @@ def drive_channels(scene: Scene, model: Model, driven: str, forces: Forces) -> l
     return [Recorded(channel, lambda block: wrench(block)[1] @ axis[:, None])]
 
 
-def _hub_drive(scene: Scene, model: Model, prescribed: PrescribedBody, forces: Forces) -> list[Recorded]:
+def _prescribed_drive(scene: Scene, model: Model, prescribed: PrescribedBody, forces: Forces) -> list[Recorded]:
     """Torque, of a slide force, of the drive that moves a prescribed body, on the joint's first link, along its axis."""
-    joint, first = scene.joints[prescribed.hub], partner(scene, prescribed)
+    joint, first = scene.joints[prescribed.drive_joint], partner(scene, prescribed)
     axis, which = joint_axis(joint), 0 if joint.kind == "prismatic" else 1
-    wrench, others = hub_wrench(scene, model, prescribed, forces)
+    wrench, others = drive_joint_wrench(scene, model, prescribed, forces)
     if not all(negligible(loose(model, *each)[which] @ axis) for each in others):
         return []
     on = moving_pair(joint)[0]
@@ -46,7 +45,7 @@ def _hub_drive(scene: Scene, model: Model, prescribed: PrescribedBody, forces: F
         direction = block.motion.R[:, bodies.get(first, 0)] @ axis
         return np.asarray(sign * (wrench(block)[which] * direction).sum(axis=1, keepdims=True))
 
-    return [Recorded(_drive_channel(scene, prescribed.hub, on), along)]
+    return [Recorded(_drive_channel(scene, prescribed.drive_joint, on), along)]
 
 
 def _drive_channel(scene: Scene, driven: str, on: str) -> Channel:
@@ -59,7 +58,7 @@ def gear_channel(model: Model, name: str) -> Recorded:
     """What gears exert on the first joint's link."""
     row, _ = of_joint(model.rows, f"gears.{name}")
     share = row.plus[0][0]
-    text = f"torque of gears {name} on the link that the first joint's turn is of, about its axis"
+    text = f"torque of gears {name} on the link whose rotation the first joint's angle is, about that joint's axis"
     return Recorded(
         Channel(f"gears/{name}/torque", ("torque",), "N m", "world", text),
         lambda block: share * effort(supports(block), f"gears.{name}")[:, None],
@@ -67,9 +66,6 @@ def gear_channel(model: Model, name: str) -> Recorded:
 
 
 def _row_drive(scene: Scene, driven: str) -> Recorded:
-    """Torque, of a slide force, of a drive enforced by constraint equations, along its axis in the second link."""
-    joint = scene.joints[driven]
-    on = moving_pair(joint)[0]
-    sign = 1.0 if ordered(joint)[0] == on else -1.0
-    channel = _drive_channel(scene, driven, on)
-    return Recorded(channel, lambda block: sign * effort(supports(block), driven)[:, None])
+    """Torque or force of a drive enforced by constraint equations, along its coordinate."""
+    on = ordered(scene.joints[driven], scene.driven_joints[driven].about)[0]
+    return Recorded(_drive_channel(scene, driven, on), lambda block: effort(supports(block), driven)[:, None])

@@ -1,44 +1,53 @@
 """Channels of motors, springs and limits, and of how far hinges have turned."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.force_element import DISTANCE, TURN, End, ForceElement, coordinate, placed
-from kedfem.dynamics.force_elements import force_elements, hinges
+from kedfem.dynamics.force_elements import Element, force_elements, on_hinge, places
 from kedfem.dynamics.history import Block
+from kedfem.dynamics.joints.constraint_joints import coordinate
+from kedfem.dynamics.joints.constraint_ports import constraint_joint
 from kedfem.dynamics.model import Model
+from kedfem.dynamics.rigid_elements import OnLink, links_of, on_links
 from kedfem.dynamics.system.forces.exerted import at_ends
+from kedfem.dynamics.system.forces.poses import value
 from kedfem.dynamics.system.forces.supports import supports
+from kedfem.dynamics.system.record import Term
 from kedfem.motion.constraints import cross
+from kedfem.motion.coordinates import counted_on
 from kedfem.motion.joint_equations import moving_pair
+from kedfem.motion.linkage import body_names
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import Channel
-from kedfem.scene import Scene
+from kedfem.scene import LineSpring, Scene
 
 POSITION, SPEED, EFFORT = "e", "rate", "multiplier"  # of `Multipliers`
 
 
 @dataclass
 class Measured:
-    """Force elements, and hinges whose turns are counted on over successive blocks, once for each block."""
+    """Force elements, and hinges whose turns are counted on over successive blocks, once for each block.
 
-    every: Sequence[ForceElement]
-    hinges: Sequence[ForceElement]
+    ends : names and numbers in the linkage of the links that each force element acts on
+    hinges : joints by name, the turn of each and the ends between which it is
+    """
+
+    every: Mapping[str, Element]
+    ends: Mapping[str, Sequence[tuple[str, int]]]
+    hinges: Mapping[str, tuple[Term, tuple[OnLink, OnLink]]]
     block: Block | None = None
     angles: Float[np.ndarray, "T A"] = field(default_factory=lambda: np.zeros((0, 0)))
 
-    def wrenches(self, links: Collection[str], block: Block) -> Iterator[tuple[End, Rows, Rows]]:
-        """Ends on some links, with force and moment about the world's origin (T, 3) of each."""
-        for element in self.every:
-            ends = [end.link in links for end in element.ends]
-            if any(ends):
-                found = at_ends(supports(block), constraint_of(element))
-                every = zip(element.ends, found, ends, strict=True)
-                yield from ((end, *on) for end, on, here in every if here)
+    def wrenches(self, links: Collection[str], block: Block) -> Iterator[tuple[int, Rows, Rows]]:
+        """Bodies of ends on some links, with force and moment about the world's origin (T, 3) on each."""
+        for name, ends in self.ends.items():
+            if any(link in links for link, _ in ends):
+                every = zip(ends, at_ends(supports(block), name), strict=True)
+                yield from ((body, *found) for (link, body), found in every if link in links)
 
     def on(self, link: str, block: Block, about: Rows) -> tuple[Rows, Rows]:
         """Force and moment of all force elements on a link without unknowns of its own: a slider, a prescribed one.
@@ -55,69 +64,72 @@ class Measured:
     def power(self, links: Collection[str], block: Block) -> Float[np.ndarray, " T"]:
         """Power of all force elements on links that move as given [W]."""
         out, motion = np.zeros(len(block)), block.motion
-        for end, f, m in self.wrenches(links, block):
-            v, omega = motion.v[:, end.body], motion.omega[:, end.body]
-            out += (f * (v - cross(omega, motion.p[:, end.body])) + m * omega).sum(axis=1)
+        for body, f, m in self.wrenches(links, block):
+            v, omega = motion.v[:, body], motion.omega[:, body]
+            out += (f * (v - cross(omega, motion.p[:, body])) + m * omega).sum(axis=1)
         return out
 
     def turns(self, block: Block) -> Float[np.ndarray, "T A"]:
         """Rotations of all hinges; blocks in the order of time."""
         if block is not self.block:
             first = block.step == 0 or not len(self.angles)
-            before = np.zeros(len(self.hinges)) if first else self.angles[-1]
-            self.block, self.angles = block, np.zeros((len(block), len(self.hinges)))
-            for i, hinge in enumerate(self.hinges):
-                x, _ = placed(hinge, block.motion, block.links)
-                self.angles[:, i] = coordinate(hinge, x, float(before[i]))
+            before, angles = np.zeros(len(self.hinges)) if first else self.angles[-1], np.zeros((len(block), 0))
+            for term, (one, other) in self.hinges.values():
+                z = np.concatenate([one.unknowns(block), other.unknowns(block)], axis=1)
+                angle = value(term, (one.end, other.end), block.motion, z)
+                angles = np.column_stack([angles, angle])
+            self.block, self.angles = block, counted_on(angles, before)
         return self.angles
-
-
-def constraint_of(element: ForceElement) -> str:
-    """What the system calls a force element."""
-    return element.name.replace("/", ".", 1)
 
 
 def measured_elements(scene: Scene, model: Model) -> Measured:
     """Motors, springs and limits of a scene and, without a drive, the turns of its hinges."""
-    turns = () if scene.driven is not None else hinges(scene, model)
-    return Measured(force_elements(scene, model), turns)
+    every, names = dict(force_elements(scene)), body_names(scene)
+    ends = {key: [(link, names.index(link)) for link, _ in places(scene, x)] for key, x in every.items()}
+    links, hinges = links_of(model, names), {}
+    for name, joint in scene.joints.items():
+        if joint.kind == "revolute" and scene.driven is None:
+            at = np.asarray(joint.at)
+            hinges[name] = (
+                coordinate(joint, turns=True),
+                on_links(model, constraint_joint(scene, name, *links, ()), (at, at)),
+            )
+    return Measured(every, ends, hinges)
 
 
 def acting(scene: Scene, measured: Measured) -> list[Recorded]:
     """How motors, springs, limits and, without a drive, hinges move, and what force they exert."""
-    every = ((element, *each) for element in measured.every for each in _channels(element))
-    elements = [Recorded(channel, partial(_column, x, which, sign)) for x, channel, which, sign in every]
+    every = ((name, *each) for name, element in measured.every.items() for each in _channels(name, element))
+    elements = [Recorded(channel, partial(_column, name, which, sign)) for name, channel, which, sign in every]
     return elements + [
-        Recorded(_turn(scene, hinge), partial(lambda i, block: measured.turns(block)[:, i, None], i))
-        for i, hinge in enumerate(measured.hinges)
+        Recorded(_turn(scene, name), partial(lambda i, block: measured.turns(block)[:, i, None], i))
+        for i, name in enumerate(measured.hinges)
     ]
 
 
-def _column(element: ForceElement, which: str, sign: float, block: Block) -> Rows:
-    n = supports(block).number(constraint_of(element))
-    return np.asarray(sign * getattr(block.multipliers, which)[:, n, None])
+def _column(name: str, which: str, sign: float, block: Block) -> Rows:
+    return np.asarray(sign * getattr(block.multipliers, which)[:, supports(block).number(name), None])
 
 
-def _turn(scene: Scene, hinge: ForceElement) -> Channel:
-    name = hinge.name.split("/")[1]
+def _turn(scene: Scene, name: str) -> Channel:
     one, other = moving_pair(scene.joints[name])
     text = f"rotation of joint {name}: link {one} against {other}, from the reference position"
-    return Channel(f"{hinge.name}/angle", ("angle",), "rad", "", text)
+    return Channel(f"joints/{name}/angle", ("angle",), "rad", "", text)
 
 
-def _channels(element: ForceElement) -> list[tuple[Channel, str, float]]:
+def _channels(key: str, element: Element) -> list[tuple[Channel, str, float]]:
     """Channels of one force element: which value it is, with which sign."""
-    kind, name = element.name.split("/")
-    what = f"{kind.removesuffix('s')} {name}"
-    if element.kind == DISTANCE:
-        length = Channel(f"{element.name}/length", ("length",), "m", "", f"length of {what}")
-        force = Channel(f"{element.name}/force", ("force",), "N", "", f"pull of {what} and its damper")
+    kind, _, name = key.partition(".")
+    what, path = f"{kind.removesuffix('s')} {name}", f"{kind}/{name}"
+    if isinstance(element, LineSpring) and element.between is not None:
+        length = Channel(f"{path}/length", ("length",), "m", "", f"length of {what}")
+        force = Channel(f"{path}/force", ("force",), "N", "", f"pull of {what} and its damper")
         return [(length, POSITION, 1.0), (force, EFFORT, -1.0)]
-    hinge = element.kind == TURN
+    hinge = on_hinge(element)
     place, unit = ("angle", "rad") if hinge else ("travel", "m")
     effort, force_unit = ("torque", "N m") if hinge else ("force", "N")
     every = [(place, unit, f"{place} of the joint of {what}", POSITION)]
     if kind == "motors":
         every.append(("speed", f"{unit}/s", f"speed of the joint of {what}", SPEED))
     every.append((effort, force_unit, f"{effort} of {what}", EFFORT))
-    return [(Channel(f"{element.name}/{x}", (x,), u, "", text), which, 1.0) for x, u, text, which in every]
+    return [(Channel(f"{path}/{x}", (x,), u, "", text), which, 1.0) for x, u, text, which in every]

@@ -1,4 +1,4 @@
-"""Forces and moments of joints that no channel shows, because statics do not determine them, and why."""
+"""Forces and moments of joints that are statically indeterminate and have no channel, with the reason."""
 
 from collections.abc import Collection, Iterator
 
@@ -13,7 +13,7 @@ from kedfem.results.recorded import drive_effort
 from kedfem.scene import GROUND, Scene
 
 
-def undetermined(scene: Scene, model: Model, channels: Collection[str]) -> dict[str, str]:
+def indeterminate_channels(scene: Scene, model: Model, channels: Collection[str]) -> dict[str, str]:
     """The channels of joints and drives that a run does not have, each with the reason."""
     out, rows = {}, ConstraintForces(model)
     for name in scene.joints:
@@ -26,7 +26,7 @@ def undetermined(scene: Scene, model: Model, channels: Collection[str]) -> dict[
     return out
 
 
-def undetermined_warning(found: dict[str, str]) -> tuple[str, ...]:
+def indeterminate_warning(found: dict[str, str]) -> tuple[str, ...]:
     """A warning for each force; moments are in the notes of the results only."""
     forces = {name: reason for name, reason in found.items() if name.endswith(("force", "torque"))}
     return tuple(f"{name}: not reported, {reason}" for name, reason in forces.items())

@@ -7,12 +7,11 @@ from typing import cast
 import numpy as np
 
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.joints.constraint_joints import ordered
 from kedfem.dynamics.model import Model, PrescribedBody, Slider
 from kedfem.links.record import in_space
 from kedfem.motion.constraints import cross
-from kedfem.motion.joint_equations import moving_pair
-from kedfem.results.forces.hub_forces import constrained_joints, hub_wrench, partner
+from kedfem.motion.joint_equations import moving_pair, ordered
+from kedfem.results.forces.drive_joint_forces import constrained_joints, drive_joint_wrench, partner
 from kedfem.results.forces.port_forces import Forces, determinate, holder, loose, negligible, port_wrench
 from kedfem.results.recorded import Recorded, Rows, once
 from kedfem.results.records import XYZ, Channel
@@ -26,9 +25,9 @@ def joint_channels(scene: Scene, model: Model, name: str, forces: Forces) -> lis
         return _row_joint(scene, model, name, forces)
     if slider is not None:
         return _slider(scene, model, slider, name, forces)
-    hub = next((x for x in model.prescribed if x.hub == name), None)
-    if hub is not None:
-        return _hub(scene, model, hub, forces)
+    prescribed = next((x for x in model.prescribed if x.drive_joint == name), None)
+    if prescribed is not None:
+        return _on_prescribed(scene, model, prescribed, forces)
     held = [link for link in scene.joints[name].links if link in {x.name for x in model.links}]
     if not held:
         return []
@@ -69,14 +68,14 @@ def _channels(
     return [Recorded(channel, rows(k)) for k, channel in enumerate(every) if determined[k]]
 
 
-def _hub(scene: Scene, model: Model, prescribed: PrescribedBody, forces: Forces) -> list[Recorded]:
+def _on_prescribed(scene: Scene, model: Model, prescribed: PrescribedBody, forces: Forces) -> list[Recorded]:
     """Force and moment that the driven joint exerts on a rigid link that moves with it."""
-    wrench, others = hub_wrench(scene, model, prescribed, forces)
+    wrench, others = drive_joint_wrench(scene, model, prescribed, forces)
     determined = [all(negligible(loose(model, *x)[which]) for x in others) for which in (0, 1)]
     rows = [forces.rows.determined(name) for name in constrained_joints(scene, model, prescribed)]
     determined = [determined[which] and all(x[which] and x[0] for x in rows) for which in (0, 1)]
-    label = f"of joint {prescribed.hub} on link {prescribed.link.name} from {partner(scene, prescribed)}"
-    return _channels(prescribed.hub, label, wrench, determined)
+    label = f"of joint {prescribed.drive_joint} on link {prescribed.link.name} from {partner(scene, prescribed)}"
+    return _channels(prescribed.drive_joint, label, wrench, determined)
 
 
 def _slider(scene: Scene, model: Model, slider: Slider, name: str, forces: Forces) -> list[Recorded]:

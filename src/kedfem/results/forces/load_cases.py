@@ -1,4 +1,4 @@
-"""What one link bears at an instant, as forces at its nodes in its own axes: the load case of a static analysis.
+"""The load case of one link at an instant: forces at its nodes in link axes, for a static analysis.
 
 With all in the link's axes the general equation, [KED, eq. (20)], is one of statics:
 

@@ -12,12 +12,12 @@ import numpy as np
 
 from kedfem.arrays import Bool, Float
 from kedfem.motion.constraints import cross
-from kedfem.motion.joint_equations import joint_axis, moving_pair
+from kedfem.motion.joint_equations import coordinate_axis, joint_axis, ordered
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.recorded import drive_effort
 from kedfem.results.records import Results
-from kedfem.scene import Joint, Scene
+from kedfem.scene import Joint, Scene, driven_travel
 
 BALL, ROLLER = 3.0, 10.0 / 3.0  # exponents of bearing lives, ISO 281: point and line contact
 HINGES = ("revolute", "cylindrical", "screw")
@@ -181,16 +181,17 @@ def drive_loads(scene: Scene, results: Results, linked: Linkage | None, motion: 
         found = next((results.channels[key] for key in keys if key in results.channels), None)
         if found is not None:
             known = (linked, motion) if linked is not None and motion is not None else None
-            rate = joint_rate(scene.joints[name], *known) if known else None
+            rate = drive_rate(scene, name, *known) if known else None
             out.append(DriveLoad(name, found[0].unit, found[1][:, 0], rate))
     return out
 
 
-def joint_rate(joint: Joint, linked: Linkage, motion: RigidMotion) -> Scalars:
-    """(T,) rate of a hinge's angle [rad/s] or a slide's travel [m/s], of the link that moves against the other."""
-    one, other = (linked.bodies.index(link) for link in moving_pair(joint))
-    axis = motion.R[:, other] @ joint_axis(joint)
-    if joint.kind != "prismatic":
+def drive_rate(scene: Scene, name: str, linked: Linkage, motion: RigidMotion) -> Scalars:
+    """(T,) rate of the angle [rad/s] or travel [m/s] that the drive of a joint prescribes."""
+    joint, drive = scene.joints[name], scene.driven_joints[name]
+    one, other = (linked.bodies.index(link) for link in ordered(joint, drive.about))
+    axis = motion.R[:, other] @ coordinate_axis(joint, drive.about, drive.along)
+    if not driven_travel(scene, name):
         return np.asarray(((motion.omega[:, one] - motion.omega[:, other]) * axis).sum(axis=1))
     at = np.asarray(joint.at)
     there = motion.position(one, at) - motion.p[:, other]
@@ -199,7 +200,7 @@ def joint_rate(joint: Joint, linked: Linkage, motion: RigidMotion) -> Scalars:
 
 
 def last_turns(results: Results, turns: float | None) -> Bool[np.ndarray, " T"]:
-    """The rows of the last so many turns of the drive; all, where it is not said."""
+    """The rows of the last so many revolutions of the drive; all, where it is not said."""
     if turns is None:
         return np.ones(len(results.time), bool)
     gone = np.abs(results.angle - results.angle[-1])

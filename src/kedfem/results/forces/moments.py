@@ -1,4 +1,4 @@
-"""What the audit needs of links and their rigid motion: moments of nodal fields, rates of the rigid motion.
+"""Moments of nodal fields and rates of the rigid motion, for the energy account.
 
 A field y, forces or a momentum, matters to a rigid motion 1 ⊗ a + X Bᵀ only through Σ y and Σ X ⊗ y, its *moments*, and
 of a planar beam through its couple. So one product per field and block does; all further work is on moments of all links

@@ -24,7 +24,7 @@ INDETERMINATE = 1e-6  # [-, m] share of a loose port force of one that a joint w
 
 @dataclass(frozen=True, slots=True)
 class Forces:
-    """What acts beside port forces: forces of constraint equations, and of motors and springs."""
+    """Forces besides port forces: of constraint equations, motors and springs."""
 
     rows: ConstraintForces
     force_elements: Measured
@@ -102,7 +102,7 @@ def determinate(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) ->
 
 
 def loose(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> tuple[Rows, Rows]:
-    """Forces and moments of a joint that statics leave open, in the reference position."""
+    """Forces and moments of a joint that statics do not determine, in the reference position."""
     attachment = model.joints[k]
     arms, link = _arms(attachment, joint, at), model.links[k]
     loose = attachment.loose[rows_of_joint(attachment, joint)].toarray().T
@@ -134,6 +134,6 @@ def resultant(link: Link, arms: Float[np.ndarray, "_ p 3"], f: Float[np.ndarray,
 
 
 def holder(model: Model, name: str, joint: str) -> int:
-    """The link of a name, or its segment, that a joint holds."""
+    """The link of a name, or its segment, that a joint acts on."""
     every = enumerate(zip(model.links, model.joints, strict=True))
     return next(k for k, (link, held) in every if link.name == name and joint in held.joints)

@@ -1,4 +1,4 @@
-"""Channels of rigid inverse dynamics: forces of joints and drive were all links rigid, beside those of elastic links."""
+"""Channels of rigid inverse dynamics: forces of joints and drives if all links were rigid."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -6,13 +6,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.force_elements import rigid_elements
 from kedfem.dynamics.inertias import Inertias, acting
 from kedfem.dynamics.joints.places import slider_axis
 from kedfem.dynamics.rigid_body import drive_range
-from kedfem.dynamics.rigid_elements import RigidElements, on_rigid_motion
+from kedfem.dynamics.rigid_elements import RigidElements, rigid_elements
 from kedfem.motion.constraints import cross
-from kedfem.motion.joint_equations import moving_pair
+from kedfem.motion.joint_equations import ordered
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path, path
 from kedfem.motion.reactions import BlockReactions, Reactions, effort, reactions
@@ -26,11 +25,11 @@ Responses = Float[np.ndarray, "T c k"]
 OPEN = 1e-9  # of squares: a share that small of what a joint bears is rounding
 ALONG = 1e-6  # sine of an angle between axes that are the same
 FEW = 4  # poses of a linkage of many bodies at which it is seen what statics determine of its joints
-KEPT = 4000  # time points of a turn whose responses are kept, some kilobytes each
+KEPT = 4000  # time points of a revolution whose responses are kept, some kilobytes each
 
 
 @dataclass(frozen=True, slots=True)
-class Borne:
+class RigidChannel:
     """A channel of what a joint or drive bears.
 
     which : 0 force, 1 moment, 2 effort of the drive
@@ -57,7 +56,7 @@ class RigidForces:
     scene: Scene
     linkage: Linkage
     inertias: Inertias
-    every: tuple[Borne, ...]
+    every: tuple[RigidChannel, ...]
     force_elements: RigidElements | None
     turn: int = 0
     _motion: RigidMotion | None = None
@@ -74,9 +73,9 @@ class RigidForces:
         if self.every and motion is not self._motion:
             force, moment = acting(self.inertias, motion)
             centre = motion.p + motion.R @ self.inertias.centre
-            for end, f, m in self.force_elements.wrenches(motion) if self.force_elements else ():
-                force[:, end.body] += f
-                moment[:, end.body] += m - cross(centre[:, end.body], f)
+            for body, f, m in self.force_elements.wrenches(motion) if self.force_elements else ():
+                force[:, body] += f
+                moment[:, body] += m - cross(centre[:, body], f)
             wrench = np.concatenate([force, moment], axis=2)[:, 1:]
             self._rows = self._borne(motion, step, wrench)
             self._motion = motion
@@ -105,7 +104,7 @@ class RigidForces:
                 yield (multipliers @ effort(self.linkage, drive))[:, None]
 
     def _responses(self, motion: RigidMotion, step: int | None) -> Responses:
-        """All channels from forces and moments; where poses return, those of the first turn again."""
+        """All channels from forces and moments; where poses return, those of the first revolution again."""
         if not self.turn or step is None or step < 1:
             return self._made(motion)
         known = sum(map(len, self._kept))
@@ -122,9 +121,9 @@ class RigidForces:
         found = reactions(self.linkage, motion)
         if not isinstance(found, Reactions):
             raise TypeError("a linkage of many bodies is not solved as one matrix")
-        return found.responses(np.concatenate([self._of(found, each) for each in self.every], axis=2))
+        return found.responses(np.concatenate([self.channel_of(found, each) for each in self.every], axis=2))
 
-    def _of(self, found: Reactions, each: Borne) -> Float[np.ndarray, "T m c"]:
+    def channel_of(self, found: Reactions, each: RigidChannel) -> Float[np.ndarray, "T m c"]:
         """A channel from scaled λ."""
         if each.which < 2:
             return np.asarray(found.on(each.joint, each.body, each.at)[each.which] @ each.project.T)
@@ -137,14 +136,15 @@ def rigid_forces(scene: Scene, linkage: Linkage, inertias: Inertias, along: Path
 
     A free motion is held in the rigid linkage, by what no link has there.
     """
-    every: list[Borne] = []
+    every: list[RigidChannel] = []
     if not linkage.mobility:
         if along is not None:
             found = reactions(linkage, _on_grid(linkage, along))
             every += [x for name in scene.joints for x in _joint(scene, linkage, found, name)]
         every += [_drive(scene, linkage, name) for name in scene.driven_joints]
-    acted = rigid_elements(scene, linkage.bodies)
-    elements = on_rigid_motion(acted, along or path(linkage, *drive_range(scene))) if acted else None
+    elements = None
+    if scene.springs or scene.motors or scene.limits:
+        elements = rigid_elements(scene, linkage, along or path(linkage, *drive_range(scene)))
     return RigidForces(scene, linkage, inertias, tuple(every), elements, returning(scene, along))
 
 
@@ -162,15 +162,15 @@ def stated_link(scene: Scene, joint: Joint) -> str:
     return min(links, key=lambda name: len(links) > 1 and slider_axis(scene, name) is not None)
 
 
-def _drive(scene: Scene, linkage: Linkage, name: str) -> Borne:
+def _drive(scene: Scene, linkage: Linkage, name: str) -> RigidChannel:
     joint = scene.joints[name]
-    link = moving_pair(joint)[0]
+    link = ordered(joint, scene.driven_joints[name].about)[0]
     key, what, unit = drive_effort(scene, name, "rigid_")
     channel = Channel(key, (what,), unit, "world", f"{what} of the drive on link {link} were all links rigid")
-    return Borne(channel, name, 2, linkage.bodies.index(link), np.asarray(joint.at), np.zeros((1, 3)))
+    return RigidChannel(channel, name, 2, linkage.bodies.index(link), np.asarray(joint.at), np.zeros((1, 3)))
 
 
-def _joint(scene: Scene, linkage: Linkage, found: Reactions | BlockReactions, name: str) -> list[Borne]:
+def _joint(scene: Scene, linkage: Linkage, found: Reactions | BlockReactions, name: str) -> list[RigidChannel]:
     joint = scene.joints[name]
     link = stated_link(scene, joint)
     other = next(each for each in joint.links if each != link)
@@ -186,7 +186,7 @@ def _joint(scene: Scene, linkage: Linkage, found: Reactions | BlockReactions, na
         columns, project, left = determined(*(x / largest for x in shares[which]))
         if columns:
             channel = Channel(f"joints/{name}/rigid_{what}", columns, unit, "world", text + left)
-            out.append(Borne(channel, name, which, body, at, project))
+            out.append(RigidChannel(channel, name, which, body, at, project))
     return out
 
 

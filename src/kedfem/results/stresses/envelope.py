@@ -34,12 +34,14 @@ class LinkEnvelope:
 
     stress : (3, p) highest von Mises, largest and smallest principal stress [Pa]; of a rigid link nan
     step : (3, p) of each
+    when : (2, 3, p) time [s] and position of the drive at each
     """
 
     link: str
     recovery: StressRecovery
     stress: Float[np.ndarray, "3 p"]
     step: Int[np.ndarray, "3 p"]
+    when: Float[np.ndarray, "2 3 p"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +140,7 @@ class Envelope:
     _stress: list[Float[np.ndarray, "3 p"]] = field(default_factory=list, repr=False)
     _step: list[Int[np.ndarray, "3 p"]] = field(default_factory=list, repr=False)
     _waiting: list[Block] = field(default_factory=list, repr=False)
-    _when: list[Float[np.ndarray, "2 T"]] = field(default_factory=list, repr=False)
+    _when: list[Float[np.ndarray, "3 T"]] = field(default_factory=list, repr=False)
     _kept: list[list[tuple[int, Float[np.ndarray, "T r"]]]] = field(default_factory=list, repr=False)
     REMEMBERED: ClassVar = (
         "worst", "looked", "evaluated", "_modes", "_stress", "_step", "_waiting", "_when", "_kept",
@@ -153,9 +155,11 @@ class Envelope:
 
     def add(self, block: Block) -> None:
         """Look at a block, with others that wait or later."""
-        self._when.append(np.stack([block.motion.t, block.motion.phi]))
+        numbers = np.arange(block.step, block.step + len(block), dtype=float)
+        self._when.append(np.stack([numbers, block.motion.t, block.motion.phi]))
         first = int(np.searchsorted(block.motion.t, self.since))
         if first == len(block):
+            self._forget()
             return
         # what waits may be stored: without multipliers, which know their system
         self._waiting.append(replace(block.part(first, len(block)), multipliers=NONE))
@@ -184,6 +188,14 @@ class Envelope:
             block = next((b for b in blocks if b.step <= step < b.step + len(b)), blocks[0])
             k = max(0, int(step) - block.step)
             self.worst = block.part(k, k + 1).at(0).copied()
+        self._forget()
+
+    def _forget(self) -> None:
+        """Instants that nothing refers to, unless histories are kept: a million are 24 MB."""
+        if self.kept_since == np.inf:
+            wanted = np.unique(np.concatenate([np.zeros(1), *(x.ravel() for x in self._step)]))
+            every = np.concatenate(self._when, axis=1)
+            self._when = [every[:, np.isin(every[0], wanted)]]
 
     def _look(self, i: int, modes: Modes, G: Float[np.ndarray, "T k"], first: int, early: int) -> None:
         from kedfem.results.stresses.envelope_kernel import LEVELS, enveloped, residuals_of
@@ -215,14 +227,14 @@ class Envelope:
         for i, (link, recovery) in enumerate(zip(names, self.recoveries, strict=True)):
             points = recovery.points
             if i >= len(self._modes) or self._modes[i] is None:
-                nothing = np.full((3, points), np.nan), np.zeros((3, points), int)
+                nothing = np.full((3, points), np.nan), np.zeros((3, points), int), np.zeros((2, 3, points))
                 out.append(LinkEnvelope(link.name, recovery, *nothing))
                 continue
             stress = self._stress[i].reshape(3, -1, points)  # both fibres of a planar beam
             chosen = stress.argmax(axis=1)[:, None]
             stress = np.take_along_axis(stress, chosen, 1)[:, 0] * [[1.0], [1.0], [-1.0]]
             step = np.take_along_axis(self._step[i].reshape(3, -1, points), chosen, 1)[:, 0]
-            out.append(LinkEnvelope(link.name, recovery, stress, step))
+            out.append(LinkEnvelope(link.name, recovery, stress, step, self.at(step)))
         return out
 
     def kept(self, i: int) -> Kept | None:
@@ -234,11 +246,19 @@ class Envelope:
         r = len(modes.basis)
         steps = np.concatenate([np.arange(first, first + len(C)) for first, C in pieces])
         C = np.concatenate([np.pad(C, ((0, 0), (0, r - C.shape[1]))) for _, C in pieces])
-        return Kept(modes.parts, self.when()[0, steps], C)
+        return Kept(modes.parts, self.at(steps)[0], C)
 
-    def when(self) -> Float[np.ndarray, "2 T"]:
-        """Time [s] and position of the drive at every step that was examined."""
-        return np.concatenate(self._when, axis=1) if self._when else np.zeros((2, 0))
+    def at(self, steps: Int[np.ndarray, "..."]) -> Float[np.ndarray, "2 ..."]:
+        """Time [s] and position of the drive at steps at which stress is highest, or whose histories are kept."""
+        if not self._when:
+            return np.zeros((2, *steps.shape))
+        known = np.concatenate(self._when, axis=1)
+        return np.asarray(known[1:, np.searchsorted(known[0], steps)])
+
+    @property
+    def times(self) -> Float[np.ndarray, " T"]:
+        """Every step's, where histories are kept [s]."""
+        return np.asarray(np.concatenate(self._when, axis=1)[1])
 
 
 def leading(

@@ -109,7 +109,7 @@ def below(seen, k, sign, limit):  # type: ignore[no-untyped-def]
 
 
 @inner
-def looked_at(heads, parts, size, C, rest, i, t, first, seen, k, highest, at):  # type: ignore[no-untyped-def] # noqa: PLR0913, PLR0917
+def examined(heads, parts, size, C, rest, i, t, first, seen, k, highest, at):  # type: ignore[no-untyped-def] # noqa: PLR0913, PLR0917
     """Point i at step t: stress seen[k], its von Mises [6], what both may lack [7:]; better extremes are kept.
 
     Returns whether all modes had to be summed up.
@@ -181,7 +181,7 @@ def enveloped(heads, parts, C, rest, residuals, first, highest, at):  # type: ig
     for i in range(p):
         sizes_of(heads, parts, i, size)
         for k in range(anchors):
-            full += looked_at(heads, parts, size, C, rest, i, min(k * width, T - 1), first, seen, k, highest, at)
+            full += examined(heads, parts, size, C, rest, i, min(k * width, T - 1), first, seen, k, highest, at)
         count += anchors
         for k in range(anchors - 1):
             top = 0
@@ -205,7 +205,7 @@ def enveloped(heads, parts, C, rest, residuals, first, highest, at):  # type: ig
                     todo[top, 0], todo[top, 1] = level - 1, 2 * window
                     continue
                 middle = anchors + level
-                full += looked_at(heads, parts, size, C, rest, i, t, first, seen, middle, highest, at)
+                full += examined(heads, parts, size, C, rest, i, t, first, seen, middle, highest, at)
                 count += 1
                 if level == 0:
                     top -= 1

@@ -14,15 +14,12 @@ APART = 0.02  # of the link's size: nearer points belong to the same place, as n
 MOST = 10
 
 
-def peaks(
-    found: Sequence[LinkEnvelope], when: Float[np.ndarray, "2 T"], near: Sequence[Sequence[str]]
-) -> dict[str, Peak]:
+def peaks(found: Sequence[LinkEnvelope], near: Sequence[Sequence[str]]) -> dict[str, Peak]:
     """The highest von Mises stress of each link that has stress, and away from places where it means little.
 
     Parameters
     ----------
     found : per link or segment
-    when : time and drive at every step
     near : per link or segment what each point is near to, in words; empty where stress is what it seems
     """
     out, away = dict[str, Peak](), dict[str, Peak]()
@@ -32,7 +29,7 @@ def peaks(
             continue
         for of, among in ((out, np.ones(len(stress), bool)), (away, np.array([not word for word in words]))):
             if among.any():
-                peak = peak_at(each, when, int(np.where(among, stress, -1.0).argmax()), words)
+                peak = peak_at(each, int(np.where(among, stress, -1.0).argmax()), words)
                 of[each.link] = max(of.get(each.link, peak), peak, key=lambda x: x.stress)
     return {name: replace(peak, away=away.get(name)) if peak.near else peak for name, peak in out.items()}
 
@@ -46,41 +43,38 @@ def highest(every: Mapping[str, Peak]) -> Peak | None:
     return replace(peak, away=max(sound, key=lambda x: x.stress, default=None)) if peak.near else peak
 
 
-def peak_at(each: LinkEnvelope, when: Float[np.ndarray, "2 T"], node: int, words: Sequence[str]) -> Peak:
+def peak_at(each: LinkEnvelope, node: int, words: Sequence[str]) -> Peak:
     """The highest von Mises stress of one point of a link, and when it is."""
     step = int(each.step[VON_MISES, node])
     place = drawn_points(each.recovery)[node]
-    time, angle = when[:, step] if step < when.shape[1] else (0.0, 0.0)
+    time, angle = each.when[:, VON_MISES, node]
     return Peak(
         float(each.stress[VON_MISES, node]), each.link, (float(place[0]), float(place[1]), float(place[2])),
         node, step, float(time), float(angle), words[node],
     )  # fmt: skip
 
 
-def hot_spots(
-    found: Sequence[LinkEnvelope], when: Float[np.ndarray, "2 T"], near: Sequence[Sequence[str]],
-    most: int = MOST,
-) -> dict[str, list[Peak]]:  # fmt: skip
+def hot_spots(found: Sequence[LinkEnvelope], near: Sequence[Sequence[str]], most: int = MOST) -> dict[str, list[Peak]]:
     """The highest von Mises stresses of each link that has stress, falling, each at some distance from those before.
 
     Link → its peaks; the first is the link's highest.
 
     Parameters
     ----------
-    found, when, near : as of :func:`peaks`
+    found, near : as of :func:`peaks`
     most : how many of each link
     """
     names = dict.fromkeys(each.link for each in found if not np.isnan(each.stress).all())
-    return {name: _of([(e, w) for e, w in zip(found, near, strict=True) if e.link == name], when, most) for name in names}
+    return {name: _of([(e, w) for e, w in zip(found, near, strict=True) if e.link == name], most) for name in names}
 
 
-def _of(parts: list[tuple[LinkEnvelope, Sequence[str]]], when: Float[np.ndarray, "2 T"], most: int) -> list[Peak]:
+def _of(parts: list[tuple[LinkEnvelope, Sequence[str]]], most: int) -> list[Peak]:
     """Of one link, in segments or not."""
     points = np.concatenate([drawn_points(each.recovery) for each, _ in parts])
     stress = np.concatenate([each.stress[VON_MISES] for each, _ in parts])
     sizes = [each.stress.shape[1] for each, _ in parts]
     found = (within(sizes, k) for k in places_apart(points, stress, most))
-    return [peak_at(parts[part][0], when, node, parts[part][1]) for part, node in found]
+    return [peak_at(parts[part][0], node, parts[part][1]) for part, node in found]
 
 
 def within(sizes: Sequence[int], k: int) -> tuple[int, int]:

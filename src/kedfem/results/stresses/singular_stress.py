@@ -1,4 +1,4 @@
-"""Which points of links have a stress that is not what it seems, in words: corners, point forces, joints' surfaces."""
+"""Points of links where stress is singular or depends on the joint: corners, point forces, joint surfaces."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -19,11 +19,11 @@ CORNER = "a sharp re-entrant corner"
 GROWS = "stress there depends on the mesh and grows when it is refined"
 CONTACT = "the contact itself is not modelled"
 CUT = "a cut between two segments where the link is no prism"
-AFFINE = "the cut lets go of all but an affine field; links.NAME.segments = 1 or another number shows how much that is"
+AFFINE = "the cut transmits only an affine displacement; links.NAME.segments = 1 or another number shows how much that is"
 AWAY = "corners, point forces, surfaces held by joints and cuts"
 
 
-def doubtful(scene: Scene, model: Model, recoveries: Sequence[StressRecovery]) -> list[list[str]]:
+def singular_places(scene: Scene, model: Model, recoveries: Sequence[StressRecovery]) -> list[list[str]]:
     """Per link or segment, then per prescribed rigid link, what each point is near to; mostly empty."""
     full: dict[str, Link] = {str(k): link.full or link for k, link in enumerate(model.links)}
     words = [np.full(recovery.points, "", object) for recovery in recoveries]

@@ -18,11 +18,18 @@ Facts = Mapping[str, str]
 """Level of each factor that is known of a part of a scene."""
 
 KINDS: tuple[str, ...] = get_args(JointKind)
-TURNED = ("revolute", "cylindrical", "screw")  # kinds with one turn, which a torque or torsion spring acts on
-SLID = ("prismatic", "cylindrical")  # and one travel along the same axis
-DRIVEN = ("revolute", "prismatic")  # kinds with one motion alone, which a drive prescribes
+TURNED = ("revolute", "cylindrical", "screw", "planar", "universal")  # kinds with angles, which torques act on
+SLID = ("prismatic", "cylindrical", "screw", "planar")  # and with travels along directions fixed in a link
+DRIVEN = ("revolute", "prismatic", "cylindrical", "screw", "universal", "planar")  # with one that a drive may prescribe
+GEARED = ("revolute", "cylindrical", "screw", "planar")  # with one angle, which gears couple
+RACKED = ("prismatic", "cylindrical", "screw")  # with one travel, along which a rack is
+ON_ANGLE, ON_TRAVEL, ON_DRIVE, ON_GEAR, ON_RACK = (
+    f"{', '.join(kinds[:-1])} or {kinds[-1]}" for kinds in (TURNED, SLID, DRIVEN, GEARED, RACKED)
+)
+NO_ANGLE = "no other joint has an angle about an axis of its links"
+NO_TRAVEL = "no other joint has a travel along a direction that is fixed in a link"
 CONSTRAINED = "constraint equations"  # how a joint is enforced that moves with both of its links
-SHARED = "shared points"  # and one that holds points of its links together for good
+SHARED = "shared points"  # and one whose links share points
 
 
 def others(*kinds: str) -> tuple[str, ...]:
@@ -76,34 +83,35 @@ REFUSALS = (
         "{where}.bushing.rotational_stiffness", "be given for a joint that constrains rotations",
         "there is none that it could resist", "a {kind} joint, which leaves all free",
         "leave it out, or take another kind of joint"),
-    Refusal("drives", {"joint": others(*DRIVEN)}, "{where}.joint", "name a revolute or prismatic joint",
-        "a drive prescribes the one motion of a joint", "{name!r}, which is {kind}",
-        "drive a hinge or a slide beside it, or take a motor"),
-    Refusal("drives", {"joint": ("prismatic",), "shaft": ("given",)}, "{where}.shaft_stiffness",
-        "be given for a hinge", "a shaft gives as it is twisted", "{name!r}, which is prismatic",
+    Refusal("drives", {"joint": others(*DRIVEN)}, "{where}.joint", f"name a {ON_DRIVE} joint",
+        "no other joint has an angle about an axis, or a travel along a direction, that is fixed in a link",
+        "{name!r}, which is {kind}", "drive a hinge or a slide beside it"),
+    Refusal("drives", {"moves": ("travel",), "shaft": ("given",)}, "{where}.shaft_stiffness",
+        "be given for an angle", "a shaft gives as it is twisted", "one for a travel of {name!r}, which is {kind}",
         "take a bushing, or a spring along the slide"),
-    Refusal("gears", {"element": ("gear",), "joint": others("revolute")}, "{where}",
-        "be revolute, as joints of gears are", "these couple rotations", "{name!r}, which is {kind}", "take hinges"),
-    Refusal("gears", {"element": ("rack",), "joint": others("prismatic")}, "{where}",
-        "be prismatic as the second joint of a rack", "a rack slides", "{name!r}, which is {kind}",
-        "take a slide, or a ratio instead of the radius"),
+    Refusal("gears", {"element": ("gear",), "joint": others(*GEARED)}, "{where}",
+        f"be a {ON_GEAR} joint, as joints of gears are", "these couple rotations about one axis each",
+        "{name!r}, which is {kind}", "take hinges"),
+    Refusal("gears", {"element": ("rack",), "joint": others(*RACKED)}, "{where}",
+        f"be a {ON_RACK} joint as the second joint of a rack", "a rack slides along one direction",
+        "{name!r}, which is {kind}", "take a slide, or a ratio instead of the radius"),
     Refusal("motors", {"element": ("torque",), "joint": others(*TURNED)}, "{where}.joint",
-        "name a revolute or cylindrical or screw joint for a torque", "no other joint has one rotation",
+        f"name a {ON_ANGLE} joint for a torque", NO_ANGLE,
         "{name!r}, which is {kind}", "take loads of kind torque on its links"),
     Refusal("motors", {"element": ("force",), "joint": others(*SLID)}, "{where}.joint",
-        "name a prismatic or cylindrical joint for a force", "no other joint has one travel",
+        f"name a {ON_TRAVEL} joint for a force", NO_TRAVEL,
         "{name!r}, which is {kind}", "take loads of kind force on its links"),
     Refusal("springs", {"element": ("torsion",), "joint": others(*TURNED)}, "{where}.joint",
-        "name a revolute or cylindrical or screw joint", "no other joint has one rotation",
+        f"name a {ON_ANGLE} joint", NO_ANGLE,
         "{name!r}, which is {kind}", "take a bushing with rotational_stiffness"),
     Refusal("springs", {"element": ("along",), "joint": others(*SLID)}, "{where}.joint",
-        "name a prismatic or cylindrical joint", "no other joint has one travel",
+        f"name a {ON_TRAVEL} joint", NO_TRAVEL,
         "{name!r}, which is {kind}", "take a spring between two points"),
     Refusal("limits", {"element": ("angle limit",), "joint": others(*TURNED)}, "{where}.joint",
-        "name a revolute or cylindrical or screw joint for an angle", "no other joint has one rotation",
+        f"name a {ON_ANGLE} joint for an angle", NO_ANGLE,
         "{name!r}, which is {kind}", "take a limit of a hinge beside it"),
     Refusal("limits", {"element": ("travel limit",), "joint": others(*SLID)}, "{where}.joint",
-        "name a prismatic or cylindrical joint for a travel", "no other joint has one travel",
+        f"name a {ON_TRAVEL} joint for a travel", NO_TRAVEL,
         "{name!r}, which is {kind}", "take a limit of a slide beside it"),
     Refusal("limits", {"moved": ("prescribed",)}, "{where}.joint", "name a joint that no drive moves",
         "a drive prescribes how far its joint goes", "{name!r}, which is driven", "limit another joint, or take a motor"),
@@ -143,7 +151,7 @@ REFUSALS = (
         "be 'quasi-static' with an initial deflection and a drive", "these forces deflect links beside their motion",
         "'rest'", 'take initial = "quasi-static"'),
     Refusal("analysis", {"start": ("initial_deflection",), "beside": ("speeds",)}, "{where}.initial_deflection",
-        "not be combined with initial speeds and motions", "what is let go has been at rest", "{given}",
+        "not be combined with initial speeds and motions", "the release is from rest", "{given}",
         "take one of them, or loads that end soon"),
     *(Refusal("analysis", {"drive": ("none",), "time": (key,)}, f"{{where}}.{key}", "be combined with a drive",
         "it counts the drive's revolutions", "a scene without one", f"take {instead} [s]")
@@ -167,9 +175,9 @@ REFUSALS = (
              "no other is prescribed", "a scene without one", "take a factor over time"),
             (("angle", "travel"), "several", "be combined with one drive over whose angle or travel it is",
              "it does not say which", "several", "take a factor over time"),
-            (("angle",), "prismatic", "be over the travel of a drive on a slide", "it has no angle", "an angle",
+            (("angle",), "travel", "be over the travel of a drive that prescribes one", "it has no angle", "an angle",
              "take 'travel'"),
-            (("travel",), "revolute", "be over the angle of a drive on a hinge", "it has no travel", "a travel",
+            (("travel",), "angle", "be over the angle of a drive that prescribes one", "it has no travel", "a travel",
              "take 'angle'"))),
 )  # fmt: skip
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 
 from kedfem.errors import Fault, Where
 from kedfem.scene.checks.capabilities import CONSTRAINED, SHARED, Facts, refusals
+from kedfem.scene.checks.drives import driven_coordinate
 from kedfem.scene.checks.parts import Entry, Parts, category, link_names
 from kedfem.scene.questions.enforced import enforced_by_equations
 from kedfem.scene.questions.modelling import default_frames
@@ -87,20 +88,21 @@ def on_joint(parts: Parts, name: str | None) -> tuple[dict[str, str], dict[str, 
 
 
 def drives(parts: Parts) -> Iterator[Told]:
-    """Drives and their shafts."""
+    """Drives, the coordinates that they prescribe and their shafts."""
     for drive in parts.all_drives:
         facts, words = on_joint(parts, drive.word("joint"))
         shaft = "given" if drive.has("shaft_stiffness") else "none"
-        yield "drives", {**facts, "shaft": shaft}, drive.where, words
+        moves = driven_coordinate(drive, facts.get("joint", ""))
+        yield "drives", {**facts, "shaft": shaft, "moves": moves}, drive.where, words
 
 
 def driven(parts: Parts) -> dict[str, str]:
-    """The kind of joint of the only drive, whose angle or travel a factor may be over."""
-    names = [drive.word("joint") for drive in parts.all_drives]
-    if len(names) != 1:
-        return {"driven": "several" if names else "nothing"}
-    joint = parts.joints.get(names[0] or "")
-    return {"driven": "" if joint is None else str(joint.word("kind"))}
+    """What the only drive prescribes, whose angle or travel a factor may be over."""
+    if len(parts.all_drives) != 1:
+        return {"driven": "several" if parts.all_drives else "nothing"}
+    drive = parts.all_drives[0]
+    joint = parts.joints.get(drive.word("joint") or "")
+    return {"driven": "" if joint is None else driven_coordinate(drive, str(joint.word("kind")))}
 
 
 def gears(parts: Parts) -> Iterator[Told]:

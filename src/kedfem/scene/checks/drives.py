@@ -8,11 +8,21 @@ from typing import Any
 from pydantic_core import PydanticCustomError
 
 from kedfem.errors import Fault, place
+from kedfem.scene.checks.capabilities import DRIVEN
 from kedfem.scene.checks.parts import Entry, Parts
 from kedfem.scene.questions.laws import table_noise
 from kedfem.scene.questions.timing import cycle, turning_speed
 from kedfem.scene.records.analysis import WITHOUT_VIBRATION
-from kedfem.scene.records.drives import SLIDING, TURNING, ConstantSpeed, Cycloidal, Polynomial, Ramp, Table
+from kedfem.scene.records.drives import (
+    SLIDING,
+    TURNING,
+    ConstantSpeed,
+    Cycloidal,
+    Polynomial,
+    Ramp,
+    Table,
+    prescribes_travel,
+)
 from kedfem.scene.records.units import Quantity, si_number
 
 ROUGH = 0.05  # share of a table's acceleration that may be noise
@@ -33,24 +43,39 @@ def drive_faults(parts: Parts) -> Iterator[Fault]:
             other = place(met[joint.name].where)
             yield drive.fault("joint", f"must name a joint of its own, got {joint.name!r} as in {other}")
         met[joint.name] = drive
-        kind = joint.word("kind")
-        if kind in {"revolute", "prismatic"}:
-            yield from law_faults(drive, str(kind))
+        kind = str(joint.word("kind"))
+        if kind in DRIVEN:
+            yield from coordinate_of_drive_faults(drive, kind)
+            yield from law_faults(drive, kind)
+
+
+def coordinate_of_drive_faults(drive: Entry, kind: str) -> Iterator[Fault]:
+    """A coordinate that is asked for of a joint with one alone, or of a planar one, which `along` says."""
+    if drive.has("coordinate") and kind not in {"cylindrical", "screw"}:
+        wanted = "must be given on a cylindrical or screw joint only"
+        instead = "; take along for a travel" if kind == "planar" else ""
+        yield drive.fault("coordinate", f"{wanted}, got one on a {kind} joint{instead}")
+
+
+def driven_coordinate(drive: Entry, kind: str) -> str:
+    """Whether a drive prescribes the angle or the travel of a joint of some kind."""
+    return "travel" if prescribes_travel(kind, drive.given("coordinate"), drive.given("along")) else "angle"
 
 
 def law_faults(drive: Entry, kind: str) -> Iterator[Fault]:
-    """A law of motion that is one of angles on a slide, or of travel on a hinge."""
+    """A law of motion that is one of angles where the drive prescribes a travel, or of travel where it is an angle."""
     motion = drive.raw.get("motion")
     if not isinstance(motion, Mapping):
         return
-    wanted, other = ("travel", "angle") if kind == "prismatic" else ("angle", "travel")
+    wanted = driven_coordinate(drive, kind)
+    other = "travel" if wanted == "angle" else "angle"
     if motion.get(other) is not None:
         article = "an" if other == "angle" else "a"
         message = f"must be given as {wanted} of a {kind} joint, got {article} {other}"
         yield drive.fault("motion", message, other)
     if (speed := motion.get("speed")) is not None:
         try:
-            AXES[kind].number(speed)
+            (TURNING if wanted == "angle" else SLIDING).number(speed)
         except PydanticCustomError as reason:
             yield drive.fault("motion", reason.message(), "speed")
 
@@ -105,8 +130,9 @@ def _repeats(parts: Parts) -> bool:
 def drive_and_analysis_faults(parts: Parts, drive: Entry) -> Iterator[Fault]:
     """An analysis that does not suit the law of motion of the only drive."""
     motion, joint = drive.record.motion, parts.joints.get(drive.record.joint)
-    if joint is not None and joint.word("kind") == "prismatic":
-        yield from steps_faults(parts, "one on a prismatic joint")
+    kind = "" if joint is None else str(joint.word("kind"))
+    if driven_coordinate(drive, kind) == "travel":
+        yield from steps_faults(parts, f"one of the travel of a {kind} joint")
     elif turning_speed(motion) == 0.0:
         still = isinstance(motion, (ConstantSpeed, Ramp))
         yield from steps_faults(parts, "speed 0" if still else f"{motion.kind!r}")

@@ -83,6 +83,35 @@ def surface_faults(joint: Entry, parts: Parts) -> Iterator[Fault]:
                 yield joint.fault(key, f"must name faces of a solid, got {name!r}, which is a {noun}", name)
 
 
+def coordinate_faults(parts: Parts) -> Iterator[Fault]:
+    """Drives, motors, springs and limits that do not say which coordinate of a joint is theirs, or wrongly."""
+    elements = (*parts.motors.values(), *parts.springs.values(), *parts.limits.values())
+    turning = [(x, x.has("torque") or x.word("kind") in {"torsion", "angle"}) for x in elements]
+    turning += [(x, not x.has("along")) for x in parts.all_drives]
+    for entry, turns in turning:
+        joint = parts.joints.get(entry.word("joint") or "")
+        if joint is None:
+            continue
+        kind = joint.word("kind")
+        for key, owner, own, wanted in (
+            ("about", "universal", turns, "the link about whose axis"),
+            ("along", "planar", not turns, "a direction in its plane"),
+        ):
+            if kind == owner and own and not entry.has(key):
+                yield entry.fault(key, f"is required on a {owner} joint, {wanted}, got nothing")
+            if kind != owner and entry.has(key):
+                yield entry.fault(key, f"must be given on a {owner} joint only, got one on a {kind} joint")
+        names, about = link_names(joint), entry.word("about")
+        if kind == "universal" and about is not None and about not in names:
+            yield entry.fault("about", unknown_name("a link of the joint", about, names))
+        normal, along = (getattr(x.record, key, None) for x, key in ((joint, "axis"), (entry, "along")))
+        if kind == "planar" and normal and along:
+            sine = abs(sum(a * b for a, b in zip(normal, along, strict=True)))  # both are unit vectors
+            if sine > SQUARE:
+                off = math.degrees(math.asin(min(1.0, sine)))
+                yield entry.fault("along", f"must be in the plane of joint '{joint.name}', got {off:.6g} deg off it")
+
+
 def connected(start: str, pairs: list[list[str]]) -> set[str]:
     """The names that pairs connect with a first one."""
     reached = {start}
@@ -127,5 +156,5 @@ def beam_faults(parts: Parts) -> Iterator[Fault]:
         elif link.word("beam") == "planar" and link.record is not None:
             yield from obstacles(parts.good, link.name)
             for other in sorted(welded(parts.good, link.name) & spatial):
-                wanted = "must not be 'planar' beside the spatial beam welded to it"
+                wanted = "must not be 'planar' beside a link in space that is welded to it"
                 yield link.fault("beam", f"{wanted}, got {other!r}")

@@ -1,4 +1,4 @@
-"""A scene under validation: what it says, and those of its parts that are good already."""
+"""A scene under validation: its tables as given, and the records of those that are valid."""
 
 from __future__ import annotations
 

@@ -45,11 +45,11 @@ def bare_numbers(raw: Any, hint: Any) -> Iterator[str]:
     for where, value, inner in walk(raw, hint):
         if isinstance(value, (int, float)) and abs(value) < 1e300 and isinstance(where[-1], str):
             units = {quantity.unit for quantity in marks(inner, Quantity)}
-            yield from doubts(place(where), float(value), units)
+            yield from unit_warnings(place(where), float(value), units)
 
 
-def doubts(where: str, value: float, units: set[str]) -> Iterator[str]:
-    """What is doubtful about one bare number of a quantity."""
+def unit_warnings(where: str, value: float, units: set[str]) -> Iterator[str]:
+    """Warnings about a number without a unit that was probably meant in another one."""
     fast = abs(value) >= FAST and value % 10 == 0
     for unit, doubtful, read, what, other in (
         ("rad", abs(value) > TURN, f"in radians, {math.degrees(value):.4g}°", "degrees", "deg"),

@@ -32,7 +32,7 @@ def _unlike(scene: Scene, name: str) -> bool:
 
 
 def _displaced(scene: Scene, name: str) -> bool:
-    """Whether a link has displacements of its own: not a slider, whose mass rides on a link, nor what a drive carries."""
+    """Whether a link has displacements of its own: not a slider (its mass is on a link), nor what a drive prescribes."""
     link = scene.links[name]
     if link.category != "rigid":
         return True

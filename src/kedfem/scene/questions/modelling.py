@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from kedfem.scene.records.drives import Drive
+from kedfem.scene.records.drives import Drive, prescribes_travel
 from kedfem.scene.records.joints import Joint
 from kedfem.scene.records.links import GROUND, Frames
 from kedfem.scene.records.scene import Scene
@@ -28,6 +28,12 @@ def corotational_links(scene: Scene) -> frozenset[str]:
 def corotational(scene: Scene) -> bool:
     """Whether any link has co-rotational frames: the equation is then not linear."""
     return bool(corotational_links(scene))
+
+
+def driven_travel(scene: Scene, name: str) -> bool:
+    """Whether the drive of a joint prescribes its travel, not its angle."""
+    drive = scene.driven_joints[name]
+    return prescribes_travel(scene.joints[name].kind, drive.coordinate, drive.along)
 
 
 SHARED = ("revolute", "spherical", "weld")  # kinds that hold points together, wherever these go
@@ -63,26 +69,26 @@ def _moved_by_drives(shapeless: set[str], scene: Scene) -> Iterator[tuple[str, s
     """Links that are held by one driven joint, on the ground or on another such link, nearest to the ground first."""
     known, left = {GROUND}, dict.fromkeys(shapeless)
     while left:
-        found = [(name, hub) for name in left if (hub := _hub(name, known, shapeless, scene))]
+        found = [(name, drive_joint) for name in left if (drive_joint := _drive_joint(name, known, shapeless, scene))]
         if not found:
             return
-        for name, hub in found:
+        for name, drive_joint in found:
             known.add(name)
             del left[name]
-            yield name, hub
+            yield name, drive_joint
 
 
-def _hub(name: str, known: set[str], shapeless: set[str], scene: Scene) -> str:
+def _drive_joint(name: str, known: set[str], shapeless: set[str], scene: Scene) -> str:
     """The driven joint that moves a link without a shape, "" if other joints hold it or there is none."""
     drives, joints = scene.driven_joints, scene.joints.items()
     own = {key: joint for key, joint in joints if name in joint.links}
     inner = [key for key, joint in own.items() if known & (set(joint.links) - {name})]
     if len(inner) != 1 or (drive := drives.get(inner[0])) is None:
         return ""
-    hub = own[inner[0]]
-    if hub.kind not in ("revolute", "prismatic") or hub.bushing or drive.shaft_stiffness is not None:
+    drive_joint = own[inner[0]]
+    if drive_joint.kind not in ("revolute", "prismatic") or drive_joint.bushing or drive.shaft_stiffness is not None:
         return ""
-    if hub.kind == "prismatic" and GROUND in hub.links:
+    if drive_joint.kind == "prismatic" and GROUND in drive_joint.links:
         others = {key: x for key, x in own.items() if key != inner[0] and not shapeless >= set(x.links)}
         if others and not any(by_constraint_equations(each, drives.get(key)) for key, each in others.items()):
             return ""

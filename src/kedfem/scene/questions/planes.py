@@ -51,7 +51,7 @@ def plane_scene(scene: Scene) -> bool:
 
 
 def rigid_in_space(scene: Scene, name: str) -> bool:
-    """Whether a rigid link moves as a body in space: it has a solid shape, and no drive simply carries it along."""
+    """Whether a rigid link moves as a body in space: it has a solid shape, and no drive prescribes it."""
     link = scene.links[name]
     if link.category != "rigid" or link.rigid_line or link.shape is None:
         return False

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kedfem.scene.questions.laws import drive_angle
+from kedfem.scene.questions.modelling import driven_travel
 from kedfem.scene.records.analysis import WITHOUT_VIBRATION
 from kedfem.scene.records.drives import ConstantSpeed, Cycloidal, Harmonic, MotionLaw, Polynomial, Ramp
 from kedfem.scene.records.scene import Scene
@@ -36,12 +37,12 @@ def turning_speed(motion: MotionLaw | None) -> float:
 
 def scene_speed(scene: Scene) -> float:
     """The speed [rad/s] at which the only drive of a scene goes on turning; 0 for a slide, for several and for none."""
-    slides = any(scene.joints[name].kind == "prismatic" for name in scene.driven_joints)
+    slides = any(driven_travel(scene, name) for name in scene.driven_joints)
     return 0.0 if slides else turning_speed(scene.motion)
 
 
 def cycle(motion: MotionLaw | None) -> float | None:
-    """Time [s] after which a drive's law repeats itself, a whole turn apart or not; None if it does not.
+    """Time [s] after which a drive's law repeats itself, a whole revolution apart or not; None if it does not.
 
     A ramp repeats itself once it has sped up.
     """
@@ -58,12 +59,12 @@ def without_vibration(scene: Scene) -> bool:
 
 
 def time_of_revolutions(motion: MotionLaw, revolutions: float) -> float:
-    """Time [s] at which a drive that goes on turning has made so many turns."""
+    """Time [s] at which a drive that goes on turning has made so many revolutions."""
     angle, speed = 2.0 * math.pi * revolutions, turning_speed(motion)
     if isinstance(motion, ConstantSpeed):
         return angle / speed
     if not isinstance(motion, Ramp):
-        raise ValueError(f"a {motion.kind} drive has no turns")
+        raise ValueError(f"a {motion.kind} drive has no revolutions")
     if angle >= 0.5 * speed * motion.time:  # the ramp, of either shape, takes half the angle of full speed
         return angle / speed + 0.5 * motion.time
     from scipy.optimize import brentq
@@ -91,7 +92,7 @@ def time_grid(scene: Scene) -> TimeGrid:
     if end is None and analysis.kind == "static" and not scene.driven_joints:
         return TimeGrid(1.0, 1) if analysis.step is None else _grid(scene, 1.0)
     if end is None:
-        raise ValueError("an analysis needs turns or an end time")
+        raise ValueError("an analysis needs revolutions or an end time")
     grid = _grid(scene, end)
     return TimeGrid(end / (steps := grid.steps + grid.steps % 2), steps) if steady else grid
 
@@ -108,6 +109,11 @@ def _grid(scene: Scene, end: float) -> TimeGrid:
         return TimeGrid(end / usual, usual)
     step = 2.0 * math.pi / (speed * (analysis.steps_per_revolution or usual))
     return TimeGrid(step, max(1, math.ceil(end / step - 1e-6)))
+
+
+def states_step(scene: Scene) -> bool:
+    """Whether a scene states how long its steps are."""
+    return scene.analysis.step is not None or scene.analysis.steps_per_revolution is not None
 
 
 def turn_steps(scene: Scene) -> float | None:

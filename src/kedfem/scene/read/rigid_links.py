@@ -1,4 +1,4 @@
-"""Rigid links without a shape, given by mass, centre and inertia: a rigid body on a line through what holds the link."""
+"""Rigid links without a shape, given by mass, centre and inertia: a rigid body on a line through their joints."""
 
 from __future__ import annotations
 

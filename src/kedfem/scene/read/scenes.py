@@ -16,7 +16,7 @@ from kedfem.scene.checks.links import ELEMENTS, meshing_faults
 from kedfem.scene.checks.parts import Entry, scene_parts
 from kedfem.scene.checks.values import bare_numbers
 from kedfem.scene.questions.modelling import default_frames
-from kedfem.scene.questions.timing import time_grid
+from kedfem.scene.questions.timing import states_step, time_grid, without_vibration
 from kedfem.scene.read.files import file_faults, inside, outside, toml_table
 from kedfem.scene.read.including import KEY, toml_text, with_includes
 from kedfem.scene.read.parameters import with_expressions
@@ -133,10 +133,18 @@ def validated(given: Any, folder: Path, *, sketch: bool = False) -> Scene:
         raise SceneError(in_pattern(each, origins) for each in [*wrong, *rest])
     if (steps := time_grid(scene).steps) > MOST_STEPS:
         raise SceneError([Fault(("analysis",), f"must end within {MOST_STEPS:.0e} steps, got {steps:.3g}")])
-    scene._doubts, scene._as_given, scene._checked = tuple(bare_numbers(bare, Scene)), written, True
+    if states_step(scene) or without_vibration(scene) or scene.analysis.accuracy == "quick":  # else a plan chooses steps
+        refuse_few_rows(scene)
+    scene._unit_warnings, scene._as_given, scene._checked = tuple(bare_numbers(bare, Scene)), written, True
     if scene.analysis.frames is None:
         scene.analysis.fill(frames=default_frames(bool(scene.driven_joints)))
     return scene
+
+
+def refuse_few_rows(scene: Scene) -> None:
+    """SceneError where rows are to be farther apart than the analysis has steps, stated or planned."""
+    if (every := scene.output.every) > (steps := time_grid(scene).steps):
+        raise SceneError([Fault(("output", "every"), f"must be at most {steps}, the steps of the analysis, got {every}")])
 
 
 def _spelt_out(raw: dict[str, Any]) -> dict[str, Any]:

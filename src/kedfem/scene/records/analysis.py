@@ -42,10 +42,10 @@ def joint_speed(value: object) -> float:
 
 
 class InitialForce(Record):
-    """A force at a point of a link that has deflected the mechanism, and is let go at the start."""
+    """A force at a point of a link that deflects the mechanism and is released at the start."""
 
     link: LinkName
-    """the link it acts on, an elastic one or a rigid one that no drive holds"""
+    """the link it acts on, an elastic one or a rigid one whose motion no drive prescribes"""
     at: Point
     """where, in the reference position"""
     force: ForceVector
@@ -86,7 +86,7 @@ class Analysis(Record):
 
     kind: Literal["transient", "steady", "static", "quasi-static"] = "transient"
     """transient: the motion from the start on; steady: the motion that repeats itself with the drive and the loads, found
-    directly and written over one period, which is as many turns of the drive as it takes, or `end_time` where the
+    directly and written over one period, which is as many revolutions of the drive as it takes, or `end_time` where the
     drive does not turn at a constant speed, or there are several. static: the mechanism stands still in each position of
     its drive, or without one as a structure, and all loads balance, without inertia; quasi-static: it moves on, with
     the inertia of its rigid-body motion, and does not vibrate. Both write a time point for each position"""
@@ -121,9 +121,9 @@ class Analysis(Record):
     initial_motions: dict[LinkName, InitialMotion] = Field(default_factory=dict)
     """velocities of links at the start, by name of the link"""
     initial_deflection: dict[str, InitialForce] = Field(default_factory=dict)
-    """forces that have deflected the mechanism and are let go at the start, by name: without a drive from static balance,
-    with one beside the deflection of `initial = "quasi-static"`; limits bear what presses against them, and may be all
-    that holds it"""
+    """forces that deflect the mechanism and are released at the start, by name: without a drive from static balance,
+    with one beside the deflection of `initial = "quasi-static"`, at rest in links that turn; limits take the forces
+    against them, and may be its only supports"""
     accuracy: Annotated[float | Literal["quick"], BeforeValidator(accuracy_or_quick)] = 0.01
     """relative error to aim at in probes, joint forces and the drive's torque: what the scene leaves open is chosen for
     it by short trial runs: frames, elements, mesh sizes, segments, modes, step and levels in time, and models
@@ -162,8 +162,8 @@ class Probe(Record):
     link: LinkName
     """the link; a rigid one for motions only"""
     at: Point
-    """where, in the reference position; of a rigid link anywhere, and for a motion in the centre of a bore that a joint
-    holds: the mean motion of the bore. Of a stress in a beam anywhere in its section: on the axis there is none of
+    """where, in the reference position; of a rigid link anywhere, and for a motion in the centre of a joint's bore:
+    the mean motion of the bore. Of a stress in a beam anywhere in its section: on the axis there is none of
     bending"""
     quantity: Literal[
         "displacement", "velocity", "acceleration", "deflection", "position", "travel", "total_velocity",
@@ -208,6 +208,9 @@ class Output(Record):
 
     folder: FileName | None = None
     """the folder of the results; `<scene>-results` beside the scene file if not given"""
+    every: Count = 1
+    """rows of `kedfem run` are those of each so many time steps, the first and the last among them; what is summed up,
+    highest or estimated is of all steps"""
     csv: StrictBool = False
     """whether the results are also written as CSV, with nine digits"""
     parquet: StrictBool = False

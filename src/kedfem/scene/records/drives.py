@@ -10,9 +10,10 @@ from pydantic import Field, StrictBool, StrictInt, model_validator
 from pydantic_core import PydanticCustomError
 
 from kedfem.errors import Fault
-from kedfem.scene.records.base import FileName, JointName, Record, refuse
+from kedfem.scene.records.base import EndName, FileName, JointName, Record, refuse
 from kedfem.scene.records.curves import curve_faults
 from kedfem.scene.records.materials import Frequency
+from kedfem.scene.records.points import Axis
 from kedfem.scene.records.units import (
     Angle,
     Duration,
@@ -52,7 +53,7 @@ class ConstantSpeed(Record):
 
     kind: Literal["constant_speed"] = "constant_speed"
     speed: DriveSpeed
-    """rotational speed, positive from x to y about z; rpm allowed in a string; of a prismatic joint its speed"""
+    """rotational speed, positive from x to y about z; rpm allowed in a string; of a travel its speed"""
 
 
 class Ramp(Record):
@@ -60,7 +61,7 @@ class Ramp(Record):
 
     kind: Literal["ramp"] = "ramp"
     speed: DriveSpeed
-    """final speed: rotational, of a prismatic joint along it"""
+    """final speed: rotational, or of a travel"""
     time: PositiveTime
     """duration of the speeding up"""
     shape: Literal["smooth", "linear"] = "smooth"
@@ -79,7 +80,7 @@ class Table(Record):
     angle: tuple[Angle, ...] = ()
     """angle at these times, from the reference position"""
     travel: tuple[Length, ...] = ()
-    """of a prismatic joint: travel at these times, instead of angles"""
+    """travel at these times, instead of angles"""
     file: FileName | None = None
     """CSV file with two columns, time and angle (or travel), instead of the two lists; a heading may give the units:
     `time [s], angle [deg]`"""
@@ -112,12 +113,12 @@ class Table(Record):
 class _Rise(Record):
     """What laws share that move by an angle or a travel: how far."""
 
-    exactly_one = ("angle", "travel"), " [rad], or travel [m] of a prismatic joint"
+    exactly_one = ("angle", "travel"), " [rad], or travel [m] where the drive prescribes one"
     kind: str
     angle: Angle | None = None
     """the rise; the amplitude φ0 of what swings"""
     travel: Length | None = None
-    """the same of a prismatic joint, instead of an angle"""
+    """the same of a travel, instead of an angle"""
 
     @property
     def height(self) -> float:
@@ -170,14 +171,26 @@ class Drive(Record):
 
     only_with = (("shaft_damping", "shaft_stiffness"),)
     joint: JointName
-    """name of the driven joint: revolute or prismatic"""
+    """name of the driven joint: any but spherical and weld"""
+    coordinate: Literal["angle", "travel"] | None = None
+    """of a cylindrical or screw joint: which of its two is prescribed; the angle if not given"""
+    about: EndName | None = None
+    """of a universal joint: the link about whose axis the angle is, as the cross has both axes"""
+    along: Axis | None = None
+    """of a planar joint: the direction in its plane along which the travel is prescribed, fixed in the joint's second
+    link, or the ground if that is one; the angle is if not given"""
     motion: MotionLaw
     """how it turns or slides, from the reference position"""
     shaft_stiffness: PositiveRotationalStiffness | None = None
-    """of a hinge: torsional stiffness of the shaft between the given motion and the link that it drives; rigid if not
+    """of an angle: torsional stiffness of the shaft between the given motion and the link that it drives; rigid if not
     given"""
     shaft_damping: RotationalDamper = 0.0
-    """of a hinge: torsional damping of that shaft"""
+    """of an angle: torsional damping of that shaft"""
+
+
+def prescribes_travel(kind: str, coordinate: object, along: object) -> bool:
+    """Whether a drive prescribes the travel of a joint of some kind, not its angle, by two of its keys."""
+    return kind == "prismatic" or coordinate == "travel" or along is not None
 
 
 class Gear(Record):
@@ -189,7 +202,7 @@ class Gear(Record):
     exactly_one = ("ratio", "teeth", "radius"), ", or teeth, or radius [m] of a rack"
     only_with = (("internal", "teeth"),)
     joints: tuple[JointName, JointName]
-    """the two joints: A and B revolute; of a rack A revolute and B prismatic"""
+    """the two joints: A and B revolute, cylindrical, screw or planar; of a rack B prismatic, cylindrical or screw"""
     ratio: Number | None = None
     """turn of B per turn of A, positive in the same direction about their axes; not zero"""
     teeth: tuple[Teeth, Teeth] | None = None
@@ -211,3 +224,8 @@ class Gear(Record):
         if self.teeth is not None:
             return (1 if self.internal else -1) * self.teeth[0] / self.teeth[1]
         return self.radius if self.radius is not None else self.ratio or 0.0
+
+    @property
+    def turning(self) -> tuple[bool, bool]:
+        """Whether what it couples of each joint is the angle: of a rack's second joint it is the travel."""
+        return True, self.radius is None

@@ -1,4 +1,4 @@
-"""Expressions such as ``"=2*r + 5 mm"``: numbers with units, parameters, a few modes; nothing else is worked out.
+"""Expressions such as ``"=2*r + 5 mm"``: numbers with units, parameters, a few functions; nothing else is worked out.
 
 The text becomes Python's syntax tree, of which only arithmetic is walked; pint multiplies and compares units.
 """

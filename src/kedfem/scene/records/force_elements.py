@@ -21,7 +21,7 @@ from kedfem.scene.records.curves import (
     TorqueCurve,
     TorqueOver,
 )
-from kedfem.scene.records.points import Point
+from kedfem.scene.records.points import Axis, Point
 from kedfem.scene.records.units import (
     Angle,
     Damper,
@@ -40,8 +40,15 @@ class Motor(Record):
     """
 
     exactly_one = ("torque", "force"), " [N*m], or force [N] of a slider"
+    only_with = ("about", "torque"), ("along", "force")
     joint: JointName
-    """the joint: revolute, cylindrical or screw for a torque, prismatic or cylindrical for a force"""
+    """the joint: revolute, cylindrical, screw, planar or universal for a torque, prismatic, cylindrical, screw or planar
+    for a force"""
+    about: EndName | None = None
+    """of a torque on a universal joint: the link about whose axis it is"""
+    along: Axis | None = None
+    """of a force on a planar joint: its direction in the plane, in the reference position; fixed in the joint's second
+    link, or the ground if that is one"""
     torque: TorqueOver | None = None
     """of a hinge, positive about its axis: a number, or `{ over = "speed", at = [...], value = [...] }`"""
     force: ForceOver | None = None
@@ -123,11 +130,14 @@ class LineSpring(_Elastic):
 
     effort = "force"
     exactly_one = ("between", "joint"), ", or a joint"
+    only_with = (("along", "joint"),)
     kind: Literal["spring"] = "spring"
     between: tuple[SpringEnd, SpringEnd] | None = None
     """its two ends, each `{ link = "...", at = point }`"""
     joint: JointName | None = None
-    """a prismatic or cylindrical joint that it lies along, instead of two ends"""
+    """a prismatic, cylindrical, screw or planar joint that it lies along, instead of two ends"""
+    along: Axis | None = None
+    """of a planar joint: the direction in its plane that it lies along, as that of a motor"""
     stiffness: Stiffness = 0.0
     """k"""
     damping: Damper = 0.0
@@ -180,7 +190,9 @@ class TorsionSpring(_Elastic):
     effort = "torque"
     kind: Literal["torsion"] = "torsion"
     joint: JointName
-    """the hinge, cylindrical joint or screw"""
+    """the hinge, or cylindrical, screw, planar or universal joint"""
+    about: EndName | None = None
+    """of a universal joint: the link about whose axis it is"""
     stiffness: TorsionStiffness = 0.0
     """k"""
     damping: RotationalDamper = 0.0
@@ -240,7 +252,9 @@ class TravelLimit(_Range):
 
     kind: Literal["travel"] = "travel"
     joint: JointName
-    """a prismatic or cylindrical joint that no drive moves"""
+    """a prismatic, cylindrical, screw or planar joint that no drive moves"""
+    along: Axis | None = None
+    """of a planar joint: the direction in its plane along which the travel is, as that of a motor"""
     lower: Length | None = None
     """least travel that is free; no stop there if not given"""
     upper: Length | None = None
@@ -260,7 +274,9 @@ class AngleLimit(_Range):
 
     kind: Literal["angle"] = "angle"
     joint: JointName
-    """a hinge, cylindrical joint or screw that no drive moves"""
+    """a hinge, or cylindrical, screw, planar or universal joint that no drive moves"""
+    about: EndName | None = None
+    """of a universal joint: the link about whose axis the angle is"""
     lower: Angle | None = None
     """least angle that is free; no stop there if not given"""
     upper: Angle | None = None

@@ -111,7 +111,7 @@ TurningDampers = Annotated[tuple[RotationalDamper, RotationalDamper, RotationalD
 
 
 class Bushing(Record):
-    """What a joint holds, held by springs and dampers; what it releases stays free.
+    """Springs and dampers in place of the constraints of a joint; motions that the joint releases stay free.
 
     One number for all directions, or three along the axes x, y, z of the joint. z is its `axis`; x is at right angles to
     z and to that world axis which is farthest from it in the reference position (of equals the first), y at right angles
@@ -121,14 +121,14 @@ class Bushing(Record):
     at_least_one = ("stiffness", "rotational_stiffness"), " [N/m], or rotational_stiffness [N m/rad]"
     only_with = ("damping", "stiffness"), ("rotational_damping", "rotational_stiffness")
     stiffness: Rates | None = None
-    """of displacements; held rigidly if not given"""
+    """against displacements; rigid if not given"""
     damping: Dampers = (0.0, 0.0, 0.0)
     """of displacements"""
     rotational_stiffness: TurningRates | None = None
-    """of turns; held rigidly if not given. Of a universal joint, whose one turn held is about the normal of its cross,
+    """against rotations; rigid if not given. A universal joint constrains one rotation, about the normal of its cross:
     the third"""
     rotational_damping: TurningDampers = (0.0, 0.0, 0.0)
-    """of turns"""
+    """of rotations"""
 
 
 def of_links(value: object, what: Callable[[object], Any]) -> dict[str, Any]:
@@ -139,7 +139,7 @@ def of_links(value: object, what: Callable[[object], Any]) -> dict[str, Any]:
 
 
 def couplings(value: object) -> object:
-    """How a joint holds its coupling surfaces: one word, or one for each link."""
+    """The kind of coupling of a joint to its surfaces: one word, or one for each link."""
     if isinstance(value, Mapping):
         return of_links(value, couplings)
     if value not in COUPLINGS:
@@ -168,21 +168,21 @@ class Joint(Record):
     axis: Axis | None = None
     """`"x"`, `"y"`, `"z"`, a vector or `{ from = point, to = point }`: a hinge's axis (`"z"` if not given), the direction
     of what slides, the normal of a planar joint (required for those); for a ball or a weld the axis of the bore that
-    holds it"""
+    it acts on"""
     axes: tuple[Axis, Axis] | None = None
     """of a universal joint: the axis in the first link and that in the second, at right angles"""
     lead: Annotated[float, Quantity("m")] | None = None
     """of a screw: travel in one revolution, positive if right-handed"""
     coupling: Annotated[Coupling | dict[str, Coupling], BeforeValidator(couplings)] = "distributing"
-    """how it holds bores and faces of solids and plane links: by their mean displacement and rotation, or so that they
-    keep their shape too, as with a pressed-in pin; for both links or by link, `{ rod = "rigid" }`"""
+    """how it constrains bores and faces of solids and plane links: their mean displacement and rotation, or all their
+    points, so that they keep their shape, as with a pressed-in pin; for both links or by link, `{ rod = "rigid" }`"""
     faces: Annotated[dict[str, Faces], BeforeValidator(by_link)] = Field(default_factory=dict)
-    """of a solid link: the face that holds it, or a list of them, by link: by name (parts from CAD, mesh files with
-    groups), `{ rod = "pin_bore" }`, or by what it is, `{ rod = { cylinder = "8 mm", axis = "z", near = "B" } }`; if not
-    given, what lies about `at`"""
+    """of a solid link: the face that the joint acts on, or a list of them, by link: by name (parts from CAD, mesh
+    files with groups), `{ rod = "pin_bore" }`, or by what it is, `{ rod = { cylinder = "8 mm", axis = "z", near = "B"
+    } }`; if not given, what lies about `at`"""
 
     bushing: Bushing | None = None
-    """what it holds is held by springs and dampers: `{ stiffness = 1e7 }`; rigidly if not given"""
+    """springs and dampers in place of its constraints: `{ stiffness = 1e7 }`; rigid if not given"""
 
     def stiff(self, link: str) -> bool:
         """Whether the coupling surface on a link keeps its shape."""

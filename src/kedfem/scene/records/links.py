@@ -92,7 +92,7 @@ class LinkScene(Record):
     """a file of its shape: short for `shape = { kind = "cad", file = … }` (STEP, IGES, BREP) or `{ kind = "mesh", … }`"""
     mass: Mass = 0.0
     """mass of a rigid link without a shape: of one with `centre` and `inertia`, of a slider, or of a part of the ground
-    that drives alone move (no other joint holds it), which these bear"""
+    that drives alone move (it has no other joint), which these bear"""
     centre: Point | None = None
     """of a rigid link given by mass, centre and inertia instead of a shape: its centre in the reference position"""
     inertia: tuple[Inertia, Inertia, Inertia, Inertia, Inertia, Inertia] | None = None

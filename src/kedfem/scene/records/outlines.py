@@ -27,7 +27,7 @@ class Arc(Record):
 
 
 class Hole(Record):
-    """A round hole through a plate; a joint at its centre holds its surface."""
+    """A round hole through a plate; a joint at its centre acts on its surface."""
 
     at: Point
     """the centre"""

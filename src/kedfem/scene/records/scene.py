@@ -76,7 +76,7 @@ class Scene(Record):
     _source: str | None = PrivateAttr(None)
     _folder: Path = PrivateAttr(Path())
     _stem: str = PrivateAttr("scene")
-    _doubts: tuple[str, ...] = PrivateAttr(())
+    _unit_warnings: tuple[str, ...] = PrivateAttr(())
     _checked: bool = PrivateAttr(False)
     _as_given: Mapping[str, Any] = PrivateAttr(default_factory=dict)
 
@@ -102,9 +102,9 @@ class Scene(Record):
         return self._as_given
 
     @property
-    def doubts(self) -> tuple[str, ...]:
+    def unit_warnings(self) -> tuple[str, ...]:
         """Numbers without a unit that were probably meant in another one, in words."""
-        return self._doubts
+        return self._unit_warnings
 
     @property
     def checked(self) -> bool:

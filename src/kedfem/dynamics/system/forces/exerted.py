@@ -1,4 +1,4 @@
-"""What constraints and laws exert over a march, where bodies are: one formula for joints, gears, drives, springs, motors.
+"""Forces of constraints and laws over a march, at the bodies' positions: one formula for joints, gears and drives.
 
 A multiplier is a force along its coordinate; `Supports` turns it into forces and moments at the displaced ends.
 """
@@ -23,8 +23,10 @@ Rows = Float[np.ndarray, "T _ _"]
 def wrench(forces: Supports, joint: ConstraintJoint) -> tuple[Vectors, Vectors, Vectors]:
     """Force of a joint by constraint equations on its link i, moment about its point there, and that point."""
     force, moment, point = np.zeros((3, len(forces), 3))
-    for each, term, ((_, x, f, t), _) in forces.pushes(joint.name):
-        point = forces.point(each, term.i, joint.at)
+    for each, term, ends in forces.pushes(joint.name):
+        side = 0 if ends[0][0].body == joint.bodies[0] else 1  # a drive's coordinate may be of j against i
+        _, x, f, t = ends[side]
+        point = forces.point(each, (term.i, term.j)[side], joint.at)
         force += f
         moment += t + cross(x - point, f)
     return force, moment, point

@@ -6,6 +6,7 @@ from kedfem.arrays import Float
 from kedfem.dynamics.system import record
 from kedfem.dynamics.system.ends import line_weights
 from kedfem.dynamics.system.forces.rotations import rotation_moment, tilt_moment
+from kedfem.dynamics.system.forces.turning_loads import rotations
 from kedfem.dynamics.system.record import End, Term
 from kedfem.motion.constraints import cross
 from kedfem.motion.rigid import RigidMotion
@@ -29,10 +30,27 @@ def turning(term: Term, Q_i: Float[np.ndarray, "T 3 3"], Q_j: Float[np.ndarray, 
     return np.asarray(moment / (along**2 + across**2))
 
 
+def value(
+    term: Term, ends: tuple[End, End], motion: RigidMotion, z: Float[np.ndarray, "T k"] | None
+) -> Float[np.ndarray, " T"]:
+    """A gap, a distance, or an angle within ±π, over time; without z as the rigid-body motion shows it."""
+    (x_i, Q_i), (x_j, Q_j) = (poses(end, motion, z, strained=term.kind == record.ANGLE) for end in ends)
+    if term.kind == record.ANGLE:  # that of strained directions differs from the rotation's by the square of the strain
+        a, a_j, e, e_j = Q_i @ term.a, Q_j @ term.a_j, Q_i @ cross(term.b, term.a), Q_j @ cross(term.b, term.a_j)
+        return np.asarray(np.arctan2((a * e_j - e * a_j).sum(axis=1), (a * a_j + e * e_j).sum(axis=1)))
+    gap = x_i + Q_i @ (term.a - ends[0].origin) - x_j - Q_j @ (term.a_j - ends[1].origin)
+    return np.asarray(np.linalg.norm(gap, axis=1) if term.kind == record.DISTANCE else (gap * (Q_j @ term.b)).sum(axis=1))
+
+
 def poses(
-    end: End, motion: RigidMotion, z: Float[np.ndarray, "T k"] | None
+    end: End, motion: RigidMotion, z: Float[np.ndarray, "T k"] | None, strained: bool = False
 ) -> tuple[Vectors, Float[np.ndarray, "T 3 3"]]:
-    """Place and orientation of an end over time; without z those that the rigid-body motion shows."""
+    """Place and orientation of an end over time; without z those that the rigid-body motion shows.
+
+    Parameters
+    ----------
+    strained : whether a surface's orientation is Σ D_k ⊗ e_k itself, for which no rotation has to be found
+    """
     R = motion.R[:, end.body]
     x = motion.p[:, end.body] + R @ end.origin
     if end.form == record.RIGID or z is None:
@@ -49,7 +67,8 @@ def poses(
         c, s, Q = np.cos(u[:, 0, 2]), np.sin(u[:, 0, 2]), np.zeros_like(R)
         Q[:, 0, 0], Q[:, 0, 1], Q[:, 1, 0], Q[:, 1, 1], Q[:, 2, 2] = c, -s, s, c, 1.0
         return x, Q @ R
-    return x, _rotations(_directions(end, R, u), end)
+    A = _directions(end, R, u).transpose(0, 2, 1) @ end.directions
+    return x, A if strained else rotations(A)
 
 
 def _directions(end: End, R: Float[np.ndarray, "T 3 3"], u: Float[np.ndarray, "T p d"]) -> Float[np.ndarray, "T 3 3"]:
@@ -67,13 +86,6 @@ def _directions(end: End, R: Float[np.ndarray, "T 3 3"], u: Float[np.ndarray, "T
         D[:, 2] = cross(D[:, 0], D[:, 1])
         D[:, 2] /= np.linalg.norm(D[:, 2], axis=1)[:, None]
     return D
-
-
-def _rotations(D: Float[np.ndarray, "T 3 3"], end: End) -> Float[np.ndarray, "T 3 3"]:
-    """Q of Σ D_k ⊗ e_k = Q U."""
-    left, _, right = np.linalg.svd(D.transpose(0, 2, 1) @ end.directions)
-    left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
-    return np.asarray(left @ right)
 
 
 def point_forces(
@@ -111,8 +123,9 @@ def _on_points(
     if end.form in (record.POINT, record.PLANAR_BEAM):
         return y
     D = _directions(end, R, u)
-    Q = _rotations(D, end)
-    U = Q.transpose(0, 2, 1) @ D.transpose(0, 2, 1) @ end.directions
+    A = D.transpose(0, 2, 1) @ end.directions
+    Q = rotations(A)
+    U = Q.transpose(0, 2, 1) @ A
     G = np.trace(U, axis1=1, axis2=2)[:, None, None] * np.eye(3) - U
     turn = np.linalg.solve(G, (Q.transpose(0, 2, 1) @ moment[:, :, None]))[:, :, 0]
     q = [(Q @ cross(turn, e)[:, :, None])[:, :, 0] for e in end.directions]

@@ -1,4 +1,4 @@
-"""Geometric stiffening as bodies of a system take it: k(t) = Σ s_j(t) k_j, as few terms over a block as it takes."""
+"""Geometric stiffening of bodies of a system: k(t) = Σ s_j(t) k_j, with as few terms in a block as possible."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,1 +1,1 @@
-"""The oracle: a system as one writes it down, which judges the compiled steps and shares none of their code."""
+"""The reference solver: a system with all its unknowns, to check the compiled steps; it shares none of their code."""

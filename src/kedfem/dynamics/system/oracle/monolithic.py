@@ -1,4 +1,4 @@
-"""The oracle: a system as one writes it down, its tangents assembled anew at each iteration, until rounding is left.
+"""The reference solver: a system with all its unknowns, iterated to rounding with tangents assembled anew each time.
 
 Unknown are the displacements u of all bodies (full rows, world components), the interface unknowns z, the forces λ at
 interface points and the multipliers m of constraints:
@@ -95,6 +95,7 @@ class Monolithic:
         ends = np.cumsum([0, *(link.unknowns for link in model.links)])
         self.of = [slice(a, b) for a, b in pairwise(ends)]
         self.N, self.k = int(ends[-1]), self.system.unknowns
+        self.terms = [(n, term) for n, x in enumerate(self.system.constraints) for term in x.terms]
         self.hard = [n for n, x in enumerate(self.system.constraints) if isinstance(x.law, Held | Driven)]
         self.linear = all(link.fit is None for link in model.links) and all(x.linear for x in self.system.constraints)
         sizes = [float(abs(link.K0).max()) * link.size for link in model.links]
@@ -247,44 +248,41 @@ class Monolithic:
         self, z: Column, turned: Column, at: RigidMotion, which: Collection[int] | None = None
     ) -> tuple[Column, Float[np.ndarray, "r k"]]:
         """All coordinates less their drives' travels, and their gradients; zero but for some, if these are given."""
-        R, p, constraints, place = at.R[0], at.p[0], self.system.constraints, 0
+        constraints = self.system.constraints
         e, C = np.zeros(len(constraints)), np.zeros((len(constraints), self.k))
-        for n, each in enumerate(constraints):
-            if which is not None and n not in which:
-                place += len(each.terms)
-                continue
-            for term in each.terms:
-                where = np.zeros(self.k) if each.linear else z
-                value, row, turned[place] = measured(self.system, term, (R, p, where), turned[place])
+        for linear in (True, False):  # those that are linear in z are so about z = 0
+            mine = [k for k, (n, _) in enumerate(self.terms)
+                    if constraints[n].linear is linear and (which is None or n in which)]  # fmt: skip
+            terms, place = [self.terms[k][1] for k in mine], (at.R[0], at.p[0], 0 * z if linear else z)
+            values, rows, turned[mine] = measured(self.system, terms, place, turned[mine])
+            for k, value, row in zip(mine, values, rows, strict=True):
+                n, term = self.terms[k]
                 e[n] += term.factor * value
                 C[n] += term.factor * row
-                place += 1
-            drive = getattr(each.law, "drive", -1)
-            e[n] -= at.drives[0, drive] if drive >= 0 else 0.0
-            if each.linear:
-                e[n] = C[n] @ z
+        for n in range(len(constraints)) if which is None else which:
+            drive = getattr(constraints[n].law, "drive", -1)
+            e[n] = C[n] @ z if constraints[n].linear else e[n] - (at.drives[0, drive] if drive >= 0 else 0.0)
         return e, C
 
     def own_rates(self, now: Now, z1: Column, at: RigidMotion) -> Column:
-        """Rates of all coordinates: Newmark's of linear ones and of those less a drive's travel.
+        """Rates of all coordinates: Newmark's of linear ones, of those less a drive's travel and of held ones.
 
         Of others by differences: the mechanism and z move on, and back, as their rates, z' of these, show.
         """
         from scipy.spatial.transform import Rotation
 
-        out = now.e[1].copy()
-        if len(self.hard) == len(out):
+        out, constraints = now.e[1].copy(), self.system.constraints
+        shown = {*self.hard, *(n for n, x in enumerate(constraints) if x.linear or getattr(x.law, "drive", -1) >= 0)}
+        which = [n for n in range(len(out)) if n not in shown]
+        if not which:
             return np.asarray(out)
         ahead = np.array([-3, -2, -1, 1, 2, 3]) * (RATES * self.scheme.h)
         values = []
         for dt in ahead:
             turn = Rotation.from_rotvec(dt * at.omega[0]).as_matrix() @ at.R[0]
             moved = replace(at, R=turn[None], p=at.p + dt * at.v)
-            values.append(self.coordinates(now.z + dt * z1, now.turned.copy(), moved)[0])
-        rates = np.array([-1, 9, -45, 45, -9, 1]) @ np.array(values) / (60 * RATES * self.scheme.h)
-        for n, each in enumerate(self.system.constraints):
-            if not each.linear and getattr(each.law, "drive", -1) < 0:
-                out[n] = rates[n]
+            values.append(self.coordinates(now.z + dt * z1, now.turned.copy(), moved, which)[0][which])
+        out[which] = np.array([-1, 9, -45, 45, -9, 1]) @ np.array(values) / (60 * RATES * self.scheme.h)
         return np.asarray(out)
 
     def _ended(self, now: Now, old: Now, at: RigidMotion, m: Column, lam: Column) -> Now:

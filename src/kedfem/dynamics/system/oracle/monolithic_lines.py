@@ -1,5 +1,6 @@
-"""The oracle's own view of terms: of pins on lines that bend and turn places by bisection, directions by rotations."""
+"""Lines of slots in the reference solver: places of pins by bisection, directions across by rotations."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,27 +10,38 @@ from scipy.spatial.transform import Rotation
 
 from kedfem.arrays import Float
 from kedfem.dynamics.system.ends import line_of
-from kedfem.dynamics.system.oracle.monolithic_places import placed, point, valued
-from kedfem.dynamics.system.record import OFFSET, End, System, Term
+from kedfem.dynamics.system.oracle.monolithic_places import of_rows, placed, point, valued
+from kedfem.dynamics.system.record import ANGLE, GAP, OFFSET, TURN, End, System, Term
 from kedfem.errors import SolveError
 
 NEAR = 1e-15  # of places by bisection
 Column = Float[np.ndarray, " _"]
 
 
-def measured(system: System, term: Term, at: tuple[Any, Any, Column], near: float) -> tuple[float, Column, float]:
-    """A term's value, its gradient by z, and an angle to be near the next time.
+def measured(
+    system: System, terms: Sequence[Term], at: tuple[Any, Any, Column], near: Column
+) -> tuple[Column, Float[np.ndarray, "t k"], Column]:
+    """Values of t terms, their gradients by z, and angles to be near the next time.
 
     Parameters
     ----------
     at : R and p of all bodies, and z
+    near : (t,) angles of the last time
     """
-    (R, p, z), ends = at, [system.ends[n] for n in (term.i, term.j)]
-    poses = [placed(end, R, p, z) for end in ends]
-    if term.kind != OFFSET:
-        return valued(system, term, poses, near)
-    body = ends[1].body
-    return (*off_line(term, *point(poses[0], ends[0], term.a), ends[1], (R[body], p[body], z)), near)
+    R, p, z = at
+    poses = {n: placed(system.ends[n], R, p, z) for n in {end for term in terms for end in (term.i, term.j)}}
+    value, gradient, near = np.zeros(len(terms)), np.zeros((len(terms), len(z))), near.copy()
+    rows = [n for n, term in enumerate(terms) if term.kind in (GAP, TURN, ANGLE)]
+    if rows:
+        value[rows], gradient[rows], near[rows] = of_rows(system, [terms[n] for n in rows], poses, near[rows])
+    for n in set(range(len(terms))).difference(rows):
+        term, end = terms[n], system.ends[terms[n].j]
+        if term.kind == OFFSET:
+            pin = point(poses[term.i], system.ends[term.i], term.a)
+            value[n], gradient[n] = off_line(term, *pin, end, (R[end.body], p[end.body], z))
+        else:
+            value[n], gradient[n] = valued(system, term, poses[term.i], poses[term.j])
+    return value, gradient, near
 
 
 def off_line(

@@ -1,5 +1,6 @@
-"""The oracle's own view of ends, coordinates and laws: one at a time, by singular values and the rows of rigid motion."""
+"""Ends, coordinates and laws in the reference solver: one at a time, by singular values and the rows of rigid motion."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +16,7 @@ from kedfem.dynamics.system.record import Constraint, Curve, End, Spring, Stop, 
 from kedfem.links.record import Link
 from kedfem.motion.constraints import ConstraintEquation, stacked
 from kedfem.motion.rigid import RigidMotion
-from kedfem.motion.values import features, jacobian
+from kedfem.motion.values import features, gradients
 
 ALIGNED = 1e-12  # sine of an angle below which any normal of an axis is one of both
 Column = Float[np.ndarray, " _"]
@@ -128,35 +129,40 @@ def point(pose: Pose, end: End, a: Float[np.ndarray, "3"]) -> tuple[Float[np.nda
     return pose.x + arm, pose.by_x + np.cross(pose.by_Q, arm, axisa=0, axisb=0, axisc=0)
 
 
-def valued(system: System, term: Term, poses: list[Pose], near: float) -> tuple[float, Column, float]:
-    """A term's value, its gradient by z, and an angle to be near the next time."""
-    one, other = poses
+def of_rows(
+    system: System, terms: Sequence[Term], poses: Mapping[int, Pose], near: Column
+) -> tuple[Column, Float[np.ndarray, "t k"], Column]:
+    """Values of terms that are constraint rows of rigid motion between their ends, their gradients by z, and angles to be
+    near the next time."""
+    number = {n: body for body, n in enumerate(poses, start=1)}
+    starts = [np.zeros(3), *(pose.x - pose.Q @ system.ends[n].origin for n, pose in poses.items())]
+    rows = stacked([ConstraintEquation(x.kind, number[x.i], number[x.j], x.a, x.b, "", x.a_j) for x in terms])
+    at = np.stack([np.eye(3), *(pose.Q for pose in poses.values())])[None], np.stack(starts)[None]
+    f = features(rows, at, near[rows.angles][None])
+    value, twists = f.value[:, 0], gradients(rows, f)[..., 0]
+    gradient = [
+        sum(_by_z(poses[n], starts[number[n]], twist) for n, twist in zip((x.i, x.j), pair, strict=True))
+        for x, pair in zip(terms, twists, strict=True)
+    ]
+    return value, np.array(gradient), np.where(rows.kind == record.ANGLE, value, near)
+
+
+def _by_z(pose: Pose, start: Float[np.ndarray, "3"], twist: Float[np.ndarray, "6"]) -> Column:
+    """How a value changes with z, by the twist of a body at the origin of the coordinates: v = δx − δθ × (x − start)."""
+    return np.asarray(twist[:3] @ pose.by_x + (twist[3:] - np.cross(pose.x - start, twist[:3])) @ pose.by_Q)
+
+
+def valued(system: System, term: Term, one: Pose, other: Pose) -> tuple[float, Column]:
+    """The value of a distance, rotation or tilt between two ends, and its gradient by z."""
     if term.kind == record.DISTANCE:
-        ends = system.ends[term.i], system.ends[term.j]
-        arms = [pose.Q @ (a - end.origin) for pose, a, end in zip(poses, (term.a, term.a_j), ends, strict=True)]
-        gap = one.x + arms[0] - other.x - arms[1]
-        size = float(np.linalg.norm(gap))
-        n = gap / size
-        by = [n @ pose.by_x + np.cross(arm, n) @ pose.by_Q for pose, arm in zip(poses, arms, strict=True)]
-        return size, by[0] - by[1], near
-    if term.kind in (record.ROTATION, record.TILT):
-        along = _rotation_along if term.kind == record.ROTATION else _tilt_along
-        value, moment = along(term, one.Q, other.Q)
-        return value, moment @ (one.by_Q - other.by_Q), near
-    origin = [x.x - x.Q @ system.ends[n].origin for x, n in zip(poses, (term.i, term.j), strict=True)]
-    rows = stacked([ConstraintEquation(term.kind, 1, 2, term.a, term.b, "", term.a_j)])
-    at = (np.stack([np.eye(3), one.Q, other.Q])[None], np.stack([np.zeros(3), *origin])[None])
-    f = features(rows, at, np.full((1, len(rows.angles)), near))
-    J = jacobian(rows, f, 3)[0, 0]
-    row = np.zeros(one.by_x.shape[1])
-    for pose, of, start in zip(poses, (J[:6], J[6:]), origin, strict=True):
-        # the twist of a body at the origin of its drawn coordinates: v = δx − δθ × (x − start)
-        row += of[:3] @ pose.by_x + (of[3:] - np.cross(pose.x - start, of[:3])) @ pose.by_Q
-    value = float(f.value[0, 0])
-    return value, row, value if term.kind == record.ANGLE else near
+        (x, by_x), (y, by_y) = point(one, system.ends[term.i], term.a), point(other, system.ends[term.j], term.a_j)
+        size = float(np.linalg.norm(x - y))
+        return size, (x - y) / size @ (by_x - by_y)
+    value, moment = (rotation_along if term.kind == record.ROTATION else tilt_along)(term, one.Q, other.Q)
+    return value, moment @ (one.by_Q - other.by_Q)
 
 
-def _rotation_along(term: Term, Q_i: Any, Q_j: Any) -> tuple[float, Float[np.ndarray, "3"]]:
+def rotation_along(term: Term, Q_i: Any, Q_j: Any) -> tuple[float, Float[np.ndarray, "3"]]:
     """Along b the logarithm of the rotation; the gradient by the mean of rotations on the way, ∫ exp [s θ]× ds."""
     from scipy.spatial.transform import Rotation
 
@@ -166,7 +172,7 @@ def _rotation_along(term: Term, Q_i: Any, Q_j: Any) -> tuple[float, Float[np.nda
     return float(theta @ term.b), Q_j @ np.linalg.solve(expm(both)[:3, 3:].T, term.b)
 
 
-def _tilt_along(term: Term, Q_i: Any, Q_j: Any) -> tuple[float, Float[np.ndarray, "3"]]:
+def tilt_along(term: Term, Q_i: Any, Q_j: Any) -> tuple[float, Float[np.ndarray, "3"]]:
     """Along b the angle between both axes about the normal e of both: ω changes the angle, and turns e about the axis."""
     a, n, b = Q_i @ term.a, Q_j @ term.a_j, Q_j @ term.b
     normal = np.cross(n, a)

@@ -1,4 +1,4 @@
-"""Steps of a system by the oracle, as a march hands them on: what `solver = "monolithic"` takes."""
+"""Steps by the reference solver, returned as those of a march: what `solver = "monolithic"` takes."""
 
 from collections.abc import Sequence
 
@@ -78,7 +78,7 @@ def begun(of: Ready, state: State, motion_at: Motion | None) -> Now:
         damped.append(np.stack([nodal_forces(of, k, x) for x in rates]))
     seen: list[list[Seen]] = [[] for _ in links]
     if motion_at is not None and any(link.fit is not None for link in links):
-        inside = Instant(of, motion_at, float(state.time[0])).inside(state.u, state.v)
+        inside = Instant(of, motion_at, float(state.time[0])).internal_states(state.u, state.v)
         seen = [[(x.angle, np.stack([x.g, x.g1, 0 * x.g])) for x in each.frames] for each in inside]
     return Now(
         u, v, a, f, F, seen, state.z[0, number], state.e.copy(), state.turned.copy(),

@@ -1,4 +1,4 @@
-"""The oracle's own view of stops: which may push in a step, and steps in parts, where one with damping is met.
+"""Stops in the reference solver: which may push in a step, and steps that are divided where a damped one is met.
 
 A step is solved as if such a stop were out of reach. Where the cubic through its coordinate and rate at both ends passes
 the limit, −c e' changes accelerations as the matrix of the step after that time lets them:

@@ -1,4 +1,4 @@
-"""The oracle's tangents: of bodies and force laws by differences, assembled in one matrix with all constraints."""
+"""Tangents of the reference solver: of bodies and force laws by differences, in one matrix with all constraints."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The motion that repeats itself with the period: the map of a period, the state that it leaves as it is, multipliers."""
+"""Steady motions: the map of a period, its fixed point, and the multipliers of small vibrations."""

@@ -1,4 +1,4 @@
-"""The map of a period: the state with which a march begins, as a vector, to that with which it ends.
+"""The period map: from the state at the start of a period, as a vector, to the state at its end.
 
 All that a step remembers is one vector, but for Anderson acceleration's memory, which only saves iterations, and the
 time. The size of a vector is √(u K u + ω² u M u + v M v), ω = 2π/T: everything else of a state follows from displacements
@@ -19,27 +19,27 @@ from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.system.arrays import ends_of
 from kedfem.dynamics.system.march import Ready, march
 from kedfem.dynamics.system.starts.instant import TURN, Flat, Instant, Motion, turned
-from kedfem.dynamics.system.starts.internal_forces import own, put_momenta, remembered
+from kedfem.dynamics.system.starts.internal_forces import own, put_momenta, store_internal_state
 from kedfem.dynamics.system.state import History, State, copied
 from kedfem.motion.rigid import RigidMotion
 
-CARRIED = (
+VECTOR_FIELDS = (
     "u", "v", "a", "F", "f", "damped", "momentum", "seen", "Q", "angle", "strain", "direction", "turn", "port_force",
     "z", "e", "turned", "bearing", "multiplier",
 )  # fmt: skip
 BLOW, SHORTEST = 0.05, 8.0  # of the period, and steps at least: what a blow lasts, and excites
 SWUNG = ("a", "port_force", "bearing", "multiplier")  # in which steps alternate, by ρ∞ less from step to step
 HIDDEN = 1e-4  # of the energy: what these count
-ANGLES = ("angle", "turn", "turned")  # which may have gone on by whole turns
+ANGLES = ("angle", "turn", "turned")  # which may have gone on by whole revolutions
 
 
-Carried = Mapping[str, Any]
+StateArrays = Mapping[str, Any]
 """Arrays of a state by name, those that a vector is made of."""
 
 
-def carried(state: State) -> Carried:
+def state_arrays(state: State) -> StateArrays:
     """What a vector of a state is made of."""
-    return {name: getattr(state, name).copy() for name in CARRIED}
+    return {name: getattr(state, name).copy() for name in VECTOR_FIELDS}
 
 
 class PeriodMap:
@@ -59,8 +59,8 @@ class PeriodMap:
         self.steps = steps = round(period / of.c.h)
         t = of.c.h * np.arange(1, steps + 1)
         self._parts = [motion_at(t[k : k + length]) for k in range(0, steps, length)]
-        ends = ends_of([getattr(start, name).size for name in CARRIED])
-        self._at = {name: slice(int(ends[k]), int(ends[k + 1])) for k, name in enumerate(CARRIED)}
+        ends = ends_of([getattr(start, name).size for name in VECTOR_FIELDS])
+        self._at = {name: slice(int(ends[k]), int(ends[k + 1])) for k, name in enumerate(VECTOR_FIELDS)}
         self.period, self._omega = period, TURN / period
         self._weights: dict[str, float] = {}
         self._now = Instant(of, motion_at, 0.0)
@@ -74,12 +74,12 @@ class PeriodMap:
 
     def vector(self, state: State) -> Flat:
         """A state as a vector."""
-        return np.concatenate([getattr(state, name).ravel() for name in CARRIED])
+        return np.concatenate([getattr(state, name).ravel() for name in VECTOR_FIELDS])
 
     def state(self, x: Flat) -> State:
         """A vector as the state at the beginning of the period."""
         like = copied(self.start)
-        for name in CARRIED:
+        for name in VECTOR_FIELDS:
             getattr(like, name)[...] = x[self._at[name]].reshape(getattr(like, name).shape)
         for name in ("time", "pairs", "products", "last", "counts"):
             getattr(like, name)[...] = 0.0
@@ -127,7 +127,7 @@ class PeriodMap:
         return [each.F + pulse[:, None, None] * more for each, more in every]
 
     def change(self, after: Flat, before: Flat) -> Flat:
-        """The difference of two vectors; angles that have gone on by whole turns are the same."""
+        """The difference of two vectors; angles that have gone on by whole revolutions are the same."""
         out = np.asarray(after - before)
         for name in ANGLES:
             here = self._at[name]
@@ -139,8 +139,8 @@ class PeriodMap:
         if self.linear:
             return x
         state, was, now = self.state(x), self.state(x), self._now
-        for k, each in enumerate(now.inside(state.u, state.v)):
-            remembered(self.of, k, each, state)
+        for k, each in enumerate(now.internal_states(state.u, state.v)):
+            store_internal_state(self.of, k, each, state)
         state.f[:], state.damped[:], state.strain[1:] = was.f, was.damped, was.strain[1:]
         for first, last in zip(self.of.bodies.at, self.of.bodies.at[1:], strict=False):
             rates = slice(2 * first + last, 3 * last)  # of (3, N) per body: all but the first N
@@ -153,8 +153,8 @@ class PeriodMap:
 
     def complete(self, state: State) -> None:
         """Give a difference of states of a linear system what follows from its displacements, rates, accelerations."""
-        for k, each in enumerate(self._now.inside(state.u, state.v)):
-            remembered(self.of, k, each, state)
+        for k, each in enumerate(self._now.internal_states(state.u, state.v)):
+            store_internal_state(self.of, k, each, state)
         put_momenta(self.of, state)
 
     def weighed(self, like: Flat) -> None:
@@ -196,7 +196,7 @@ class PeriodMap:
 
     def _forced(self, u: Flat) -> Flat:
         """R K0 Rᵀ u of all bodies, R at the beginning of the period."""
-        still = self._now.always.still
+        still = self._now.always.static
         every = (still.sprung(k, R, u[own(self.of, k)]) for k, R in enumerate(self._now.R))
         return np.concatenate(list(every))
 

@@ -1,4 +1,4 @@
-"""By what small vibrations about a steady motion are multiplied in a period: the eigenvalues of Φ (Floquet).
+"""Floquet multipliers of small vibrations about a steady motion: the eigenvalues of Φ.
 
 They are found by Arnoldi's method from a state that a random blow has left, so that vibrations show which the loads do
 not excite: by the largest magnitude a vibration grows, or falls, in a period.

@@ -1,4 +1,4 @@
-"""The steady state: the state that a march over one period leads back to, and what small vibrations about it grow by.
+"""The search of the steady state: the state that a march over one period leads back to, and its Floquet multipliers.
 
 x = P(x) by Newton's method. Each of its linear systems, (I − Φ) d = P(x) − x with Φ the derivative of P, is solved by
 GMRES: a product with Φ is one more march over the period, so that it takes as many marches as there are vibrations that a
@@ -14,7 +14,7 @@ import numpy as np
 from kedfem.arrays import Complex
 from kedfem.dynamics.system.period.coarse import Coarse
 from kedfem.dynamics.system.period.krylov import Derivative, Solution, Watch, Watched, combined, gmres, scale_of
-from kedfem.dynamics.system.period.map import CARRIED, Carried, PeriodMap
+from kedfem.dynamics.system.period.map import VECTOR_FIELDS, PeriodMap, StateArrays
 from kedfem.dynamics.system.period.multipliers import multipliers
 from kedfem.dynamics.system.record import ANGLE, COORDINATE, Spring, Stop, curve_of
 from kedfem.dynamics.system.starts.instant import TURN, Flat
@@ -40,15 +40,15 @@ class Search:
     closed : what a period may leave of its size
     """
 
-    near: Carried | None = None
+    near: StateArrays | None = None
     closed: float = CLOSED
 
     def start(self, usual: State) -> State:
         """The state to begin with."""
         near = self.near
-        if near is None or any(near[x].shape != getattr(usual, x).shape for x in CARRIED):
+        if near is None or any(near[x].shape != getattr(usual, x).shape for x in VECTOR_FIELDS):
             return usual
-        return copied(usual)._replace(**{name: np.array(near[name]) for name in CARRIED})
+        return copied(usual)._replace(**{name: np.array(near[name]) for name in VECTOR_FIELDS})
 
 
 @dataclass(frozen=True, slots=True)

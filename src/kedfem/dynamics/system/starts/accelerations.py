@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.matrices.bordered import Asked
+from kedfem.dynamics.matrices.bordered import ConstraintTerms
 from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.system.sparse import SparsePart
 from kedfem.dynamics.system.starts.instant import Flat, Instant
@@ -26,7 +26,7 @@ STIFFER = 1e6  # s
 AGAIN = 3  # times: what strains is then 1e-18 of b
 
 
-def accelerations(now: Instant, r: Flat, u: Flat, v: Flat, asked: Asked, rigid: bool = False) -> Solved:
+def accelerations(now: Instant, r: Flat, u: Flat, v: Flat, asked: ConstraintTerms, rigid: bool = False) -> Solved:
     """Accelerations under forces r (N,), world components, with joints and constraints closed.
 
     Parameters
@@ -55,7 +55,7 @@ def accelerations(now: Instant, r: Flat, u: Flat, v: Flat, asked: Asked, rigid: 
     return replace(found, x=found.x + turning)
 
 
-def accelerated_in_a_step(now: Instant, r: Flat, u: Flat, v: Flat, asked: Asked) -> Solved:
+def accelerated_in_a_step(now: Instant, r: Flat, u: Flat, v: Flat, asked: ConstraintTerms) -> Solved:
     """The same, but for what springs, motors and loads that turn with bodies do: A x = c_M Wᵀ λ with a step's matrix.
 
     Their whole force would at first accelerate next to no mass about their points: no step resolves that, and laws would
@@ -70,9 +70,9 @@ def accelerated_in_a_step(now: Instant, r: Flat, u: Flat, v: Flat, asked: Asked)
     return Solved(alone.x + more.x, alone.z + more.z, alone.m + more.m, alone.forces + more.forces, more.f)
 
 
-def in_a_step(now: Instant, pushed: Flat, asked: Asked, R: Float[np.ndarray, "bodies 3 3"]) -> Solved:
+def in_a_step(now: Instant, pushed: Flat, asked: ConstraintTerms, R: Float[np.ndarray, "bodies 3 3"]) -> Solved:
     """Accelerations under forces on bodies, and that constraints know, with a step's matrix, turned by R; see above."""
-    of, still = now.of, now.always.still
+    of, still = now.of, now.always.static
     share = of.c.c_K / of.c.c_M
     held = [
         stepped_body(part, of.c.c_M) if isinstance(part, SparsePart)

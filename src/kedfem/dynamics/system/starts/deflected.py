@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.matrices.bordered import Asked
+from kedfem.dynamics.matrices.bordered import ConstraintTerms
 from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.starts.accelerations import accelerations, own_spin
@@ -22,7 +22,7 @@ from kedfem.dynamics.system.starts.initial_states import as_coordinates, begun
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
 from kedfem.dynamics.system.starts.internal_forces import drawn, own, rows, turned_rate
 from kedfem.dynamics.system.starts.laws import feels_rates
-from kedfem.dynamics.system.starts.modified_newton import FREE, ROUNDING, NoBalanceError, equilibrium, unpropped
+from kedfem.dynamics.system.starts.modified_newton import FREE, ROUNDING, NoBalanceError, direct_balance, equilibrium
 from kedfem.dynamics.system.starts.turning_bodies import CONVERGED, Spins, spins_of
 from kedfem.dynamics.system.state import State
 from kedfem.errors import MotionError, SolveError
@@ -31,6 +31,9 @@ from kedfem.motion.newton import cross_matrix
 DAMPED = 12  # times that rates of a deflection are found anew where dampers feel them
 WIDER = 6  # times that their instants are taken four times as far apart, while rates change by no more than
 SAME, ENOUGH = 3.0, 1e-7  # times what rounding leaves open of them; share of them that may stay open
+# of rates, or of what rotates at 1 rad/s: the most that may stay open of what is released, which would be shaken else
+OPEN = 1e-3
+UNSETTLED = "rates that dampers feel do not settle: take weaker dampers, less force, a slower drive or short loads"
 LEAST = 1 / 64  # of loads, that an increment of theirs is
 LATER = np.array([
     [-25, 48, -36, 16, -3], [-3, -10, 18, -6, 1], [1, -8, 0, 8, -1], [-1, 6, -18, 10, 3], [3, -16, 36, -48, 25],
@@ -43,7 +46,7 @@ Rows = Sequence[Float[np.ndarray, "_ _"]]
 
 
 @dataclass(frozen=True, slots=True)
-class Moved:
+class MovingDeflection:
     """A deflection u with its rate v, (N,) world components.
 
     strained : the rate again, by differences of what rigid-body frames see, for what damps deformations: the error of v
@@ -56,7 +59,7 @@ class Moved:
 
 
 def quasi_static(of: Ready, motion_at: Motion, rates: Rows | None = None, time: float = 0.0) -> State:
-    """The state at a time with the deflection that its links have as they move on without vibrating.
+    """The state at a time with the quasi-static deflection: links move on without vibration.
 
     Parameters
     ----------
@@ -146,7 +149,7 @@ def _in_increments(now: Instant, pull: Flat, spins: Spins | None) -> Flat:
         part_loaded.F, part_loaded.amounts = tried * now.F, tried * now.amounts
         part_loaded.relief = (1.0 - tried) * drawn_apart
         try:
-            u = unpropped(part_loaded, u, _constant(tried * pull), spins, None, ROUNDING)
+            u = direct_balance(part_loaded, u, _constant(tried * pull), spins, None, ROUNDING)
         except NoBalanceError:
             part /= 2
             if part < LEAST:
@@ -157,17 +160,16 @@ def _in_increments(now: Instant, pull: Flat, spins: Spins | None) -> Flat:
 
 
 def plucked(of: Ready, motion_at: Motion, forces: Rows, time: float = 0.0) -> State:
-    """The state at a time in which the system is let go by forces that have deflected it.
+    """The state at a time in which the system is released from a deflection by forces.
 
-    With a drive these act on the quasi-static deflection, whose rates it has; without one, on a system at rest.
+    With a drive these have turned with its links, whose deflection is quasi-static under them and has its rates;
+    without one, the system is at rest.
     """
     now = Instant(of, motion_at, time)
     if not now.motion.drives.shape[1]:
         return static(of, motion_at, time, forces)
-    found = _moving(now, motion_at)
-    pull = as_work(of, forces)
-    u = equilibrium(now, found.u, _constant(pull), spins_of(now), now.interface(found.v))
-    return begun(now, u, found.v, strained=found.strained)
+    found = _moving(now, motion_at, pull=as_work(of, forces))
+    return begun(now, found.u, found.v, strained=found.strained)
 
 
 def as_work(of: Ready, forces: Rows) -> Flat:
@@ -175,32 +177,36 @@ def as_work(of: Ready, forces: Rows) -> Flat:
     return np.concatenate([work_on(part, each).ravel() for part, each in zip(of.parts, forces, strict=True)])
 
 
-def _moving(first: Instant, motion_at: Motion, widenings: int = WIDER) -> Moved:
+def _moving(first: Instant, motion_at: Motion, widenings: int = WIDER, pull: Flat | float = 0.0) -> MovingDeflection:
     """Deflection and rate with the rigid-body motion, from instants as close as their rounding allows, put farther apart
-    so many times at most."""
+    so many times at most; under a pull beside loads, as it is at the first instant, that turns with its links."""
     h = first.of.c.h / 4
-    found, left = _differenced(first, motion_at, h)
+    pull = pull + np.zeros(int(first.of.bodies.at[-1]))
+    found, left = differenced_rates(first, motion_at, h, pull)
     for _ in range(widenings):
         if left <= ENOUGH * np.linalg.norm(found.v):
             break
         h *= 4
         try:
-            wider, rest = _differenced(first, motion_at, h)
+            wider, rest = differenced_rates(first, motion_at, h, pull)
         except (SolveError, MotionError):
             break
         if np.linalg.norm(wider.v - found.v) > SAME * left:  # the motion bends within
             break
         if rest < left:
             found, left = wider, rest
+    if pull.any() and left > OPEN * max(np.linalg.norm(found.v), np.linalg.norm(found.u)):
+        raise NoBalanceError(cause=UNSETTLED)
     return found
 
 
-def _differenced(first: Instant, motion_at: Motion, h: float) -> tuple[Moved, float]:
+def differenced_rates(first: Instant, motion_at: Motion, h: float, pull: Flat) -> tuple[MovingDeflection, float]:
     """Deflection and rate from five instants, h after each other, and by how much rates are open where rounding ends what
     dampers feel of them."""
     of = first.of
     instants = [first, *(Instant(of, motion_at, first.time + k * h, first) for k in range(1, 5))]
-    u, change = np.zeros((5, int(of.bodies.at[-1]))), np.inf
+    pulls = [_with_links(first, now, pull) for now in instants]
+    u, change = np.zeros((5, len(pull))), np.inf
     v = felt = np.zeros((5, 0))
     left = 0.0
     for again in range(DAMPED if _feels_rates(of) else 1):
@@ -214,9 +220,9 @@ def _differenced(first: Instant, motion_at: Motion, h: float) -> tuple[Moved, fl
                 now.slow = now.slow or instants[k - 1].slow
                 z1 = now.interface(v[k]) if again else None
                 if again or k:
-                    u[k] = equilibrium(now, guess, _constant(np.zeros_like(guess)), spins_of(now), z1)
+                    u[k] = equilibrium(now, guess, _constant(pulls[k]), spins_of(now), z1)
                 else:
-                    u[k] = _balance(now, guess, np.zeros_like(guess), spins_of(now))
+                    u[k] = _balance(now, guess, pulls[k], spins_of(now))
         except SolveError:
             if again < 2:  # rounding has not grown yet
                 raise
@@ -232,7 +238,18 @@ def _differenced(first: Instant, motion_at: Motion, h: float) -> tuple[Moved, fl
     return _moved(instants, u, felt, h), left  # the rates that dampers have felt: u balances these
 
 
-def _moved(instants: Sequence[Instant], u: Float[np.ndarray, "5 N"], v: Float[np.ndarray, "5 N"], h: float) -> Moved:
+def _with_links(first: Instant, now: Instant, pull: Flat) -> Flat:
+    """Forces as they are at a first instant, at another that links have turned to."""
+    out = np.empty_like(pull)
+    for k, link in enumerate(now.of.system.model.links):
+        here, turn = own(now.of, k), (now.R[k] @ first.R[k].T)[: link.d, : link.d]
+        out[here] = (turn @ pull[here].reshape(link.d, -1)).ravel()
+    return out
+
+
+def _moved(
+    instants: Sequence[Instant], u: Float[np.ndarray, "5 N"], v: Float[np.ndarray, "5 N"], h: float
+) -> MovingDeflection:
     """At the first of five instants, h after each other."""
     now, strained = instants[0], np.empty(u.shape[1])
     for k, link in enumerate(now.of.system.model.links):
@@ -241,7 +258,7 @@ def _moved(instants: Sequence[Instant], u: Float[np.ndarray, "5 N"], v: Float[np
         g = np.stack([each.R[k][:d, :d].T @ y for each, y in zip(instants, x, strict=True)])
         rate = now.R[k][:d, :d] @ (np.tensordot(LATER[0], g, 1) / h)
         strained[here] = (rate + cross_matrix(now.omega[k])[:d, :d] @ x[0]).ravel()
-    return Moved(u[0], v[0], strained)
+    return MovingDeflection(u[0], v[0], strained)
 
 
 def _scatter(u: Float[np.ndarray, "5 N"]) -> float:
@@ -272,7 +289,7 @@ def _relieved(now: Instant, v: Flat) -> tuple[Flat, Flat]:
         C, e = now.gradients(z), now.coordinates(np.stack([z, now.interface(moving), 0 * z]))
         hard = now.hard(C)
         m = np.where(hard, 0.0, now.forces(e)[:, 0])
-        asked = Asked(C[hard], -e[2, hard], np.zeros(int(hard.sum())), C.T @ m)
+        asked = ConstraintTerms(C[hard], -e[2, hard], np.zeros(int(hard.sum())), C.T @ m)
         return -accelerations(now, now.F - f, u, moving, asked, rigid=True).x
 
     u = equilibrium(now, np.zeros_like(v), inertia, None, now.interface(v), FREE)

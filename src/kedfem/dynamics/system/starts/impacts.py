@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from kedfem.arrays import Bool, Float
-from kedfem.dynamics.matrices.bordered import Asked
+from kedfem.dynamics.matrices.bordered import ConstraintTerms
 from kedfem.dynamics.system.arrays import Constraints
 from kedfem.dynamics.system.march import Motion, Ready, march, shortened
 from kedfem.dynamics.system.sparse import SparsePart, momentum
@@ -90,8 +90,10 @@ def _pushed(of: Ready, state: State, between: Motion, met: Bool[np.ndarray, " r"
     m = np.where(met, -of.constraints.numbers[:, 3] * now.coordinates(z)[1], 0.0)
     hard = now.hard(C)
     none = np.zeros(int(hard.sum()))
-    R = np.stack([each.R for each in now.inside(state.u, state.v)])  # links may have turned far from rigid-body motion
-    found = in_a_step(now, np.zeros_like(state.u), Asked(C[hard], none, none, C.T @ m), R)
+    R = np.stack(
+        [each.R for each in now.internal_states(state.u, state.v)]
+    )  # links may have turned far from rigid-body motion
+    found = in_a_step(now, np.zeros_like(state.u), ConstraintTerms(C[hard], none, none, C.T @ m), R)
     m[hard] += found.m
     state.a[:] += found.x
     if found.f is not None:

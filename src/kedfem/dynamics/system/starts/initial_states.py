@@ -8,16 +8,16 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import scipy.sparse as sp
 
-from kedfem.dynamics.matrices.bordered import Asked
+from kedfem.dynamics.matrices.bordered import ConstraintTerms
 from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.starts.accelerations import accelerations
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
-from kedfem.dynamics.system.starts.internal_forces import own, put_momenta, remembered
+from kedfem.dynamics.system.starts.internal_forces import own, put_momenta, store_internal_state
 from kedfem.dynamics.system.starts.linear_equations import LinearEquations, Solved
 from kedfem.dynamics.system.state import State, empty_state
 
-Accelerated = Callable[[Instant, Flat, Flat, Flat, Asked], Solved]
+Accelerated = Callable[[Instant, Flat, Flat, Flat, ConstraintTerms], Solved]
 
 
 def rest(
@@ -65,14 +65,14 @@ def begun(
     z1 = now.interface(v)
     e = now.coordinates(np.stack([z, z1, none]))
     m = np.where(hard, 0.0, now.forces(e)[:, 0])
-    asked = Asked(C[hard], -e[2, hard], np.zeros(int(hard.sum())), C.T @ m)
-    inside = now.inside(u, strained)
+    asked = ConstraintTerms(C[hard], -e[2, hard], np.zeros(int(hard.sum())), C.T @ m)
+    inside = now.internal_states(u, strained)
     found = accelerated(now, now.F - np.concatenate([x.f for x in inside]), u, v, asked)
     m[hard] = found.m
     e[2] += C @ found.z
     state = empty_state(of.bodies, of.constraints)
     for k, each in enumerate(inside):
-        remembered(of, k, each, state)
+        store_internal_state(of, k, each, state)
     if found.f is not None:
         state.f[:] += found.f
     state.time[0], state.F[:], state.u[:], state.v[:] = now.time, now.F, u, v
@@ -91,5 +91,5 @@ def _closing(now: Instant, C: sp.csr_array, open_: Flat) -> Flat:
     if not np.abs(open_).max(initial=0.0):
         return none
     held = [now.always.mass(k) for k in range(len(of.parts))]
-    asked = Asked(C, -open_, np.zeros(len(open_)), np.zeros(of.system.unknowns))
+    asked = ConstraintTerms(C, -open_, np.zeros(len(open_)), np.zeros(of.system.unknowns))
     return LinearEquations(of, held, now.R, asked).solved(none).x

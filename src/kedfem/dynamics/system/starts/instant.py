@@ -1,4 +1,4 @@
-"""A system at one time of its rigid-body motion: all that starts ask of bodies, coordinates and laws there."""
+"""A system at one instant of its rigid-body motion: bodies, coordinates and laws as starts need them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -21,8 +21,8 @@ from kedfem.dynamics.system.march import Ready, driving
 from kedfem.dynamics.system.record import ANGLE, Driven, Held, law_at
 from kedfem.dynamics.system.sparse import SparsePart, softening
 from kedfem.dynamics.system.starts.coordinate_rates import angles, coordinates, pins, places, travels
-from kedfem.dynamics.system.starts.internal_forces import Inside, Still, inside, own, rows
-from kedfem.dynamics.system.starts.laws import Props, exerted, feels_rates
+from kedfem.dynamics.system.starts.internal_forces import InternalState, StaticForces, internal_state, own, rows
+from kedfem.dynamics.system.starts.laws import TemporarySprings, exerted, feels_rates
 from kedfem.dynamics.system.starts.linear_equations import HeldBody, mass_body, sparse_body
 from kedfem.errors import SolveError
 from kedfem.motion.newton import cross_matrix
@@ -44,7 +44,7 @@ class Always:
     columns : (e,) interface unknowns that coordinates have entries of their gradients on
     rated : which coordinates are linear in these, with a force that depends on their rate
     closed : z from displacements at all interface points, w = B z as nearly as can be
-    still : internal forces of bodies
+    static : internal forces of bodies
     least : what the stiffness of body k gets of its mass, so that it is definite where nothing holds it [1/s²]
     held, mass : a sparse body with that stiffness, and a body with its mass for a matrix, factored once
     """
@@ -53,7 +53,7 @@ class Always:
     columns: Int[np.ndarray, " e"]
     rated: Bool[np.ndarray, " r"]
     closed: Callable[[Flat], Flat]
-    still: Still
+    static: StaticForces
     least: Callable[[int], float]
     held: Callable[[int], HeldBody]
     mass: Callable[[int], HeldBody]
@@ -65,7 +65,7 @@ class Instant:
     Parameters
     ----------
     like : another of the same system: what does not depend on time is taken from there
-    near : (terms,) angles of all terms to within half a turn, as of a state shortly before; none: near zero
+    near : (terms,) angles of all terms to within half a revolution, as of a state shortly before; none: near zero
 
     `relief`, (r,) or nothing, is taken from the forces along all coordinates.
     """
@@ -80,7 +80,7 @@ class Instant:
         self.F, self.amounts, self.at = along.F[0], along.amounts[0], places(motion)
         self._stations = along.stations[0]
         self.slow = False  # whether the mass that makes matrices of bodies definite slows iterations
-        self.props: Props | None = None
+        self.temporary_springs: TemporarySprings | None = None
         self.R, self.omega = motion.R[0][of.bodies.motion], motion.omega[0][of.bodies.motion]
         self.travels = travels(of.system, self.at)
         self.always: Always = always(of) if like is None else like.always
@@ -95,11 +95,11 @@ class Instant:
             out[own(self.of, k)] = work_on(self.of.parts[k], force).ravel()
         return out
 
-    def inside(self, u: Flat, v: Flat) -> list[Inside]:
+    def internal_states(self, u: Flat, v: Flat) -> list[InternalState]:
         """All bodies at a displacement and rate; loads that turn with them are taken from their internal forces."""
         of, spins = self.of, cross_matrix(self.omega)
-        still = self.always.still
-        out = [inside(still, k, self.R[k], spins[k], u[own(of, k)], v[own(of, k)]) for k in range(len(self.R))]
+        static = self.always.static
+        out = [internal_state(static, k, self.R[k], spins[k], u[own(of, k)], v[own(of, k)]) for k in range(len(self.R))]
         pushed = self.pushed(u) - self.stress(u)
         return [replace(each, f=each.f - pushed[own(of, k)]) for k, each in enumerate(out)]
 
@@ -135,7 +135,7 @@ class Instant:
         return e
 
     def _whole_turns(self, z: Flat) -> Float[np.ndarray, " r"]:
-        """What coordinates gain by the whole turns that their terms have made; none where they are linear in z."""
+        """What coordinates gain by the whole revolutions that their terms have made; none where they are linear in z."""
         system, out, place = self.of.system, np.zeros(len(self.of.system.constraints)), 0
         found = angles(system, self.at, z)
         more = _counted(self, found) - found
@@ -173,17 +173,17 @@ class Instant:
         return self._as_in_steps(z)[0]
 
     def _as_in_steps(self, z: Flat) -> tuple[sp.csr_array, Float[np.ndarray, " r"], Float[np.ndarray, " r"]]:
-        """The same with values and rates as in `Still.measured`."""
+        """The same with values and rates as in `StaticForces.measured`."""
         of, always, known = self.of, self.always, np.zeros(self.of.system.unknowns)
         known[always.number] = z
         near = np.zeros(len(of.constraints.kind)) if self.near is None else _nearby(self)
-        data, e, rate = always.still.measured(self.motion, self._stations, near, known)
+        data, e, rate = always.static.measured(self.motion, self._stations, near, known)
         return sp.csr_array((data, always.columns, of.constraints.column_at), (len(e), len(z))), e, rate
 
     def forces(self, e: Float[np.ndarray, "_ r"]) -> Float[np.ndarray, "r 3"]:
         """Of all laws: force along the coordinate, and how it falls with it and its rate; zero of constraints."""
         laws = [law_at(each.law, self.motion.t, self.motion.phi) for each in self.of.system.constraints]
-        found = exerted(laws, self.time, e, self.props)
+        found = exerted(laws, self.time, e, self.temporary_springs)
         found[:, 0] -= self.relief
         return found
 
@@ -202,8 +202,8 @@ def sizes(C: sp.csr_array) -> Float[np.ndarray, " r"]:
 
 def always(of: Ready) -> Always:
     """What starts of a system ask at every time."""
-    still, links, joints = Still(of), of.system.model.links, of.system.model.joints
-    lowest = cache(lambda: SOFTER * _lowest(of, still))
+    static, links, joints = StaticForces(of), of.system.model.links, of.system.model.joints
+    lowest = cache(lambda: SOFTER * _lowest(of, static))
 
     def least(k: int) -> float:
         return softening(links[k]) if isinstance(of.parts[k], SparsePart) else lowest()
@@ -214,12 +214,12 @@ def always(of: Ready) -> Always:
     number = renumbered(of)
     rated = np.array([each.linear and feels_rates(each.law) for each in of.system.constraints], bool)
     columns, mass = np.argsort(number)[of.constraints.columns], partial(mass_body, of)
-    return Always(number, columns, rated, closure(of), still, cache(least), cache(held), cache(mass))
+    return Always(number, columns, rated, closure(of), static, cache(least), cache(held), cache(mass))
 
 
-def _lowest(of: Ready, still: Still) -> float:
+def _lowest(of: Ready, static: StaticForces) -> float:
     """Least eigenvalue of free dense bodies that strain."""
-    every = zip(still.K, of.system.model.links, of.parts, strict=True)
+    every = zip(static.K, of.system.model.links, of.parts, strict=True)
     dense = [(K, link) for K, link, part in every if not isinstance(part, SparsePart) and K.any()]
     return min((float(np.linalg.eigvalsh(K)[3 if link.planar else 6]) for K, link in dense), default=1.0)
 
@@ -242,19 +242,19 @@ def renumbered(of: Ready) -> Int[np.ndarray, " k"]:
 
 
 def turned(now: Instant, z: Flat) -> Flat:
-    """Angles of all terms, within half a turn of what they are near; of drives of what these ask."""
+    """Angles of all terms, within half a revolution of what they are near; of drives of what these ask."""
     return _counted(now, angles(now.of.system, now.at, z))
 
 
 def _counted(now: Instant, found: Flat) -> Flat:
-    """The same of angles to within whole turns."""
+    """The same of angles to within whole revolutions."""
     near = _nearby(now)
     of_angles = np.array([x.kind == ANGLE for each in now.of.system.constraints for x in each.terms], bool)
     return np.asarray(np.where(of_angles, found + TURN * np.round((near - found) / TURN), 0.0))
 
 
 def _nearby(now: Instant) -> Flat:
-    """Angles of all terms to within half a turn."""
+    """Angles of all terms to within half a revolution."""
     near, place = np.zeros(len(now.of.constraints.kind)) if now.near is None else now.near.copy(), 0
     for each in now.of.system.constraints:
         drive = getattr(each.law, "drive", -1)

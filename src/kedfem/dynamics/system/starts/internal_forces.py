@@ -1,4 +1,4 @@
-"""What a body is inside where a march begins: internal force, frames and damped quantities from u and u'."""
+"""Internal state of a body at the start of a march: internal force, frames and damped quantities from u and u'."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,7 +24,7 @@ Frames = tuple[Float[np.ndarray, "L 3 3"], Float[np.ndarray, " L"]]
 """Rotations of bodies' frames against the rigid-body motion; of planar ones the angles, which count turns."""
 
 
-class Still:
+class StaticForces:
     """Internal forces of all bodies where they do not move in their frames: what balances of deflections ask for.
 
     K : per body its stiffness on coordinates, in its frame; of sparse ones K0, on nodal rows
@@ -56,10 +56,10 @@ class Still:
         bodies, trial = self.of.bodies, self._trial
         trial.u[:] = u
         if (bodies.frame > RIGID_BODY).any():  # else nothing has to be compiled
-            from kedfem.dynamics.system.still_kernel import still_forces
+            from kedfem.dynamics.system.static_kernel import static_forces
 
             c, constant, state, end, work = self._of_forces
-            still_forces(c, constant, R, amounts, state, end, work)
+            static_forces(c, constant, R, amounts, state, end, work)
         f, mean = trial.f.copy(), R[bodies.motion].copy()
         for k, frame in enumerate(bodies.frame):
             if frame > RIGID_BODY:
@@ -72,16 +72,16 @@ class Still:
     @cached_property
     def _of_forces(self) -> list[Any]:
         """Records as compiled code is handed them, once: their arrays stay where they are."""
-        from kedfem.dynamics.system.reference import handed
+        from kedfem.dynamics.system.reference import by_address
 
-        return [handed(x) for x in (self._c, self.of.bodies, self._state, self._trial, self._work)]
+        return [by_address(x) for x in (self._c, self.of.bodies, self._state, self._trial, self._work)]
 
     @cached_property
     def _of_gradients(self) -> list[Any]:
         """The same for gradients."""
-        from kedfem.dynamics.system.reference import handed
+        from kedfem.dynamics.system.reference import by_address
 
-        return [handed(x) for x in (self.of.ends, self.of.constraints, self._trial, self._work)]
+        return [by_address(x) for x in (self.of.ends, self.of.constraints, self._trial, self._work)]
 
     def frames(self) -> Frames:
         """The bodies' frames as they were last found, from which they are sought again."""
@@ -102,18 +102,18 @@ class Still:
         Parameters
         ----------
         motion : rigid-body motion at one time; stations : weights of ends on lines there
-        near : angles of all terms to within half a turn
+        near : angles of all terms to within half a revolution
         z : in the order of a state
         """
         trial = self._trial
         if len(trial.e):
-            from kedfem.dynamics.system.still_kernel import still_gradients
+            from kedfem.dynamics.system.static_kernel import static_gradients
 
             omega = np.ascontiguousarray(motion.omega[0])  # laid out as in steps: compiled once for both
             turning = motion.R[0], motion.v[0], omega
             ends, constraints, handed_trial, work = self._of_gradients
             trial.turned[:] = near
-            still_gradients(ends, constraints, turning, motion.p[0], stations, z, handed_trial, work)
+            static_gradients(ends, constraints, turning, motion.p[0], stations, z, handed_trial, work)
         return trial.C.copy(), trial.e.copy(), trial.m.copy()
 
     def sprung(self, k: int, R: Float[np.ndarray, "3 3"], u: Flat) -> Flat:
@@ -142,7 +142,7 @@ def _rigid(link: Link, part: Any) -> Float[np.ndarray, "N m"]:
 
 
 @dataclass(frozen=True, slots=True)
-class Inside:
+class InternalState:
     """A body at one time: internal force f (N,) on its coordinates, world components; R (3, 3) its mean orientation.
 
     g : (n, d) its displacement in the rigid-body frame [m]; energy : ½ gᵀ K0 g, as its frames see it [J]
@@ -184,14 +184,16 @@ def turned_rate(spin: Float[np.ndarray, "3 3"], x: Nodal) -> Nodal:
     return np.asarray(x @ spin[:d, :d].T)
 
 
-def inside(still: Still, k: int, R: Float[np.ndarray, "3 3"], spin: Float[np.ndarray, "3 3"], u: Flat, v: Flat) -> Inside:
+def internal_state(
+    static: StaticForces, k: int, R: Float[np.ndarray, "3 3"], spin: Float[np.ndarray, "3 3"], u: Flat, v: Flat
+) -> InternalState:
     """Body k at the displacement u with the rate v.
 
     Parameters
     ----------
     R, spin : of the rigid-body motion, and its [ω]×
     """
-    of = still.of
+    of = static.of
     link, damping = of.system.model.links[k], of.system.model.damping
     d = link.d
     x, x1 = rows(of, k, u), rows(of, k, v)
@@ -206,17 +208,17 @@ def inside(still: Still, k: int, R: Float[np.ndarray, "3 3"], spin: Float[np.nda
     mean = R.copy()
     mean[:d, :d] = mean_orientation(link, x, R[:d, :d])
     if link.fit is None:
-        elastic = still.sprung(k, R, u)
+        elastic = static.sprung(k, R, u)
         f = elastic + work_on(of.parts[k], damped[1] @ R[:d, :d].T).ravel()
-        return Inside(f, mean, frames, damped, g, 0.5 * float(elastic @ u))
+        return InternalState(f, mean, frames, damped, g, 0.5 * float(elastic @ u))
     force, energy = damped[1], 0.0
     for frame, now in zip(frames_of(link), frames, strict=True):
         own_force, own_energy = frame_force(link, frame, now, y, damping.beta)
         force, energy = force + own_force, energy + own_energy
-    return Inside(work_on(of.parts[k], force @ R[:d, :d].T).ravel(), mean, frames, damped, g, energy)
+    return InternalState(work_on(of.parts[k], force @ R[:d, :d].T).ravel(), mean, frames, damped, g, energy)
 
 
-def remembered(of: Ready, k: int, found: Inside, state: State) -> None:
+def store_internal_state(of: Ready, k: int, found: InternalState, state: State) -> None:
     """What a step remembers of body k, put into the state."""
     link, part, here = of.system.model.links[k], of.parts[k], own(of, k)
     state.f[here] = found.f

@@ -1,4 +1,4 @@
-"""Forces of laws at one instant, as starts ask for them."""
+"""Forces of laws at one instant, for the starts of marches."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,24 +12,26 @@ Coordinates = Float[np.ndarray, " r"]
 
 
 @dataclass(frozen=True, slots=True)
-class Props:
+class TemporarySprings:
     """Springs on coordinates that stops limit: stiffness (r,), none on others, and where they exert nothing (r,)."""
 
     stiffness: Coordinates
     about: Coordinates
 
 
-def exerted(laws: Sequence[Law], t: float, e: Float[np.ndarray, "_ r"], props: Props | None) -> Float[np.ndarray, "r 3"]:
-    """Of all laws and props: force along the coordinate, and how it falls with it and its rate; zero of constraints.
+def exerted(
+    laws: Sequence[Law], t: float, e: Float[np.ndarray, "_ r"], temporary: TemporarySprings | None
+) -> Float[np.ndarray, "r 3"]:
+    """Forces of all laws and temporary springs, and how they fall with coordinate and rate; zero of constraints.
 
     Parameters
     ----------
     e : coordinates and their rates
     """
     out = np.array([push(law, t, e[0, n], e[1, n]) for n, law in enumerate(laws)]).reshape(-1, 3)
-    if props is not None:
-        out[:, 0] -= props.stiffness * (e[0] - props.about)
-        out[:, 1] += props.stiffness
+    if temporary is not None:
+        out[:, 0] -= temporary.stiffness * (e[0] - temporary.about)
+        out[:, 1] += temporary.stiffness
     return out
 
 

@@ -21,7 +21,7 @@ from scipy.sparse.linalg import LinearOperator
 from kedfem.arrays import Float
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.ports import port_rotation
-from kedfem.dynamics.matrices.bordered import Asked, Bordered
+from kedfem.dynamics.matrices.bordered import Bordered, ConstraintTerms
 from kedfem.dynamics.matrices.substructure import Substructure, mass_substructure
 from kedfem.dynamics.system.march import Ready
 from kedfem.dynamics.system.sparse import SparsePart, sparse_part
@@ -109,7 +109,9 @@ class LinearEquations:
     asked : constraints that repeat others get no force
     """
 
-    def __init__(self, of: Ready, held: Sequence[HeldBody], R: Float[np.ndarray, "_ 3 3"], asked: Asked) -> None:
+    def __init__(
+        self, of: Ready, held: Sequence[HeldBody], R: Float[np.ndarray, "_ 3 3"], asked: ConstraintTerms
+    ) -> None:
         self.of, self.held, self.R, self.asked = of, held, R, asked
         joints = of.system.model.joints
         self.columns = [joint.columns for joint in joints]

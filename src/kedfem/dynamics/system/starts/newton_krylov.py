@@ -21,7 +21,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from kedfem.arrays import Bool, Float
 from kedfem.dynamics.frames import mean_orientation
-from kedfem.dynamics.matrices.bordered import Asked
+from kedfem.dynamics.matrices.bordered import ConstraintTerms
 from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.system.record import COROTATIONAL
 from kedfem.dynamics.system.sparse import momentum
@@ -95,7 +95,7 @@ class Equilibrium:
     def forces(self, u: Flat) -> tuple[Flat, Flat, Frames]:
         """Internal ones, all on bodies, and their mean frames."""
         now = self.now
-        f, R = self.bodies.still.forces(now.motion.R[0], u, now.amounts)
+        f, R = self.bodies.static.forces(now.motion.R[0], u, now.amounts)
         return f, now.F - f + self.more(u, f) - self.inertia.inertia(u) - now.stress(u), R
 
     def at(self, u: Flat) -> Point:
@@ -108,16 +108,16 @@ class Equilibrium:
         moved = np.zeros_like(u)
         for k, open_ in enumerate(gaps(now, u, z)):
             moved[own(of, k)] = self.right[k] @ open_
-        frames = self.bodies.still.frames()
+        frames = self.bodies.static.frames()
         return Point(u, f, r, R, z, C, e[0], laws[:, 0], laws[:, 1], now.hard(C), moved, frames)
 
-    def asked(self, at: Point, m: Flat) -> Asked:
+    def asked(self, at: Point, m: Flat) -> ConstraintTerms:
         """What constraints and laws ask of a change, with forces m of constraints in it."""
         soft = at.slopes > 0.0
         every = at.hard | soft
         compliance = np.where(soft, 1 / np.where(soft, at.slopes, 1.0), 0.0)
         target = np.where(at.hard, -at.e, 0.0)
-        return Asked(at.C[every], target[every], compliance[every], at.C.T @ self.exerted(at, m))
+        return ConstraintTerms(at.C[every], target[every], compliance[every], at.C.T @ self.exerted(at, m))
 
     def exerted(self, at: Point, m: Flat) -> Flat:
         """Forces along all coordinates."""
@@ -150,7 +150,7 @@ class Equilibrium:
             R = at.R[k][:d, :d]
             local = (R.T @ x[here].reshape(d, -1)).ravel()
             mass = momentum(links[k], local) if self.bodies.sparse[k] else local
-            f = always.still.times(k, local) + always.least(k) * mass
+            f = always.static.times(k, local) + always.least(k) * mass
             out[here] = (R @ f.reshape(d, -1)).ravel()
         return out
 
@@ -181,7 +181,7 @@ class Equilibrium:
         """
         part = 1.0
         while True:
-            self.bodies.still.seek_from(at.frames)
+            self.bodies.static.seek_from(at.frames)
             new = self.at(self.taken(at, part * change))
             left = float(np.linalg.norm(self.left(new, m, balance)))
             if left <= (1 - FALLS * part) * before or tiny or part <= SHORTEST:
@@ -210,7 +210,7 @@ class Equilibrium:
             before, after = base + rows(of, k, at.u[here]), base + rows(of, k, u[here])
             turned = mean_orientation(link, rows(of, k, u[here]), R0)
             share = link.m1[:, 0] / (link.one @ link.m1[:, 0])
-            B = self.now.always.still.rigid[k]
+            B = self.now.always.static.rigid[k]
             strain = (R.T @ change[here].reshape(d, -1)).ravel()
             strain = strain - B @ (B.T @ strain)
             strain = rows(of, k, strain)
@@ -252,16 +252,8 @@ def stands_off(now: Instant, u: Flat, z1: Flat | None) -> str:
     return ""
 
 
-@dataclass(frozen=True, slots=True)
-class Found:
-    """A deflection; moves : what changed most where the search ended without a balance, in words."""
-
-    u: Flat
-    moves: str = ""
-
-
-def solution(problem: Equilibrium, u: Flat) -> Found:
-    """The deflection at which all forces balance, from a guess."""
+def solution(problem: Equilibrium, u: Flat) -> tuple[Flat, str]:
+    """The deflection at which all forces balance, from a guess; what changed most where none is found, in words."""
     now, bodies, last, settled, short = problem.now, problem.bodies, np.inf, False, 0
     at = problem.at(u)
     m, change, new = np.zeros(len(at.e)), np.zeros_like(u), at
@@ -279,13 +271,13 @@ def solution(problem: Equilibrium, u: Flat) -> Found:
         left, tiny = float(np.linalg.norm(first.x)), size <= ROUNDING * reached
         new, part = problem.stepped(at, m, balance, change, left, tiny)
         if settled:
-            return Found(new.u)
+            return new.u, ""
         stalls = size > last / 2 and tiny
         settled = stalls or (part == 1.0 and size <= CONVERGED * reached + now.of.c.floor)
         short = short + 1 if part <= SHORTEST else 0
         if short == IN_A_ROW:
             if size <= LEAST * reached and left <= CONVERGED * reached:
-                return Found(at.u)
+                return at.u, ""
             break
         at, last = new, size
-    return Found(at.u, problem.moves(at, new, change))
+    return at.u, problem.moves(at, new, change)

@@ -1,4 +1,4 @@
-"""Series in time: arrays (3, …) of a value, its rate, and the rate of that."""
+"""Time series to second order: arrays (3, …) of a value and its first and second rates."""
 
 from collections.abc import Callable
 

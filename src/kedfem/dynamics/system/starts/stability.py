@@ -1,4 +1,4 @@
-"""Whether a balance of forces is stable: by what these leave of the stiffness.
+"""Stability of a balance of forces: whether the stiffness is positive definite with the change of the forces.
 
 With A the stiffness of bodies in their mean frames and of laws, and J the tangent of all forces at a balance, both of
 motions that joints allow,
@@ -93,7 +93,7 @@ class _Tangent:
 
     def _forces(self, u: Flat) -> tuple[Flat, Flat]:
         """Of all bodies, and of joints and laws on the interface, at a deflection."""
-        self.problem.bodies.still.seek_from(self.at.frames)
+        self.problem.bodies.static.seek_from(self.at.frames)
         now = self.problem.now
         return self.problem.forces(u)[1], now.gradients(now.interface(u)).T @ self.push
 

@@ -1,4 +1,4 @@
-"""Bodies with K0 and the inertia of turning, held at their interface points."""
+"""Stiffness of bodies with the inertia of their rotation, held at their interface points."""
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
@@ -29,7 +29,7 @@ class TurningBodies:
 
     def __init__(self, now: Instant, spins: Spins | None) -> None:
         self.now, self.spins, self._made = now, spins, list[HeldBody]()
-        self.still = now.always.still
+        self.static = now.always.static
         self.sparse = [isinstance(part, SparsePart) for part in now.of.parts]
 
     def held(self, R: Float[np.ndarray, "L 3 3"]) -> list[HeldBody]:
@@ -39,7 +39,7 @@ class TurningBodies:
             if self.sparse[k]:
                 self._made.append(self.now.always.held(k))
                 continue
-            A = self.still.K[k] + self.now.always.least(k) * np.eye(len(self.still.K[k]))
+            A = self.static.K[k] + self.now.always.least(k) * np.eye(len(self.static.K[k]))
             if self.spins is not None:
                 S = (R[k].T @ self.spins[k] @ R[k])[: link.d, : link.d]
                 A = A + np.kron(S, np.eye(link.n))

@@ -1,4 +1,4 @@
-"""Places and normals on the faces of a solid, and the axes about which single faces turn."""
+"""Sample points and normals on the faces of a solid, and the axes of its faces of revolution."""
 
 from dataclasses import dataclass
 from types import ModuleType
@@ -26,7 +26,7 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True)
-class Looks:
+class FaceSamples:
     """Places (q, 3) and unit normals (q, 3) on a face, lengths in sizes of the solid, from its middle."""
 
     face: CadFace
@@ -42,19 +42,19 @@ class Looks:
         return bool(abs(self.normals @ direction).max(initial=0) < OFF)
 
 
-def looks(gmsh: ModuleType, solid: Solid) -> dict[int, Looks]:
+def face_samples(gmsh: ModuleType, solid: Solid) -> dict[int, FaceSamples]:
     """Of each face, by its tag, places and normals, without those that OpenCASCADE does not know."""
-    return {face.tag: _looks(gmsh, solid, face) for face in solid.faces}
+    return {face.tag: _face_samples(gmsh, solid, face) for face in solid.faces}
 
 
-def _looks(gmsh: ModuleType, solid: Solid, face: CadFace) -> Looks:
+def _face_samples(gmsh: ModuleType, solid: Solid, face: CadFace) -> FaceSamples:
     """Those of one face."""
     on = places_on(gmsh, face.tag, _SHARES)
     known = np.isfinite(on.points).all(axis=1) & (abs(np.linalg.norm(on.normals, axis=1) - 1) < 1e-6)
-    return Looks(face, (on.points[known] - solid.middle) / solid.extent, on.normals[known])
+    return FaceSamples(face, (on.points[known] - solid.middle) / solid.extent, on.normals[known])
 
 
-def common_axes(solid: Solid, every: list[Looks]) -> list[Axis]:
+def common_axes(solid: Solid, every: list[FaceSamples]) -> list[Axis]:
     """The axes of single faces, each once, of those with the largest area first.
 
     The normals of a surface of revolution meet its axis: n · (a × (x − p)) = 0 of all places x and normals n on it is
@@ -72,7 +72,7 @@ def common_axes(solid: Solid, every: list[Looks]) -> list[Axis]:
     return [axis for _, axis in sorted(found, key=lambda each: -each[0])]
 
 
-def _own_axes(solid: Solid, look: Looks, every: list[Looks]) -> list[Axis]:
+def _own_axes(solid: Solid, look: FaceSamples, every: list[FaceSamples]) -> list[Axis]:
     """Axes about which one face turns; of a sphere those across plane faces, else z."""
     face = look.face
     if face.kind == "plane":

@@ -1,4 +1,4 @@
-"""The size of a swept mesh: what is asked for, smaller where elements are poor, larger where they are plenty."""
+"""The element size of a swept mesh: as asked for, smaller where elements are poor, larger where they are too many."""
 
 from collections.abc import Callable
 from typing import TypeVar

@@ -1,7 +1,8 @@
-"""Balances in which nothing but stops holds links: an arm on a hinge that a force presses against one.
+"""Static balance of links that only stops constrain, such as an arm pressed against one, by temporary springs.
 
-A search that begins apart from them has no stiffness to go by. Springs on what stops limit hold links first, near where
-the search begins, and are loosened until stops bear what they bore; the balance that is found is one without them.
+A search that begins away from the stops finds no stiffness. Temporary springs on the limited coordinates first hold the
+links near the start of the search, and are weakened until the stops take over their forces; the final balance is without
+springs.
 """
 
 from collections.abc import Callable
@@ -12,12 +13,12 @@ import numpy as np
 from kedfem.arrays import Bool
 from kedfem.dynamics.system.record import Stop
 from kedfem.dynamics.system.starts.instant import Flat, Instant, turned
-from kedfem.dynamics.system.starts.laws import Props
+from kedfem.dynamics.system.starts.laws import TemporarySprings
 from kedfem.errors import SolveError
 
-STIFFER, STIFFENED = 1e2, 4  # props than the stops, so many times, until a balance is found
+STIFFER, STIFFENED = 1e2, 4  # temporary springs than the stops, so many times, until a balance is found
 LOOSER, LEAST_LOOSER = 0.1, 0.7  # from one balance to the next, and where that is far too
-STILL = 1e-2  # of how far limited coordinates have gone: changes from one to the next below which props bear nothing
+STILL = 1e-2  # of how far limited coordinates have gone: changes below which temporary springs bear nothing
 LAST = 1e-12  # of a stop's stiffness: the loosest
 
 Sought = Callable[[Instant, Flat], Flat]
@@ -28,8 +29,8 @@ def has_stops(now: Instant) -> bool:
     return any(isinstance(each.law, Stop) for each in now.of.system.constraints)
 
 
-def without_props(now: Instant, u: Flat, z1: Flat | None, sought: Sought) -> Flat | None:
-    """A balance that is found from ones with props; None if none is.
+def with_temporary_springs(now: Instant, u: Flat, z1: Flat | None, sought: Sought) -> Flat | None:
+    """A balance that is found by temporary springs; None if none is.
 
     Parameters
     ----------
@@ -37,17 +38,17 @@ def without_props(now: Instant, u: Flat, z1: Flat | None, sought: Sought) -> Fla
     z1 : rates of the interface unknowns
     sought : a balance at an instant, from a guess
     """
-    laws, still = [each.law for each in now.of.system.constraints], now.always.still
+    laws, static = [each.law for each in now.of.system.constraints], now.always.static
     stiffness = np.array([each.stiffness if isinstance(each, Stop) else 0.0 for each in laws])
     about, bearing = limited(now, u, z1)
-    near, frames, at, e = now.near, still.frames(), u, about
+    near, frames, at, e = now.near, static.frames(), u, about
 
     def found(factor: float) -> Flat | None:
-        still.seek_from(frames)
-        propped = copy(now)
-        propped.near, propped.props = near, Props(factor * stiffness, about) if factor else None
+        static.seek_from(frames)
+        sprung = copy(now)
+        sprung.near, sprung.temporary_springs = near, TemporarySprings(factor * stiffness, about) if factor else None
         try:
-            return sought(propped, at)
+            return sought(sprung, at)
         except SolveError:
             return None
 
@@ -65,7 +66,7 @@ def without_props(now: Instant, u: Flat, z1: Flat | None, sought: Sought) -> Fla
                 return None
             factor *= looser
             continue
-        at, frames, first = nearer, still.frames(), False
+        at, frames, first = nearer, static.frames(), False
         counted = copy(now)
         counted.near = near
         near = turned(counted, counted.interface(at))

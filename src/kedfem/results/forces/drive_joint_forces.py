@@ -1,24 +1,24 @@
-"""What a rigid link that a drive carries exerts on its hub."""
+"""What a rigid link that a drive prescribes exerts on its drive joint."""
 
 import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.joints.constraint_joints import ordered
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model, PrescribedBody
 from kedfem.dynamics.system.forces.exerted import effort
 from kedfem.dynamics.system.forces.supports import supports
 from kedfem.links.record import in_space
 from kedfem.motion.constraints import cross
+from kedfem.motion.joint_equations import ordered
 from kedfem.results.forces.port_forces import Forces, Wrench, holder, port_wrench, resultant
 from kedfem.results.recorded import Rows
 from kedfem.scene import Scene
 
 
 def partner(scene: Scene, prescribed: PrescribedBody) -> str:
-    """What a prescribed body's driven joint holds it on: the ground, or a moving part of it."""
-    first, second = scene.joints[prescribed.hub].links
+    """The other link of a prescribed body's drive joint: the ground, or a moving part of it."""
+    first, second = scene.joints[prescribed.drive_joint].links
     return second if first == prescribed.link.name else first
 
 
@@ -31,9 +31,12 @@ def constrained_joints(scene: Scene, model: Model, prescribed: PrescribedBody) -
     return [x.name for x in model.rows if x.name in joints and prescribed.link.name in joints[x.name].links]
 
 
-def hub_wrench(scene: Scene, model: Model, prescribed: PrescribedBody, forces: Forces) -> tuple[Wrench, list[Held]]:
-    """What holds a prescribed link in balance: P − M R0'', motors, springs, other joints, and the hub's; these joints."""
-    link, hub = prescribed.link, np.asarray(scene.joints[prescribed.hub].at)
+def drive_joint_wrench(
+    scene: Scene, model: Model, prescribed: PrescribedBody, forces: Forces
+) -> tuple[Wrench, list[Held]]:
+    """Force and moment of the drive joint that balance a prescribed link under P − M R0'', motors, springs, other joints;
+    and these joints."""
+    link, centre_of_joint = prescribed.link, np.asarray(scene.joints[prescribed.drive_joint].at)
     held: list[Held] = []
     sliding = constrained_joints(scene, model, prescribed)
     for name, joint in scene.joints.items():
@@ -42,24 +45,24 @@ def hub_wrench(scene: Scene, model: Model, prescribed: PrescribedBody, forces: F
             held.append((holder(model, elastic[0], name), name, np.asarray(joint.at)))
     others = [(port_wrench(model, *each, forces), each[2]) for each in held]
     carried = [x for x in model.prescribed if partner(scene, x) == link.name]
-    riders = [(x, *hub_wrench(scene, model, x, forces)) for x in carried]
+    riders = [(x, *drive_joint_wrench(scene, model, x, forces)) for x in carried]
     held += [each for _, _, below in riders for each in below]
 
     def wrench(block: Block) -> tuple[Rows, Rows]:
         F = applied(link, prescribed.loads, block.motion, prescribed.body)
         R = block.motion.R[:, prescribed.body]
-        arms = (link.X - np.outer(link.one, hub)) @ R.transpose(0, 2, 1)
-        centre = block.motion.p[:, prescribed.body] + R @ hub
+        arms = (link.X - np.outer(link.one, centre_of_joint)) @ R.transpose(0, 2, 1)
+        centre = block.motion.p[:, prescribed.body] + R @ centre_of_joint
         force, moment = forces.force_elements.on(link.name, block, centre)
         force = -force - in_space(link, np.tensordot(F, link.one, (1, 0)))
         moment = -moment - resultant(link, arms, F)[1]
         for other, at in others:
             f, m = other(block)
             force = force + f
-            moment = moment + m + cross((R @ (at - hub)), f)
+            moment = moment + m + cross((R @ (at - centre_of_joint)), f)
         for rider, on_rider, _ in riders:
             f, m = on_rider(block)
-            place = block.motion.position(rider.body, np.asarray(scene.joints[rider.hub].at))
+            place = block.motion.position(rider.body, np.asarray(scene.joints[rider.drive_joint].at))
             force, moment = force + f, moment + m + cross(place - centre, f)
         for name in sliding:
             f, m, point = forces.rows.wrench(name, block)

@@ -1,5 +1,4 @@
-"""What balances of deflections ask for, compiled by numba: internal forces of bodies that do not move in their frames,
-and gradients of coordinates. They are those of a step, without rates."""
+"""Internal forces and gradients of coordinates in static balance, compiled by numba: those of a step, without rates."""
 
 from kedfem.compiled import compiled
 from kedfem.dynamics.beams_kernel import begun
@@ -11,7 +10,7 @@ from kedfem.dynamics.system.record import RIGID_BODY
 
 
 @compiled
-def still_forces(c, bodies, R, amounts, state, trial, work):  # type: ignore[no-untyped-def]
+def static_forces(c, bodies, R, amounts, state, trial, work):  # type: ignore[no-untyped-def]
     """trial.f becomes the internal force of bodies with frames of their own at trial.u, trial.Rp their orientation.
 
     Parameters
@@ -28,7 +27,7 @@ def still_forces(c, bodies, R, amounts, state, trial, work):  # type: ignore[no-
 
 
 @compiled
-def still_gradients(ends, of, rigid_motion, p, stations, z, trial, work):  # type: ignore[no-untyped-def]
+def static_gradients(ends, of, rigid_motion, p, stations, z, trial, work):  # type: ignore[no-untyped-def]
     """trial.C becomes the gradients of all coordinates on z: of those that are linear, and do not change, at z = 0.
 
     trial.e becomes their values there, trial.m their rates in the rigid-body motion.

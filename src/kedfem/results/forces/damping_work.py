@@ -1,4 +1,4 @@
-"""What damping takes of energy, and what its forces do on the rigid-body motion where they turn with it."""
+"""The energy that damping dissipates, and the work of damping forces on the rigid-body motion."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ Scalars = Float[np.ndarray, " T"]
 
 
 @dataclass(frozen=True, slots=True)
-class Resistance:
+class DampingWork:
     """What damping takes of all links in each of the steps that end at T time points.
 
     dissipated : (T,) h ġᵀ C0 ġ with ġ = (g1 − g0)/h [J]
@@ -35,7 +35,7 @@ class Resistance:
 
 
 @dataclass(frozen=True, slots=True)
-class Last:
+class PreviousPoint:
     """The time point before a block: t, rigid-body motion, each link's g, K0 g, C0 g and `held`; T is one."""
 
     t: Scalars
@@ -43,10 +43,10 @@ class Last:
     links: Sequence[tuple[Field, Field, Field | None, Field | None]]
 
 
-def resistance(
+def damping_work(
     of: Sequence[Constants], histories: Sequence[LinkHistory], made: Sequence[Products], turns: Sequence[bool],
-    now: tuple[Scalars, RigidRates], before: Last,
-) -> Resistance:  # fmt: skip
+    now: tuple[Scalars, RigidRates], before: PreviousPoint,
+) -> DampingWork:  # fmt: skip
     """Of damped links over a block, from the time point before it on.
 
     Parameters
@@ -76,8 +76,8 @@ def resistance(
             arms[:, slot] = crossed(k, end, Cg) - 0.5 * crossed(k, g, Cg)
     taken /= np.where(h > 0, h, 1.0)
     if not len(which):
-        return Resistance(taken, np.zeros(len(t)))
-    return Resistance(taken, _turning(rows, arms, _mean(at.of(bodies, k), before.at.of(bodies, k))))
+        return DampingWork(taken, np.zeros(len(t)))
+    return DampingWork(taken, _turning(rows, arms, _mean(at.of(bodies, k), before.at.of(bodies, k))))
 
 
 def _turning(rows: Float[np.ndarray, "m S T"], arms: Float[np.ndarray, "c S T"], at: RigidRates) -> Scalars:
@@ -98,10 +98,10 @@ def held(of: Constants, history: LinkHistory, at: RigidRates) -> Field | None:
     return np.asarray(history.u @ at.R[:d, :d, of.body].transpose(2, 0, 1))
 
 
-def last_of(
+def previous_of(
     t: Scalars, at: RigidRates, of: Sequence[Constants], histories: Sequence[LinkHistory], made: Sequence[Products],
     which: int,
-) -> Last:  # fmt: skip
+) -> PreviousPoint:  # fmt: skip
     """What the next block needs of one time point of this one."""
     first = which % len(t)
     one = slice(first, first + 1)
@@ -110,7 +110,7 @@ def last_of(
     for link, x, y in zip(of, histories, made, strict=True):
         Cg = None if y.Cg is None else y.Cg[one].copy()
         kept.append((x.g[one].copy(), y.Kg[one].copy(), Cg, held(link, x.every(one), then)))
-    return Last(t[one], then, kept)
+    return PreviousPoint(t[one], then, kept)
 
 
 def products(of: Constants, history: LinkHistory, turns: bool) -> Products:

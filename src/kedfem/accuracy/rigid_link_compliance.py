@@ -1,4 +1,4 @@
-"""What rigid links with co-rotational frames give to the forces that they pass on, as no step lets them be stiffer.
+"""Displacements of rigid links with co-rotational frames under the forces that they transmit: an error of the step.
 
 It falls with the square of the step, as other errors of the step do, and is part of the error that these make of a
 channel: marches in steps twice as long have such links four times as soft (`dynamics.rigid_links.for_steps`).
@@ -21,20 +21,20 @@ INSTANTS = 256  # of a block that are examined
 
 
 @dataclass
-class Given:
+class RigidLinkCompliance:
     """The largest that each such link gave so far, and the largest displacement at joints of all links and their ends.
 
-    given : (L,) change of the vector between two of a link's joints or outermost nodes [m]
+    displacement : (L,) change of the vector between two of a link's joints or outermost nodes [m]
     moved : from the reference position [m]
     """
 
     model: Model
-    given: Float[np.ndarray, " L"]
+    displacement: Float[np.ndarray, " L"]
     moved: float = 0.0
-    REMEMBERED: ClassVar = ("given", "moved")
+    REMEMBERED: ClassVar = ("displacement", "moved")
 
     def __init__(self, model: Model) -> None:
-        self.model, self.given = model, np.zeros(len(model.links))
+        self.model, self.displacement = model, np.zeros(len(model.links))
         every = zip(model.links, model.joints, model.step_limits, strict=True) if model.step_limits else ()
         self._places = [
             (joint.weights, joint.nodes) if limit is None else (ends(link, joint), np.arange(link.n))
@@ -49,7 +49,7 @@ class Given:
             if self.model.step_limits[k] is not None:
                 x = in_space(link, weights @ history.g[some])
                 apart = np.linalg.norm(x[:, :, None] - x[:, None], axis=3)
-                self.given[k] = max(self.given[k], float(apart.max(initial=0.0)))
+                self.displacement[k] = max(self.displacement[k], float(apart.max(initial=0.0)))
             X = weights @ link.X[nodes]
             carried = motion.p[some, body, None] + X @ motion.R[some, body].transpose(0, 2, 1) - X
             moved = carried + in_space(link, weights @ history.u[some][:, nodes])
@@ -58,7 +58,7 @@ class Given:
     @property
     def relative(self) -> float:
         """The most that a link gave, of the largest displacement."""
-        most = float(self.given.max(initial=0.0))
+        most = float(self.displacement.max(initial=0.0))
         return most / self.moved if self.moved else 0.0
 
 
@@ -72,20 +72,20 @@ def ends(link: Link, joint: Attachment) -> Float[np.ndarray, "p n"]:
     return np.column_stack([np.ones(len(points)), points]) @ np.linalg.pinv(known)
 
 
-def given_warning(found: Given, asked: float | None = None) -> tuple[str, ...]:
+def compliance_warning(found: RigidLinkCompliance, asked: float | None = None) -> tuple[str, ...]:
     """A warning where rigid links give by more than the accuracy that is asked for, of the largest displacement."""
     allowed = WARNED if asked is None else asked
     if found.relative <= allowed:
         return ()
-    k = int(found.given.argmax())
+    k = int(found.displacement.argmax())
     limit, name = found.model.step_limits[k], found.model.links[k].name
     if limit is None:
         raise ValueError("no link gives")
     turned, step = np.degrees(limit.turning * limit.step), limit.step * np.sqrt(allowed / found.relative)
-    cause = f"it turns by up to {turned:.2g} deg in a step" if np.isfinite(turned) else "no drive leads it"
+    cause = f"it rotates by up to {turned:.2g} deg in a step" if np.isfinite(turned) else "no drive leads it"
     return (
-        f"rigid link {name} gives by up to {1e3 * found.given[k]:.2g} mm, {percent(found.relative)} of the largest "
-        f"displacement, to the forces that it passes on: {cause}, and steps of {limit.step:.2g} s let it be no stiffer. "
-        f"It gives with the square of the step: take {float(f'{step:.1g}'):g} s or less, or "
+        f"rigid link {name} deforms by up to {1e3 * found.displacement[k]:.2g} mm, {percent(found.relative)} of the "
+        f"largest displacement, under the forces that it transmits: {cause}, and steps of {limit.step:.2g} s let it be "
+        f"no stiffer. This falls with the square of the step: take {float(f'{step:.1g}'):g} s or less, or "
         "analysis.extrapolation_levels = 2",
     )

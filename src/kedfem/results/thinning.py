@@ -1,0 +1,60 @@
+"""The time points of a run that become rows of its file (each n-th, first, last), and the largest values of all."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+
+from kedfem.arrays import Float
+from kedfem.results.records import Channel
+
+Rows = dict[str, Float[np.ndarray, "b ..."]]
+
+
+@dataclass
+class Thinning:
+    """What one run gives its file.
+
+    channels : of the run
+    every : n
+    steps : time points so far
+    last : the rows of the last of them, where those are not written yet
+    largest : name of a channel → time, position of the drive and values at those time points so far at which one of
+        its columns, or the length of all of them, is largest: in the order of time, at most one more than it has columns
+    """
+
+    channels: Sequence[Channel]
+    every: int = 1
+    steps: int = 0
+    last: Rows | None = None
+    largest: dict[str, Float[np.ndarray, "k r"]] = field(default_factory=dict)
+    REMEMBERED: ClassVar = ("last", "largest")
+
+    @property
+    def rows(self) -> int:
+        """How many of the time points so far are written as they come."""
+        return -(-self.steps // self.every)
+
+    def chosen(self, rows: Rows, when: tuple[str, str]) -> tuple[Rows, Rows | None]:
+        """Of more time points the rows that are to be written now, and the last one if it is to wait.
+
+        Parameters
+        ----------
+        when : names of time and of the drive's position among the rows
+        """
+        which = slice(-self.steps % self.every, None, self.every)
+        self.steps, self.last = self.steps + len(rows[when[0]]), None
+        if self.every > 1:
+            self._look(rows, when)
+        waits = {name: block[-1:].copy() for name, block in rows.items()} if (self.steps - 1) % self.every else None
+        return {name: block[which] for name, block in rows.items()}, waits
+
+    def _look(self, rows: Rows, when: tuple[str, str]) -> None:
+        for channel in self.channels:
+            here = np.column_stack([*(rows[name] for name in when), rows[channel.name]])
+            before = self.largest.get(channel.name, here[:0])
+            every = np.concatenate([before, here])
+            sizes = np.abs(every[:, 2:])
+            which = [*sizes.argmax(axis=0), np.linalg.norm(sizes, axis=1).argmax()]  # the first where several are alike
+            self.largest[channel.name] = every[np.unique(which)]
