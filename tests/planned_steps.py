@@ -89,9 +89,9 @@ def main(say: Callable[[str], None] = print) -> None:
     lines = [
         "# The step that a plan chooses", "",
         "Written by `python -m tests.planned_steps`: the source's four-bar, two revolutions, 0.3 % allowed.",
-        "Truth: the largest difference in time of the worst channel, of its peak, from three levels of a quarter of the",
-        "step. Work: steps of all levels in a revolution; the last column is what a single level, of order 2, would need",
-        "for the 0.3 %.", "",
+        "Truth: the largest difference over time of the worst channel, relative to its peak, from three levels of a",
+        "quarter of the step. Work: steps of all levels in a revolution; the last column is the number of steps that",
+        "a single level, of order 2, would need for the 0.3 %.", "",
         "| run | chosen, a revolution | expected | truth | work | choosing, running | order 2 needs |",
         "|---|---|---:|---:|---:|---:|---:|",
     ]  # fmt: skip
