@@ -170,9 +170,10 @@ def page(found: list[Judged]) -> str:
     within = np.mean((ratios > 1 / 3) & (ratios < 3))
     lines = [
         "# What a run says of its errors, against what they are", "",
-        "Written by `python -m tests.budget`. True error: the largest difference over time of the worst channel of a kind,",
-        "relative to its peak, from a run with co-rotational frames, finer elements and shorter steps. In percent:",
-        "estimate / true error. The last column compares the largest of each. True errors below 0.1 % are not judged.", "",
+        "Written by `python -m tests.budget`. True error: the largest difference over time of the worst channel of a",
+        "kind, relative to its peak, from a run with co-rotational frames, finer elements and shorter steps. In percent:",
+        "estimate / true error. The last column compares the largest of each. True errors below 0.1 % are not judged.",
+        "",
         f"Of {len(found)} runs {100 * within:.0f} % are within a factor of three at their worst; the least ratio of",
         f"estimate and true error of any kind is {min(each.least for each in found):.2f}.", "",
         "| run | displacement | stress | joint forces | drive | ratio at worst |",

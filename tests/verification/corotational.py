@@ -71,7 +71,7 @@ def loaded(radius: float = 0.01, elements: int = 12, step: float = 0.01, **chang
     long=True,
 )
 def elastica() -> list[Row]:
-    """L √(A/I) = 100, without shear, loaded slowly, with damping; stretch is worth 1e-4 to 1e-3."""
+    """L √(A/I) = 100, without shear, loaded slowly, with damping; axial strain changes the results by 1e-4 to 1e-3."""
     rows = []
     for load, (across, along) in ELASTICA.items():
         factor = {"time": [0, 2], "value": [0, 1]}
@@ -84,7 +84,8 @@ def elastica() -> list[Row]:
 
 @case("Elastica: a full circle", "end moment 2π EI/L", long=True)
 def circle() -> list[Row]:
-    """A motor between the tip and a light disc of great inertia, which takes the moment; loaded slowly, with damping."""
+    """A motor acts between the tip and a light disc of large inertia, which takes the moment; loaded slowly, with
+    damping."""
     disc = {"model": "rigid", "material": "light",
             "shape": {"kind": "polyline", "points": [[1, 0], [1.1, 0]], "width": 0.001, "thickness": 0.001}}  # fmt: skip
     wheel = {"kind": "rigid_body", "link": "disc", "at": [1, 0], "mass": 1e-6, "centre": [1, 0],
@@ -142,9 +143,8 @@ def kicked(mu: float) -> float:
     long=True,
 )
 def turning() -> list[Row]:
-    """Nothing added for the stiffening: L √(A/I) = 700, where the table's Coriolis forces and elongation vanish; the
-
-    chordwise frequency from a transient, 400 steps a period, at μ = 50 6,000."""
+    """No term for the stiffening is added: L √(A/I) = 700, where the table's Coriolis forces and elongation vanish; the
+    chordwise frequency from a transient, 400 steps per period, at μ = 50 6,000."""
     return [
         Row(f"chord, μ = {mu:g}", chordwise(flap, mu), kicked(mu), 5e-3, "8 beam3")
         for mu, (_, flap) in ROTATING_CANTILEVER.items()
@@ -172,9 +172,8 @@ def spun_up(h: float) -> Ran:
 
 @case("Spin-up of a flexible arm", f"Simo, Vu-Quoc, J. Appl. Mech. 53 (1986); {EXACT}")
 def spin_up() -> list[Row]:
-    """Deflection of the tip against the turning axis: largest difference over 20 s, of the largest deflection; and the
-
-    steady stretch at 6 rad/s, published as 5.14e-4."""
+    """Deflection of the tip relative to the rotating axis: largest difference over 20 s, relative to the largest
+    deflection; and the steady elongation at 6 rad/s, published as 5.14e-4."""
     made, kept = spun_up(0.005), history("spin_up")
     angle = np.concatenate([block.motion.phi for block in made.blocks])
     c, s = np.cos(angle), np.sin(angle)
@@ -230,9 +229,9 @@ def flight_energy(h: float) -> tuple[float, float]:
     return float(energy.std() / energy.mean()), float(lost / energy.mean())
 
 
-@case("A rod thrown through space, beams in space", EXACT, long=True)
+@case("A free rod in large motion, beams in space", EXACT, long=True)
 def flying_in_space() -> list[Row]:
-    """The same throw as of planar beams, by elements whose strains are changes of metric."""
+    """The motion of the planar beams, by elements whose strains are changes of metric."""
     found = flown(2.5e-4, (8, 3, "spatial"))
     errors = history("flying_rod").difference(found[:, 0], found[:, 1:7])
     names = ("x0", "y0", "x1", "y1", "energy", "spin")
@@ -242,11 +241,10 @@ def flying_in_space() -> list[Row]:
     ]
 
 
-@case("A rod thrown through space", EXACT)
+@case("A free rod in large motion", EXACT)
 def flying_rod() -> list[Row]:
-    """1 m × 20 mm × 2 mm, thrown by a force on one end for 0.1 s; its middle leaves the chord by 90 mm. Largest
-
-    differences over 0.5 s, of the largest values; linear momentum afterwards."""
+    """1 m × 20 mm × 2 mm, accelerated by a force on one end for 0.1 s; its middle deflects from the chord by 90 mm.
+    Largest differences over 0.5 s, relative to the largest values; linear momentum afterwards."""
     h = 2.5e-4
     errors, text = flight_errors(h), f"8 beam5, step {h:g} s"
     names = ("x0", "y0", "x1", "y1", "energy", "spin")
@@ -296,9 +294,9 @@ def _cubic(t: np.ndarray, x: np.ndarray, k: int) -> Any:
     return lambda s: float(fit(s))
 
 
-@case("Compound pendulum let go from the horizontal", "4 √(I/mgd) K(sin 45°)")
+@case("Compound pendulum released from the horizontal", "4 √(I/mgd) K(sin 45°)")
 def pendulum() -> list[Row]:
-    """Steel bar 1 m × 30 mm × 30 mm, rigid and as a beam, which bends hardly at all."""
+    """Steel bar 1 m × 30 mm × 30 mm, rigid and as a beam, whose bending is negligible."""
     mass = 7850 * SIDE**2
     inertia = mass * (1 / 3 + SIDE**2 / 12)
     exact = pendulum_period(mass, 0.5, inertia, np.pi / 2)
@@ -350,7 +348,8 @@ def double_errors(h: float) -> tuple[float, float, float]:
 
 @case("Double pendulum of rigid rods", "Lagrange's equations, Dormand and Prince of order 8 at 1e-13")
 def double() -> list[Row]:
-    """Steel rods of 0.5 m and 0.3 m, let go from the horizontal, 1.5 s; energy of what they can lose."""
+    """Steel rods of 0.5 m and 0.3 m, released from the horizontal, 1.5 s; energy relative to the available potential
+    energy."""
     found = double_errors(5e-4)
     names = ("first angle [rad]", "second angle [rad]", "energy")
     return [
@@ -387,7 +386,7 @@ def four_bar_from_rest() -> list[Row]:
     """2 % damping at 20 and 200 Hz, three revolutions (60 rpm: one): the same rows as for rigid-body frames, whose errors
     are 0.6,
 
-    3.8, 14, 25, 40 % of the peak. Largest difference of the stress on the rocker's outer side, of its peak."""
+    3.8, 14, 25, 40 % of the peak. Largest difference of the stress on the rocker's outer side, relative to its peak."""
     rows = []
     for rpm, h in {60: 5e-5, 150: 5e-5, 300: 2.5e-5, 400: 2.5e-5, 600: 2.5e-5}.items():
         text = f"4 beam5 a link, steps of {h:g} s"

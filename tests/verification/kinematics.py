@@ -72,7 +72,7 @@ def angle_of(
 
 @case("Four-bar", "R. L. Norton, Design of Machinery: position, velocity and acceleration of the pin-jointed four-bar")
 def planar_four_bar() -> list[Row]:
-    """The linkage of the source's example (Nath and Ghosh 1980), drawn at 60°, a full revolution by a cycloidal law."""
+    """The linkage of Nath and Ghosh (1980), reference position at 60°, a full revolution by a cycloidal law."""
     a, b, c, d = 0.3048, 0.9144, 0.762, 0.9144
     joints = four_bar(a, b, c, d, np.pi / 3)
     B, C, D = (joints[k][3] for k in "BCD")
@@ -109,7 +109,7 @@ def slider_x(joints: JointTable) -> tuple[Curve, Curve]:
 
 @case("Slider-crank", "closed form of any textbook: x = r cos φ + √(l² − r² sin² φ)")
 def planar_slider_crank() -> list[Row]:
-    """Crank 0.1 m, rod 0.3 m, drawn at 40°, a full revolution by a cycloidal law."""
+    """Crank 0.1 m, rod 0.3 m, reference position at 40°, a full revolution by a cycloidal law."""
     r, rod, drawn = 0.1, 0.3, np.radians(40)
     got, drive = slider_x(slider_crank(r, rod, drawn))
     sin, cos = np.sin(drawn + drive[0]), np.cos(drawn + drive[0])
@@ -123,7 +123,8 @@ def planar_slider_crank() -> list[Row]:
 def slider_crank_in_space() -> list[Row]:
     """Crank 0.08 m about an axis along x at y = 0.1, z = 0.12; rod 0.3 m; slider on x: x² = l² − y_B² − z_B².
 
-    A ball at the crank; at the slider a universal joint, or its cross as a body, so that the rod cannot spin.
+    A ball at the crank; at the slider a universal joint, or its cross as a body, so that the rod cannot rotate
+    about itself.
     """
     drawn = 0.3
     crossed = "4 links, 3 revolutes, a ball, a slide"
@@ -193,7 +194,8 @@ def bricard() -> list[Row]:
     "RSSR", "R. S. Hartenberg, J. Denavit, Kinematic Synthesis of Linkages (1964): constant distance of the ball centres"
 )
 def spatial_four_bar() -> list[Row]:
-    """Crank 0.1 m about z, rocker 0.25 m about x; one ball is a universal joint, so that the coupler cannot spin."""
+    """Crank 0.1 m about z, rocker 0.25 m about x; one ball is a universal joint, so that the coupler cannot rotate
+    about itself."""
     drawn = 1.0
     crossed, universal = "4 links, 4 revolutes, a ball", "3 links, 2 revolutes, a ball, a universal joint"
     return [*_rocker_in_space(rssr(drawn), drawn, crossed), *_rocker_in_space(universal_rssr(drawn), drawn, universal)]

@@ -62,7 +62,7 @@ def difference(a: np.ndarray, b: np.ndarray) -> float:
 
 @case("Source's four-bar: generalised coordinates", KED)
 def coordinates() -> list[Row]:
-    """One 3-node beam a link: 27 − 2·2 at the pins B, C − 3 at the driven root − 2 at D."""
+    """One 3-node beam per link: 27 − 2·2 at the pins B, C − 3 at the driven root − 2 at D."""
     scene = read_scene(SCENE)
     return [Row("generalised coordinates", 18, elastic_model(scene, linkage(scene)).coordinates, 0.0, "1 beam3 a link")]
 
@@ -79,28 +79,30 @@ def time_errors() -> dict[int, float]:
     return {n: difference(stress(8, n), stress(8, 11520)) for n in (720, 1440, 2880)}
 
 
-@case("Source's four-bar: stress curve, elements", "against 32 elements a link, 720 steps a revolution, same start")
+@case("Source's four-bar: stress curve, elements", "against 32 elements per link, 720 steps per revolution, same start")
 def elements() -> list[Row]:
-    """Bending stress on the rocker's outer side over two revolutions at 600 rpm; largest difference, of the peak."""
+    """Bending stress on the rocker's outer side over two revolutions at 600 rpm; largest difference, relative to the
+    peak."""
     caps = {1: 0.8, 2: 0.6, 4: 0.05, 8: 0.0035, 16: 0.00025}
     return [Row("difference / peak", 0.0, e, caps[n], f"{n} beam3 a link") for n, e in space_errors().items()]
 
 
 @case(
-    "Source's four-bar: stress curve, steps", "against 11520 steps a revolution, 8 elements a link, same start", long=True
+    "Source's four-bar: stress curve, steps",
+    "against 11520 steps per revolution, 8 elements per link, same start",
+    long=True,
 )
 def steps() -> list[Row]:
-    """The same, for the step."""
+    """The same stress, with fewer steps."""
     caps = {720: 0.05, 1440: 0.0125, 2880: 0.003}
     return [Row("difference / peak", 0.0, e, caps[n], f"{n} steps a revolution") for n, e in time_errors().items()]
 
 
-@case("Four-bar: solids against beams", "16 beam3 a link against bars of hex27, one turn at 600 rpm", long=True)
+@case("Four-bar: solids against beams", "16 beam3 per link against bars of hex27, one revolution at 600 rpm", long=True)
 def solids() -> list[Row]:
-    """Section 25.4 mm square, links 12 to 36 times as long: beam theory (plane sections, 5/6 of the area in shear) and
-
-    hinges that hold an end face in the mean, beside the mesh's own error. Frequencies differ by parts of a percent,
-    and the curves run apart with the turns."""
+    """Section 25.4 mm square, links 12 to 36 times as long. The differences are those of beam theory (plane sections,
+    5/6 of the area in shear), of hinges that constrain the mean of an end face, and of the mesh. Frequencies differ
+    by parts of a percent, and the difference between the curves grows with the revolutions."""
     scene = four_bar(
         {"revolutions": 1, "steps_per_revolution": 720}, {"model": "solid", "mesh": {"elements": [16, 2, 1]}}
     )

@@ -36,7 +36,7 @@ def moved(raw: dict[str, Any], end: float, step: float, rho_inf: float, **more: 
     long=True,
 )
 def squeezer() -> list[Row]:
-    """Seven bodies in a plane, a constant torque and a spring; the crank turns twice and a half in 0.03 s."""
+    """Seven bodies in a plane, a constant torque and a spring; the crank makes two and a half revolutions in 0.03 s."""
     mass = [0.04325, 0.00365, 0.02373, 0.00706, 0.07050, 0.00706, 0.05498]
     inertia = [2.194e-6, 4.410e-7, 5.255e-6, 5.667e-7, 1.169e-5, 5.667e-7, 1.912e-5]
     origin, A, B, C = np.array([[0, 0], [-0.06934, -0.00227], [-0.03635, 0.03273], [0.014, 0.072]])
@@ -91,7 +91,8 @@ def squeezer() -> list[Row]:
     long=True,
 )
 def governor() -> list[Row]:
-    """A shaft that spins freely, two hinged rods with balls, a slider that stiff springs with dampers hold to them."""
+    """A freely rotating shaft, two hinged rods with balls, and a slider that stiff springs and dampers connect to
+    them."""
     K, C, long, start, end = 8e5, 4e4, 0.5, np.pi / 6, 2.0
     rod, ball, slider = 0.3, 5.0, 3.0
     axial, mass = rod * 2e-4 / 12, rod + ball
@@ -172,10 +173,9 @@ def falling(count: int, end: float) -> float:
     long=True,
 )
 def four_bars() -> list[Row]:
-    """Five links of 1 m and 1 kg; where all lie in a line each window could fold.
-
-    Slightly elastic links with damping stay on the branch, at order 2 in the step; what is left of the angle is their
-    elasticity. Rigid ones keep their energy.
+    """Five links of 1 m and 1 kg; where all are collinear, each loop could change its branch.
+    Slightly elastic links with damping stay on the branch, at order 2 in the step; the remaining error of the angle is
+    due to their elasticity. Rigid links conserve energy.
     """
     end, steps = 10.0, (2e-3, 1e-3, 5e-4, 2.5e-4)
 

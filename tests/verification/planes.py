@@ -25,7 +25,7 @@ FLEXIBLE = Material(density=1, youngs_modulus=210e9, poisson_ratio=0.3)
 
 @case("NAFEMS FV32: tapered membrane, plane elements", f"{NAFEMS}, test FV32")
 def tapered_membrane() -> list[Row]:
-    """The same mesh as of the solid above, without its third dimension."""
+    """The mesh of the solid above without its third dimension."""
     counts = (16, 8)
     link = mapped_plane(counts, lambda r, s: (10 * r, (s - 0.5) * (5 - 4 * r)), 0.05, STEEL)
     T = free_map(link, held((link.X[:, 0] == 0, "xy"), d=2))
@@ -98,9 +98,8 @@ def energy_error(counts: tuple[int, int]) -> float:
 
 @case("Cantilever of a plane link", f"{GOODIER}: exact in plane stress; beam theory with Cowper's κ")
 def cantilevers() -> list[Row]:
-    """Length 4 depths, the root held as in the exact solution, of which beam theory knows nothing.
-
-    Beam theory says P L³/(3EI) + P L/(κGA) with κ = 10(1 + ν)/(12 + 11ν).
+    """Length 4 depths, the root constrained as in the exact solution, which beam theory does not represent.
+    Beam theory has P L³/(3EI) + P L/(κGA) with κ = 10(1 + ν)/(12 + 11ν).
     """
     counts, nu = (8, 2), FLEXIBLE.poisson_ratio
     link, u = cantilever(counts)
@@ -143,8 +142,8 @@ def four_bar(kind: str, thickness: float) -> list[np.ndarray]:
 def against_solids() -> list[Row]:
     """Largest difference over a revolution, for the example's plates, as thick as wide, and for thinner ones.
 
-    What is left is the assumption of plane stress, which near the bores holds for thin plates only: the
-    displacements' difference falls about as the square of the thickness.
+    The remaining difference is due to the assumption of plane stress, which near the bores is valid for thin plates
+    only: the difference of the displacements falls about as the square of the thickness.
     """
     out = []
     for thickness, caps in ((0.0254, (5e-4, 2e-3, 2e-4, 2e-4, 2e-4)), (0.006, (1e-4, 2e-4, 1e-4, 1e-4, 1e-4))):

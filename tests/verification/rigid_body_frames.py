@@ -42,8 +42,7 @@ def linear_errors() -> dict[str, tuple[float, float]]:
 )
 def rigid_body_frames() -> list[Row]:
     """The linear equation (20) from δ = δ' = 0, 2 % damping at 20 and 200 Hz: stress on the rocker's outer side, three
-
-    turns, at 60 rpm one. With damping mesh and step account for no more than 0.015 of the peak."""
+    revolutions, at 60 rpm one. With damping, mesh and step cause errors of no more than 0.015 of the peak."""
     caps = {"60 rpm": 0.01, "150 rpm": 0.05, "300 rpm": 0.17, "400 rpm": 0.28, "600 rpm": 0.45}
     model = f"{ELEMENTS} beam3 a link, steps of {STEP:g} s"
     rows = []

@@ -54,9 +54,9 @@ def bar_stress(x: float) -> float:
     return BAR.density * SPEED**2 * (LENGTH**2 - x**2) / 2 / 1e6
 
 
-@case("SSLV104: turning bar, static", STATIC)
+@case("SSLV104: rotating bar, static", STATIC)
 def turning_bar_at_rest() -> list[Row]:
-    """K0 δ = −M R0''; the cubic u(x) is met at all nodes up to the elements' error."""
+    """K0 δ = −M R0''; all nodes have the cubic u(x) up to the elements' error."""
     link, T, force = bar(10)
     u = deflection(link, T, force)
     text, tip = model((10, 1, 1), link), link.X[:, 0].argmax()
@@ -69,7 +69,7 @@ def turning_bar_at_rest() -> list[Row]:
     ]
 
 
-@case("SSLV105: turning bar, steady state", STEADY)
+@case("SSLV105: rotating bar, steady state", STEADY)
 def turning_bar() -> list[Row]:
     """(K0 − ω² M) g = −M R0'' in the link frame."""
     link, T, force = bar(10)
@@ -117,9 +117,9 @@ def tip_history(scene: Scene) -> tuple[np.ndarray, Link]:
     return np.array([mean @ shot.states[0].g for shot in shots]), link
 
 
-@case("SSLV105: turning bar, through the transient solver", STEADY)
+@case("SSLV105: rotating bar, by the transient solver", STEADY)
 def turning_bar_by_steps() -> list[Row]:
-    """From the quasi-static start, which is the steady state already, and from rest, over four revolutions."""
+    """From the quasi-static start, which is the steady state, and from rest, over four revolutions."""
     g, link = tip_history(turning_bar_scene("quasi-static"))
     from_rest, _ = tip_history(turning_bar_scene("rest"))
     text, tip = f"{model((6, 2, 1), link, 'hex20')}, 360 steps a revolution", 0.0151572424

@@ -55,7 +55,7 @@ def text(part: Part) -> str:
 
 @case("Free square plate, as a part from a mesh file", f"{NAFEMS}, test FV12")
 def free_plate() -> list[Row]:
-    """Plate 10 × 10 × 0.05 without supports: six motions without strain are left out."""
+    """Plate 10 × 10 × 0.05 without supports: the six rigid-body modes are left out."""
     part = of_mesh(mapped_mesh((12, 12, 1), box((10, 10, 0.05))), STEEL)
     got = found(part, 3)
     return rows(["mode 7", "mode 8", "mode 9"], FREE_PLATE, got, 0.006, text(part))
@@ -82,7 +82,7 @@ def ring_part() -> list[Row]:
 
 @case("NAFEMS FV32: tapered membrane, as a plane link welded at its end", f"{NAFEMS}, test FV32")
 def tapered_link() -> list[Row]:
-    """A plane link of an outline; its weld keeps the shape of the wide end (`coupling = "rigid"`)."""
+    """A plane link given by its outline; its weld keeps the shape of the wide end (`coupling = "rigid"`)."""
     outline = [[0, -2.5], [10, -0.5], [10, 0.5], [0, 2.5]]
     raw = {
         "materials": {"m": {"density": 8000, "youngs_modulus": 200e9, "poisson_ratio": 0.3}},
@@ -102,9 +102,9 @@ def tapered_link() -> list[Row]:
     return rows([f"mode {k}" for k in range(1, 7)], targets, found(part, 6), 0.0025, text(part))
 
 
-@case("NAFEMS FV5: deep beam, as a link held by hinges at both ends", f"{NAFEMS}, test FV5")
+@case("NAFEMS FV5: deep beam, as a link on hinges at both ends", f"{NAFEMS}, test FV5")
 def hinged_beam() -> list[Row]:
-    """Bending modes are those of the test; hinges at both ends hold the beam along its axis too, √(E/ρ)/2L."""
+    """Bending modes are those of the test; hinges at both ends constrain the beam along its axis too, √(E/ρ)/2L."""
     hinge = {"kind": "revolute", "links": ["ground", "bar"]}
     joints = {"left": hinge | {"at": [0, 0]}, "right": hinge | {"at": [10, 0]}}
     part = of_bar(10.0, 2.0, joints, model="beam", mesh={"elements": 40})

@@ -168,9 +168,10 @@ def exact_slanted(load: float, angle: float) -> np.ndarray:
     )
 
 
-@case("Cantilever strip under a leaning tip load", "Cosserat rod by collocation (tests/verification/space_statics.py)")
+@case("Cantilever strip under an oblique tip load", "Cosserat rod by collocation (tests/verification/space_statics.py)")
 def princeton() -> list[Row]:
-    """After the Princeton experiment (Dowell and Traybar 1975), 508 × 12.3 × 3.2 mm: bent both ways and twisted."""
+    """After the Princeton experiment (Dowell and Traybar 1975), 508 × 12.3 × 3.2 mm: bending about both axes and
+    torsion."""
     out = []
     for angle in (30, 60):
         rod, y = slanted(4, 13.345, np.radians(angle))
@@ -189,7 +190,8 @@ SOFT = Material(density=1.0, youngs_modulus=1e7, poisson_ratio=0.0)
 
 @case("45° bend under 600 lb", "Bathe, Bolourchi (1979); Sonneville, Cardona, Brüls: CMAME 268 (2014)")
 def forty_five() -> list[Row]:
-    """An arc of radius 100 in, section 1 × 1 in, E 1e7 psi, ν 0, a dead load out of its plane, in ten equal shares."""
+    """An arc of radius 100 in, section 1 × 1 in, E 1e7 psi, ν 0, a dead load out of its plane, in ten equal
+    increments."""
     angle = np.linspace(0, np.pi / 4, 9)
     points = 100 * np.stack([np.sin(angle), 1 - np.cos(angle), 0 * angle], axis=1)
     rod = Rod(smooth_axis(points, 1, 3, np.array([0.0, 0, 1])), rectangle(1.0, 1.0), SOFT)
@@ -226,7 +228,7 @@ def lateral(length: float) -> float:
 
 @case("Lateral buckling of a cantilever strip", "4.0126 √(EI GJ)/L², Timoshenko and Gere (1961), §6.3")
 def buckling() -> list[Row]:
-    """1 m × 30 mm × 1 mm; deflection in its plane, which the formula leaves out, adds some 1 − EI/EI' = 0.1 %."""
+    """1 m × 30 mm × 1 mm; deflection in its plane, which the formula neglects, adds some 1 − EI/EI' = 0.1 %."""
     return [Row("critical load [N]", lateral(1.0), critical_load(4), 0.01, "4 beam3")]
 
 

@@ -119,7 +119,7 @@ def cantilevers() -> list[Row]:
 
 @case("NAFEMS FV5: deep beam, beam elements in space", f"{NAFEMS}, test FV5")
 def deep_beam_in_space() -> list[Row]:
-    """As the solid: (u, v, w) and the turn about x held at one end, (v, w) at the other."""
+    """Supports as of the solid: (u, v, w) and the rotation about x at one end, (v, w) at the other."""
     axis = straight_axis(np.array([[0.0, 0, 0], [10, 0, 0]]), 40, 3, None)
     link = spatial_beam_link("beam", axis, DEEP, STEEL)
     number = np.arange(link.n)
@@ -150,7 +150,7 @@ def bent_cantilever(a: float, b: float, section: Section) -> dict[str, float]:
 
 @case("Bent cantilever", "Castigliano's theorem with shear and extension")
 def bent() -> list[Row]:
-    """An L of 0.5 m and 0.3 m, section 30 × 20 mm: one element a leg has the cubic's tip exactly."""
+    """An L of 0.5 m and 0.3 m, section 30 × 20 mm: one element per leg has the exact tip displacement of the cubic."""
     link = straight([[0, 0, 0], [0.5, 0, 0], [0.5, 0.3, 0]], FLAT, 1)
     out = []
     for axis, exact in bent_cantilever(0.5, 0.3, FLAT).items():
@@ -195,7 +195,7 @@ def curved() -> list[Row]:
 
 @case("MacNeal–Harder: twisted beam, beam elements in space", MACNEAL)
 def twisted_in_space() -> list[Row]:
-    """Their 12 elements, the directions of the section turned by 90° along the axis."""
+    """Their 12 elements; the directions of the section rotate by 90° along the axis."""
     s = np.arange(25)
     angle = s / 24 * np.pi / 2
     frame = np.zeros((25, 4, 3))
@@ -230,8 +230,8 @@ def mitred(a: float, b: float, height: float, thickness: float) -> Callable[...,
 def beside_solids() -> list[Row]:
     """First frequencies, 50 and 80 sections long.
 
-    The solid is stiffer: its clamped face may not contract (ν = 0.33), and its corner is wide, which the fourth mode
-    of the L turns most.
+    The solid is stiffer: its clamped face cannot contract (ν = 0.33), and its corner has a width, which matters most
+    in the fourth mode of the L.
     """
     height, thickness = 0.01, 0.008
     section = rectangle(height, thickness)

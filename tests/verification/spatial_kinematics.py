@@ -48,7 +48,7 @@ def swinging(r: float, d: float, drawn: float, block: bool, model: str) -> list[
 
 @case("Quick-return", "closed form of any textbook: the arm points at the crank's pin, tan θ = (d + r sin φ)/(r cos φ)")
 def quick_returns() -> list[Row]:
-    """Crank 0.1 m, pivots 0.25 m apart: the arm swings (shaper); 0.06 m apart: it turns fully (Whitworth)."""
+    """Crank 0.1 m, pivots 0.25 m apart: the arm swings (shaper); 0.06 m apart: it revolves (Whitworth)."""
     return [
         *swinging(0.1, 0.25, 0.4, False, "shaper: 2 links, 2 revolutes, a slot"),
         *swinging(0.1, 0.25, 0.4, True, "shaper: 3 links, 3 revolutes, a block that slides on the arm"),
@@ -58,7 +58,7 @@ def quick_returns() -> list[Row]:
 
 @case("Inverted slider-crank", "closed form of any textbook: the rod passes through the block's pivot at all times")
 def rod_through_a_block() -> list[Row]:
-    """Crank 0.1 m, pivots 0.3 m apart, drawn at 1.2 rad, a full revolution by a cycloidal law."""
+    """Crank 0.1 m, pivots 0.3 m apart, reference position at 1.2 rad, a full revolution by a cycloidal law."""
     r, d, drawn = 0.1, 0.3, 1.2
     start = float(np.angle(d - r * np.exp(1j * drawn)))
     got, drive = angle_of(inverted_slider_crank(r, d, drawn), "rod", Z, start)
@@ -92,7 +92,7 @@ def one_universal_joint() -> list[Row]:
     "parallel shafts, forks of the middle shaft in line: constant velocity; crossed: tan φ3 = tan φ1 / cos² β",
 )
 def two_universal_joints() -> list[Row]:
-    """Shafts at 35°; the middle one is held by its two universal joints alone."""
+    """Shafts at 35°; the middle one has no support but its two universal joints."""
     cb = np.cos(np.radians(35))
     rows = []
     for crossed, cosine in ((False, 1.0), (True, cb**2)):
@@ -104,10 +104,11 @@ def two_universal_joints() -> list[Row]:
 
 @case(
     "Oldham coupling",
-    "closed form of any textbook: constant velocity; the disc's centre circles twice a turn between the shafts",
+    "closed form of any textbook: constant velocity; the disc's centre circles twice per revolution between the shafts",
 )
 def oldham_coupling() -> list[Row]:
-    """Shafts 0.04 m apart, drawn at 0.5 rad; the disc slides on both, or leans on one flank of the second's groove."""
+    """Shafts 0.04 m apart, reference position at 0.5 rad; the disc slides on both, or on one flank of the second's
+    groove."""
     e, drawn = 0.04, 0.5
     rows = []
     for tongue in ("prismatic", "planar"):
@@ -139,7 +140,7 @@ def turning(axis: Sequence[float], angle: np.ndarray) -> np.ndarray:
     "J. Appl. Mech. 31 (1964) 300: turns are those of the spherical linkage of the same twists; slides close the loop",
 )
 def revolute_and_three_cylinders() -> list[Row]:
-    """A Cardan joint of 35° whose axes are moved apart: the shaft turns as before, and slides."""
+    """A Cardan joint of 35° with offset axes: the shaft rotates as without the offset, and slides."""
     beta = np.radians(35)
     joints = offset_cardan(beta)
     out = np.asarray(joints["D"][4])

@@ -124,9 +124,11 @@ def columns() -> list[Row]:
     return out
 
 
-@case("Column that twists", "P = GJ A/(I_y + I_z), free warping (Timoshenko, Gere: Theory of Elastic Stability, 5.5)")
+@case(
+    "Torsional column buckling", "P = GJ A/(I_y + I_z), free warping (Timoshenko, Gere: Theory of Elastic Stability, 5.5)"
+)
 def twisted_column() -> list[Row]:
-    """A flat strip under pressure: work of an axial force on sections that turn evenly along the beam."""
+    """A flat strip in compression: work of an axial force on sections whose rotation varies linearly along the beam."""
     section = rectangle(0.1, 0.004)
     link, T, text = spatial_beam(16, section)
     x = np.asarray(link.triples @ link.X).reshape(-1, 3, 3)
@@ -168,7 +170,7 @@ def turning_frequencies(link: Link, T: sp.csr_array, mu: float) -> np.ndarray:
 
 @case("Rotating cantilever, chordwise", ROTATING)
 def thin_cantilever() -> list[Row]:
-    """A thin planar beam, as in the table, at all speeds; at μ = 50 the root is strained by 26 %."""
+    """A thin planar beam, as in the table, at all speeds; at μ = 50 the strain at the root is 26 %."""
     link, T, text = thin_beam()
     return [
         Row(f"μ = {mu}", chord, float(turning_frequencies(link, T, mu)[0]), 1e-3, text)
@@ -178,10 +180,9 @@ def thin_cantilever() -> list[Row]:
 
 @case("Rotating cantilever with shear and rotary inertia", ROTATING)
 def thick_cantilevers() -> list[Row]:
-    """Chord and flap of other links, whose shear and rotary inertia the table has not: some 0.2 % at slenderness 70.
-
-    At μ = 50 strains of 26 % at the root are no longer small beside 1; then it matters which measure of strain is taken
-    as linear, and the chord differs by up to 2 %. It is not listed.
+    """Chordwise and flapwise bending of other links, with shear and rotary inertia, which the table neglects: some 0.2 %
+    at slenderness 70. At μ = 50 strains of 26 % at the root are no longer small beside 1. The result then depends on
+    the measure of strain that is linear, and the chordwise frequency differs by up to 2 %. It is not listed.
     """
     out = []
     for name, made in {"beam in space": spatial_beam, "solid": solid, "plane": plane}.items():
@@ -197,7 +198,7 @@ def thick_cantilevers() -> list[Row]:
 
 @case("Rotating cantilever without geometric stiffening", "√(3.516² − μ²), thin beam, chordwise")
 def unstiffened_cantilever() -> list[Row]:
-    """What equation (20) alone says; unstable above μ = 3.516. Axial motion, at 1/70 of its rate, is part of it."""
+    """The result of equation (20) alone, unstable above μ = 3.516. It includes axial motion, at 1/70 of its rate."""
     link, T, text = thin_beam()
     soft = replace(link, E=0.0)  # no stress, K0 stays
     return [
@@ -246,9 +247,9 @@ def vibration(scene: Scene, component: int) -> float:
     return float(scipy.optimize.minimize_scalar(left, bounds=near, method="bounded", options=options).x)
 
 
-@case("Rotating cantilever, through the transient solver", ROTATING, long=True)
+@case("Rotating cantilever, by the transient solver", ROTATING, long=True)
 def turning_by_steps() -> list[Row]:
-    """μ = 6: a load on the tip, put on at once, 200 steps a period."""
+    """μ = 6: a sudden load on the tip, 200 steps per period."""
     unit = np.sqrt(RUBBER.youngs_modulus * HEIGHT**2 / 12 / RUBBER.density) / LENGTH**2
     chord, flap = TABLE[6]
     found = {
@@ -311,7 +312,7 @@ def whirl_of_link(omega: float, mass: float, polar: float, stiffened: bool = Tru
 
 @case("Whirl of a disc on an overhung shaft", "Stodola; Green: gyroscopic effect of a thin disc on a massless shaft")
 def overhung_disc() -> list[Row]:
-    """0.5 kg, I_p = 0.05 kg m² on 1 m; without stress stiffness the disc's moment of momentum is lost as it tilts."""
+    """0.5 kg, I_p = 0.05 kg m² on 1 m; without stress stiffness the angular momentum of the tilting disc is lost."""
     out = []
     for omega in (50.0, 200.0, 500.0):
         wanted, got = whirl(omega, 0.5, 0.05), np.sort(whirl_of_link(omega, 0.5, 0.05))

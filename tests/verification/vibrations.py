@@ -38,9 +38,9 @@ def plate(counts: tuple[int, int, int]) -> Link:
     return mapped_link(counts, box((10, 10, 1)), STEEL)
 
 
-@case("NAFEMS FV52: plate held along its bottom edges", f"{NAFEMS}, test FV52; 20-node result: V2.03.502 of code_aster")
+@case("NAFEMS FV52: plate on its bottom edges", f"{NAFEMS}, test FV52; 20-node result: V2.03.502 of code_aster")
 def plate_on_its_edges() -> list[Row]:
-    """On the mesh that the test asks for, 4 × 4 × 1.
+    """On the mesh that the test requires, 4 × 4 × 1.
 
     A line cannot support a solid: the deflection under a line force is infinite, so the frequencies of the
     out-of-plane modes sink without limit, though slowly (log h), as the mesh is refined. The target is plate
@@ -79,11 +79,12 @@ def plate_on_its_sides_exactly(m: int, n: int) -> float:
     return float(np.sqrt(scipy.linalg.eigvalsh(K, M)[0]) / (2 * np.pi))
 
 
-@case("FV52's plate, sides held as in plate theory", f"{NAFEMS}, test 21 (same closed form); Srinivas et al. 1970")
+@case("FV52's plate, sides supported as in plate theory", f"{NAFEMS}, test 21 (same closed form); Srinivas et al. 1970")
 def plate_on_its_sides() -> list[Row]:
     """u_z and the displacement along the side are zero on the sides: supports for which the target is exact.
 
-    The rest is between Mindlin's plate theory and the solid: the second set is the solid's exact solution.
+    The remaining difference is that between Mindlin's plate theory and the solid: the second set is the solid's
+    exact solution.
     """
     counts = (12, 12, 2)
     link = plate(counts)
@@ -135,9 +136,8 @@ def deep_beam() -> list[Row]:
 
 @case("NAFEMS FV5: deep beam, solid", f"{NAFEMS}, test FV5")
 def deep_solid() -> list[Row]:
-    """The end faces held in the mean: (u, v, w) and the turn about x at one end, (v, w) at the other.
-
-    Timoshenko's beam is not quite the solid: 0.25 % off in the third bending mode, a wave 3 depths long.
+    """The mean displacement of the end faces is constrained: (u, v, w) and the rotation about x at one end, (v, w) at
+    the other. Timoshenko's beam differs from the solid: by 0.25 % in the third bending mode, a wave 3 depths long.
     """
     counts = (20, 4, 4)
     link = mapped_link(counts, box((10, 2, 2), (0, -1, -1)), STEEL)
@@ -187,7 +187,7 @@ def ring_mapping(r: np.ndarray, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarra
 def ring() -> list[Row]:
     """Mean radius 0.369, thickness 0.048, length 0.05.
 
-    The references are of a mesh themselves and lie above the converged values (205.58, 210.06, 586.5, 587.8).
+    The references are results of a mesh and lie above the converged values (205.58, 210.06, 586.5, 587.8).
     """
     counts = (36, 2, 2)
     material = Material(density=7800, youngs_modulus=185e9, poisson_ratio=0.3)
