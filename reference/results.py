@@ -133,12 +133,12 @@ brackets). Energies apart, nothing is summed up over time.
 
 | group | attributes |
 |---|---|
-| `/` | `status` (`complete`, `doubtful`, `interrupted`, `running`), `reason`, `kedfem_version`, `Conventions` |
+| `/` | `status` (`complete`, `unreliable`, `interrupted`, `running`), `reason`, `kedfem_version`, `Conventions` |
 | `/notes` | what the run reported of itself: unknowns, step, estimated errors (`error of mesh, stress` ...), the residual of energy; `steps between rows` of a file without all |
 | `/notes/LINK` | what a link was modelled as: `model`, `elements`, `unknowns`; with what is attached `mass [kg]`, `centre of mass [m]` in the reference position, `inertia [kg m^2]` about it: xx, yy, zz, xy, yz, zx |
 | `/warnings`, `/timing` | what was reported to the user; seconds of each stage; both of a run that came to its end |
 | `/peaks/LINK` | highest von Mises stress over all steps, its place in the reference position, time, step and drive; `away` from places where it means little |
-| `/fatigue/LINK/RANK` | of a scene with `[fatigue]`: damage in a period, utilisation, worst cycle, criterion, place of the highest damage of each link, the worst first; period and `doubt` are those of `/fatigue` |
+| `/fatigue/LINK/RANK` | of a scene with `[fatigue]`: damage in a period, utilisation, worst cycle, criterion, place of the highest damage of each link, the worst first; period and `unreliable` are those of `/fatigue` |
 | `/scene` | the scene that was analysed, as `json` and `toml` |
 
 `peaks.csv` has the ten highest von Mises stresses of each link over all steps, each at least 2 % of the link's size from

@@ -27,7 +27,7 @@ def statuses() -> str:
     meanings = {
         0: "done",
         cli.USER_ERROR: "refused: the message says where, what is required and what was given",
-        cli.DOUBTFUL: "done, but the results mean nothing by their own estimates; they are marked `doubtful`",
+        cli.UNRELIABLE: "done, but the results mean nothing by their own estimates; they are marked `unreliable`",
         cli.INTERRUPTED: "interrupted; what was computed is kept and marked",
         cli.DEFECT: "a defect of kedfem; `KEDFEM_DEBUG=1` shows where",
     }

@@ -45,7 +45,7 @@ from kedfem.output.derived import (
 from kedfem.output.stress_files import Extremes, write_envelope, write_fatigue, write_top
 from kedfem.output.vtu import write_cells, write_frame
 from kedfem.results import Channel, Fatigue, Peak, Results, add_notes, claimed, read_results
-from kedfem.results.additions import add_account, add_fatigue, add_peaks, mark_doubtful
+from kedfem.results.additions import add_account, add_fatigue, add_peaks, mark_unreliable
 from kedfem.results.audit import Account, balance_warning
 from kedfem.results.balance import Balance, balance_notes
 from kedfem.results.cross_checks import CrossChecks
@@ -210,8 +210,8 @@ def _analysed(
     results = replace(results, notes={**results.notes, **notes})
     why = meaningless(found, balance, efforts.unworked)
     if why := unstable(steady) or unstable_balance(solvers) or why:
-        mark_doubtful(folder / "results.h5", why)
-        results = replace(results, status="doubtful", reason=why)
+        mark_unreliable(folder / "results.h5", why)
+        results = replace(results, status="unreliable", reason=why)
     if period:
         damaged = clock.timed("fatigue", lambda: _damaged(ready, folder, envelope, singular, period))
         results = replace(results, fatigue=damaged)

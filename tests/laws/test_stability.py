@@ -133,10 +133,10 @@ def test_a_mast_stands_on_a_spring_that_holds_its_weight(axis: str, weak: float)
     assert "link 'mast'" in at(2 - SURE, motor=1.0)
 
 
-def test_a_run_of_an_unstable_balance_is_doubtful(tmp_path: Path) -> None:
+def test_a_run_of_an_unstable_balance_is_unreliable(tmp_path: Path) -> None:
     raw = column("beam", AXES["x"], 1.5) | {"materials": STEEL, "output": {"folder": str(tmp_path / "run")}}
     raw["analysis"]["accuracy"] = "quick"
     run = analyse(scene_from(raw))
-    assert run.results.status == "doubtful"
+    assert run.results.status == "unreliable"
     assert "beyond its buckling load" in run.results.reason
     assert any("kind = 'transient'" in each for each in run.warnings)

@@ -343,14 +343,14 @@ def test_a_ramp_counts_as_the_speed_that_it_leads_to() -> None:
     assert_allclose(steady(with_ramp)[1], steady(raw)[1], atol=1e-15)
 
 
-def test_an_unstable_motion_is_doubtful_and_says_by_how_much_it_grows(tmp_path: Path) -> None:
+def test_an_unstable_motion_is_unreliable_and_says_by_how_much_it_grows(tmp_path: Path) -> None:
     raw = spun("y", 230.0, (0.012, 0.01))
     nothing = {"plots": False, "picture": False, "animation": False, "folder": str(tmp_path / "out")}
     raw["analysis"] = {"kind": "steady", "accuracy": "quick", "steps_per_revolution": 180}
     run = analyse(scene_from({**raw, "output": nothing}))
     results = read_results(tmp_path / "out" / "results.h5")
     assert run.steady is not None
-    assert results.status == "doubtful"
+    assert results.status == "unreliable"
     assert f"grows by {100 * (run.steady.growth - 1):.3g} %" in results.reason
     assert results.notes["steady growth in a period"] == run.steady.growth > 1.5
     assert len(results.time) == 181

@@ -71,10 +71,10 @@ def read_texts(tally: Tally, count: int, seed: int, folder: Path) -> None:
 
 
 def ran(raw: Raw, folder: Path) -> str:
-    """A whole short run: complete or doubtful with finite numbers, or refused."""
+    """A whole short run: complete or unreliable with finite numbers, or refused."""
     scene = scene_from(raw, folder)
     found = analyse(scene).results
-    if found.status not in {"complete", "doubtful"}:
+    if found.status not in {"complete", "unreliable"}:
         return f"ended as {found.status}"
     wrong = [name for name, (_, values) in found.channels.items() if not np.isfinite(values).all()]
     stresses = [peak.stress for peak in found.peaks.values()]

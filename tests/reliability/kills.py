@@ -55,7 +55,7 @@ ROOT = Path(__file__).parents[2]
 LONGEST = 300.0  # seconds that one run may take
 POLL = 2e-4  # seconds between two looks at what a run is at
 ORPHANS = 5.0  # seconds after which nothing of a killed run may be there
-FOUND, REFUSED, DOUBTFUL, ENDED = 0, 2, 4, 130
+FOUND, REFUSED, UNRELIABLE, ENDED = 0, 2, 4, 130
 
 
 @dataclass
@@ -118,7 +118,7 @@ def ready(folder: Path, steps: int = 6000, levels: int = 1, reduction: str = "no
         (folder / "phases").unlink(missing_ok=True)
         cache, began = new_cache(folder / "cache"), time.monotonic()
         code, said = finished(started(folder, "--states", "0.05", cache=cache))
-        if code not in {FOUND, DOUBTFUL}:
+        if code not in {FOUND, UNRELIABLE}:
             raise RuntimeError(said)
     took, rows = time.monotonic() - began, read_results(folder / "scene-results" / "results.h5")
     return Ground(folder, rows, took, {phase: spans(folder / "phases", phase) for phase in PHASES})
@@ -203,7 +203,7 @@ def killed(ground: Ground, number: signal.Signals, phase: str, name: str, seed: 
             running.kill()
     what = f"{number.name} {_stage(folder) if ended else 'after the end'}"
     wrong = f"a traceback: {said[said.index('Traceback') :][:900]}" if "Traceback" in said else ""
-    if ended and number == signal.SIGTERM and code not in {ENDED, FOUND, DOUBTFUL, -number}:
+    if ended and number == signal.SIGTERM and code not in {ENDED, FOUND, UNRELIABLE, -number}:
         wrong = f"exit code {code}: {said[-300:]}"
     end = time.monotonic() + ORPHANS
     while others(folder) and time.monotonic() < end:
@@ -215,7 +215,7 @@ def killed(ground: Ground, number: signal.Signals, phase: str, name: str, seed: 
     resumes = ("--resume",) * state
     code, said = finished(started(folder, *resumes, cache=cache))
     after = "gone on with" if state else "run again"
-    wrong = "" if code in {FOUND, DOUBTFUL} else f"exit code {code}: {said[-400:]}"
+    wrong = "" if code in {FOUND, UNRELIABLE} else f"exit code {code}: {said[-400:]}"
     ground.count(after, wrong or unequal(ground, folder) or torn(folder))
     rmtree(folder, ignore_errors=True)
 
@@ -234,7 +234,7 @@ def together(ground: Ground, count: int, shared: str) -> None:
         folders = [new_place(ground, f"together{k}") for k in range(count)]
     running = [started(folder, cache=cache) for folder in folders]
     ends = [finished(each) for each in running]
-    good = [code in {FOUND, DOUBTFUL} for code, _ in ends]
+    good = [code in {FOUND, UNRELIABLE} for code, _ in ends]
     refused = [code == REFUSED and "another run" in said for code, said in ends]
     every = all(a or b for a, b in zip(good, refused, strict=True)) if shared == "folder" else all(good)
     wrong = "" if every and any(good) else " | ".join(f"{code}: {said[-200:]}" for code, said in ends)
@@ -259,7 +259,7 @@ def short_of(ground: Ground, what: str, limit: int = 0) -> None:
         rmtree(results, ignore_errors=True)
     code, said = finished(running)
     wrong = ""
-    if "Traceback" in said or "internal error" in said or code not in {FOUND, REFUSED, DOUBTFUL}:
+    if "Traceback" in said or "internal error" in said or code not in {FOUND, REFUSED, UNRELIABLE}:
         wrong = f"exit code {code}: {said[-400:]}"
     if what != "folder removed":
         wrong = wrong or unequal(ground, folder, whole=False)

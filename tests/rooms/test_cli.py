@@ -19,7 +19,7 @@ import pytest
 
 import kedfem
 from kedfem.analysis import analyse
-from kedfem.cli import DEFECT, DOUBTFUL, INTERRUPTED, KINDS, USER_ERROR, main
+from kedfem.cli import DEFECT, INTERRUPTED, KINDS, UNRELIABLE, USER_ERROR, main
 from kedfem.cli.running import with_plain_defaults
 from kedfem.errors import OutputError
 from kedfem.mesh.files.read import mesh_from_file
@@ -485,11 +485,11 @@ def test_a_run_that_means_nothing_is_not_called_complete(run_kedfem: Command, ar
     text = arm.read_text("utf-8").replace("= 360", "= 8").replace('initial = "quasi-static"', "")
     arm.write_text(text.replace("60 rpm", "600 rpm"), encoding="utf-8")
     said = run_kedfem("run", arm)
-    assert said.code == DOUBTFUL
-    last = said.err.partition("doubtful: ")[2].replace("\n", " ")
+    assert said.code == UNRELIABLE
+    last = said.err.partition("unreliable: ")[2].replace("\n", " ")
     assert "of energy unaccounted for" in last
     results = read_results(arm.with_name("arm-results") / "results.h5")
-    assert (results.status, len(results.time)) == ("doubtful", 9)
+    assert (results.status, len(results.time)) == ("unreliable", 9)
     assert results.reason in last
 
 

@@ -203,14 +203,14 @@ def test_beyond_all_scale_no_part_is_blamed() -> None:
     assert "most of it from the step" in budget_warning(lost(mesh=0.4, step=0.5), 0.01)[0]
 
 
-def test_a_run_with_errors_over_its_results_is_doubtful_in_its_file(
+def test_a_run_with_errors_over_its_results_is_unreliable_in_its_file(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr("kedfem.analysis.budget", lambda *given: lost())
     raw = example("four_bar_beams", 60, revolutions=0.1)
     run = analyse(scene_from(raw, tmp_path))
     stored = read_results(run.folder / "results.h5")
-    assert stored.status == run.results.status == "doubtful"
+    assert stored.status == run.results.status == "unreliable"
     assert stored.reason == "estimated error of joint forces over 100 %"
     assert meaningless(lost(mesh=0.6, step=0.39), None, 0.0) == ""
     assert meaningless(lost(mesh=0.02, step=2.0), None, 0.0) == ""  # a phase

@@ -76,7 +76,7 @@ def test_turning_under_a_fixed_force_is_the_guidelines_life_by_hand(along: Any, 
     assert_allclose(found(done).hours(spot), 60 / 3600 / damage, rtol=1e-9)
     assert_allclose(found(done).turns(spot), 1 / damage, rtol=1e-9)
     assert_allclose(spot.utilisation, 1.5 * (spot.amplitude + M * spot.mean) / STRENGTH, rtol=1e-9)
-    assert (spot.criterion, spot.cycles, found(done).doubt) == ("signed von Mises", 1, "")
+    assert (spot.criterion, spot.cycles, found(done).unreliable) == ("signed von Mises", 1, "")
 
 
 def test_without_the_force_along_the_mean_is_none_and_a_required_life_counts(tmp_path: Path) -> None:
@@ -108,20 +108,20 @@ def test_a_run_and_a_steady_motion_come_to_the_same(settled: Run, tmp_path: Path
     raw = swung(kind="steady")
     del raw["analysis"]["revolutions"]
     steady = run(raw, tmp_path)
-    assert not found(settled).doubt
+    assert not found(settled).unreliable
     assert found(steady).repeats < 1e-6
     assert_allclose(worst(settled).amplitude, worst(steady).amplitude, rtol=0.02)
     assert_allclose(worst(settled).mean, worst(steady).mean, rtol=0.02)
 
 
-def test_a_motion_that_has_not_settled_is_doubtful_in_words(tmp_path: Path) -> None:
+def test_a_motion_that_has_not_settled_is_unreliable_in_words(tmp_path: Path) -> None:
     done = run(swung(revolutions=2), tmp_path)
     assert found(done).repeats > 0.01
-    assert "has not settled" in found(done).doubt
+    assert "has not settled" in found(done).unreliable
     assert any("has not settled" in said for said in done.warnings)
-    assert "DOUBTFUL" in fatigue_table(found(done)).note
+    assert "UNRELIABLE" in fatigue_table(found(done)).note
     once = run(swung(initial="quasi-static", revolutions=1), tmp_path / "once")
-    assert "one period only" in found(once).doubt
+    assert "one period only" in found(once).unreliable
 
 
 def test_what_is_near_joints_is_left_out_unless_asked_for(settled: Run, tmp_path: Path) -> None:

@@ -91,6 +91,7 @@ RETIRED = {
     "sweeps": r"\bSWEEPS\b",
     "turn": r"\b(two|three|four|five|ten|whole|full|last) turns\b|\b(over|after|within) (a|one) turn\b|\bsteps a turn\b",
     "in thought": r"\bstands? still in thought\b",
+    "doubtful": r"[`\"]doubtful|\bDOUBTFUL\b|\.doubt\b",
     "let go": r"\blets? go of\b",
     "fidelity": r"(?i)\bfidelit",
     "averaged": r"`averaged`|\bAveraged\b",

@@ -31,7 +31,7 @@ from kedfem.results import (
     replacing,
     write_csv,
 )
-from kedfem.results.additions import add_account, add_peaks, mark_doubtful
+from kedfem.results.additions import add_account, add_peaks, mark_unreliable
 from kedfem.results.layout import read_facts, seal, write_facts
 from kedfem.results.recorded import drive_channel
 from kedfem.scene import scene_from
@@ -175,7 +175,7 @@ def test_no_text_that_is_read_has_a_variable_length(tmp_path: Path) -> None:
     write(path, 2)
     add_peaks(path, {"rod": Peak(2e6, "rod", (0.1, 0.2, 0.3), 7, 3, 0.01, 0.5, "a corner")})
     add_notes(path, {"way": "layers", "error": 0.01})
-    mark_doubtful(path, "too much energy")
+    mark_unreliable(path, "too much energy")
     found: list[str] = []
 
     def look(name: str, item: h5py.Dataset | h5py.Group) -> None:
@@ -492,7 +492,7 @@ def gap(path: Path) -> None:
         (corrupt, "must be a results file of kedfem, got a corrupt file"),
         (truncated, "must be a results file of kedfem, got a corrupt file .*truncated"),
         (foreign, "must be a results file of kedfem, got another HDF5 file"),
-        (newer, "must be a results file of kedfem with layout 3, got layout 99 .*: run the scene again"),
+        (newer, "must be a results file of kedfem with layout 4, got layout 99 .*: run the scene again"),
         (unknown_status, "must be a results file of kedfem, got one with a gap .*status 'perfect'"),
         (gap, "must be a results file of kedfem, got one with a gap .*angle"),
     ],

@@ -204,10 +204,10 @@ def test_a_share_of_the_budget_with_the_link_and_what_to_do() -> None:
     assert 'model = "rigid"' in said
 
 
-def test_a_run_that_rounding_makes_meaningless_is_doubtful(tmp_path: Path) -> None:
+def test_a_run_that_rounding_makes_meaningless_is_unreliable(tmp_path: Path) -> None:
     scene = scene_from(four_bar("coupler", 1e13, revolutions=0.25, initial="rest"), tmp_path)
     run = analyse(scene)
-    assert run.results.status == "doubtful"
+    assert run.results.status == "unreliable"
     assert run.budget is not None
     assert float(run.results.notes["error of rounding, drive"]) > 3.0
     assert "estimated error of drive" in meaningless(run.budget, Balance(), 0.0)

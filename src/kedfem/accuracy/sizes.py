@@ -74,7 +74,7 @@ def sizes(scene: Scene, model: Model) -> Sizes:
 
 
 def size_warnings(scene: Scene, found: Sizes) -> tuple[str, ...]:
-    """Doubts about sizes that no machine has, each with the unit that was probably meant."""
+    """Warnings of sizes that no machine has, each with the unit that was probably meant."""
     lengths, others = _length_warnings(scene, found), _other_warnings(scene, found)
     return (*scene.unit_warnings, *lengths, *_material_warnings(scene), *others)
 

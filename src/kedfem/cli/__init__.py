@@ -11,7 +11,7 @@ import typer
 
 from kedfem.cli.exporting import export
 from kedfem.cli.new import KINDS, new
-from kedfem.cli.options import DEFECT, DOUBTFUL, INTERRUPTED, USER_ERROR, flag
+from kedfem.cli.options import DEFECT, INTERRUPTED, UNRELIABLE, USER_ERROR, flag
 from kedfem.cli.parts import frequencies, mesh
 from kedfem.cli.results import compare, loads, report, view
 from kedfem.cli.running import accuracy, check, kinematics, run, sweep

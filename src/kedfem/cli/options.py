@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-USER_ERROR, DEFECT, DOUBTFUL, INTERRUPTED = 2, 3, 4, 130
+USER_ERROR, DEFECT, UNRELIABLE, INTERRUPTED = 2, 3, 4, 130
 
 
 def option(text: str, metavar: str | None = None, *names: str) -> Any:

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from kedfem.cli.options import DOUBTFUL, Quick, ScenePath, Within, flag, goes_to, option
+from kedfem.cli.options import UNRELIABLE, Quick, ScenePath, Within, flag, goes_to, option
 from kedfem.cli.screen import interruptible, progress, say, say_written, show, stages, warn
 from kedfem.errors import SceneError
 
@@ -61,9 +61,9 @@ def run(
         say(size_line(done.sizes))
     show(run_tables(loaded, done), done.warnings)
     say_written(done.folder, FILES)
-    if done.results.status == "doubtful":
-        warn(f"doubtful: {done.results.reason}; these results mean nothing", "red")
-        raise typer.Exit(DOUBTFUL)
+    if done.results.status == "unreliable":
+        warn(f"unreliable: {done.results.reason}; these results mean nothing", "red")
+        raise typer.Exit(UNRELIABLE)
 
 
 def with_plain_defaults(scene: Any) -> Any:

@@ -53,10 +53,10 @@ def peak_warning(peak: Peak | None, since: float) -> tuple[str, ...]:
 
 
 def fatigue_warning(found: Fatigue | None) -> tuple[str, ...]:
-    """Warnings where damage is doubtful, incomplete, or more than is allowed."""
+    """Warnings where damage is unreliable, incomplete, or more than is allowed."""
     if found is None:
         return ()
-    out = [f"fatigue: {found.doubt}"] if found.doubt else []
+    out = [f"fatigue: {found.unreliable}"] if found.unreliable else []
     if found.without:
         out.append(f"fatigue: no data of {', '.join(found.without)}, which were left out")
     if left := found.left_out_words:

@@ -100,7 +100,7 @@ def _write_spots(path: Path, found: Fatigue) -> None:
     header = [
         "link", "rank", *PLACE, "node", "criterion", "damage in a period", "life [periods]", "life [revolutions]",
         "life [h]", "utilisation", "amplitude [Pa]", "mean stress [Pa]", "disproportion", "support factor",
-        "cycles in a period", "near", "doubt",
+        "cycles in a period", "near", "unreliable",
     ]  # fmt: skip
     rows = []
     for link, spots in found.spots.items():
@@ -110,7 +110,7 @@ def _write_spots(path: Path, found: Fatigue) -> None:
             rows.append(
                 [link, rank, *spot.place, spot.node, spot.criterion, spot.damage, periods, turns, found.hours(spot),
                  spot.utilisation, spot.amplitude, spot.mean, spot.disproportion, spot.support, spot.cycles,
-                 spot.near, found.doubt]
+                 spot.near, found.unreliable]
             )  # fmt: skip
     write_rows(path, header, rows)
 

@@ -62,7 +62,7 @@ def facts(results: Results, highest: Peak | None, moment: Callable[[float, float
             out.append(Fact(what, with_prefix(value, unit), message))
     if results.fatigue is not None and (spot := results.fatigue.worst) is not None:
         message = f"link {spot.link}; life {life_of(spot.damage, results.fatigue)}"
-        message += "; doubtful, see below" if results.fatigue.doubt else ""
+        message += "; unreliable, see below" if results.fatigue.unreliable else ""
         out.append(Fact("Highest utilisation in fatigue", percent(spot.utilisation), message))
     if errors := _noted(results.notes, TOGETHER):
         worst = max(errors, key=lambda kind: errors[kind])
@@ -253,7 +253,7 @@ def fatigue_notes(found: Fatigue) -> list[str]:
     """What a reader of the table has to know, in words."""
     turns = f", {found.revolutions:.6g} revolutions" if found.revolutions else ""
     lines = [f"Period {with_prefix(found.period, 's')}{turns}; stresses repeat to {percent(found.repeats)}."]
-    lines += [f"DOUBTFUL: {found.doubt}."] if found.doubt else []
+    lines += [f"UNRELIABLE: {found.unreliable}."] if found.unreliable else []
     lines += [f"{name}: {words}." for name, words in found.strengths.items()]
     if left := found.left_out_words:
         lines.append(f"Left out near corners, point forces and joints: {left} points.")

@@ -19,7 +19,7 @@ OF_PEAK = {
     "stress": "von_mises [Pa]", "link": "link", "place": "place [m]", "node": "node", "step": "step",
     "time": "time [s]", "angle": "drive [rad or m]", "near": "near",
 }  # fmt: skip
-OF_FATIGUE = {"period": "period [s]", "revolutions": "revolutions", "repeats": "repeats to", "doubt": "doubt"}
+OF_FATIGUE = {"period": "period [s]", "revolutions": "revolutions", "repeats": "repeats to", "unreliable": "unreliable"}
 OF_SPOT = {
     "place": "place [m]", "node": "node", "criterion": "criterion", "damage": "damage in a period",
     "utilisation": "utilisation", "amplitude": "amplitude [Pa]", "mean": "mean stress [Pa]",
@@ -28,10 +28,10 @@ OF_SPOT = {
 """Fields of records by their names in the file."""
 
 
-def mark_doubtful(path: Path, why: str) -> None:
+def mark_unreliable(path: Path, why: str) -> None:
     """Say that results mean nothing, and why."""
     with _changed(path) as file:
-        write_facts(file, {"status": "doubtful", "reason": why})
+        write_facts(file, {"status": "unreliable", "reason": why})
 
 
 def add_peaks(path: Path, peaks: Mapping[str, Peak]) -> None:

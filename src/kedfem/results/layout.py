@@ -15,7 +15,7 @@ import numpy as np
 from kedfem.arrays import Float, UInt8
 from kedfem.results.files import unwritable
 
-FORMAT = 3  # version of the file's layout
+FORMAT = 4  # version of the file's layout
 CACHED = 2**18  # bytes of chunks of each series: some chunks; HDF5 would hold 8 MB of each that is open
 # rows of a chunk: tens of kilobytes for the widest channel, little waste for the shortest run
 CHUNK_ROWS = 512

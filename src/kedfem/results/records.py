@@ -10,7 +10,7 @@ import numpy as np
 
 from kedfem.arrays import Float
 
-Status = Literal["running", "complete", "doubtful", "interrupted", "abandoned"]
+Status = Literal["running", "complete", "unreliable", "interrupted", "abandoned"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +120,7 @@ class Fatigue:
     period, revolutions : [s], and turns of the drive in it; 0 of a drive that does not go on turning
     repeats : by how much stresses differ between the last period and the one before, or its beginning, of each link's
         highest
-    doubt : why the numbers are doubtful, else empty
+    unreliable : why the numbers are unreliable, else empty
     spots : link → places of the highest damage, apart from each other, the highest first
     strengths : link → what its material withstands, in words
     left_out : link → points of its surface that were not examined, as they are near corners, point forces or joints
@@ -130,7 +130,7 @@ class Fatigue:
     period: float
     revolutions: float
     repeats: float
-    doubt: str
+    unreliable: str
     spots: Mapping[str, tuple[FatigueSpot, ...]]
     strengths: Mapping[str, str]
     left_out: Mapping[str, int]
@@ -163,11 +163,11 @@ class Results:
     time : (n,) moments of the rows, read-only [s]
     angle : (n,) drive angle [rad] or travel [m] from the reference position, as `drive` says, read-only
     channels : name → (channel, values (n, columns) in the channel's unit, read-only), in the order recorded
-    status : ``complete``; ``doubtful``: whole, but meaningless by its own estimates; ``interrupted``; ``running``:
+    status : ``complete``; ``unreliable``: whole, but meaningless by its own estimates; ``interrupted``; ``running``:
         still being written; ``abandoned``: its process was killed
     scene_json, scene_toml : the scene that was analysed; the TOML text is None for a scene made in Python
     notes : what the run reported about itself
-    reason : why the run was interrupted or is doubtful, else empty
+    reason : why the run was interrupted or is unreliable, else empty
     version : the kedfem that wrote the file
     warnings : what was reported to the user; of a run that came to its end
     seconds : stage → what it took [s]; of a run that came to its end

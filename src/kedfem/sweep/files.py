@@ -20,7 +20,7 @@ from kedfem.sweep.points import MAGNITUDE, Row
 
 ROWS, STATES = "rows", "states"
 KINDS = ("max", "min", "rms", "when")
-FORMAT = 1
+FORMAT = 2
 
 
 def kept_row(folder: FilePath, identity: str) -> Row | None:

@@ -99,8 +99,8 @@ class Job:
 class Row:
     """The row of one point of a sweep.
 
-    status : ``complete``, ``doubtful`` or ``failed``
-    message : why it failed or is doubtful, else empty
+    status : ``complete``, ``unreliable`` or ``failed``
+    message : why it failed or is unreliable, else empty
     change : between the last two revolutions, relative; nan if there were none
     seconds : that the run took
     extremes : name of a column → unit, (maximum, minimum, root of the mean square, time [s] of the largest magnitude)

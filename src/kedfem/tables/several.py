@@ -143,6 +143,6 @@ def _warnings(done: Swept) -> list[str]:
             f"{len(loose)} of {len(done.rows)} points have not settled: their last two revolutions differ by more than "
             f"1 %, by {100 * done.rows[worst].change:.2g} % at {_place(done, worst)}; raise analysis.revolutions"
         )
-    if doubtful := sum(row.status == "doubtful" for row in done.rows):
-        lines.append(f"{doubtful} points are doubtful: their results mean nothing; sweep.csv says why")
+    if unreliable := sum(row.status == "unreliable" for row in done.rows):
+        lines.append(f"{unreliable} points are unreliable: their results mean nothing; sweep.csv says why")
     return lines

@@ -234,7 +234,7 @@ def heading(text: str, channel: Channel | None, results: Results) -> str:
     if results.every > 1:
         below.append(f"one step in {results.every}")
     if results.status != "complete":
-        below.append("doubtful" if results.status == "doubtful" else f"not a whole run: {results.status}")
+        below.append("unreliable" if results.status == "unreliable" else f"not a whole run: {results.status}")
     title = "\n".join(textwrap.wrap(text[:1].upper() + text[1:], 95))
     return _plain("\n".join([title, "  ·  ".join(below)] if below else [title]))
 

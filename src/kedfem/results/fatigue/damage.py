@@ -62,8 +62,8 @@ def fatigue_of(
     turn = turn_steps(scene)
     elastic = dict.fromkeys(link.name for link in model.links if not link.rigid)
     return Fatigue(
-        length, length / (turn * time_grid(scene).step) if turn else 0.0, repeats, _doubt(scene, period, repeats),
-        spots, {name: each.words for name, each in strengths.items()},
+        length, length / (turn * time_grid(scene).step) if turn else 0.0,
+        repeats, _why_unreliable(scene, period, repeats), spots, {name: each.words for name, each in strengths.items()},
         {name: sum(x.left_out for x in each.values()) for name, each in of.items()},
         tuple(name for name in elastic if name not in strengths),
     ), [fields.get(k, nothing[k]) for k in range(len(nothing))]  # fmt: skip
@@ -79,8 +79,8 @@ def link_strengths(scene: Scene, asked: Asked) -> dict[str, Strength]:
     return out
 
 
-def _doubt(scene: Scene, period: Period, repeats: float) -> str:
-    """Why the numbers are doubtful, in words."""
+def _why_unreliable(scene: Scene, period: Period, repeats: float) -> str:
+    """Why the numbers are unreliable, in words."""
     if repeats > REPEATS:
         what = "the period before" if period.before else "its beginning"
         return (
