@@ -40,7 +40,7 @@ def _measured(name: str) -> tuple[str, ...]:
         envelope.flush()
         took = process_time() - since
     count, points = sum(map(len, blocks)), sum(recovery.stressed for recovery in recoveries)
-    shares = (envelope.looked / count / points, envelope.evaluated / count / points)
+    shares = (envelope.examined / count / points, envelope.evaluated / count / points)
     return (
         name, f"{points:,}", f"{count:,}", f"{steps:.3g}", f"{took:.2g}", f"{took / steps:.2g}",
         *(f"{100 * share:.2g} %" for share in shares),

@@ -13,7 +13,7 @@ from kedfem.links.solid import solid_link
 from kedfem.mesh import link_mesh
 from kedfem.results.fatigue.strength import strength_of
 from kedfem.results.fatigue.surface import Period, SurfaceHistory
-from kedfem.results.stresses.envelope import Kept
+from kedfem.results.stresses.envelope import StressHistory
 from kedfem.scene import Bar, Fatigue, FatigueData, LinkScene, Material, Meshing
 
 ELEMENTS, INSTANTS, MODES, PERIOD = (120, 26, 2), 720, 30, 0.1
@@ -38,7 +38,7 @@ def bench_fatigue(folder: Path, quick: bool) -> None:
     write_page(folder, "performance/fatigue", [table(header, rows)])
 
 
-def _look(recovery: StressRecovery, kept: Kept, criterion: str) -> SurfaceHistory:
+def _look(recovery: StressRecovery, kept: StressHistory, criterion: str) -> SurfaceHistory:
     data = FatigueData.model_validate({"group": "steel", "tensile_strength": 8e8})
     asked = Fatigue.model_validate({"materials": {"steel": data}, "criterion": criterion})
     nowhere, period = [""] * recovery.points, Period(PERIOD, 2 * PERIOD, before=True)
@@ -53,14 +53,14 @@ def _plate(elements: tuple[int, int, int]) -> StressRecovery:
     return stress_recovery(solid_link("plate", link_mesh("plate", scene, Path()), material, link_axes(scene)))
 
 
-def _history(points: int) -> Kept:
+def _history(points: int) -> StressHistory:
     """Two periods of stress that is far from proportional: random modes, each with harmonics of its own."""
     rng = np.random.default_rng(1)
     times = np.linspace(0.0, 2 * PERIOD, 2 * INSTANTS + 1)
     k = np.array([1, 2, 3, 5, 8, 20])
     a, lag = rng.normal(size=(MODES, 6)) / k, rng.uniform(0, 6, (MODES, 6))
     C = (a * np.cos(2 * np.pi / PERIOD * k * times[:, None, None] + lag)).sum(axis=2)
-    return Kept(1e7 * rng.normal(size=(points, 6, MODES)), times, C)
+    return StressHistory(1e7 * rng.normal(size=(points, 6, MODES)), times, C)
 
 
 if __name__ == "__main__":

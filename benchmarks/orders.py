@@ -29,7 +29,7 @@ TIMED = {
     "orders_corotational": "pass, co-rotational frames",
     "orders_slides": "solve, slide",
 }
-DOUBT = 10.0  # times the truth's own error, from which on errors are shown
+RESOLVED = 10.0  # times the truth's own error, from which on errors are shown
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Found:
     """
 
     curves: Curves
-    doubt: float
+    uncertainty: float
     second: float
     coupled: float = 0.0
 
@@ -69,7 +69,7 @@ def _table(found: Mapping[str, Found], asked: float) -> list[str]:
     for name in names:
         cells = []
         for each in found.values():
-            shown = name in each.curves and asked > DOUBT * each.doubt
+            shown = name in each.curves and asked > RESOLVED * each.uncertainty
             cells.append(needed(*each.curves[name], asked) if shown else "-")
         rows.append((name, *cells))
     return table((f"work a turn for {100 * asked:g} %", *found), rows)
@@ -118,14 +118,14 @@ def corotational(raw: Callable[[Callable[..., Raw]], Raw], quick: bool) -> Found
     """The study with co-rotational frames: a pass is a solve with the forces that lead to the next."""
     of = Corotational(raw(four_bar))
     share = (QUICK if quick else 1) * (LARGE if of.large else 1)
-    truth, doubt = of.truth(FINEST // (share * (LARGE if of.large else 1)), LEVELS)
+    truth, uncertainty = of.truth(FINEST // (share * (LARGE if of.large else 1)), LEVELS)
     errors, curves = of.errors(truth), {}
     for scheme in SCHEMES:
         if not _is_marched(scheme):
             continue
         tried = [of.march(scheme, n) for n in doubled(2 * SEEN, _most(scheme) / share / scheme.solves)]
         curves[scheme.name] = [work / TURNS for _, work in tried], [errors(u) for u, _ in tried]
-    return Found(curves, errors(doubt), of.costs.one, of.costs.coupled)
+    return Found(curves, errors(uncertainty), of.costs.one, of.costs.coupled)
 
 
 def _most(scheme: Scheme) -> int:

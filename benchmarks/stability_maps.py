@@ -14,8 +14,8 @@ from tests.laws.test_unstable_bands import plane_four_bar, plane_slider_crank
 
 from kedfem.sweep import sweep
 from kedfem.sweep.axes import axes_of
-from kedfem.sweep.points import Base
-from kedfem.sweep.run import Asked
+from kedfem.sweep.points import BaseScene
+from kedfem.sweep.run import SweepOptions
 
 #: scene, speeds, damping β [s], steps in a revolution
 MAPS = {
@@ -32,7 +32,7 @@ def main(given: Sequence[str]) -> None:
         raw = linkage(True)
         raw["analysis"] |= {"kind": "steady", "steps_per_revolution": steps}
         over = axes_of([f"drive.motion.speed={speeds}", f"damping.beta={damping}"], raw)
-        done = sweep(Base(raw, folder, name), over, Asked(quick=True, edges=1e-3), folder / name)
+        done = sweep(BaseScene(raw, folder, name), over, SweepOptions(quick=True, edges=1e-3), folder / name)
         print(name, dict(Counter(row.status for row in done.rows)))
         for each in done.edges:
             which = "unstable" if each.unstable_above else "stable"

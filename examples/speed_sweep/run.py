@@ -6,7 +6,7 @@ import numpy as np
 
 from kedfem.frequencies import Wanted, frequencies
 from kedfem.scene import read_keys, read_scene
-from kedfem.sweep import Asked, Base, axes_of, sweep
+from kedfem.sweep import BaseScene, SweepOptions, axes_of, sweep
 
 SCENE = Path(__file__).with_name("scene.toml")
 RANGE = "drive.speed=1600rpm:2400rpm:9"
@@ -20,7 +20,7 @@ def main() -> None:
     print(f"harmonic 2 meets {found.values[0, 0]:.2f} Hz at {expected:.0f} rpm")
 
     raw, _ = read_keys(SCENE)
-    done = sweep(Base(raw, SCENE.parent, SCENE.stem), axes_of([RANGE], raw), Asked())
+    done = sweep(BaseScene(raw, SCENE.parent, SCENE.stem), axes_of([RANGE], raw), SweepOptions())
     speeds = np.asarray(done.axes[0].numbers)
     stress = np.array([row.extremes["stress/rod/peak"][1][0] for row in done.rows])
     growth = np.array([row.extremes["steady/growth"][1][0] for row in done.rows])

@@ -51,9 +51,9 @@ from kedfem.results.balance import Balance, balance_notes
 from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.fatigue.damage import fatigue_of, kept_since, stress_period
 from kedfem.results.fatigue.strength import require_fatigue
-from kedfem.results.forces.force_elements import measured_elements
+from kedfem.results.forces.force_elements import element_forces
 from kedfem.results.forces.indeterminate import indeterminate_channels, indeterminate_warning
-from kedfem.results.on_demand import Chosen
+from kedfem.results.on_demand import ChannelSelection
 from kedfem.results.recording import recording
 from kedfem.results.stresses.envelope import Envelope
 from kedfem.results.stresses.peaks import highest, hot_spots, peaks
@@ -162,7 +162,7 @@ def _analysed(
     plain = sizes(scene, ready.model)
     notices = [*size_warnings(scene, plain), *assembly_warning(assembly), *stubby_warning(ready.model)]
     solvers = clock.timed("factor", lambda: _solvers(ready, beside), factor_words(ready.model))
-    account = Account(ready.model, measured_elements(scene, ready.model), lambda: solvers[0].stiffening)
+    account = Account(ready.model, element_forces(scene, ready.model), lambda: solvers[0].stiffening)
     recorded = clock.timed("probes", lambda: recording(scene, ready.model, account, ready.path, ready.linkage))
     every = [*ready.model.links, *(each.link for each in ready.model.prescribed)]
     recoveries = clock.timed("recovery", lambda: [stress_recovery(link) for link in every])
@@ -177,7 +177,7 @@ def _analysed(
     unbalanced = balance_warning(balance) if balance else ()
     notices += [
         *unbalanced,
-        *(mass_damping_warning(ready, balance.resisted) if balance else ()),
+        *(mass_damping_warning(ready, balance.mass_damping) if balance else ()),
         *efforts.warnings(),
         *indeterminate_warning(untold),
         *watched.passes.warnings(),
@@ -288,4 +288,4 @@ def _in_memory(results: Results, solvers: Sequence[Steps]) -> Histories:
     if results.every > 1:
         return Histories(results.time[:0], {}, begun=steady_state(solvers))
     names = tuple(name for name in results.channels if kind_of_name(name) is not None)
-    return Histories(results.time, Chosen(results.channels, names), begun=steady_state(solvers))
+    return Histories(results.time, ChannelSelection(results.channels, names), begun=steady_state(solvers))

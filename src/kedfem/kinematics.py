@@ -23,7 +23,7 @@ from kedfem.motion.transmission import LEAST
 from kedfem.output.animation import AnimationWriter, remove_animation
 from kedfem.output.attached import rigid_springs
 from kedfem.output.derived import PLOTS, STEM, TABLE
-from kedfem.output.frames import rigid_fields, sights
+from kedfem.output.frames import drawn_bodies, rigid_fields
 from kedfem.output.plots import write_plots
 from kedfem.results import Results, ResultsWriter, claimed, read_results, write_csv
 from kedfem.results.additions import add_account
@@ -133,7 +133,7 @@ def _stepped(
     channels = [channel for channel, _ in recorded.every] + [each.channel for each in forces.every]
     drive, wanted = drive_channel(scene), set(frame_steps(scene).tolist())
     frames = AnimationWriter(folder, STEM, drive_heading(drive))
-    seen = sights(scene, linked, links)
+    seen = drawn_bodies(scene, linked, links)
     places = {each.name: each.points for each in seen if not each.label}
     notes: dict[str, str | float] = {"kind": "kinematics", "step [s]": time_grid(scene).step}
     with ResultsWriter(

@@ -80,7 +80,7 @@ def test_the_envelope_is_the_maximum_over_all_steps(kind: str, frames: str) -> N
         assert_allclose(each.stress[1], of_frames[..., 1].max(axis=0), atol=10 * EXACT * top)
         assert_allclose(each.stress[2], of_frames[..., 0].min(axis=0), atol=10 * EXACT * top)
     assert all(np.isnan(each.stress).all() for each in found[len(ready.model.links) :])
-    assert envelope.evaluated <= envelope.looked < 0.95 * len(g) * sum(each.stressed for each in recoveries)
+    assert envelope.evaluated <= envelope.examined < 0.95 * len(g) * sum(each.stressed for each in recoveries)
 
 
 def test_leading_modes_tell_where_there_is_no_extreme() -> None:
@@ -99,7 +99,7 @@ def test_leading_modes_tell_where_there_is_no_extreme() -> None:
     for block in transient(ready.scene, ready.linkage, ready.path, ready.model, steps_of(ready.scene, ready.model)):
         envelope.add(block)
     envelope.flush()
-    assert envelope.evaluated < 0.6 * envelope.looked
+    assert envelope.evaluated < 0.6 * envelope.examined
 
 
 def ran(folder: Path, kind: str, animation: Any) -> Run:

@@ -15,7 +15,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.errors import SceneError
-from kedfem.sweep import Asked, Base, Swept, axes_of, sweep
+from kedfem.sweep import BaseScene, SweepOptions, SweepResult, axes_of, sweep
 from tests.laws.test_varying_springs import MASS, OMEGA, hill
 from tests.rooms.test_sweep import Inline
 
@@ -53,13 +53,15 @@ def amplitudes(speed: float) -> np.ndarray:
     return np.sqrt(np.sort(roots[np.abs(roots.imag) < 1e-9 * np.abs(roots).max()].real))
 
 
-def along(folder: Path, values: str, follow: bool) -> Swept:
+def along(folder: Path, values: str, follow: bool) -> SweepResult:
     raw = duffing()
     axes = axes_of([f"drive.speed={values}"], raw)
-    return sweep(Base(raw, folder, "d"), axes, Asked(quick=True, follow=follow), folder / "out", executor=Inline())
+    return sweep(
+        BaseScene(raw, folder, "d"), axes, SweepOptions(quick=True, follow=follow), folder / "out", executor=Inline()
+    )
 
 
-def size(done: Swept, k: int) -> float:
+def size(done: SweepResult, k: int) -> float:
     most, least = done.rows[k].extremes["probes/x/displacement/x"][1][:2]
     return 0.5 * (most - least)
 
@@ -80,7 +82,7 @@ def test_following_asks_for_steady_motions_without_edges(tmp_path: Path) -> None
     raw = duffing()
     axes = axes_of(["drive.speed=36:38:2"], raw)
     with pytest.raises(SceneError, match="--follow: must be without --edges"):
-        sweep(Base(raw, tmp_path, "d"), axes, Asked(quick=True, follow=True, edges=0.01), tmp_path / "a")
+        sweep(BaseScene(raw, tmp_path, "d"), axes, SweepOptions(quick=True, follow=True, edges=0.01), tmp_path / "a")
     raw = {**raw, "analysis": {"revolutions": 2, "steps_per_revolution": 60}}
     with pytest.raises(SceneError, match=r"--follow: .* got kind = 'transient'"):
-        sweep(Base(raw, tmp_path, "d"), axes, Asked(quick=True, follow=True), tmp_path / "b")
+        sweep(BaseScene(raw, tmp_path, "d"), axes, SweepOptions(quick=True, follow=True), tmp_path / "b")

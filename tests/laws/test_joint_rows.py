@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from kedfem.accuracy.prepared import Prepared
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.joints.constraint_joints import needs_rows
+from kedfem.dynamics.joints.constraint_joints import needs_constraints
 from kedfem.motion.joint_equations import joint_axis
 from kedfem.scene import GROUND
 from tests.joint_checks import (
@@ -164,7 +164,7 @@ def test_what_joints_hold_is_held(kind: str) -> None:
     ready, blocks = run_of(kind)
     at, size = bodies(ready, blocks), deflection(ready, blocks)
     for name, joint in ready.scene.joints.items():
-        if not needs_rows(ready.scene, name):
+        if not needs_constraints(ready.scene, name):
             assert np.abs(shared_gap(ready, blocks, name)).max() < 1e-10 * size
             continue
         i, j = sides(joint)

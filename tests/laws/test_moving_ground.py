@@ -122,7 +122,7 @@ def test_damping_by_mass_of_what_moves_freely_is_told_with_what_it_takes(tmp_pat
     exchanged = max(
         np.abs(x).max() for x in (change, rows["energy/strain"], rows["energy/work"], rows["energy/dissipated"])
     )
-    assert done.balance.resisted == pytest.approx(taken / exchanged, rel=1e-3)
+    assert done.balance.mass_damping == pytest.approx(taken / exchanged, rel=1e-3)
     (said,) = warnings
     assert f"they lose {100 * (1 - np.exp(-alpha * T)):.2g} % of their speed in the 0.5 s" in said
     assert f"it took {100 * taken / exchanged:.2g} % of the largest energy exchanged" in said

@@ -16,7 +16,7 @@ from kedfem.analysis import Run, analyse
 from kedfem.errors import SceneError
 from kedfem.motion.period import over_one_period
 from kedfem.scene import scene_from
-from kedfem.sweep import Asked, Base, Swept, axes_of, sweep
+from kedfem.sweep import BaseScene, SweepOptions, SweepResult, axes_of, sweep
 from kedfem.sweep.edges import edges, unstable_bands
 from kedfem.sweep.points import GROWTH, Row
 from tests.laws.test_steady import as_steady, clamped, planar, spun, states
@@ -28,10 +28,10 @@ Raw = dict[str, Any]
 WIDTH = 3e-2
 
 
-def swept(raw: Raw, folder: Path, *over: str, edges: float | None = WIDTH) -> Swept:
-    asked = Asked(quick=True, edges=edges)
+def swept(raw: Raw, folder: Path, *over: str, edges: float | None = WIDTH) -> SweepResult:
+    asked = SweepOptions(quick=True, edges=edges)
     raw = {**raw, "analysis": {**raw["analysis"], "kind": "steady"}}
-    return sweep(Base(raw, folder, "scene"), axes_of(over, raw), asked, folder / "out", executor=Inline())
+    return sweep(BaseScene(raw, folder, "scene"), axes_of(over, raw), asked, folder / "out", executor=Inline())
 
 
 @pytest.mark.long
@@ -85,7 +85,13 @@ def test_edges_are_refused_where_nothing_tells_of_stability(tmp_path: Path) -> N
     def said(width: float = 1e-3, axes: Any = axes, **analysis: Any) -> str:
         scene = {**raw, "analysis": {**raw["analysis"], **analysis}}
         with pytest.raises(SceneError) as found:
-            sweep(Base(scene, tmp_path, "s"), axes, Asked(quick=True, edges=width), tmp_path / "o", executor=Inline())
+            sweep(
+                BaseScene(scene, tmp_path, "s"),
+                axes,
+                SweepOptions(quick=True, edges=width),
+                tmp_path / "o",
+                executor=Inline(),
+            )
         return str(found.value)
 
     assert "--edges: must be a relative width from 1e-09 to below 1, such as 0.001, got 2" in said(2.0, kind="steady")

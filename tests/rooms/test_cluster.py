@@ -9,7 +9,7 @@ import pytest
 from distributed import LocalCluster
 
 from kedfem.errors import OutputError
-from kedfem.sweep import Base, axes_of, cluster, sweep
+from kedfem.sweep import BaseScene, axes_of, cluster, sweep
 from kedfem.sweep.points import Row
 from tests.rooms.test_cli import Command, run_kedfem
 from tests.rooms.test_sweep import QUICK, arm, swept
@@ -43,7 +43,7 @@ def test_workers_of_a_cluster_find_the_same_rows_and_go_on_with_those_of_a_pool(
 
     def run(over: str) -> list[object]:
         executor = cluster.cluster(address, tmp_path)
-        done = sweep(Base(raw, tmp_path, "arm"), axes_of([over], raw), QUICK, tmp_path / "out", executor=executor)
+        done = sweep(BaseScene(raw, tmp_path, "arm"), axes_of([over], raw), QUICK, tmp_path / "out", executor=executor)
         assert [row.status for row in done.rows] == ["complete"] * len(done.rows)
         return [done.before, *map(left, done.rows)]
 

@@ -11,7 +11,7 @@ from kedfem.analysis import analyse
 from kedfem.dynamics.history import Block
 from kedfem.results.audit import Account
 from kedfem.results.cross_checks import CrossChecks
-from kedfem.results.forces.force_elements import Measured, measured_elements
+from kedfem.results.forces.force_elements import ElementForces, element_forces
 from kedfem.results.recording import recording, rows
 from kedfem.scene import scene_from
 from tests.joint_checks import row_values
@@ -29,7 +29,7 @@ def checked(raw: dict[str, Any], **changed: float) -> tuple[str, ...]:
 
 def compared(ready: Prepared, blocks: list[Block], **changed: float) -> tuple[CrossChecks, Account]:
     """A run's efforts with some channels multiplied, and its energy."""
-    account = Account(ready.model, measured_elements(ready.scene, ready.model))
+    account = Account(ready.model, element_forces(ready.scene, ready.model))
     every = recording(ready.scene, ready.model, account, ready.path)
     checks = CrossChecks(ready.scene, ready.linkage, [each.channel for each in every], account)
     for block in blocks:
@@ -50,7 +50,7 @@ def test_a_drive_that_is_dropped_contradicts_rigid_links() -> None:
 def test_a_spring_or_motor_that_is_missing_at_the_hub_is_noticed(acting: str, monkeypatch: Any) -> None:
     raw = four_bar("rigid", ON_CRANK[acting])
     assert checked(raw) == ()
-    monkeypatch.setattr(Measured, "on", lambda self, link, block, about: np.zeros((2, len(block), 3)))
+    monkeypatch.setattr(ElementForces, "on", lambda self, link, block, about: np.zeros((2, len(block), 3)))
     found = checked(raw)
     assert any(each.startswith("drive/torque contradicts drive/rigid_torque") for each in found)
     assert any(each.startswith("drive/torque: the work of the drive is off") for each in found)

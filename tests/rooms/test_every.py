@@ -22,8 +22,8 @@ from kedfem.loads import loads
 from kedfem.results import Channel, ResultsWriter, read_results
 from kedfem.results.thinning import Thinning
 from kedfem.scene import scene_from
-from kedfem.sweep import Asked, Base, axes_of, sweep
-from kedfem.sweep.points import Chosen, Job, finished
+from kedfem.sweep import BaseScene, SweepOptions, axes_of, sweep
+from kedfem.sweep.points import Job, SharedChoices, finished
 from kedfem.tables import run_tables
 from tests.scenes import arm, bar, constant_speed, cycloidal, four_bar, material
 
@@ -237,12 +237,12 @@ def test_a_sweep_finds_extremes_of_all_steps(tmp_path: Path) -> None:
     rows = []
     for every in (1, 7):
         raw = scene_of(tmp_path, every).as_given
-        base = Base(raw, tmp_path, f"s{every}")
-        rows.append(finished(Job(base, {}, Chosen(), 1.0)))
+        base = BaseScene(raw, tmp_path, f"s{every}")
+        rows.append(finished(Job(base, {}, SharedChoices(), 1.0)))
     assert rows[0].extremes
     assert repr(rows[0].extremes) == repr(rows[1].extremes)
     with pytest.raises(SceneError, match=r"output\.every: must be 1 for files that stay \(--keep\)"):
-        sweep(base, axes_of(["analysis.rho_inf=0.9"], raw), Asked(keep=True), tmp_path / "kept")
+        sweep(base, axes_of(["analysis.rho_inf=0.9"], raw), SweepOptions(keep=True), tmp_path / "kept")
 
 
 @pytest.mark.long

@@ -192,7 +192,7 @@ def test_the_steps_of_the_guideline_by_hand() -> None:
     curve = strength_of(wrought, 7e10)
     assert_allclose([curve.endurance, curve.M], [0.3 * 3e8, 0.26], rtol=1e-12)
     used = verdict(4.5e7 * np.cos(PHASE), curve, 0.0, 1.5, np.inf).utilisation
-    assert_allclose(used, 1.5 * 0.5 * 100 ** (1 / 15), rtol=1e-12)  # borne 1e8 times and more
+    assert_allclose(used, 1.5 * 0.5 * 100 ** (1 / 15), rtol=1e-12)  # endured 1e8 times and more
 
 
 def test_a_required_life_uses_what_it_needs() -> None:

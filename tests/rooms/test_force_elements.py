@@ -24,7 +24,7 @@ from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path
 from kedfem.motion.rigid import RigidMotion, resting
-from kedfem.results.forces.force_elements import acting, measured_elements
+from kedfem.results.forces.force_elements import acting, element_forces
 from kedfem.results.recording import recording
 from kedfem.scene import Factor, Pieces, Scene, pieces, scene_from
 from tests.force_vectors import TURN, ForceElement, coordinate, placed, wrench
@@ -196,7 +196,7 @@ def test_every_kind_of_link_shows_its_turn_and_takes_the_torque(kind: str, angle
     """Angles count about the joint's axis, here −z, of the link named first against the ground."""
     scene, model = built(arm(kind))
     link, (element,) = model.links[0], on_arm(scene, model).every
-    (looked,) = measured_elements(scene, model).hinges.values()
+    (looked,) = element_forces(scene, model).hinges.values()
     (block,) = blocks(model, np.array([0.0, 1.0]), np.array([angle, angle]), 2)
     for term_, on in ((element.term, element.on), looked):
         z = np.concatenate([each.unknowns(block) for each in on], axis=1)
@@ -331,7 +331,7 @@ def test_channels_and_forces_are_those_of_laws_where_links_are(kind: str) -> Non
         raw["analysis"] = {"end_time": 0.5, "step": 5e-3, "rho_inf": 0.8}
     ready, every = ran(raw)
     elements = by_vectors(ready.scene, ready.model)
-    measured, before = measured_elements(ready.scene, ready.model), np.zeros(len(elements))
+    measured, before = element_forces(ready.scene, ready.model), np.zeros(len(elements))
     channels = acting(ready.scene, measured)
     assert not any(each.channel.name.startswith("drive") for each in channels)
     for block in every:

@@ -20,7 +20,7 @@ from kedfem.mesh.cad.sides import boundary_sides
 from kedfem.motion.coordinates import coordinates, counted_on
 from kedfem.motion.linkage import linkage
 from kedfem.motion.transmission import transmissions
-from kedfem.output.frames import rigid_fields, sights
+from kedfem.output.frames import drawn_bodies, rigid_fields
 from kedfem.results import read_results
 from kedfem.results.kinematic import coordinate_channel, kinematics_of, plane_normal
 from kedfem.scene import Scene, drive_angle, scene_from
@@ -458,7 +458,7 @@ def test_an_arm_is_held_against_gravity_and_its_centrifugal_force(tmp_path: Path
 def test_frames_show_velocities_of_bodies_and_a_dot_for_a_slider() -> None:
     scene = linkage_scene(slider_crank(0.1, 0.25, 0.3), sliders=("slider",))
     linked = linkage(scene)
-    seen = sights(scene, linked, bare_links(scene))
+    seen = drawn_bodies(scene, linked, bare_links(scene))
     assert [x.cell_type for x in seen] == ["quad", "quad", "vertex"]
     motion = motion_at(scene, np.array([0.0, 0.4]))
     (dot,) = rigid_fields(seen, motion, 1)[2:]

@@ -19,15 +19,15 @@ from kedfem.accuracy import reduction
 from kedfem.analysis import analyse
 from kedfem.errors import SceneError
 from kedfem.scene import scene_from
-from kedfem.sweep import Asked, Base, Swept, axes_of, sweep
-from kedfem.sweep.points import GROWTH, Chosen, Job, extremes, finished
+from kedfem.sweep import BaseScene, SweepOptions, SweepResult, axes_of, sweep
+from kedfem.sweep.points import GROWTH, Job, SharedChoices, extremes, finished
 from tests import scenes
 from tests.scenes import bar, constant_speed, material
 
 G = 9.81
 RHO, L, W = 7850.0, 0.5, 0.02  # an arm of steel, square
 MASS = RHO * L * W**2
-QUICK = Asked(quick=True)
+QUICK = SweepOptions(quick=True)
 
 
 def arm(**analysis: Any) -> dict[str, Any]:
@@ -58,9 +58,11 @@ class Inline(Executor):
         return future
 
 
-def swept(tmp_path: Path, *over: str, asked: Asked = QUICK, most: int = 1000, **analysis: Any) -> tuple[Swept, int]:
+def swept(
+    tmp_path: Path, *over: str, asked: SweepOptions = QUICK, most: int = 1000, **analysis: Any
+) -> tuple[SweepResult, int]:
     raw, runs = arm(**analysis), Inline(most)
-    done = sweep(Base(raw, tmp_path, "arm"), axes_of(over, raw), asked, tmp_path / "out", executor=runs)
+    done = sweep(BaseScene(raw, tmp_path, "arm"), axes_of(over, raw), asked, tmp_path / "out", executor=runs)
     return done, runs.runs
 
 
@@ -248,8 +250,8 @@ def test_all_points_run_by_one_plan(tmp_path: Path) -> None:
     raw = arm()
     del raw["analysis"]["steps_per_revolution"]
     axes = axes_of(["drive.speed=100rpm,200rpm"], raw)
-    asked = Asked(keep=True)
-    done = sweep(Base(raw, tmp_path, "arm"), axes, asked, tmp_path / "out", executor=Inline())
+    asked = SweepOptions(keep=True)
+    done = sweep(BaseScene(raw, tmp_path, "arm"), axes, asked, tmp_path / "out", executor=Inline())
     assert done.planned == 1  # the faster one
     steps = []
     for k in range(2):
@@ -263,7 +265,7 @@ def test_all_points_run_by_one_plan(tmp_path: Path) -> None:
 def test_a_pool_of_processes_finds_the_same_rows(tmp_path: Path) -> None:
     raw = arm()
     axes = axes_of(["drive.speed=100rpm:300rpm:3"], raw)
-    pooled = sweep(Base(raw, tmp_path, "arm"), axes, Asked(workers=2, quick=True), tmp_path / "pool")
+    pooled = sweep(BaseScene(raw, tmp_path, "arm"), axes, SweepOptions(workers=2, quick=True), tmp_path / "pool")
     here, _ = swept(tmp_path, "drive.speed=100rpm:300rpm:3")
     for one, other in zip(pooled.rows, here.rows, strict=True):
         for name, (_, four) in other.extremes.items():
@@ -284,9 +286,9 @@ def test_a_point_whose_worker_is_lost_is_a_failed_row(tmp_path: Path) -> None:
 
     raw = arm()
 
-    def run(executor: Executor) -> Swept:
+    def run(executor: Executor) -> SweepResult:
         axes = axes_of(["drive.speed=100rpm:300rpm:3"], raw)
-        return sweep(Base(raw, tmp_path, "arm"), axes, QUICK, tmp_path / "out", executor=executor)
+        return sweep(BaseScene(raw, tmp_path, "arm"), axes, QUICK, tmp_path / "out", executor=executor)
 
     done = run(Losing())
     assert [row.status for row in done.rows] == ["complete", "failed", "complete"]
@@ -328,7 +330,7 @@ def test_a_sweep_that_was_killed_goes_on_without_a_lost_or_doubled_point(tmp_pat
     for name, content in before.items():
         assert (tmp_path / "killed" / "rows" / name).read_bytes() == content
     assert len(list((tmp_path / "killed").glob("rows/*"))) == 10
-    sweep(Base(raw, tmp_path, "arm"), axes_of([over], raw), QUICK, tmp_path / "whole", executor=Inline())
+    sweep(BaseScene(raw, tmp_path, "arm"), axes_of([over], raw), QUICK, tmp_path / "whole", executor=Inline())
     tables = [(tmp_path / folder / "sweep.csv").read_text() for folder in ("killed", "whole")]
     assert tables[0] == tables[1]
     assert tables[0].count("complete") == 10
@@ -360,21 +362,21 @@ def test_points_at_other_speeds_and_dampings_share_their_modes(tmp_path: Path, m
     found = reduction.reduced
     monkeypatch.setattr(reduction, "reduced", counted)
     axes = axes_of(["drive.speed=100rpm,200rpm,400rpm", "damping.beta=1e-5,4e-5"], raw)
-    base = Base(raw, tmp_path, "four")
+    base = BaseScene(raw, tmp_path, "four")
     done = sweep(base, axes, QUICK, tmp_path / "out", executor=Inline())
     assert len(made) == 1
     assert [row.status for row in done.rows] == ["complete"] * 6
     for k in (0, 3, 4):
-        alone = finished(Job(base_of(base), done_at(axes, k), Chosen(), 1.0))
+        alone = finished(Job(base_of(base), done_at(axes, k), SharedChoices(), 1.0))
         for name in ("stress/coupler/peak", "joints/C/force/magnitude"):
             assert_allclose(done.rows[k].extremes[name][1][0], alone.extremes[name][1][0], rtol=1e-2)
         assert_allclose(done.rows[k].extremes[GROWTH][1][0], alone.extremes[GROWTH][1][0], rtol=2e-2)
     assert len(made) == 4
 
 
-def base_of(base: Base) -> Base:
+def base_of(base: BaseScene) -> BaseScene:
     """As a sweep with plain defaults takes it."""
-    return Base({**base.raw, "analysis": {**base.raw["analysis"], "accuracy": "quick"}}, base.folder, base.stem)
+    return BaseScene({**base.raw, "analysis": {**base.raw["analysis"], "accuracy": "quick"}}, base.folder, base.stem)
 
 
 def done_at(axes: Any, k: int) -> dict[Any, Any]:

@@ -86,7 +86,7 @@ def unsimplified(scene: Scene) -> Scene:
 
 
 @dataclass(frozen=True, slots=True)
-class Linked:
+class FrozenLinkage:
     """A scene's linkage and system, what finds its modes, and its motion and frequencies at a position [Hz]."""
 
     scene: Scene
@@ -105,7 +105,7 @@ class Linked:
 
 def frozen(
     scene: Scene, modes: int, at: float, let_go: LetGo | None = None
-) -> tuple[Linked, Float[np.ndarray, " f"], tuple[str, ...]]:
+) -> tuple[FrozenLinkage, Float[np.ndarray, " f"], tuple[str, ...]]:
     """A scene's linkage, unreduced, with meshes that resolve its lowest vibrations where they are left open.
 
     Parameters
@@ -123,7 +123,7 @@ def frozen(
     quick = scene.analysis.accuracy == "quick"
     left_open = [name for name in names if not quick and "mesh" not in scene.links[name].model_fields_set]
 
-    def finer(made: Linked, factor: float, names: Sequence[str] = names) -> Linked:
+    def finer(made: FrozenLinkage, factor: float, names: Sequence[str] = names) -> FrozenLinkage:
         links = {name: refined(made.scene.links[name], factor) for name in names}
         return _frozen(with_links(made.scene, links), modes, at, let_go)
 
@@ -134,13 +134,13 @@ def frozen(
     return made, errors, (*mesh_warning(errors, allowed, remedy(scene)), *file_warning(scene))
 
 
-def _frozen(scene: Scene, modes: int, at: float, let_go: LetGo | None) -> Linked:
+def _frozen(scene: Scene, modes: int, at: float, let_go: LetGo | None) -> FrozenLinkage:
     linkage, along = moving(scene)
     system = system_of(let_go(scene) if let_go else scene, linkage, along)
     solver = frozen_linkage(scene, system, linkage, along, modes, let_go is not None)
     t = np.array([at])
     motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
-    return Linked(scene, linkage, along, system, solver, motion, solver.at(motion).frequencies)
+    return FrozenLinkage(scene, linkage, along, system, solver, motion, solver.at(motion).frequencies)
 
 
 def allowed_error(scene: Scene) -> float:

@@ -179,14 +179,14 @@ def sweep(
 ) -> None:
     """Run a scene at many values of its keys: peak stresses, joint forces, torque over them. Started again it goes on."""
     from kedfem.scene import read_keys
-    from kedfem.sweep import Asked, Base, axes_of, sweep_folder
+    from kedfem.sweep import BaseScene, SweepOptions, axes_of, sweep_folder
     from kedfem.sweep import sweep as swept_by
     from kedfem.sweep.cluster import cluster as on_cluster
     from kedfem.tables import sweep_tables
 
     raw, _ = read_keys(scene, within=within)
-    base = Base(raw, scene.parent, scene.stem)
-    axes, asked = axes_of(over, raw, samples), Asked(last, workers, quick, keep, edges, follow)
+    base = BaseScene(raw, scene.parent, scene.stem)
+    axes, asked = axes_of(over, raw, samples), SweepOptions(last, workers, quick, keep, edges, follow)
     if follow and samples is not None:
         raise SceneError("--follow: must be without --samples, whose points have no order along a key")
     if cluster is not None and workers is not None:

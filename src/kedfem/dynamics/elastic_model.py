@@ -8,7 +8,7 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.dynamics.inertias import hinge_axis
 from kedfem.dynamics.joints.attachments import SharedCut
-from kedfem.dynamics.joints.constraint_joints import needs_rows
+from kedfem.dynamics.joints.constraint_joints import needs_constraints
 from kedfem.dynamics.joints.constraint_ports import LinkageLayout, slot_travels
 from kedfem.dynamics.joints.coupling import joined
 from kedfem.dynamics.joints.places import on_part, part_surface, slider_axis, slider_guide
@@ -134,7 +134,7 @@ def drive_joint_of(scene: Scene, name: str) -> str | None:
         return None
     if name in (ground := moving_grounds(scene)):
         return ground[name]
-    driven = (x for x in scene.driven_joints if name in scene.joints[x].links and not needs_rows(scene, x))
+    driven = (x for x in scene.driven_joints if name in scene.joints[x].links and not needs_constraints(scene, x))
     return next(driven, None)
 
 
@@ -210,7 +210,7 @@ def _slider(scene: Scene, name: str, links: dict[str, Link], numbers: dict[str, 
     joints = {key: joint for key, joint in scene.joints.items() if name in joint.links}
     guide = slider_guide(scene, name)
     for key, joint in joints.items():
-        if key != guide and needs_rows(scene, key):
+        if key != guide and needs_constraints(scene, key):
             raise SceneError([SLIDERS.fault(("joints", key), {"kind": joint.kind, "name": name})])
     elastic = {link.name for link in links.values()}
     held = [(key, other) for key, joint in joints.items() for other in joint.links if other in elastic]

@@ -154,7 +154,7 @@ def width_across(link: Link) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Sight:
+class DrawnBody:
     """What is seen of a link, or of a mass that it carries.
 
     body : its number
@@ -171,7 +171,7 @@ class Sight:
     label: str = ""
 
 
-def sights(scene: Scene, linkage: Linkage, links: Mapping[str, Link]) -> list[Sight]:
+def drawn_bodies(scene: Scene, linkage: Linkage, links: Mapping[str, Link]) -> list[DrawnBody]:
     """Of all links and what they carry; links without a record are sticks between their joints."""
     out = []
     for name in scene.links:
@@ -179,16 +179,16 @@ def sights(scene: Scene, linkage: Linkage, links: Mapping[str, Link]) -> list[Si
         points, cells, kind = _sticks(scene, name) if link is None else _seen(link)
         used, numbers = np.unique(cells, return_inverse=True)
         body = linkage.bodies.index(name)
-        out.append(Sight(name, body, points[used], numbers.reshape(cells.shape), kind))
+        out.append(DrawnBody(name, body, points[used], numbers.reshape(cells.shape), kind))
     size = float(np.linalg.norm(np.ptp(np.concatenate([each.points for each in out]), axis=0)))
     for name, carried in scene.bodies.items():
         points = np.asarray(getattr(carried, "centre", carried.at)) + ball(carried.mass, size)
         on, cell = linkage.bodies.index(carried.link), np.arange(27)[None]
-        out.append(Sight(name, on, points, cell, "hexahedron27", ball_words(name, carried)))
+        out.append(DrawnBody(name, on, points, cell, "hexahedron27", ball_words(name, carried)))
     return out
 
 
-def rigid_fields(every: Sequence[Sight], motion: RigidMotion, k: int) -> list[RigidField]:
+def rigid_fields(every: Sequence[DrawnBody], motion: RigidMotion, k: int) -> list[RigidField]:
     """All links at one time point, with velocities and accelerations."""
     out = []
     for each in every:

@@ -19,7 +19,7 @@ FINENESS = 4  # straight pieces that a side of an element is drawn in
 
 
 @dataclass(frozen=True, slots=True)
-class Drawn:
+class MeshSurface:
     """The surface of a mesh as VTK takes it.
 
     points : (n, 3) [m]
@@ -34,7 +34,7 @@ class Drawn:
     lines: Int[np.ndarray, "l k"]
 
 
-def drawn(mesh: SolidMesh) -> Drawn:
+def mesh_surface(mesh: SolidMesh) -> MeshSurface:
     """Outer sides of the elements in small patches, curved as the elements are; those of triangles end in a point."""
     full = FORMS["hex27"](mesh)
     quality = mesh_quality(mesh).scaled_jacobian
@@ -53,7 +53,7 @@ def drawn(mesh: SolidMesh) -> Drawn:
     points = (functions @ full.points[sides]).reshape(-1, 3)
     start = k * k * np.arange(len(sides))[:, None, None]
     patches, lines = (start + square).reshape(-1, 4), (start + rim).reshape(-1, k)
-    return Drawn(points, patches, np.repeat(quality[owners], FINENESS**2), lines)
+    return MeshSurface(points, patches, np.repeat(quality[owners], FINENESS**2), lines)
 
 
 def write_mesh_picture(
@@ -73,7 +73,7 @@ def write_mesh_picture(
     """
     arrays: dict[str, np.ndarray] = {"title": np.array(title)}
     for i, (words, mesh) in enumerate(meshes):
-        each = drawn(mesh)
+        each = mesh_surface(mesh)
         arrays |= {f"words{i}": np.array(words), f"quality{i}": mesh_quality(mesh).scaled_jacobian}
         arrays |= {f"{key}{i}": getattr(each, key) for key in ("points", "patches", "values", "lines")}
     if found:

@@ -35,7 +35,7 @@ from kedfem.motion.rigid import RigidMotion
 from kedfem.results.balance import Balance, Flow, Stress, fields_of, flow, prescribed_fields, stress
 from kedfem.results.forces.constraint_forces import joint_spring_work
 from kedfem.results.forces.damping_work import PreviousPoint, damping_work, previous_of, products
-from kedfem.results.forces.force_elements import Measured
+from kedfem.results.forces.force_elements import ElementForces
 from kedfem.results.forces.moments import Constants, RigidRates, constants, rates_of_bodies
 from kedfem.results.records import Channel
 
@@ -82,7 +82,7 @@ class Account:
     REMEMBERED = ("_next", "_sums", "_start", "_stored", "_last", "_springs", "_largest")
 
     def __init__(
-        self, model: Model, force_elements: Measured | None = None,
+        self, model: Model, force_elements: ElementForces | None = None,
         stresses: Callable[[], Stiffening | None] = lambda: None,
     ) -> None:  # fmt: skip
         self.model, self.force_elements, self.stresses = model, force_elements, cache(stresses)
@@ -137,21 +137,21 @@ class Account:
         strain = strain + stressed.stored
         energy = flow.kinetic + strain
         flow = replace(flow, neglected=flow.neglected + stressed.power)
-        rates = np.stack([flow.loads, flow.supports, flow.neglected, flow.led, flow.resisted], axis=1)
+        rates = np.stack([flow.loads, flow.supports, flow.neglected, flow.constraint_joints, flow.mass_damping], axis=1)
         if self._sums is None:
             self._sums = _Sums(float(block.motion.t[0]), rates[0], np.zeros(5), np.zeros(3))
             self._start, self._stored = float(energy[0]), float(stressed.stored[0])
         work, total = self._sums.add(block.motion.t, rates, taken)
-        loads, supports, neglected, led, resisted = work.T
+        loads, supports, neglected, joints, damped = work.T
         neglected = neglected - (stressed.stored - self._stored)
         dissipated, drag, pushed = total.T
-        driven, supports = supports - led, supports - pushed
+        driven, supports = supports - joints, supports - pushed
         if self._displaced:  # constraints along directions of displaced bodies do no work in all
             driven = supports
         change = energy - self._start
         left = change - loads - supports + dissipated + drag + neglected
         exchanged = change, strain, loads, supports, dissipated, LITTLE * flow.kinetic
-        found = tuple(np.abs(x).max() for x in (exchanged, left, neglected, resisted))
+        found = tuple(np.abs(x).max() for x in (exchanged, left, neglected, damped))
         self._largest = np.maximum(self._largest, found)
         rows = {
             "kinetic": flow.kinetic, "strain": strain, "dissipated": dissipated, "neglected": neglected + drag,

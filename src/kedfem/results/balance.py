@@ -26,16 +26,16 @@ class Flow:
         for what directions that vary in time do on the elastic motion
     neglected : (T,) power on the rigid-body rotation of Σ δ × K δ, the moment that K's forces have on the bent link, as
         K turns with the rigid-body frame [W]
-    led : (T,) power of the port forces on the elastic motion, where joints are enforced by constraint equations [W]
-    resisted : (T,) power that damping in proportion to mass takes, α δ' · M δ' [W]
+    constraint_joints : (T,) power of port forces of joints enforced by constraint equations, on the elastic motion [W]
+    mass_damping : (T,) power that damping in proportion to mass takes, α δ' · M δ' [W]
     """
 
     kinetic: Scalars
     loads: Scalars
     supports: Scalars
     neglected: Scalars
-    led: Scalars
-    resisted: Scalars
+    constraint_joints: Scalars
+    mass_damping: Scalars
 
     def __add__(self, other: "Flow") -> "Flow":
         """Both together."""
@@ -167,12 +167,12 @@ class Balance:
 
     energy : of the integration [-]
     neglected : energy that the neglected turning of K exchanges [-]
-    resisted : energy that damping in proportion to mass takes [-]
+    mass_damping : energy that damping in proportion to mass takes [-]
     """
 
     energy: float = 0.0
     neglected: float = 0.0
-    resisted: float = 0.0
+    mass_damping: float = 0.0
 
 
 def balance_notes(found: Balance) -> dict[str, float]:

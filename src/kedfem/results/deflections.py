@@ -10,7 +10,7 @@ from kedfem.dynamics.model import Model
 from kedfem.links.record import in_space
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.released_motions import components
-from kedfem.results.link_points import Drawn, LinkPoint, link_point, seen_from
+from kedfem.results.link_points import LinkPoint, Point, link_point, seen_from
 from kedfem.results.recorded import Rows
 from kedfem.scene import Probe, Scene
 
@@ -43,14 +43,14 @@ def deflection(
     return from_chord, f"deflection from the chord {ends},"
 
 
-def _farthest(scene: Scene, link: str) -> tuple[Drawn, Drawn] | None:
+def _farthest(scene: Scene, link: str) -> tuple[Point, Point] | None:
     """The two joints of a link that are farthest apart; None if it has no two at different points."""
     points = [np.asarray(joint.on(link)) for joint in scene.joints.values() if link in joint.links]
     pairs = [(P, Q) for i, P in enumerate(points) for Q in points[i + 1 :] if np.linalg.norm(P - Q) > 0]
     return max(pairs, key=lambda pair: float(np.linalg.norm(pair[1] - pair[0])), default=None)
 
 
-def _along(R: Float[np.ndarray, "T 3 3"], drawn: Drawn, now: Rows) -> Float[np.ndarray, "T 3 3"]:
+def _along(R: Float[np.ndarray, "T 3 3"], drawn: Point, now: Rows) -> Float[np.ndarray, "T 3 3"]:
     """The orientations nearest to R that take a drawn chord to the direction that it has now."""
     a = R @ (drawn / np.linalg.norm(drawn))
     b = now / np.linalg.norm(now, axis=1)[:, None]
@@ -62,14 +62,14 @@ def _along(R: Float[np.ndarray, "T 3 3"], drawn: Drawn, now: Rows) -> Float[np.n
     return np.asarray(flip @ turn @ R)
 
 
-def _mean_motion(model: Model, name: str) -> Callable[[Block], tuple[Rows, Drawn, Float[np.ndarray, "T 3 3"]]]:
+def _mean_motion(model: Model, name: str) -> Callable[[Block], tuple[Rows, Point, Float[np.ndarray, "T 3 3"]]]:
     """The rigid motion of least mean square distance, by mass: centre now and in the reference position, orientation."""
     here = [(k, link, model.bodies[k]) for k, link in enumerate(model.links) if link.name == name]
     mass = sum(float(link.one @ link.m1[:, 0]) for _, link, _ in here)
     X = np.sum([link.one @ link.mX for _, link, _ in here], axis=0) / mass
     fits = [link.mX - np.outer(link.m1[:, 0], X) for _, link, _ in here]
 
-    def moved(block: Block) -> tuple[Rows, Drawn, Float[np.ndarray, "T 3 3"]]:
+    def moved(block: Block) -> tuple[Rows, Point, Float[np.ndarray, "T 3 3"]]:
         x, B = np.zeros((len(block), 3)), np.zeros((len(block), 3, 3))
         for (k, link, body), fit in zip(here, fits, strict=True):
             motion, u = block.motion, in_space(link, block.links[k].u)

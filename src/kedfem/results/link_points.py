@@ -15,7 +15,7 @@ from kedfem.motion.linkage import Linkage
 from kedfem.results.recorded import Rows
 
 HELD = 1e-6  # of a link's size: a point as near to where a joint holds it is that one
-Drawn = Float[np.ndarray, "3"]
+Point = Float[np.ndarray, "3"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ class LinkPoint:
     """
 
     body: int
-    X: Drawn
+    X: Point
     elastic: Callable[[Block, str], Rows]
     axes: Float[np.ndarray, "3 3"]
     planar: bool = False
@@ -47,7 +47,7 @@ class LinkPoint:
         return np.asarray(block.motion.acceleration(self.body, self.X) + self.elastic(block, "a"))
 
 
-def link_point(model: Model, linked: Linkage, where: str, name: str, at: Drawn) -> LinkPoint:
+def link_point(model: Model, linked: Linkage, where: str, name: str, at: Point) -> LinkPoint:
     """A point of a link: elastic, rigid, prescribed by a drive, or a slider without a shape, which moves with a pin."""
     prescribed = next((x for x in model.prescribed if x.link.name == name), None)
     if prescribed is not None:
@@ -71,7 +71,7 @@ def link_point(model: Model, linked: Linkage, where: str, name: str, at: Drawn) 
     return LinkPoint(model.bodies[k], X, _read(k, link, value), link.axes, link.planar)
 
 
-def _held(model: Model, name: str, at: Drawn) -> tuple[int, Float[np.ndarray, " n"]] | None:
+def _held(model: Model, name: str, at: Point) -> tuple[int, Float[np.ndarray, " n"]] | None:
     """The number of a link, or of its segment, that a joint holds about a point by a bore or face, and values of its
     functions whose sum is the mean motion there; None where no joint does."""
     for k, (link, joint) in enumerate(zip(model.links, model.joints, strict=True)):
@@ -104,7 +104,7 @@ def _read(k: int, link: Link, value: Float[np.ndarray, " n"]) -> Callable[[Block
     return read
 
 
-def _value(link: Link, where: str, at: Drawn) -> tuple[Float[np.ndarray, " n"], Drawn]:
+def _value(link: Link, where: str, at: Point) -> tuple[Float[np.ndarray, " n"], Point]:
     """Values of a link's functions at a point, and the point itself; of a rigid link wherever it is."""
     if link.rigid:
         known = np.column_stack([link.one, link.X[:, :2] if link.planar else link.X])
@@ -118,7 +118,7 @@ def _value(link: Link, where: str, at: Drawn) -> tuple[Float[np.ndarray, " n"], 
     return value, X
 
 
-def seen_from(x: Rows, R: Float[np.ndarray, "T 3 3"], X: Drawn, axes: Float[np.ndarray, "3 3"] | None) -> Rows:
+def seen_from(x: Rows, R: Float[np.ndarray, "T 3 3"], X: Point, axes: Float[np.ndarray, "3 3"] | None) -> Rows:
     """What x differs by from the rigid X, in axes that turn with the frame, or in the world's."""
     if axes is None:
         return np.asarray(x - R @ X)

@@ -76,7 +76,7 @@ class OnDemand(Mapping[str, Series]):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Chosen(Mapping[str, Series]):
+class ChannelSelection(Mapping[str, Series]):
     """Some of the channels, by their names."""
 
     every: Mapping[str, Series]

@@ -13,7 +13,7 @@ from kedfem.links.recovery import von_mises
 from kedfem.motion.linkage import Linkage, linkage
 from kedfem.motion.released_motions import components
 from kedfem.results.deflections import deflection
-from kedfem.results.link_points import Drawn, LinkPoint, link_point
+from kedfem.results.link_points import LinkPoint, Point, link_point
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.results.records import STRESS, XYZ, Channel
 from kedfem.scene import ForceLoad, Probe, Scene, TorqueLoad
@@ -50,7 +50,7 @@ def _channel(scene: Scene, model: Model, linked: Linkage, name: str, probe: Prob
     return Recorded(channel, lambda block: values(block)[:, : len(columns)])
 
 
-def _place(link: str, X: Drawn) -> str:
+def _place(link: str, X: Point) -> str:
     return f"of link {link} at {components(X, form='.6g')} m in the reference position"
 
 

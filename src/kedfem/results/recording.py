@@ -12,7 +12,7 @@ from kedfem.motion.path import Path
 from kedfem.results.audit import Account, energy_channels
 from kedfem.results.forces.constraint_forces import ConstraintForces
 from kedfem.results.forces.drive_forces import drive_channels, gear_channel
-from kedfem.results.forces.force_elements import acting, measured_elements
+from kedfem.results.forces.force_elements import acting, element_forces
 from kedfem.results.forces.joint_forces import joint_channels
 from kedfem.results.forces.port_forces import Forces
 from kedfem.results.forces.rigid import rigid_forces
@@ -42,7 +42,7 @@ def recording(
     """
     probes = probe_channels(scene, model, linked)
     force_elements = account.force_elements if account else None
-    forces = Forces(ConstraintForces(model), force_elements or measured_elements(scene, model))
+    forces = Forces(ConstraintForces(model), force_elements or element_forces(scene, model))
     account = account or Account(model, forces.force_elements, lambda: stresses_of(scene, model))
     joints = [channel for name in scene.joints for channel in joint_channels(scene, model, name, forces)]
     driven = scene.driven_joints

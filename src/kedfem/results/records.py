@@ -92,10 +92,10 @@ class FatigueSpot:
     link, place, node, near : as of :class:`Peak`
     criterion : ``signed von Mises``, ``normal stress`` or ``Findley``
     damage : Miner's sum in a period; 1 is failure
-    utilisation : of the amplitude that is borne for the required life, with the safety factor
+    utilisation : of the endurable amplitude for the required life, with the safety factor
     amplitude, mean : of the cycle that does most damage [Pa]
     disproportion : what the best proportional history leaves of the stresses, of the highest [-]
-    support : the factor by which a stress gradient raises what is borne
+    support : the factor by which a stress gradient raises the endurable amplitude
     cycles : in a period
     """
 

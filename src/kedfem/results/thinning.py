@@ -46,11 +46,11 @@ class Thinning:
         which = slice(-self.steps % self.every, None, self.every)
         self.steps, self.last = self.steps + len(rows[when[0]]), None
         if self.every > 1:
-            self._look(rows, when)
+            self._examine(rows, when)
         waits = {name: block[-1:].copy() for name, block in rows.items()} if (self.steps - 1) % self.every else None
         return {name: block[which] for name, block in rows.items()}, waits
 
-    def _look(self, rows: Rows, when: tuple[str, str]) -> None:
+    def _examine(self, rows: Rows, when: tuple[str, str]) -> None:
         for channel in self.channels:
             here = np.column_stack([*(rows[name] for name in when), rows[channel.name]])
             before = self.largest.get(channel.name, here[:0])

@@ -1,5 +1,5 @@
 """Sweeps: a scene run at many values of some of its keys, and the extremes of each run in one file."""
 
 from kedfem.sweep.axes import Axis, axes_of
-from kedfem.sweep.points import Base, Row
-from kedfem.sweep.run import Asked, Swept, sweep, sweep_folder
+from kedfem.sweep.points import BaseScene, Row
+from kedfem.sweep.run import SweepOptions, SweepResult, sweep, sweep_folder

@@ -38,7 +38,7 @@ Extreme = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Base:
+class BaseScene:
     """A scene as it is written: keys and values, what file names are relative to, its name."""
 
     raw: Mapping[str, Any]
@@ -47,7 +47,7 @@ class Base:
 
 
 @dataclass(frozen=True, slots=True)
-class Chosen:
+class SharedChoices:
     """What one plan chose, for all points: of the analysis, and of links by name."""
 
     analysis: Mapping[str, Any] = field(default_factory=dict)
@@ -73,9 +73,9 @@ class Job:
     near : the state with which that begins; none: there is no point before, or it failed
     """
 
-    base: Base
+    base: BaseScene
     values: Mapping[Where, Value]
-    chosen: Chosen
+    chosen: SharedChoices
     last: float
     folder: FilePath | None = None
     ends: tuple[Mapping[Where, Value], ...] = ()
@@ -135,15 +135,15 @@ class Row:
         return cls(**content, extremes=found)
 
 
-def chosen_by_plan(scene: Scene, stage: Stage) -> Chosen:
+def chosen_by_plan(scene: Scene, stage: Stage) -> SharedChoices:
     """What the plan of one point chooses, which all other points then take too."""
     before, _ = assembled(scene)
     plan = plan_for(before, stage)
     if plan is None:
-        return Chosen()
+        return SharedChoices()
     every = plan.scene.links.items()
     links = {name: _different(dict(before.links[name]), dict(link)) for name, link in every}
-    return Chosen(_different(dict(before.analysis), dict(plan.scene.analysis)), links)
+    return SharedChoices(_different(dict(before.analysis), dict(plan.scene.analysis)), links)
 
 
 def _different(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:

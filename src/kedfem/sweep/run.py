@@ -19,14 +19,14 @@ from kedfem.sweep.edges import Edge, edges, refuse_without_growth, with_middles,
 from kedfem.sweep.files import ROWS, STATES, keep_row, kept_row, write_sweep, write_table
 from kedfem.sweep.neighbours import Ends, Following, refuse_without_order
 from kedfem.sweep.plot import write_plot
-from kedfem.sweep.points import Base, Chosen, Job, Row, chosen_by_plan, finished
+from kedfem.sweep.points import BaseScene, Job, Row, SharedChoices, chosen_by_plan, finished
 
 AHEAD = 2  # points that wait for each worker, so that none is idle
 ONE_THREAD = dict.fromkeys((*BLAS_THREADS, "NUMBA_NUM_THREADS"), "1")
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class SweepOptions:
     """Options of a sweep.
 
     last : turns of the drive whose extremes count
@@ -46,7 +46,7 @@ class Asked:
 
 
 @dataclass(frozen=True, slots=True)
-class Swept:
+class SweepResult:
     """The outcome of a sweep: a row for each point, in the order of the axes' values.
 
     before : rows that an earlier sweep had finished
@@ -62,15 +62,15 @@ class Swept:
     edges: tuple[Edge, ...] = ()
 
 
-def sweep_folder(base: Base) -> FilePath:
+def sweep_folder(base: BaseScene) -> FilePath:
     """Where a sweep goes if nothing else is said: beside the scene."""
     return base.folder / f"{base.stem}-sweep"
 
 
 def sweep(
-    base: Base, axes: Sequence[Axis], asked: Asked, folder: FilePath | None = None,
+    base: BaseScene, axes: Sequence[Axis], asked: SweepOptions, folder: FilePath | None = None,
     watch: Watch = lambda stage, done, total: None, executor: Executor | None = None,
-) -> Swept:  # fmt: skip
+) -> SweepResult:  # fmt: skip
     """Run a scene at all points; rows are kept as they are finished, so that the same sweep goes on where it was.
 
     Parameters
@@ -127,10 +127,10 @@ def sweep(
             write_plot(target / "sweep.png", done, every, found)
             if asked.edges is not None:
                 write_edges(target / "edges.csv", axes, found)
-    return Swept(target, tuple(axes), tuple(every), point.before, planned, tuple(found))
+    return SweepResult(target, tuple(axes), tuple(every), point.before, planned, tuple(found))
 
 
-def _refuse_thinned(scene: Scene, asked: Asked) -> None:
+def _refuse_thinned(scene: Scene, asked: SweepOptions) -> None:
     """Files that stay have the rows in which the sweep looks for extremes."""
     if asked.keep and scene.output.every > 1:
         message = "must be 1 for files that stay (--keep): a sweep finds extremes in the rows of all steps"
@@ -144,9 +144,9 @@ class _Points:
     before : rows that an earlier sweep had finished
     """
 
-    base: Base
-    chosen: Chosen
-    asked: Asked
+    base: BaseScene
+    chosen: SharedChoices
+    asked: SweepOptions
     target: FilePath
     ends: Ends
     following: Following
@@ -180,7 +180,7 @@ def _points(axes: Sequence[Axis]) -> Iterator[dict[Any, Any]]:
         yield {axis.where: value for axis, value in zip(axes, values, strict=True)}
 
 
-def _planned(base: Base, axes: Sequence[Axis], watch: Watch) -> tuple[Chosen, int | None]:
+def _planned(base: BaseScene, axes: Sequence[Axis], watch: Watch) -> tuple[SharedChoices, int | None]:
     """What is chosen for all points: planned at the one whose drive is fastest, the first of several."""
     points, speeds = list(_points(axes)), dict[int, float]()
     for k, values in enumerate(points):
@@ -196,7 +196,7 @@ def _planned(base: Base, axes: Sequence[Axis], watch: Watch) -> tuple[Chosen, in
         except KedfemError:
             continue  # its row says why
         return chosen, k if chosen.analysis else None
-    return Chosen(), None
+    return SharedChoices(), None
 
 
 def _run(

@@ -32,7 +32,7 @@ from kedfem.output.vtu import write_frame
 from kedfem.output.words import NOTHING, with_prefix
 from kedfem.results.audit import Account
 from kedfem.results.cross_checks import CrossChecks
-from kedfem.results.forces.force_elements import measured_elements
+from kedfem.results.forces.force_elements import element_forces
 from kedfem.results.recording import recording
 from kedfem.scene import Curve, Limit, LineSpring, Scene, Spring, is_constant, time_grid
 from kedfem.scene.questions.timing import turn_steps
@@ -82,7 +82,7 @@ def forecast(ready: Prepared) -> tuple[Cost, KedfemError | None]:
 
     def run(begun: Scene, solvers: list[Steps]) -> None:
         still = begun.model_copy(update={"output": begun.output.model_copy(update={"animation": None})})
-        account = Account(model, measured_elements(still, model))
+        account = Account(model, element_forces(still, model))
         recorded = recording(still, model, account, ready.path, ready.linkage)
         efforts = CrossChecks(still, ready.linkage, [each.channel for each in recorded], account)
         watched = Watched(recorded, {}, efforts, recoveries, SingularPasses(ready))

@@ -4,10 +4,10 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from kedfem.accuracy.study.measuring import Measured, Study
+from kedfem.accuracy.study.measuring import MeasuredVariant, Study
 from kedfem.compare import Comparison
 from kedfem.output.words import percent, with_prefix
-from kedfem.sweep import Swept
+from kedfem.sweep import SweepResult
 from kedfem.sweep.files import column_units, largest, plain_quantities
 from kedfem.tables.layout import facts, left, listed, right
 
@@ -81,7 +81,7 @@ def study_tables(study: Study, machine: str) -> list[Table]:
     return [table, facts("Not run", left_out)]
 
 
-def _study_row(row: Measured, study: Study) -> tuple[str, ...]:
+def _study_row(row: MeasuredVariant, study: Study) -> tuple[str, ...]:
     if row.seconds is None:
         raise ValueError(f"{row.variant.name} was not run")
     v, s = row.variant, row.seconds
@@ -98,7 +98,7 @@ def _seconds(s: float) -> str:
     return f"{s:.0f}" if s >= 10 else f"{s:.2g}" if s >= 0.01 else "<0.01"
 
 
-def sweep_tables(done: Swept) -> tuple[list[Table], list[str]]:
+def sweep_tables(done: SweepResult) -> tuple[list[Table], list[str]]:
     """The largest magnitudes over all points, where they are; and warnings."""
     failed = [k for k, row in enumerate(done.rows) if row.status == "failed"]
     fresh = len(done.rows) - done.before
@@ -114,7 +114,7 @@ def sweep_tables(done: Swept) -> tuple[list[Table], list[str]]:
     return [table], [*_failures(done, failed), *_warnings(done)]
 
 
-def _place(done: Swept, k: int) -> str:
+def _place(done: SweepResult, k: int) -> str:
     return ", ".join(f"{axis.key} = {_said(axis.values[k])}" for axis in done.axes)
 
 
@@ -128,13 +128,13 @@ def _said(value: object) -> str:
         return str(value)
 
 
-def _failures(done: Swept, failed: list[int]) -> list[str]:
+def _failures(done: SweepResult, failed: list[int]) -> list[str]:
     lines = [f"{_place(done, k)}: failed: {done.rows[k].message}" for k in failed[:SHOWN]]
     more = len(failed) - SHOWN
     return [*lines, f"{more} more points failed; sweep.csv has their messages"] if more > 0 else lines
 
 
-def _warnings(done: Swept) -> list[str]:
+def _warnings(done: SweepResult) -> list[str]:
     loose = [k for k, row in enumerate(done.rows) if row.settled == "no"]
     lines = []
     if loose:

@@ -6,7 +6,7 @@ from itertools import cycle
 from pathlib import Path
 from typing import Any
 
-from kedfem.accuracy.study.measuring import Measured, Study
+from kedfem.accuracy.study.measuring import MeasuredVariant, Study
 from kedfem.results.files import replacing
 from kedfem.results.table import text_file
 
@@ -17,7 +17,7 @@ COLUMNS = (
 MARKERS = "osD^vP*X<>"
 
 
-def written(row: Measured) -> tuple[str, ...]:
+def written(row: MeasuredVariant) -> tuple[str, ...]:
     """One variant; numbers have the digits that give back the same float."""
     v, s = row.variant, row.seconds
     tolerance = "" if v.tolerance is None else repr(v.tolerance)
@@ -69,19 +69,19 @@ def write_study_plot(study: Study, path: Path, machine: str) -> None:
         figure.savefig(part, format="png")
 
 
-def _least(study: Study, ran: Sequence[Measured]) -> float:
+def _least(study: Study, ran: Sequence[MeasuredVariant]) -> float:
     """Where errors that are not known are drawn."""
     known = [row.error for row in ran if row.error > 0.0]
     return study.floor or (0.5 * min(known) if known else 1e-6)
 
 
-def _point(row: Measured, least: float) -> tuple[float, float]:
+def _point(row: MeasuredVariant, least: float) -> tuple[float, float]:
     if row.seconds is None:
         raise ValueError(f"{row.variant.name} was not run")
     return row.seconds.whole, max(row.error, least)
 
 
-def _name_points(axes: Any, front: Sequence[tuple[tuple[float, float], Measured]]) -> None:
+def _name_points(axes: Any, front: Sequence[tuple[tuple[float, float], MeasuredVariant]]) -> None:
     """Numbers at the points of the front, their names in a list beside the axes."""
     lines = []
     for number, (point, row) in enumerate(front, start=1):

@@ -41,7 +41,7 @@ class Seconds:
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class MeasuredVariant:
     """One variant of a study.
 
     steps, unknowns : how many
@@ -79,9 +79,9 @@ class Study:
     """
 
     title: str
-    reference: Measured
+    reference: MeasuredVariant
     shares: dict[str, float]
-    rows: tuple[Measured, ...]
+    rows: tuple[MeasuredVariant, ...]
 
     @property
     def floor(self) -> float:
@@ -102,7 +102,7 @@ class _Bench:
     repeats: int
     watch: Watch
     since: float = field(default_factory=lambda: perf_counter())  # noqa: PLW0108
-    rows: dict[Variant, Measured] = field(default_factory=dict)
+    rows: dict[Variant, MeasuredVariant] = field(default_factory=dict)
     runs: dict[Variant, Histories] = field(default_factory=dict)
     estimates: dict[Variant, float] = field(default_factory=dict)
     in_full: dict[Variant, float] = field(default_factory=dict)
@@ -126,17 +126,17 @@ class _Bench:
             try:
                 self.rows[variant] = self._measured(variant)
             except KedfemError as error:
-                self.rows[variant] = Measured(variant, note=str(error).splitlines()[0])
+                self.rows[variant] = MeasuredVariant(variant, note=str(error).splitlines()[0])
             except _LateError:
-                self.rows[variant] = Measured(variant, note="left out: the time was spent while it ran")
+                self.rows[variant] = MeasuredVariant(variant, note="left out: the time was spent while it ran")
         return self.rows[variant].seconds is not None
 
     def leave_out(self, variant: Variant, expected: float) -> None:
         """Note that a variant does not fit the budget."""
         known = f": would take about {expected:.0f} s" if expected < float("inf") else " with its like"
-        self.rows[variant] = Measured(variant, note=f"left out{known}")
+        self.rows[variant] = MeasuredVariant(variant, note=f"left out{known}")
 
-    def _measured(self, variant: Variant) -> Measured:
+    def _measured(self, variant: Variant) -> MeasuredVariant:
         scene = varied(self.scene, variant)
         times: list[tuple[float, float]] = []
         again = True
@@ -146,7 +146,7 @@ class _Bench:
             again = len(times) < self.repeats and sum(times[0]) < SHORT * self.most and self.left > 0
         preparation, stepping = zip(*times, strict=True)
         seconds = Seconds(median(preparation), median(stepping), median(map(sum, times)), len(times))
-        return Measured(variant, time_grid(scene).steps, int(unknowns), seconds)
+        return MeasuredVariant(variant, time_grid(scene).steps, int(unknowns), seconds)
 
     def _once(self, scene: Scene, variant: Variant) -> tuple[float, float, int]:
         """Seconds to prepare and to step, unknowns."""

@@ -96,7 +96,7 @@ def direction(term: Term) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"
     return (term.factor * n, none) if term.kind == record.GAP else (none, term.factor * n)
 
 
-def needs_rows(scene: Scene, name: str) -> bool:
+def needs_constraints(scene: Scene, name: str) -> bool:
     """Whether a joint is enforced by constraint equations: where shared port points cannot express it."""
     if name in scene.driven_joints and name in moving_grounds(scene).values():
         return False

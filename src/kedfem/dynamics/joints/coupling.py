@@ -12,7 +12,7 @@ import scipy.sparse as sp
 
 from kedfem.arrays import Float
 from kedfem.dynamics.joints.attachments import Attachment, SharedCut, used_columns
-from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side, needs_rows
+from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side, needs_constraints
 from kedfem.dynamics.joints.constraint_ports import (
     LinkageLayout,
     can_be_bars,
@@ -95,7 +95,7 @@ def joined(
     sliders = {name: axis for name in scene.links if (axis := slider_axis(scene, name)) is not None}
     first_of: dict[str, int] = {name: k for k, name in enumerate(sliders)}
     unknowns = len(sliders)
-    held_by_rows = [constraint_joint(scene, name, links, layout) for name in scene.joints if needs_rows(scene, name)]
+    enforced = [constraint_joint(scene, name, links, layout) for name in scene.joints if needs_constraints(scene, name)]
     geared = [gear_joint(scene, name, links, layout) for name in scene.gears]
     acting = [
         element_joint(scene, f"{kind}.{name}", element, links, layout)
@@ -103,7 +103,7 @@ def joined(
         for name, element in (every.items() if elements else ())
     ]
     stiff = [rigid_points(link, key, layout) for key, link in links.items() if bars and can_be_bars(link)]
-    rows = [row for row in (*held_by_rows, *geared, *acting, *stiff) if any(row.all_sides)]
+    rows = [row for row in (*enforced, *geared, *acting, *stiff) if any(row.all_sides)]
     sides = [(row.name, side) for row in rows for side in row.all_sides]
     columns: dict[int, list[int]] = {}  # of each side's own unknowns: all components of its ports; a slider's own travel
     for name, side in sides:
@@ -113,7 +113,7 @@ def joined(
             ports[key].append(_Port(weights, point, name, range(d), unknowns, np.eye(d)))
             unknowns += d
     for name, joint in scene.joints.items():
-        if needs_rows(scene, name):
+        if needs_constraints(scene, name):
             continue
         elastic = {link.name for link in links.values()}
         surfaces = dict(part_surface(scene, name, links, link) for link in joint.links if link in elastic)

@@ -16,7 +16,7 @@ from kedfem.results.fatigue.surface import CRITERIA, FINDLEY, LinkFatigue, Perio
 from kedfem.results.records import Fatigue, FatigueSpot
 from kedfem.results.stresses.envelope import Envelope
 from kedfem.results.stresses.peaks import drawn_points, places_apart, within
-from kedfem.scene import Fatigue as Asked
+from kedfem.scene import Fatigue as FatigueSettings
 from kedfem.scene import Scene, time_grid, turn_steps, without_vibration
 
 MOST = 5  # hot spots of a link
@@ -69,7 +69,7 @@ def fatigue_of(
     ), [fields.get(k, nothing[k]) for k in range(len(nothing))]  # fmt: skip
 
 
-def link_strengths(scene: Scene, asked: Asked) -> dict[str, Strength]:
+def link_strengths(scene: Scene, asked: FatigueSettings) -> dict[str, Strength]:
     """Of all links with data, their own or of their material."""
     out = {}
     for name, link in scene.links.items():
@@ -96,7 +96,7 @@ def _why_unreliable(scene: Scene, period: Period, repeats: float) -> str:
 
 
 def _spots(
-    surfaces: Mapping[int, SurfaceHistory], fields: Mapping[int, LinkFatigue], asked: Asked, period: Period
+    surfaces: Mapping[int, SurfaceHistory], fields: Mapping[int, LinkFatigue], asked: FatigueSettings, period: Period
 ) -> tuple[FatigueSpot, ...]:
     """The places of a link with the highest damage, as pyLife judges them."""
     if not surfaces:
@@ -109,7 +109,7 @@ def _spots(
     return tuple(_spot(list(surfaces.values())[part], node, asked, period) for part, node in found)
 
 
-def _spot(surface: SurfaceHistory, point: int, asked: Asked, period: Period) -> FatigueSpot:
+def _spot(surface: SurfaceHistory, point: int, asked: FatigueSettings, period: Period) -> FatigueSpot:
     place = surface.place_of(point)
     judged = surface.judged([place])
     h = judged.h[0]

@@ -33,7 +33,7 @@ class Strength:
     M : mean stress sensitivity
     endurance, cycles : amplitude [Pa] at the bend and the cycles there
     slope, beyond : k above and below the bend; nan of strain-life data, infinite where there is nothing below
-    endless : share of `endurance` that is borne for ever, as far as that is known
+    endless : share of `endurance` that is endured for ever, as far as that is known
     data : as the scene has it
     """
 
@@ -144,8 +144,8 @@ class Verdict:
 
     damage : in a period
     cycles : in a period
-    utilisation : of the amplitude that is borne, with the safety factor
-    support : the factor by which the stress gradient raises what is borne; 1 without one
+    utilisation : of the endurable amplitude, with the safety factor
+    support : the factor by which the stress gradient raises the endurable amplitude; 1 without one
     """
 
     damage: float
@@ -186,7 +186,7 @@ def verdict(h: Float[np.ndarray, " T"], strength: Strength, gradient: float, saf
     ----------
     gradient : related stress gradient normal to the surface [1/m]
     safety : factor
-    periods : that are to be borne; infinite for ever
+    periods : required number of them; infinite for ever
     """
     counted = collective(h)
     if not len(counted):
@@ -195,8 +195,8 @@ def verdict(h: Float[np.ndarray, " T"], strength: Strength, gradient: float, saf
     amplitudes = alternating["range"].to_numpy() / 2
     worst = int(amplitudes.argmax())
     cycle = (float(counted["range"].iloc[worst]) / 2, float(counted["mean"].iloc[worst]))
-    borne, support = _borne(strength, gradient, cycle, float(amplitudes[worst]))
-    used = safety * cycle[0] / (borne * _for_life(strength, amplitudes, periods))
+    endurable, support = _endured(strength, gradient, cycle, float(amplitudes[worst]))
+    used = safety * cycle[0] / (endurable * _for_life(strength, amplitudes, periods))
     return Verdict(_damage(strength, alternating), len(counted), used, support)
 
 
@@ -214,14 +214,14 @@ def _damage(strength: Strength, alternating: Any) -> float:
 
 
 def _interpolated(strength: Strength, x: Float[np.ndarray, " c"]) -> Float[np.ndarray, " c"]:
-    """Logarithms of the cycles that amplitudes are borne, straight on beyond the ends of the table."""
+    """Logarithms of the cycles that amplitudes are endured, straight on beyond the ends of the table."""
     S, N = strength.S, strength.N
     j = np.clip(np.searchsorted(S, x), 1, len(S) - 1)
     return np.asarray(N[j - 1] + (N[j] - N[j - 1]) / (S[j] - S[j - 1]) * (x - S[j - 1]))
 
 
-def _borne(strength: Strength, gradient: float, cycle: tuple[float, float], alternating: float) -> tuple[float, float]:
-    """The amplitude [Pa] that is borne with the mean of a cycle, and the support factor."""
+def _endured(strength: Strength, gradient: float, cycle: tuple[float, float], alternating: float) -> tuple[float, float]:
+    """The amplitude [Pa] that is endured with the mean of a cycle, and the support factor."""
     if strength.data.group is None:
         return strength.endurance * cycle[0] / alternating, 1.0
     row = material_factors(strength.data, gradient, cycle)
@@ -229,9 +229,9 @@ def _borne(strength: Strength, gradient: float, cycle: tuple[float, float], alte
 
 
 def _for_life(strength: Strength, amplitudes: Float[np.ndarray, " c"], periods: float) -> float:
-    """The guideline's factor of service strength K_BK: how much more is borne in a limited life, or less for ever.
+    """The guideline's factor of service strength K_BK: how much more is endured in a limited life, or less for ever.
 
-    Miner's elementary rule with the effective damage sum; at least what is borne for ever.
+    Miner's elementary rule with the effective damage sum; at least what is endured for ever.
     """
     if not np.isfinite(periods) or np.isnan(strength.slope):
         return strength.endless

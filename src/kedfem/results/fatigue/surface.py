@@ -12,8 +12,8 @@ from kedfem.links.recovery import StressRecovery
 from kedfem.processes import threads
 from kedfem.results.fatigue.planes import disproportion, dominant, findley_stresses, normal_stresses, signed_von_mises
 from kedfem.results.fatigue.strength import Strength
-from kedfem.results.stresses.envelope import Kept
-from kedfem.scene import Fatigue as Asked
+from kedfem.results.stresses.envelope import StressHistory
+from kedfem.scene import Fatigue as FatigueSettings
 
 PLANES = 36  # through a point, at the least, on which histories are counted
 CHUNK = 4_000_000  # bytes of histories of some points: they stay in the cache
@@ -70,7 +70,7 @@ class Period:
     end: float
     before: bool
 
-    def of(self, kept: Kept) -> tuple[Float[np.ndarray, "T r"], Float[np.ndarray, "_ r"]]:
+    def of(self, kept: StressHistory) -> tuple[Float[np.ndarray, "T r"], Float[np.ndarray, "_ r"]]:
         """Coordinates of modes over the period, without its beginning, and how far those a period before are from them.
 
         Where there is no period before, those at its beginning and its end.
@@ -93,8 +93,8 @@ class SurfaceHistory:
     """
 
     def __init__(
-        self, recovery: StressRecovery, kept: Kept | None, near: Sequence[str], strength: Strength, asked: Asked,
-        period: Period,
+        self, recovery: StressRecovery, kept: StressHistory | None, near: Sequence[str], strength: Strength,
+        asked: FatigueSettings, period: Period,
     ) -> None:  # fmt: skip
         self.recovery, self.strength, self.asked, self.near = recovery, strength, asked, near
         self.name = recovery.link.name

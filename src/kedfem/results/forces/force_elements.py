@@ -29,7 +29,7 @@ POSITION, SPEED, EFFORT = "e", "rate", "multiplier"  # of `Multipliers`
 
 
 @dataclass
-class Measured:
+class ElementForces:
     """Force elements, and hinges whose turns are counted on over successive blocks, once for each block.
 
     ends : names and numbers in the linkage of the links that each force element acts on
@@ -82,7 +82,7 @@ class Measured:
         return self.angles
 
 
-def measured_elements(scene: Scene, model: Model) -> Measured:
+def element_forces(scene: Scene, model: Model) -> ElementForces:
     """Motors, springs and limits of a scene and, without a drive, the turns of its hinges."""
     every, names = dict(force_elements(scene)), body_names(scene)
     ends = {key: [(link, names.index(link)) for link, _ in places(scene, x)] for key, x in every.items()}
@@ -94,10 +94,10 @@ def measured_elements(scene: Scene, model: Model) -> Measured:
                 coordinate(joint, turns=True),
                 on_links(model, constraint_joint(scene, name, *links, ()), (at, at)),
             )
-    return Measured(every, ends, hinges)
+    return ElementForces(every, ends, hinges)
 
 
-def acting(scene: Scene, measured: Measured) -> list[Recorded]:
+def acting(scene: Scene, measured: ElementForces) -> list[Recorded]:
     """How motors, springs, limits and, without a drive, hinges move, and what force they exert."""
     every = ((name, *each) for name, element in measured.every.items() for each in _channels(name, element))
     elements = [Recorded(channel, partial(_column, name, which, sign)) for name, channel, which, sign in every]

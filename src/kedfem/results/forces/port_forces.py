@@ -16,7 +16,7 @@ from kedfem.dynamics.system.forces.supports import supports
 from kedfem.links.record import Link, in_space
 from kedfem.motion.constraints import cross
 from kedfem.results.forces.constraint_forces import ConstraintForces
-from kedfem.results.forces.force_elements import Measured
+from kedfem.results.forces.force_elements import ElementForces
 from kedfem.results.recorded import Rows, once
 
 INDETERMINATE = 1e-6  # [-, m] share of a loose port force of one that a joint would carry
@@ -27,7 +27,7 @@ class Forces:
     """Forces besides port forces: of constraint equations, motors and springs."""
 
     rows: ConstraintForces
-    force_elements: Measured
+    force_elements: ElementForces
     on_ports: Callable[[Block], Rows] = field(default_factory=lambda: once(lambda x: on_ports(supports(x))))
 
 

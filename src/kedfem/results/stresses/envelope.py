@@ -45,7 +45,7 @@ class LinkEnvelope:
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class StressHistory:
     """The stress of a link over some time as a product.
 
     parts : (p, 6, r) stresses of its modes, as of `links.recovery.stress_modes`
@@ -119,14 +119,14 @@ class Modes:
 
 @dataclass
 class Envelope:
-    """Looks at blocks of steps as they come; a pure consumer of them.
+    """The highest and lowest stresses of blocks of steps as they come; it only reads them.
 
     model : whose steps they are
     recoveries : per link, then per prescribed rigid link
     since : time [s] before which stresses do not count
     kept_since : time [s] from which on the coordinates of all modes are kept; none if not given
     worst : the instant of the highest stress so far
-    looked, evaluated : stresses at a point and a time that were examined, and that all modes were summed up for
+    examined, evaluated : stresses at a point and a time that were examined, and that all modes were summed up for
     """
 
     model: Model
@@ -134,7 +134,7 @@ class Envelope:
     since: float = -np.inf
     kept_since: float = np.inf
     worst: Snapshot | None = None
-    looked: int = 0
+    examined: int = 0
     evaluated: int = 0
     _modes: list[Modes | None] = field(default_factory=list, repr=False)
     _stress: list[Float[np.ndarray, "3 p"]] = field(default_factory=list, repr=False)
@@ -143,7 +143,7 @@ class Envelope:
     _when: list[Float[np.ndarray, "3 T"]] = field(default_factory=list, repr=False)
     _kept: list[list[tuple[int, Float[np.ndarray, "T r"]]]] = field(default_factory=list, repr=False)
     REMEMBERED: ClassVar = (
-        "worst", "looked", "evaluated", "_modes", "_stress", "_step", "_waiting", "_when", "_kept",
+        "worst", "examined", "evaluated", "_modes", "_stress", "_step", "_waiting", "_when", "_kept",
     )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -182,7 +182,7 @@ class Envelope:
         for i, modes in enumerate(self._modes):
             if modes is not None:
                 G = np.concatenate([block.links[i].g.reshape(len(block), -1) for block in blocks])
-                self._look(i, modes, G, blocks[0].step, early)
+                self._examine(i, modes, G, blocks[0].step, early)
         if self._highest() > before or self.worst is None:
             _, step = max(((x[0].max(), k[0][x[0].argmax()]) for x, k in self._stressed()), default=(0.0, 0))
             block = next((b for b in blocks if b.step <= step < b.step + len(b)), blocks[0])
@@ -197,7 +197,7 @@ class Envelope:
             every = np.concatenate(self._when, axis=1)
             self._when = [every[:, np.isin(every[0], wanted)]]
 
-    def _look(self, i: int, modes: Modes, G: Float[np.ndarray, "T k"], first: int, early: int) -> None:
+    def _examine(self, i: int, modes: Modes, G: Float[np.ndarray, "T k"], first: int, early: int) -> None:
         from kedfem.results.stresses.envelope_kernel import LEVELS, enveloped, residuals_of
 
         C = modes.coordinates(G, max(0.0, float(self._stress[i][0].max(initial=0.0))))
@@ -208,8 +208,8 @@ class Envelope:
         residuals_of(C, m, residuals)
         heads = np.ascontiguousarray(parts[:, :, :m].transpose(0, 2, 1))
         rest = np.sqrt((C[:, m:] ** 2).sum(axis=1))
-        looked, full = enveloped(heads, parts, C, rest, residuals, first, self._stress[i], self._step[i])
-        self.looked += looked
+        examined, full = enveloped(heads, parts, C, rest, residuals, first, self._stress[i], self._step[i])
+        self.examined += examined
         self.evaluated += full
 
     def _stressed(self) -> list[tuple[Float[np.ndarray, "3 p"], Int[np.ndarray, "3 p"]]]:
@@ -237,7 +237,7 @@ class Envelope:
             out.append(LinkEnvelope(link.name, recovery, stress, step, self.at(step)))
         return out
 
-    def kept(self, i: int) -> Kept | None:
+    def kept(self, i: int) -> StressHistory | None:
         """The history of a link or segment over the time that is kept; None of one that has no stress."""
         self.flush()
         modes, pieces = self._modes[i], self._kept[i]
@@ -246,7 +246,7 @@ class Envelope:
         r = len(modes.basis)
         steps = np.concatenate([np.arange(first, first + len(C)) for first, C in pieces])
         C = np.concatenate([np.pad(C, ((0, 0), (0, r - C.shape[1]))) for _, C in pieces])
-        return Kept(modes.parts, self.at(steps)[0], C)
+        return StressHistory(modes.parts, self.at(steps)[0], C)
 
     def at(self, steps: Int[np.ndarray, "..."]) -> Float[np.ndarray, "2 ..."]:
         """Time [s] and position of the drive at steps at which stress is highest, or whose histories are kept."""

@@ -60,7 +60,7 @@ class FatigueData(Record):
     slope_beyond: Annotated[float | Literal["endless"], BeforeValidator(slope_or_endless)] | None = None
     """k below; `"endless"`: smaller amplitudes do no damage. If not given 2 k - 1, with a group of aluminium 15"""
     mean_stress_sensitivity: Sensitivity | None = None
-    """M: by how much amplitudes that are borne fall with the mean stress; of the group if not given, else required"""
+    """M: by how much endurable amplitudes fall with the mean stress; of the group if not given, else required"""
     strain_life: StrainLife | None = None
     """instead of a group or an S-N curve"""
 
