@@ -23,13 +23,11 @@ class Share:
 
     source : mesh, step, positions, reduction, frames or rounding
     errors : kind of channel → estimated error, of the channel's largest value, at the worst instant of the worst channel
-    how : what the estimate was made from, in words
     remedy : what would lower it, in words; what usually does if not given
     """
 
     source: str
     errors: Mapping[str, float]
-    how: str = ""
     remedy: str = ""
 
 

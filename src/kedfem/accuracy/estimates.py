@@ -128,14 +128,13 @@ def budget(
     small = companion(ready)
     limits = list(_limits(ready, found))
     modes = by_kind(reduction.estimate) if reduction else {}
-    reduced = Share("reduction", modes, "richer modes") if modes else None
+    reduced = Share("reduction", modes) if modes else None
     shares = [reduced, frames_share(seen.geometric, kinds), seen.rounding.share(kinds)]
     if small is None:
         local = dict.fromkeys(kinds, SINGLE * seen.running.total)
         if "displacement" in local:
             local["displacement"] += seen.compliance.relative
-        alone = Share("step", local, "local errors of its steps: no run beside one so large")
-        marched = alone if step is None else _step_share(step)
+        marched = Share("step", local if step is None else by_kind(step))
         shares += [marched if seen.steps else None, plain_mesh_share(eta, kinds)]
         return Budget(joined(shares), tuple(limits), eta)
     own = ran is not None and small.model is ready.model and len(ran.time) > 1
@@ -150,7 +149,7 @@ def budget(
         shares[1:] = [frames_share(seen.geometric, here), seen.rounding.share(here)]
         if seen.steps:
             known = known or step_errors(small, base)
-            shares.append(_step_share({n: error for n, error in known.items() if n in sizes}))
+            shares.append(Share("step", by_kind({n: error for n, error in known.items() if n in sizes})))
         elif not states_step(ready.scene):  # stated positions are wanted there
             shares.append(positions_share(base, sizes))
         shares.append(mesh_share(small, base, eta))
@@ -184,7 +183,7 @@ def frames_share(geometric: GeometricError, kinds: Sequence[str]) -> Share | Non
     remedy = warned[0].rsplit("; ", 1)[-1] if warned else ""
     how = bent(geometric)
     errors = {kind: geometric.estimate if kind == "stress" else geometric.worst for kind in kinds}
-    return Share("frames", errors, how, f"{how}; {remedy}" if remedy else "")
+    return Share("frames", errors, f"{how}; {remedy}" if remedy else "")
 
 
 def step_errors(ready: Prepared, base: Histories) -> dict[str, float]:
@@ -207,10 +206,6 @@ def step_errors(ready: Prepared, base: Histories) -> dict[str, float]:
 def in_steps(scene: Scene, h: float, steps: int) -> Scene:
     """The scene in so many steps of h."""
     return with_analysis(scene, end_time=h * steps, revolutions=None, step=h, steps_per_revolution=None)
-
-
-def _step_share(errors: Mapping[str, float]) -> Share:
-    return Share("step", by_kind(errors), "longer steps, or levels in time")
 
 
 def _limits(ready: Prepared, found: Mapping[int, Indicator]) -> list[str]:

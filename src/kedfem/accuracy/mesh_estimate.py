@@ -76,7 +76,7 @@ def plain_mesh_share(eta: Mapping[str, float], kinds: tuple[str, ...]) -> Share 
         return None
     worst = max(eta.values())
     errors = {kind: SOFT * worst**2 + (LOCAL * worst if kind == "stress" else 0.0) for kind in kinds}
-    return Share("mesh", errors, "recovered stress against that of elements")
+    return Share("mesh", errors)
 
 
 def mesh_share(small: Prepared, base: Histories, eta: Mapping[str, float]) -> Share:
@@ -84,4 +84,4 @@ def mesh_share(small: Prepared, base: Histories, eta: Mapping[str, float]) -> Sh
     errors = by_kind(mesh_errors(small, base, eta))
     if eta and "stress" in errors:
         errors["stress"] += LOCAL * max(eta.values())
-    return Share("mesh", errors, "recovered stress against that of elements; beams of twice the elements")
+    return Share("mesh", errors)

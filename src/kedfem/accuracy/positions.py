@@ -27,7 +27,7 @@ def positions_share(found: Histories, sizes: Mapping[str, float]) -> Share:
     lengths = {name: np.linalg.norm(found.channels[name][1], axis=1) for name in sizes}
     errors = {name: missed(lengths[name]) / size for name, size in sizes.items()}
     remedy = "take more of them, analysis.steps_per_revolution, and let loads come and go over several of them"
-    return Share("positions", by_kind(errors), "differences about the largest values", remedy)
+    return Share("positions", by_kind(errors), remedy)
 
 
 def missed(values: Float[np.ndarray, " n"]) -> float:

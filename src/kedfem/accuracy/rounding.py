@@ -141,7 +141,7 @@ class Rounding:
         link = self.model.links[int(self.forces.argmax())].name
         how = f"link {link} is so stiff beside its neighbours that its numbers do not tell rigid motion from strain"
         remedy = f'{how}; take model = "rigid" for it, or its true stiffness and larger elements'
-        return Share("rounding", dict.fromkeys(kinds, self.relative), how, remedy)
+        return Share("rounding", dict.fromkeys(kinds, self.relative), remedy)
 
 
 def unstressed(model: Model, peak: Peak | None) -> bool:

@@ -42,7 +42,6 @@ class StepEstimate:
     running : what local errors of the steps add up to, of the largest displacement [-]; all that a single level knows
         while it runs, which puts twice of it for the error of every channel; a march beside it, with steps twice as
         long, shows more (`single_errors`)
-    local : the largest local error of a step, of the largest displacement [-]
     """
 
     h: float
@@ -51,7 +50,6 @@ class StepEstimate:
     differences: Mapping[str, tuple[float, ...]]
     fast: Mapping[str, float]
     running: float
-    local: float
 
     @property
     def notes(self) -> dict[str, str | float]:
@@ -213,15 +211,15 @@ class StepWatch:
     def estimate(self) -> StepEstimate:
         """Of what was examined so far."""
         analysis = self.ready.scene.analysis
-        running, local, h = self.running.total, self.running.relative, time_grid(self.ready.scene).step
+        running, h = self.running.total, time_grid(self.ready.scene).step
         if (analysis.extrapolation_levels or 1) == 1:
             errors = {each.channel.name: min(1.0, SINGLE * running) for each in self.recorded}
-            return StepEstimate(h, 1, errors, {}, {}, running, local)
+            return StepEstimate(h, 1, errors, {}, {}, running)
         sizes = {name: x for name, x in self.sizes.items() if x.peak}
         return StepEstimate(
             h, analysis.extrapolation_levels or 1, {name: _error(x) for name, x in sizes.items()},
             {name: tuple((x.differences / x.peak).tolist()) for name, x in sizes.items()},
-            {name: x.fast for name, x in sizes.items()}, running, local,
+            {name: x.fast for name, x in sizes.items()}, running,
         )  # fmt: skip
 
 

@@ -16,7 +16,6 @@ from kedfem.dynamics.modes.linear_model import LinearModel, Shapes, linear_model
 from kedfem.dynamics.system.record import System
 from kedfem.errors import SceneError
 from kedfem.export.files import read_record, write_record
-from kedfem.links.record import Link
 from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
@@ -196,7 +195,7 @@ class _Reader:
     def _values(self, field: str, moved: Sequence[Float[np.ndarray, "c n d"]], count: int) -> Matrix:
         motion = self.motion.at(np.zeros(count, int))
         links = [
-            _history(link, motion.R[:, body, : link.d, : link.d], field, u)
+            _history(motion.R[:, body, : link.d, : link.d], field, u)
             for link, body, u in zip(self.model.links, self.model.bodies, moved, strict=True)
         ]
         block = Block(0, motion, links)
@@ -204,7 +203,7 @@ class _Reader:
         return np.hstack([np.zeros((count, 0)), *rows]).T
 
 
-def _history(link: Link, R: Float[np.ndarray, "c d d"], field: str, x: Float[np.ndarray, "c n d"]) -> LinkHistory:
+def _history(R: Float[np.ndarray, "c d d"], field: str, x: Float[np.ndarray, "c n d"]) -> LinkHistory:
     """A link with one of u, v, a and nothing else."""
     none = np.zeros_like(x)
     own = LinkHistory(none, none, none, none, R, none, np.zeros((len(x), 0)), np.zeros(len(x)))

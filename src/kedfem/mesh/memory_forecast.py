@@ -34,6 +34,14 @@ def least_bytes(unknowns: float, factored: bool = True, plane: bool = False) -> 
     return LINK_BYTES * unknowns, FACTOR_BYTES * unknowns**1.5 * (PLANE_FILL if plane else 1.0) * factored
 
 
+def unknowns_that_fit(unknowns: float, factor: float, free: float) -> float:
+    """Unknowns, to two digits, of the mesh whose factor takes the free memory, where `unknowns` take `factor` [bytes].
+
+    The factor grows by the power 1.5 at most.
+    """
+    return float(f"{unknowns * (free / factor) ** (1 / 1.5):.2g}")
+
+
 def check_room(where: str, unknowns: float, factored: bool = True, plane: bool = False) -> None:
     """Refuse a link that the free memory cannot hold: the least that its matrices and their factor take.
 

@@ -49,8 +49,18 @@ class Coordinate:
             gap = motion.p[:, self.body] - motion.p[:, self.other]
             gap += (motion.R[:, self.body] - motion.R[:, self.other]) @ self.at
             return np.asarray((back @ gap[..., None])[..., 0] @ self.axis)
-        seen = (back @ motion.R[:, self.body]) @ self.mark
-        return np.asarray(np.arctan2(seen @ np.cross(self.axis, self.mark), seen @ self.mark))
+        return rotation_about(motion.R[:, self.body], motion.R[:, self.other], self.axis, self.mark)
+
+
+def rotation_about(
+    R_i: Float[np.ndarray, "T 3 3"], R_j: Float[np.ndarray, "T 3 3"], axis: Vector, mark: Vector
+) -> Float[np.ndarray, " T"]:
+    """Angle of body i against body j about an axis of j, within ±π [rad].
+
+    mark : direction in body i, in the reference position, across the axis: its rotation is measured
+    """
+    seen = (np.swapaxes(R_j, 1, 2) @ R_i) @ mark
+    return np.asarray(np.arctan2(seen @ np.cross(axis, mark), seen @ mark))
 
 
 def coordinates(scene: Scene, linkage: Linkage) -> list[Coordinate]:

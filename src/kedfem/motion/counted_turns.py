@@ -7,6 +7,7 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.errors import MotionError
 from kedfem.motion.constraints import perpendiculars
+from kedfem.motion.coordinates import rotation_about
 from kedfem.motion.joint_equations import coordinate_axis, ordered
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path, place_on
@@ -75,8 +76,7 @@ def turn_of(
     one, other = ordered(joint, about)
     i, j, b = link.bodies.index(one), link.bodies.index(other), coordinate_axis(joint, about)
     a = perpendiculars(b)[0] if about is None else coordinate_axis(joint, one)
-    u, x, y = along.R[:, i] @ a, along.R[:, j] @ a, along.R[:, j] @ np.cross(b, a)
-    turn = np.unwrap(np.arctan2((u * y).sum(axis=1), (u * x).sum(axis=1)))
+    turn = np.unwrap(rotation_about(along.R[:, i], along.R[:, j], b, a))
     turn -= 2 * np.pi * np.round(turn[np.abs(along.phi).argmin()] / (2 * np.pi))
     k, s, turns = place_on(along, tau)
     there = np.minimum(k + 1, len(turn) - 1)

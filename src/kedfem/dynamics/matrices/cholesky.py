@@ -14,7 +14,7 @@ from cvxopt import cholmod, matrix, sparse, spmatrix
 from kedfem.arrays import Float, Int
 from kedfem.dynamics.matrices.dissection import dissected
 from kedfem.errors import SolveError
-from kedfem.mesh.memory_forecast import free_memory
+from kedfem.mesh.memory_forecast import free_memory, unknowns_that_fit
 from kedfem.processes import ended_at_once
 
 MANY = 32  # right-hand sides solved at once
@@ -56,7 +56,7 @@ def laid_out(factor: object, N: int) -> float:
 
 def _check_room(what: str, N: int, factor: float) -> None:
     if N >= SLOW and factor > (free := free_memory()):
-        fits = float(f"{N * (free / factor) ** (1 / 1.5):.2g}")  # a factor grows by the power 1.5 at most
+        fits = unknowns_that_fit(N, factor, free)
         raise SolveError(
             f"{what}: must have a factor that fits in the free memory of {free / 1e9:.3g} GB, got {N:,} unknowns, whose "
             f"factor takes {factor / 1e9:.3g} GB; take larger elements: about {fits:,.0f} unknowns would fit"

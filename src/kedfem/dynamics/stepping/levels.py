@@ -33,7 +33,7 @@ from kedfem.dynamics.stepping.start import started
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.steps import Steps
 from kedfem.errors import SolveError
-from kedfem.mesh.memory_forecast import free_memory, memory
+from kedfem.mesh.memory_forecast import free_memory, memory, unknowns_that_fit
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import joined as motions_joined
@@ -72,7 +72,7 @@ def level_steps(scene: Scene, model: Model) -> list[Steps]:
 
     need = factor_bytes(model)
     if need > (free := free_memory()):
-        fits = float(f"{model.unknowns * (free / need) ** (1 / 1.5):.2g}")
+        fits = unknowns_that_fit(model.unknowns, need, free)
         raise SolveError(
             f"links: must have factors that fit in the free memory of {free / 1e9:.3g} GB, got {model.unknowns:,} "
             f"unknowns in all, whose factors take about {need / 1e9:.3g} GB; take larger elements: {fits:,.0f} would fit"

@@ -22,7 +22,7 @@ def joint_channels(scene: Scene, model: Model, name: str, forces: Forces) -> lis
     """Force and moment (about the joint's point of the rigid-body motion) that a joint exerts on one of its links."""
     slider = next((s for s in model.sliders if name in (s.guide, s.joint)), None)
     if any(row.name == name for row in model.rows) and slider is None:
-        return _row_joint(scene, model, name, forces)
+        return _constraint_joint(scene, name, forces)
     if slider is not None:
         return _slider(scene, model, slider, name, forces)
     prescribed = next((x for x in model.prescribed if x.drive_joint == name), None)
@@ -42,7 +42,7 @@ def joint_channels(scene: Scene, model: Model, name: str, forces: Forces) -> lis
     return _channels(name, label, wrench, determinate(model, k, name, at), sign)
 
 
-def _row_joint(scene: Scene, model: Model, name: str, forces: Forces) -> list[Recorded]:
+def _constraint_joint(scene: Scene, name: str, forces: Forces) -> list[Recorded]:
     """Of a joint enforced by constraint equations, about its point on the first link, of a slot the pin."""
     on, other = moving_pair(scene.joints[name])
     sign = 1.0 if ordered(scene.joints[name])[0] == on else -1.0
