@@ -169,9 +169,11 @@ def _analysed(
     notices += _about_steps(ready)
     moving = None if without_vibration(scene) else clock.timed("frequencies", lambda: resolution(ready))
     channels = [each.channel for each in recorded]
-    untold = indeterminate_channels(scene, ready.model, [each.name for each in channels])
+    indeterminate = indeterminate_channels(scene, ready.model, [each.name for each in channels])
     efforts = CrossChecks(scene, ready.linkage, channels, account)
-    watched = Watched(recorded, untold, efforts, recoveries, SingularPasses(ready), since, kept_since(scene, period))
+    watched = Watched(
+        recorded, indeterminate, efforts, recoveries, SingularPasses(ready), since, kept_since(scene, period)
+    )
     envelope, seen, step = clock.timed("steps", lambda: stepped(ready, solvers, watched, folder, watch, keeper))
     balance = None if without_vibration(scene) else account.balance
     unbalanced = balance_warning(balance) if balance else ()
@@ -179,7 +181,7 @@ def _analysed(
         *unbalanced,
         *(mass_damping_warning(ready, balance.mass_damping) if balance else ()),
         *efforts.warnings(),
-        *indeterminate_warning(untold),
+        *indeterminate_warning(indeterminate),
         *watched.passes.warnings(),
         *eased_warning(solvers),
         *unstable_balance_warning(solvers),
@@ -226,7 +228,7 @@ def _analysed(
 
 
 def _solvers(ready: Prepared, beside: Neighbours) -> list[Steps]:
-    """Those of all levels in time; a steady motion is looked for where that of a neighbour was."""
+    """Those of all levels in time; the search for a steady motion starts from that of a neighbour."""
     solvers = level_steps(ready.scene, ready.model)
     for each in solvers:
         each.search = replace(each.search, near=beside.near)

@@ -61,14 +61,14 @@ def frame_steps(scene: Scene) -> Int[np.ndarray, " f"]:
 
 @dataclass(frozen=True, slots=True)
 class Watched:
-    """What is made of each step: channels, those that none shows with the reason, efforts to compare, stresses.
+    """What is evaluated at each step: channels, the indeterminate ones with the reason, efforts, stresses.
 
     stresses_since : time [s] before which they do not count as highest
     kept_since : time [s] from which on their history is kept
     """
 
     recorded: list[Recorded]
-    untold: dict[str, str]
+    indeterminate: dict[str, str]
     efforts: CrossChecks
     recoveries: list[StressRecovery]
     passes: SingularPasses
@@ -143,7 +143,7 @@ def _notes(ready: Prepared, watched: Watched) -> dict[str, str | float | Mapping
     corotational = {name: parts for name, parts in segments(model).items() if parts[0].fit is not None}
     notes |= {f"segments of {name}": len(parts) for name, parts in corotational.items()}
     notes |= {f"mesh of {name}": method for name, method in mesh_methods(model).items()}
-    notes |= {f"not reported: {name}": reason for name, reason in watched.untold.items()}
+    notes |= {f"not reported: {name}": reason for name, reason in watched.indeterminate.items()}
     return notes | modelled(ready.scene, ready.linkage, model)
 
 

@@ -106,7 +106,7 @@ def test_an_edge_is_not_looked_for_where_points_between_tell_nothing() -> None:
 
     axes = axes_of(["drive.speed=10,20,30,40"], spun("x", 100.0, (0.012, 0.01)))
     found = edges(axes, dict(enumerate(grown(0.9, None, 1.2, 0.8))))
-    assert [(x.below, x.above, x.untold) for x in found] == [(10, 30, 1), (30, 40, 0)]
+    assert [(x.below, x.above, x.unknown) for x in found] == [(10, 30, 1), (30, 40, 0)]
 
 
 def grown(*growths: float | None) -> list[Row]:

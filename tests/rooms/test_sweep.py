@@ -20,7 +20,7 @@ from kedfem.analysis import analyse
 from kedfem.errors import SceneError
 from kedfem.scene import scene_from
 from kedfem.sweep import BaseScene, SweepOptions, SweepResult, axes_of, sweep
-from kedfem.sweep.points import GROWTH, Job, SharedChoices, extremes, finished
+from kedfem.sweep.points import GROWTH, Job, Row, SharedChoices, extremes, finished
 from tests import scenes
 from tests.scenes import bar, constant_speed, material
 
@@ -334,6 +334,13 @@ def test_a_sweep_that_was_killed_goes_on_without_a_lost_or_doubled_point(tmp_pat
     tables = [(tmp_path / folder / "sweep.csv").read_text() for folder in ("killed", "whole")]
     assert tables[0] == tables[1]
     assert tables[0].count("complete") == 10
+
+
+def test_a_row_with_a_status_of_an_earlier_kedfem_is_run_again() -> None:
+    text = Row("complete").text()
+    assert Row.read(text).status == "complete"
+    with pytest.raises(ValueError, match="doubtful"):
+        Row.read(text.replace("complete", "doubtful"))
 
 
 def reduced_four_bar() -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Axes of a sweep: keys of a scene, dotted, with their values, as ``drive.speed=500rpm:4000rpm:50``; all points."""
+"""Axes of a sweep: dotted keys of a scene with their values, as in ``drive.speed=500rpm:4000rpm:50``; all points."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
@@ -18,8 +18,8 @@ from kedfem.scene.records.units import NUMBER, UNIT, UNREADABLE, Quantity, unit_
 from kedfem.scene.records.wording import nearest, shown
 
 Value = bool | int | float | str
-MOST = 100_000  # points: a slip of the keyboard, not a sweep
-SEED = 0  # of Latin hypercubes: the same points each time, so that a sweep goes on where it was
+MOST = 100_000  # points: more is a typing error
+SEED = 0  # of Latin hypercubes: the same points each time, so that a sweep can be continued
 PARAMETERS = "parameters"
 HOW = "a list a,b,c or a range from:to:count"
 
@@ -53,7 +53,7 @@ class Axis:
 def axes_of(texts: Sequence[str], raw: Mapping[str, Any], samples: int | None = None) -> list[Axis]:
     """The swept keys, each with a value for every point: a grid of all, or a Latin hypercube.
 
-    A SceneError says what is wrong with the first of them that cannot be.
+    A SceneError names the first invalid one.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Points of a sweep on the workers of a Dask scheduler that runs already."""
+"""Points of a sweep on the workers of a running Dask scheduler."""
 
 import os
 from collections.abc import Callable
@@ -13,7 +13,7 @@ PATIENCE = 10  # s, in which a scheduler must answer
 
 
 class OnCluster(Executor):
-    """The workers of a `distributed` client, each with one thread, as an executor that a sweep can take."""
+    """The workers of a `distributed` client, each with one thread, as an executor for a sweep."""
 
     def __init__(self, client: Any) -> None:
         self._client, self._executor = client, client.get_executor(pure=False)
@@ -25,7 +25,7 @@ class OnCluster(Executor):
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Wait for what runs, or give it up; the workers stay."""
+        """Wait for running points, or cancel them; the workers stay."""
         self._executor.shutdown(wait=wait and not cancel_futures)
         self._client.close()
 
@@ -44,7 +44,7 @@ def cluster(address: str, folder: FilePath) -> OnCluster:
         raise OutputError("--cluster: needs dask.distributed: pip install 'kedfem[cluster]'") from None
 
     class Answered(Client):
-        """One that ends its thread where no scheduler answers."""
+        """A client that ends its thread if no scheduler answers."""
 
         def start(self, **how: Any) -> Any:
             try:

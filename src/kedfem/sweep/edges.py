@@ -1,4 +1,4 @@
-"""Edges of unstable bands: the interval between a stable and an unstable point is halved again and again.
+"""Edges of unstable bands, by bisection of the interval between a stable and an unstable point.
 
 Neighbours are points whose other keys have the same values, along the first key.
 """
@@ -26,9 +26,9 @@ class Edge:
 
     others : values of the other keys
     below, above : of the first key: the edge is between them
-    unstable_above : else below
-    points : numbers of these two points
-    untold : points between of which nothing is known: they failed, or their steps are too long
+    unstable_above : whether the motion is unstable above the edge; else below
+    points : numbers of the two points
+    unknown : number of points between whose stability is unknown: they failed, or their steps are too long
     """
 
     others: tuple[Value, ...]
@@ -36,21 +36,21 @@ class Edge:
     above: float
     unstable_above: bool
     points: tuple[int, int]
-    untold: int = 0
+    unknown: int = 0
 
     @property
     def at(self) -> float:
-        """Their mean."""
+        """The middle of the interval."""
         return 0.5 * (self.below + self.above)
 
     @property
     def width(self) -> float:
-        """Relative."""
+        """Relative width of the interval."""
         return (self.above - self.below) / max(abs(self.below), abs(self.above))
 
 
 def refuse_without_growth(scene: Scene, axis: Axis, width: float) -> None:
-    """Refuse to look for edges where none can be found."""
+    """Refuse edges without steady motions, their stability, or numbers along the first key."""
     if not FINEST <= width < 1.0:
         wanted = f"must be a relative width from {FINEST:g} to below 1, such as 0.001"
         raise SceneError(f"--edges: {wanted}, got {width:g}")
@@ -65,7 +65,7 @@ def refuse_without_growth(scene: Scene, axis: Axis, width: float) -> None:
 
 
 def edges(axes: Sequence[Axis], rows: Mapping[int, Row]) -> Iterator[Edge]:
-    """All edges between points that are done, in the order of the other keys and the first."""
+    """All edges between finished points, in the order of the other keys and the first."""
     numbers, others = axes[0].numbers, axes[1:]
     if numbers is None:
         return
@@ -84,7 +84,7 @@ def edges(axes: Sequence[Axis], rows: Mapping[int, Row]) -> Iterator[Edge]:
 def unstable_bands(
     numbers: np.ndarray, rows: Sequence[Row], line: Sequence[int], found: Sequence[Edge]
 ) -> list[tuple[float, float]]:
-    """From where to where a motion is unstable, along some points.
+    """Intervals of the first key in which the motion is unstable, along a line of points.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def unstable_bands(
 
 
 def with_middles(axes: Sequence[Axis], found: Sequence[Edge]) -> list[Axis]:
-    """The axes with a point more in the middle of each edge."""
+    """The axes with an additional point in the middle of each edge."""
     first, out = axes[0], []
     middles = np.array([each.at for each in found])
     for axis in axes:
@@ -117,7 +117,7 @@ def with_middles(axes: Sequence[Axis], found: Sequence[Edge]) -> list[Axis]:
 
 
 def write_edges(path: FilePath, axes: Sequence[Axis], found: Sequence[Edge]) -> None:
-    """One line an edge: the other keys' values, the place, its half width, and on which side the motion is unstable."""
+    """One line per edge: values of the other keys, the edge, half its width, and the unstable side."""
     first = axes[0]
     unit = f" [{first.unit}]" if first.unit else ""
     header = [*(axis.key for axis in axes[1:]), f"{first.key}{unit}", f"half width{unit}", "unstable"]

@@ -1,6 +1,6 @@
-"""Files of a sweep: a row for each point as it is done, all rows as `sweep.h5` and `sweep.csv`.
+"""Files of a sweep: a row for each finished point, all rows as `sweep.h5` and `sweep.csv`.
 
-An OutputError says that one cannot be written.
+An OutputError is raised if a file cannot be written.
 """
 
 import math
@@ -42,19 +42,19 @@ def kept_state(folder: FilePath, identity: str) -> StateArrays | None:
 
 
 def keep_state(folder: FilePath, identity: str, state: StateArrays) -> None:
-    """Put the state with which a steady motion begins on the disk, whole or not at all."""
+    """Write the state at the beginning of a steady motion, as a whole or not at all."""
     with replacing(folder / STATES / f"{identity}.npz") as part, part.open("wb") as file:
         np.savez(file, **state)
 
 
 def keep_row(folder: FilePath, identity: str, row: Row) -> None:
-    """Put a row on the disk, whole or not at all."""
+    """Write a row, as a whole or not at all."""
     with replacing(folder / ROWS / f"{identity}.json") as part:
         part.write_text(row.text(), encoding="utf-8")
 
 
 def write_table(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row]) -> None:
-    """One line a point: values of the keys, how it ended, extremes of every column."""
+    """One line per point: values of the keys, status, extremes of every column."""
     units = column_units(rows)
     header = [f"{axis.key} [{axis.unit}]" if axis.unit else axis.key for axis in axes]
     header += ["status", "settled", "change of the last revolution"]
@@ -69,7 +69,7 @@ def write_table(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row]) -> No
 
 
 def write_sweep(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row], last: float) -> None:
-    """All rows in HDF5, in the layout of netCDF 4: dimensions `point` and `column`, which xarray reads as they are."""
+    """All rows in HDF5, in the layout of netCDF 4, which xarray reads: dimensions `point` and `column`."""
     units = column_units(rows)
     shape = len(rows), len(units), len(KINDS)
     numbers = np.array([list(_numbers(row, units)) for row in rows]).reshape(shape)

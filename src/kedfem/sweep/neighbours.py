@@ -1,11 +1,11 @@
 """Sharing between points of a sweep: the steady motion found before, and the modes of reduced links.
 
-A steady motion is looked for where that of the point before was found. Points follow along the first key in the order of
-its values, as long as the others are the same. Of motions that are not linear several may be steady at one speed; which
-is found then depends on from where the sweep comes.
+Continuation: the search for a steady motion starts from that of the previous point, along the first key in the order of
+its values, while the other keys are the same. A nonlinear scene may have several steady motions at one speed; the
+direction of the sweep then determines which of them is found.
 
-Points that differ in the drive's speed and in damping alone share their reduced links: modes are found for the fastest
-and the slowest of them, and serve those in between.
+Points that differ only in the drive's speed and in damping share their reduced links: modes are computed for the fastest
+and the slowest of them, and used for those in between.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,28 +27,28 @@ Values = Mapping[Where, Value]
 
 
 def refuse_without_order(scene: Scene, edges: bool) -> None:
-    """Refuse to follow where there is nothing to follow, or no order."""
+    """Refuse continuation without steady motions, or where the points have no order."""
     if scene.analysis.kind != "steady":
         raise SceneError(
-            "--follow: must be combined with analysis.kind = 'steady', whose motion is looked for near that of the point "
-            f"before, got kind = {scene.analysis.kind!r}"
+            "--follow: must be combined with analysis.kind = 'steady', whose search starts from the motion of the "
+            f"previous point, got kind = {scene.analysis.kind!r}"
         )
     if edges:
         raise SceneError("--follow: must be without --edges, whose points lie between others")
 
 
 @dataclass
-class Following:
-    """Which point each one follows, and what their rows are called: that depends on all that were followed before.
+class Continuation:
+    """The point that each one follows, and the names of their rows, which depend on all points before.
 
-    before : number of a point → that of the one which it follows; None of the first ones
+    before : number of a point → that of the previous point; None for the first of a line
     """
 
     before: Mapping[int, int | None] = field(default_factory=dict)
     names: dict[int, str] = field(default_factory=dict)
 
     @classmethod
-    def along(cls, axes: Sequence[Axis]) -> "Following":
+    def along(cls, axes: Sequence[Axis]) -> "Continuation":
         """Along the first key."""
         last: dict[tuple[Value, ...], int] = {}
         before: dict[int, int | None] = {}
@@ -73,7 +73,7 @@ class Following:
         return last is None or last in rows
 
     def started(self, k: int, job: Job, target: FilePath) -> Job:
-        """A point as it is run, with the state that it begins near."""
+        """The job of a point, with the state from which its search starts."""
         if k not in self.before:
             return job
         last = self.before[k]
@@ -81,7 +81,7 @@ class Following:
         return replace(job, follows=True, near=near)
 
     def kept(self, k: int, row: Row, target: FilePath) -> Row:
-        """A row without the state that it hands on, which goes to the disk."""
+        """A row without the state for the next point, which is written to the disk."""
         if row.begun is not None and k in self.names:
             keep_state(target, self.names[k], row.begun)
         return replace(row, begun=None)
@@ -89,7 +89,7 @@ class Following:
 
 @dataclass(frozen=True, slots=True)
 class Ends:
-    """Of points that are alike the values of the fastest and of the slowest, by what they have in common."""
+    """Values of the fastest and of the slowest point of each group with common reduced links."""
 
     by: Mapping[str, tuple[Values, ...]] = field(default_factory=dict)
 
@@ -107,7 +107,7 @@ class Ends:
         return cls({name: _fastest_and_slowest(each) for name, each in groups.items() if len(each) >= FEWEST})
 
     def of(self, job: Job) -> tuple[Values, ...]:
-        """Those that a point shares its modes with; none if it has its own."""
+        """The points with which a point shares its modes; none if it has its own."""
         return self.by.get(alike(job.scene()) or "", ()) if self.by else ()
 
 

@@ -1,4 +1,4 @@
-"""The resonance plot: largest stresses, joint forces and torques over a swept key; the map of stability over two. PNG."""
+"""The resonance plot: largest stresses, joint forces and torques over a swept key; or the stability map over two. PNG."""
 
 from collections.abc import Sequence
 from pathlib import Path as FilePath
@@ -17,15 +17,15 @@ PANELS = (
     ("joints/", "N", "joint force (N)", 1.0),
     ("drive/", "N m", "drive torque (N m)", 1.0),
     ("drive/", "N", "drive force (N)", 1.0),
-    (GROWTH, "1", "vibrations:\nleft after a period", 1.0),
+    (GROWTH, "1", "growth of vibrations\nin a period", 1.0),
 )
 
 
 def write_plot(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row], edges: Sequence[Edge] = ()) -> None:
-    """Largest magnitudes over the only key that is swept, or the map of stability of two.
+    """Plot largest magnitudes over the only swept key, or the stability map of two.
 
-    A plot of an earlier sweep goes. Points that have not settled are open rings, unstable bands whose edges are known are
-    shaded. Nothing is drawn of words, of more keys, of fewer than two points, nor of two keys without a known growth.
+    A plot of an earlier sweep is removed. Points that have not settled are open rings; unstable bands with known edges
+    are shaded. Keys with words, more than two keys, fewer than two points, and two keys without growth have no plot.
     """
     path.unlink(missing_ok=True)
     if len(axes) == 2:

@@ -1,4 +1,4 @@
-"""One point of a sweep: the scene with its values, its run, the row that it leaves: extremes of the last revolutions."""
+"""One point of a sweep: the scene with its values, its run, and its row: extremes of the last revolutions."""
 
 import json
 import math
@@ -26,12 +26,13 @@ from kedfem.resume import origin
 from kedfem.scene import Scene, scene_from, time_grid, turn_steps
 from kedfem.sweep.axes import Value, with_values
 
-SETTLED = 0.01  # what the last two revolutions may differ by
+SETTLED = 0.01  # largest relative difference of the last two revolutions
 NOTHING = 1e-6  # of the largest channel with the same unit: what is rounding in a channel that should be zero
 MAGNITUDE = "magnitude"
-SUMS = "energy/"  # channels that add up over the run: they have no extremes of a turn
+SUMS = "energy/"  # channels that add up over the run: they have no extremes of a revolution
 STRESS = "stress/{}/peak"
 GROWTH, MARCHES = "steady/growth", "steady/marches"
+STATUSES = ("complete", "unreliable", "failed")
 
 Extreme = tuple[float, float, float, float]
 """Maximum, minimum, root of the mean square, time [s] of the largest magnitude."""
@@ -39,7 +40,7 @@ Extreme = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class BaseScene:
-    """A scene as it is written: keys and values, what file names are relative to, its name."""
+    """A scene as it is written: keys and values, the folder of its files, its name."""
 
     raw: Mapping[str, Any]
     folder: FilePath
@@ -48,7 +49,7 @@ class BaseScene:
 
 @dataclass(frozen=True, slots=True)
 class SharedChoices:
-    """What one plan chose, for all points: of the analysis, and of links by name."""
+    """Choices of one plan for all points: of the analysis, and of links by name."""
 
     analysis: Mapping[str, Any] = field(default_factory=dict)
     links: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
@@ -63,14 +64,14 @@ class SharedChoices:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A point to be run, in another process: nothing but plain records.
+    """A point to be run in another process, of plain records alone.
 
     values : key → value
-    last : turns whose extremes count
-    folder : where the run's files stay; None if they do not
-    ends : values of the points with which its reduced links are shared; none: it has its own
-    follows : whether its steady motion is looked for where that of the point before is, and its own is handed on
-    near : the state with which that begins; none: there is no point before, or it failed
+    last : revolutions whose extremes are evaluated
+    folder : where the run's files are kept; None if they are not
+    ends : values of the points with which it shares its reduced links; empty if it has its own
+    follows : whether the search for its steady motion starts from that of the previous point, and its own is kept
+    near : the state at the beginning of that motion; None without a previous point, or if it failed
     """
 
     base: BaseScene
@@ -88,7 +89,7 @@ class Job:
         return self.chosen.applied(scene_from(raw, self.base.folder, stem=self.base.stem))
 
     def identity(self) -> str:
-        """What the row depends on, as a digest: values, scene, its files, kedfem's version, turns."""
+        """Digest of all that the row depends on: values, scene, its files, kedfem's version, revolutions."""
         content = {k: v for k, v in origin(self.scene()).items() if not k.startswith("output.folder")}
         shared = [sorted((place(where), value) for where, value in each.items()) for each in self.ends]
         parts = [content, self.last, *([shared] if shared else [])]
@@ -101,10 +102,10 @@ class Row:
 
     status : ``complete``, ``unreliable`` or ``failed``
     message : why it failed or is unreliable, else empty
-    change : between the last two revolutions, relative; nan if there were none
-    seconds : that the run took
+    change : relative, between the last two revolutions; nan without two
+    seconds : duration of the run
     extremes : name of a column → unit, (maximum, minimum, root of the mean square, time [s] of the largest magnitude)
-    begun : the state with which its steady motion begins, if the next point is to follow it; not part of its text
+    begun : the state at the beginning of its steady motion, if the next point starts from it; not part of its text
     """
 
     status: str
@@ -116,7 +117,7 @@ class Row:
 
     @property
     def settled(self) -> str:
-        """``yes``, ``no``, or ``unknown`` where there were no two revolutions."""
+        """``yes``, ``no``, or ``unknown`` without two revolutions."""
         return "unknown" if math.isnan(self.change) else "yes" if self.change <= SETTLED else "no"
 
     def text(self) -> str:
@@ -127,8 +128,10 @@ class Row:
 
     @classmethod
     def read(cls, text: str) -> "Row":
-        """From JSON; a ValueError, KeyError or TypeError of another text."""
+        """From JSON; a ValueError, KeyError or TypeError of another text, or of a status of an earlier kedfem."""
         content = json.loads(text)
+        if content["status"] not in STATUSES:
+            raise ValueError(f"a status {content['status']!r}")
         found: dict[str, tuple[str, Extreme]] = {}
         for name, (unit, (most, least, rms, when)) in content.pop("extremes").items():
             found[name] = unit, (float(most), float(least), float(rms), float(when))
@@ -136,7 +139,7 @@ class Row:
 
 
 def chosen_by_plan(scene: Scene, stage: Stage) -> SharedChoices:
-    """What the plan of one point chooses, which all other points then take too."""
+    """The choices of one point's plan, which all other points use too."""
     before, _ = assembled(scene)
     plan = plan_for(before, stage)
     if plan is None:
@@ -151,7 +154,7 @@ def _different(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str,
 
 
 def finished(job: Job) -> Row:
-    """The row of a point; whatever goes wrong is its message."""
+    """The row of a point; its message has the reason of any failure."""
     began = perf_counter()
     try:
         row = _ran(job)
@@ -218,7 +221,7 @@ def _since(scene: Scene, last: float) -> float:
 
 
 def extremes(results: Results, since: float) -> dict[str, tuple[str, Extreme]]:
-    """Of every column after a time [s]: name → unit, extremes; of vectors also their magnitude."""
+    """Extremes of every column after a time [s], by name with unit; of vectors also of their magnitude."""
     some = results.time > since
     t = results.time[some]
     return {name: (unit, _four(t, values)) for name, unit, values in columns(results, some)}
@@ -245,9 +248,9 @@ def columns(results: Results, some: np.ndarray) -> Iterator[tuple[str, str, Floa
 
 
 def change(results: Results, turn: float) -> float:
-    """By how much the largest magnitudes of the last turn [s] differ from those of the turn before, relative, at worst.
+    """Largest relative difference between the largest magnitudes of the last revolution [s] and of the previous one.
 
-    Channels that are nothing beside others of the same unit are left out; nan where there are no two revolutions.
+    Channels that are negligible beside others of the same unit are left out; nan without two revolutions.
     """
     end = float(results.time[-1])
     half = 0.5 * float(results.time[-1] - results.time[-2])

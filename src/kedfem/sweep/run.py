@@ -1,4 +1,4 @@
-"""All points of a sweep on a pool of processes; what was done before is not done again."""
+"""All points of a sweep on a pool of processes; points that an earlier sweep finished are not run again."""
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,11 +17,11 @@ from kedfem.stepping import Watch
 from kedfem.sweep.axes import Axis, with_values
 from kedfem.sweep.edges import Edge, edges, refuse_without_growth, with_middles, write_edges
 from kedfem.sweep.files import ROWS, STATES, keep_row, kept_row, write_sweep, write_table
-from kedfem.sweep.neighbours import Ends, Following, refuse_without_order
+from kedfem.sweep.neighbours import Continuation, Ends, refuse_without_order
 from kedfem.sweep.plot import write_plot
 from kedfem.sweep.points import BaseScene, Job, Row, SharedChoices, chosen_by_plan, finished
 
-AHEAD = 2  # points that wait for each worker, so that none is idle
+AHEAD = 2  # points in the queue of each worker, so that none is idle
 ONE_THREAD = dict.fromkeys((*BLAS_THREADS, "NUMBA_NUM_THREADS"), "1")
 
 
@@ -29,12 +29,12 @@ ONE_THREAD = dict.fromkeys((*BLAS_THREADS, "NUMBA_NUM_THREADS"), "1")
 class SweepOptions:
     """Options of a sweep.
 
-    last : turns of the drive whose extremes count
-    workers : processes; as many as this one may use cores if None
+    last : revolutions of the drive whose extremes are evaluated
+    workers : number of processes; if None, the number of cores that this one may use
     quick : plain defaults for what the scene leaves open, instead of a plan
-    keep : whether the files of each run stay
-    edges : relative width to which edges of unstable bands are found along the first key; none: they are not looked for
-    follow : whether steady motions are looked for where that of the point before along the first key was found
+    keep : whether the files of each run are kept
+    edges : relative width to which edges of unstable bands are found along the first key; None: no edges
+    follow : whether the search for a steady motion starts from that of the previous point along the first key
     """
 
     last: float = 1.0
@@ -50,8 +50,8 @@ class SweepResult:
     """The outcome of a sweep: a row for each point, in the order of the axes' values.
 
     before : rows that an earlier sweep had finished
-    planned : the point by whose plan all were run; None if there was none
-    edges : of unstable bands; empty if they were not looked for
+    planned : the point whose plan all points use; None without a plan
+    edges : of unstable bands; empty if none were asked for
     """
 
     folder: FilePath
@@ -63,7 +63,7 @@ class SweepResult:
 
 
 def sweep_folder(base: BaseScene) -> FilePath:
-    """Where a sweep goes if nothing else is said: beside the scene."""
+    """The default folder of a sweep: beside the scene."""
     return base.folder / f"{base.stem}-sweep"
 
 
@@ -71,7 +71,7 @@ def sweep(
     base: BaseScene, axes: Sequence[Axis], asked: SweepOptions, folder: FilePath | None = None,
     watch: Watch = lambda stage, done, total: None, executor: Executor | None = None,
 ) -> SweepResult:  # fmt: skip
-    """Run a scene at all points; rows are kept as they are finished, so that the same sweep goes on where it was.
+    """Run a scene at all points; finished rows are kept, so that the same sweep continues where it was stopped.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def sweep(
     Raises
     ------
     KedfemError
-        The scene is invalid, the folder cannot be written, a worker was killed; what fails at a point is in its row.
+        The scene is invalid, the folder cannot be written, a worker was killed; the failure of a point is in its row.
     """
     if not asked.last > 0:
         raise SceneError(f"--last: must be positive, got {asked.last:g}")
@@ -99,7 +99,7 @@ def sweep(
     with claimed(folder or sweep_folder(base), (ROWS, STATES)) as target:
         chosen, planned = _planned(base, axes, watch)
         jobs = [Job(base, values, chosen, asked.last) for values in _points(axes)]
-        following = Following.along(axes) if asked.follow else Following()
+        following = Continuation.along(axes) if asked.follow else Continuation()
         point = _Points(base, chosen, asked, target, Ends.among(jobs), following)
         rows: dict[int, Row] = {}
         axes, found, pool = list(axes), list[Edge](), executor
@@ -111,7 +111,7 @@ def sweep(
                 if asked.edges is None:
                     break
                 found = list(edges(axes, rows))
-                if not (wide := [each for each in found if each.width > asked.edges and not each.untold]):
+                if not (wide := [each for each in found if each.width > asked.edges and not each.unknown]):
                     break
                 axes = with_middles(axes, wide)
             _end(pool, kill=False)
@@ -131,7 +131,7 @@ def sweep(
 
 
 def _refuse_thinned(scene: Scene, asked: SweepOptions) -> None:
-    """Files that stay have the rows in which the sweep looks for extremes."""
+    """Refuse to keep files of thinned runs: a sweep finds extremes in the rows of all steps."""
     if asked.keep and scene.output.every > 1:
         message = "must be 1 for files that stay (--keep): a sweep finds extremes in the rows of all steps"
         raise SceneError([Fault(("output", "every"), f"{message}, got {scene.output.every}")])
@@ -139,7 +139,7 @@ def _refuse_thinned(scene: Scene, asked: SweepOptions) -> None:
 
 @dataclass
 class _Points:
-    """The points of a sweep: which have a row from before, and which wait to be run.
+    """The points of a sweep: those with a row of an earlier sweep, and those that are still to be run.
 
     before : rows that an earlier sweep had finished
     """
@@ -149,11 +149,11 @@ class _Points:
     asked: SweepOptions
     target: FilePath
     ends: Ends
-    following: Following
+    following: Continuation
     before: int = 0
 
     def waiting(self, axes: Sequence[Axis], rows: dict[int, Row]) -> dict[int, tuple[str, Job]]:
-        """Points without a row, with their digests; those of earlier sweeps, and invalid scenes, get theirs."""
+        """Points without a row, with their digests; rows of earlier sweeps and of invalid scenes are added to `rows`."""
         out: dict[int, tuple[str, Job]] = {}
         for k, values in enumerate(_points(axes)):
             if k in rows:
@@ -181,7 +181,7 @@ def _points(axes: Sequence[Axis]) -> Iterator[dict[Any, Any]]:
 
 
 def _planned(base: BaseScene, axes: Sequence[Axis], watch: Watch) -> tuple[SharedChoices, int | None]:
-    """What is chosen for all points: planned at the one whose drive is fastest, the first of several."""
+    """Choices for all points, by the plan of the point with the fastest drive, the first of several."""
     points, speeds = list(_points(axes)), dict[int, float]()
     for k, values in enumerate(points):
         try:
@@ -202,7 +202,7 @@ def _planned(base: BaseScene, axes: Sequence[Axis], watch: Watch) -> tuple[Share
 def _run(
     waiting: Mapping[int, tuple[str, Job]], rows: dict[int, Row], point: _Points, watch: Watch, pool: Executor
 ) -> None:
-    """Rows of points that wait, in whatever order they are finished; none before the one that it follows."""
+    """Run the waiting points, in any order, but none before the point that it follows."""
     left, total, target = dict(waiting), len(rows) + len(waiting), point.target
     pending: dict[Future[Row], int] = {}
     most = AHEAD * (getattr(pool, "_max_workers", 0) or os.cpu_count() or 1)
@@ -231,7 +231,7 @@ def _keep(
     done: set[Future[Row]], pending: dict[Future[Row], int], waiting: Mapping[int, tuple[str, Job]],
     rows: dict[int, Row], point: _Points,
 ) -> None:  # fmt: skip
-    """Rows of points that are done go to the disk."""
+    """Write the rows of finished points to the disk."""
     for each in done:
         k = pending.pop(each)
         try:
@@ -264,7 +264,7 @@ def _pool(workers: int | None, points: int) -> Executor:
 
 
 def _begin() -> None:
-    """A worker leaves Ctrl-C to its parent, and ends with it."""
+    """A worker ignores Ctrl-C, which its parent handles, and ends with its parent."""
     import signal
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
