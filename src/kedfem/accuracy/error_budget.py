@@ -1,4 +1,4 @@
-"""The error of a run, part by part and kind of channel by kind: one record for table, results file and warnings."""
+"""The error budget of a run, by source and kind of channel: one record for table, results file and warnings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -7,23 +7,23 @@ from kedfem.results.balance import Balance
 
 KINDS = ("displacement", "stress", "joint forces", "drive")
 SOURCES = ("mesh", "step", "positions", "reduction", "frames", "rounding")
-WARNED = 0.05  # an error that no run leaves without a warning
-TWICE = 2.0  # of the accuracy asked for: estimates are no better than that
+WARNED = 0.05  # error above which every run warns
+TWICE = 2.0  # times the required accuracy: estimates are no better than that
 WHOLE = 1.0  # an error as large as the result
-FACTOR = 3.0  # estimates are right within it: of so many results an error is as large as one for certain
+FACTOR = 3.0  # estimates are right within it: an estimate of three times the result means an error as large as the result
 UNACCOUNTED = 0.5  # of energy
-UNKNOWNS = 60_000  # of a model, beyond which no mesh is made finer unasked
-LEAST = 0.005  # what no run warns of
+UNKNOWNS = 60_000  # of a model, beyond which no mesh is refined automatically
+LEAST = 0.005  # error below which no run warns
 OF_SOURCE, TOGETHER, UNKNOWN = "error of ", "error together, ", "no estimate "  # how notes of a budget begin
 
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """One part of the error.
+    """The contribution of one source to the error.
 
     source : mesh, step, positions, reduction, frames or rounding
-    errors : kind of channel → estimated error, of the channel's largest value, at the worst instant of the worst channel
-    remedy : what would lower it, in words; what usually does if not given
+    errors : kind of channel → estimated error, relative to the channel's largest value, at the worst instant and channel
+    remedy : how to reduce it, in words; if empty, the usual remedy of its source
     """
 
     source: str
@@ -35,9 +35,9 @@ class Share:
 class Budget:
     """Estimated errors of a run.
 
-    shares : by source; one that is not there does not err so
+    shares : by source; a source without a share causes no error
     limits : where no estimate is claimed, in words
-    links : link → its mesh's error in the energy norm [-], of meshed links
+    links : meshed link → error of its mesh in the energy norm [-]
     step : channel → error of the step
     """
 
@@ -48,12 +48,12 @@ class Budget:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """Kinds of channels of which something is known."""
+        """Kinds of channels with an estimate."""
         return tuple(kind for kind in KINDS if any(kind in share.errors for share in self.shares))
 
     @property
     def together(self) -> dict[str, float]:
-        """Kind → sum of all shares: they may add up."""
+        """Kind → sum of all shares, as they may add up."""
         return {kind: sum(share.errors.get(kind, 0.0) for share in self.shares) for kind in self.kinds}
 
     @property
@@ -63,14 +63,14 @@ class Budget:
 
     @property
     def limiting(self) -> Share | None:
-        """The share that is largest where the error is worst."""
+        """The largest share of the kind with the largest error."""
         if not self.kinds:
             return None
         kind = max(self.together, key=lambda kind: self.together[kind])
         return max(self.shares, key=lambda share: share.errors.get(kind, 0.0))
 
     def error_of(self, source: str) -> float | None:
-        """The error of a source where it is worst; None where it is not known."""
+        """The largest error of a source over all kinds; None if it is unknown."""
         share = self.of(source)
         return max(share.errors.values(), default=None) if share else None
 
@@ -80,7 +80,7 @@ class Budget:
 
 
 def kind_of_name(name: str) -> str | None:
-    """The kind of a channel whose accuracy counts, by its name; None of others.
+    """The kind of a channel that is judged, by its name; None for other channels.
 
     >>> kind_of_name("probes/tip/velocity"), kind_of_name("joints/A/force"), kind_of_name("drive/rigid_torque")
     ('displacement', 'joint forces', None)
@@ -95,7 +95,7 @@ def kind_of_name(name: str) -> str | None:
 
 
 def by_kind(errors: Mapping[str, float]) -> dict[str, float]:
-    """Errors of channels as those of kinds: the worst of each."""
+    """Errors by kind: that of the worst channel of each."""
     out: dict[str, float] = {}
     for name, error in errors.items():
         kind = kind_of_name(name)
@@ -105,12 +105,12 @@ def by_kind(errors: Mapping[str, float]) -> dict[str, float]:
 
 
 def budget_warning(budget: Budget, asked: float | None = None, chosen: bool = False) -> tuple[str, ...]:
-    """A warning where a run is worse than WARNED, or clearly worse than what was asked for, with what limits it.
+    """A warning if an error is above WARNED, or clearly above the required accuracy, with its largest source.
 
     Parameters
     ----------
-    asked : the accuracy
-    chosen : whether the step is what that chose
+    asked : the required accuracy
+    chosen : whether the step was chosen for it
     """
     limit = WARNED if asked is None else min(WARNED, max(TWICE * asked, LEAST))
     over = {kind: error for kind, error in budget.together.items() if error > limit}
@@ -122,7 +122,7 @@ def budget_warning(budget: Budget, asked: float | None = None, chosen: bool = Fa
 
 
 def _advice(budget: Budget, share: Share, chosen: bool) -> str:
-    """What would lower the error, of which a share is the largest; beyond all scale no part is blamed before others."""
+    """How to reduce the error, whose largest share is given; if several parts exceed the result, none is singled out."""
     kind = max(budget.together, key=lambda kind: budget.together[kind])
     beyond = _beyond(budget, kind)
     if len(beyond) > 1:
@@ -142,12 +142,12 @@ def _beyond(budget: Budget, kind: str) -> list[Share]:
 
 
 def meaningless(budget: Budget, balance: Balance | None, unworked: float) -> str:
-    """Why the results of a run are useless by its own estimates, in words; else empty.
+    """Why the results of a run are meaningless by its own estimates, in words; else empty.
 
     Parameters
     ----------
-    balance : of energy; none where there are no time steps
-    unworked : work of the drives that the account of energy does not have, of the energy exchanged [-]
+    balance : of energy; None without time steps
+    unworked : work of the drives that is missing in the energy account, relative to the energy exchanged [-]
     """
     # one part alone may be the phase of a vibration, whose size is right; several are another motion altogether
     lost = {
@@ -196,5 +196,5 @@ def attributes(budget: Budget) -> dict[str, float | str]:
 
 
 def joined(shares: Sequence[Share | None]) -> tuple[Share, ...]:
-    """The shares that are there, in the order of SOURCES."""
+    """All shares but None, in the order of SOURCES."""
     return tuple(sorted((x for x in shares if x is not None), key=lambda share: SOURCES.index(share.source)))

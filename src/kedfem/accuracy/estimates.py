@@ -41,9 +41,9 @@ from kedfem.scene import ForceLoad, Scene, states_step, time_grid, without_vibra
 
 # unknowns of a model for which no companion is made: its modes cost as much as hundreds of steps
 LARGE = 100_000
-SPAN = 6000  # steps of a companion's run, at most: longer analyses are judged by their beginning
-CHEAP = 2e7  # steps times unknowns that take seconds: of small models more than SPAN
-SLOW = 1000  # the same where no compiled loop runs them
+SPAN = 6000  # steps of a companion's run, at most: of longer analyses only the beginning is run
+CHEAP = 2e7  # steps times unknowns that take seconds: small models may have more steps than SPAN
+SLOW = 1000  # steps at most without a compiled loop
 
 
 @dataclass
@@ -59,7 +59,7 @@ class PeakStrainStates:
         self.model, self.energy, self.states = model, {}, {}
 
     def add(self, block: Block) -> None:
-        """Look at the steps of a block."""
+        """Evaluate the steps of a block."""
         for k, (link, history) in enumerate(zip(self.model.links, block.links, strict=True)):
             if link.meshed and not link.rigid:
                 worst = int(history.strain.argmax())
@@ -68,7 +68,7 @@ class PeakStrainStates:
 
     @cached_property
     def indicators(self) -> dict[int, Indicator]:
-        """Of each meshed link, or segment of one, by its number; once all steps have been seen."""
+        """The indicator of each meshed link or segment, by its number, after all steps."""
         return {k: indicator(self.model.links[k], g) for k, g in self.states.items()}
 
 
@@ -82,11 +82,11 @@ class ErrorMonitor:
     rounding: Rounding
     compliance: RigidLinkCompliance
     steps: bool = True
-    """whether there are time steps, and not positions found each by itself"""
+    """whether there are time steps, not independent static positions"""
     REMEMBERED: ClassVar = ("strained", "geometric", "running", "rounding", "compliance")
 
     def add(self, block: Block) -> None:
-        """Look at the steps of a block."""
+        """Evaluate the steps of a block."""
         self.strained.add(block)
         self.geometric.add(block)
         if self.steps:
@@ -96,7 +96,7 @@ class ErrorMonitor:
 
 
 def watcher(ready: Prepared, solvers: Sequence[Steps] = ()) -> ErrorMonitor:
-    """A watcher of a prepared scene's steps, as its solvers take them; of its links alone without any."""
+    """A monitor of a prepared scene's steps, by its solvers; without solvers of its links alone."""
     scene, model = ready.scene, ready.model
     geometric = GeometricError(model, scene.analysis.stiffening, bool(scene.limits))
     rounding, steps = Rounding.of(model, solvers), not without_vibration(scene)
@@ -106,7 +106,7 @@ def watcher(ready: Prepared, solvers: Sequence[Steps] = ()) -> ErrorMonitor:
 
 
 def companion(ready: Prepared) -> Prepared | None:
-    """A model whose runs are cheap beside those of a prepared scene; None of one too large to make it."""
+    """A model whose runs are cheap compared with those of a prepared scene; None if that is too large."""
     return None if ready.model.unknowns > LARGE else first_reduced(ready, FUNCTIONS)
 
 
@@ -118,9 +118,9 @@ def budget(
 
     Parameters
     ----------
-    seen : what the run showed while it stepped
-    ran : the run's own channels, where they are at hand at all time points; else, of a steady motion, its state
-    step : channel → error of the step, where the run itself knows it
+    seen : the monitor of the run's steps
+    ran : the run's own channels, if available at all time points; else the state of its steady motion, if any
+    step : channel → error of the step, if the run itself estimates it
     """
     found = seen.strained.indicators
     eta = link_errors(ready.model, found)
@@ -165,7 +165,7 @@ def channel_kinds(ready: Prepared) -> tuple[str, ...]:
 
 
 def beginning(scene: Scene, model: Model) -> Scene:
-    """The beginning of an analysis that is too long to be run beside itself; of a steady motion its period."""
+    """The beginning of an analysis that is too long to be repeated; of a steady motion its period."""
     if scene.analysis.kind == "steady":
         return with_analysis(scene, stability=False)
     grid = time_grid(scene)
@@ -176,7 +176,7 @@ def beginning(scene: Scene, model: Model) -> Scene:
 
 
 def frames_share(geometric: GeometricError, kinds: Sequence[str]) -> Share | None:
-    """The error of rigid-body frames; None where all are co-rotational."""
+    """The error of rigid-body frames; None if all are co-rotational."""
     if all(link.fit is not None for link in geometric.model.links):
         return None
     warned = geometric_warning(geometric)
@@ -187,7 +187,7 @@ def frames_share(geometric: GeometricError, kinds: Sequence[str]) -> Share | Non
 
 
 def step_errors(ready: Prepared, base: Histories) -> dict[str, float]:
-    """Channel → error of the step of a run in memory, of a single level: what it differs by from another level.
+    """Channel → step error of a run of a single level in memory: its difference from another level.
 
     That one has steps twice as long; where those would grow without bound, or rigid links would turn too far in them to
     stay as stiff beside a step, half as long.

@@ -20,7 +20,7 @@ from kedfem.results.records import largest_by_unit
 
 # of the largest force at the linkage's size: a torque below is what is left of others that cancel
 FAINT = 3e-3
-ROUGHLY = 1e-6  # of its size: what a steady motion that is compared may leave in a period
+ROUGHLY = 1e-6  # of its size: residual of a period that a compared steady motion may have
 NOTHING = 1e-6  # of the largest value of the same unit: a channel below holds rounding, not results
 
 
@@ -30,9 +30,9 @@ class Histories:
 
     time : (T,) [s]
     channels : name → (channel, values (T, c))
-    kept : states at the steps that were asked for
+    kept : states at the requested steps
     size : of the linkage [m]
-    begun : the state with which a steady motion begins; None of another, or if it is not at hand
+    begun : the state at the beginning of a steady motion; None for other analyses, or if unknown
     """
 
     time: Float[np.ndarray, " T"]
@@ -53,10 +53,10 @@ def histories(
     Parameters
     ----------
     keep : numbers of the steps whose states are kept too
-    watch : called now and then; what it raises ends the run
-    look : sees every block
-    follow : sees every block with its rows
-    near : a state near to that with which a steady motion begins
+    watch : called regularly; an exception that it raises ends the run
+    look : called with every block
+    follow : called with every block and its rows
+    near : a state near to that at the beginning of a steady motion
     """
     every = recording(ready.scene, ready.model, linked=ready.linkage)
     recorded = [x for x in every if asked_for(x.channel.name)]
@@ -79,7 +79,7 @@ def histories(
 
 
 def steady_state(solvers: Sequence[Steps]) -> StateArrays | None:
-    """The state with which a steady motion begins, that of the finest steps; None of another motion."""
+    """The state at the beginning of a steady motion, with the finest steps; None for other motions."""
     found = getattr(solvers[-1], "steady", None)
     return state_arrays(found.state) if isinstance(found, Periodic) else None
 
@@ -91,12 +91,12 @@ def extent(model: Model) -> float:
 
 
 def asked_for(name: str) -> bool:
-    """Whether a channel counts when an accuracy is asked for: probes, joint forces, the drive's torque."""
+    """Whether a required accuracy applies to a channel: probes, joint forces, the drive's torque."""
     return kind_of_name(name) is not None
 
 
 def relative_errors(found: Histories, reference: Histories) -> dict[str, float]:
-    """Largest difference in time of every channel that counts, of the channel's largest value.
+    """Largest difference over time of every judged channel, relative to the channel's largest value.
 
     Both runs need not have the same steps: the reference is interpolated (cubic spline).
     """
@@ -113,7 +113,7 @@ def relative_errors(found: Histories, reference: Histories) -> dict[str, float]:
 
 
 def counted(reference: Histories) -> dict[str, float]:
-    """Channel that counts → its largest value; those that hold next to nothing are left out."""
+    """Judged channel → its largest value; negligible channels are left out."""
     units = largest_by_unit(reference.channels.values())
     sizes = {
         name: (channel.unit, float(np.linalg.norm(values, axis=1).max()))
@@ -127,7 +127,7 @@ def counted(reference: Histories) -> dict[str, float]:
 
 
 def worst(errors: Mapping[str, float]) -> float:
-    """The largest of relative errors; 0 where nothing was asked for."""
+    """The largest relative error; 0 without any channel."""
     return max(errors.values(), default=0.0)
 
 

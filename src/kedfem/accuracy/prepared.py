@@ -41,7 +41,7 @@ from kedfem.store import contents
 
 BESIDE = ("title", "fatigue", "output")
 """Sections of a scene on which no plan and no reduced model depends, probes of the output apart."""
-INSTANTS = 16  # where the linkage is examined before the first run
+INSTANTS = 16  # at which the linkage is examined before the first run
 
 T = TypeVar("T")
 
@@ -63,7 +63,7 @@ def meshed(
 
     Parameters
     ----------
-    known : links that are made already, by name; the others are meshed
+    known : existing links, by name; the others are meshed
     """
     stage("motion")
     joined, along = moving(scene)
@@ -72,7 +72,7 @@ def meshed(
 
 
 def moving(scene: Scene) -> tuple[Linkage, Path]:
-    """The linkage of a scene, and its rigid motion over the drive's range; the speeds at the start are possible."""
+    """The linkage of a scene, with consistent speeds at the start, and its rigid motion over the drive's range."""
     joined = linkage(scene)
     initial_twists(scene, joined)
     return joined, path(joined, *drive_range(scene))
@@ -96,10 +96,10 @@ def key(scene: Scene) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Neighbours:
-    """Data that a run takes over from runs of similar scenes.
+    """Data of similar scenes that a run reuses.
 
     ends : assembled scenes with which reduced links are shared (`accuracy.reduction.prepared`)
-    near : the state with which the steady motion of one of them begins, to look for this one's from there
+    near : the state at the beginning of the steady motion of one of them, from which the search starts
     """
 
     ends: Sequence[Scene] = ()
@@ -112,10 +112,10 @@ _LAST: dict[str, Any] = {}
 
 
 def alike(scene: Scene) -> str | None:
-    """What scenes have in common whose reduced links may be the same; None of one that shares them with none.
+    """The digest that scenes with common reduced links share; None for a scene that shares them with no other.
 
-    It is all but the damping and the speed of a drive that turns steadily, or comes to. Rigid links with co-rotational
-    frames depend on the step.
+    It covers everything but the damping and the speed of a drive with constant or ramped speed. Rigid links with
+    co-rotational frames depend on the step.
     """
     if scene.drive is None or not any(link.reduced for link in scene.links.values()):
         return None
@@ -127,7 +127,7 @@ def alike(scene: Scene) -> str | None:
 
 
 def last_of(name: str, made: Callable[[], T]) -> T:
-    """What this process has under a name, the last one alone."""
+    """The entry of this process under a name; only the last one is kept."""
     if name not in _LAST:
         _LAST.clear()
         _LAST[name] = made()

@@ -29,10 +29,10 @@ from kedfem.scene import (
     turn_steps,
 )
 
-POSES = 8  # of the last revolution in which the linkage is frozen
-LARGE = 100_000  # unknowns of a model whose stiffness is not factored only to look at its frequencies
+POSES = 8  # of the last revolution at which the linkage is frozen
+LARGE = 100_000  # unknowns of a model whose stiffness is not factored for this check
 FEWEST = 10  # steps in a period: the period is then 3 % too long
-UNFOLLOWED = 0.01  # error of a step below which what vibrates unresolved is no matter
+UNFOLLOWED = 0.01  # error of a step below which unresolved vibration is negligible
 HARMONICS = 5  # of the drive
 NEAR = 0.03  # of a frequency
 
@@ -48,7 +48,7 @@ class Resonance:
 
 @dataclass(frozen=True, slots=True)
 class Resolution:
-    """First frequencies of the linkage in some poses, drive held, of what its loads excite.
+    """First frequencies of the linkage in some poses, with fixed drive, of the vibrations that its loads excite.
 
     step : of the analysis [s]
     first : (p,) frequency in each pose [Hz]
@@ -68,7 +68,7 @@ class Resolution:
 
 
 def resolution(ready: Prepared) -> Resolution | None:
-    """Frequencies of a prepared scene's linkage; None where it is free to move, nothing is excited or the model large."""
+    """Frequencies of a prepared scene's linkage; None if it is free to move, nothing is excited or the model is large."""
     if ready.model.unknowns > LARGE or ready.linkage.mobility:
         return None
     scene, grid = ready.scene, time_grid(ready.scene)
@@ -92,7 +92,7 @@ def resolution(ready: Prepared) -> Resolution | None:
 
 
 def resonances(first: Float[np.ndarray, " p"], angles: Float[np.ndarray, " p"], speed: float) -> list[Resonance]:
-    """Where harmonics of a drive's speed [Hz] come near frequencies that change from pose to pose."""
+    """Poses in which a harmonic of a drive's speed [Hz] is near a frequency."""
     found = []
     around = [*zip(first, angles, strict=True), (first[0], angles[0])]
     for k in range(1, HARMONICS + 1):
@@ -114,7 +114,7 @@ def local_error(scheme: Scheme) -> float:
 
 @dataclass
 class StepError:
-    """The largest local error of the steps so far, in the norm of the mass, and what local errors add up to.
+    """The largest local error of the steps so far, in the mass norm, and the sum of local errors.
 
     Vibration adds them up, step by step, for as long as damping at its frequency lets it: what is left of earlier errors
     falls by exp(−h (α + β ω²)/2) in a step, ω² = |δ''|/|δ|.
@@ -132,7 +132,7 @@ class StepError:
     REMEMBERED: ClassVar = ("change", "peak", "grown", "_swing", "_left", "_last")
 
     def add(self, block: Block) -> None:
-        """Look at the steps of a block."""
+        """Evaluate the steps of a block."""
         a = self._weighted(block, "a")
         before = a[:1] if self._last is None else self._last[None]
         change = np.linalg.norm(np.diff(np.concatenate([before, a]), axis=0), axis=1)
@@ -150,12 +150,12 @@ class StepError:
 
     @property
     def relative(self) -> float:
-        """Of the largest displacement."""
+        """The largest local error, relative to the largest displacement."""
         return self.constant * self.change / self.peak if self.peak else 0.0
 
     @property
     def total(self) -> float:
-        """What local errors add up to, of the largest displacement; of a motion that is wrong altogether 1."""
+        """The sum of local errors, relative to the largest displacement, at most 1."""
         return min(1.0, self.constant * self.grown / self.peak) if self.peak else 0.0
 
     def _weighted(self, block: Block, name: str) -> Float[np.ndarray, "T k"]:
@@ -167,19 +167,19 @@ class StepError:
 
 
 def step_error(ready: Prepared) -> StepError:
-    """A watcher of a prepared scene's steps."""
+    """The monitor of a prepared scene's local errors."""
     scheme = generalised_alpha(time_grid(ready.scene).step, ready.scene.analysis.rho_inf)
     return StepError(ready.model, local_error(scheme), scheme.h)
 
 
 def resolution_warnings(found: Resolution | None, error: float | None = None) -> list[str]:
-    """What a user should know about the step and the drive's speed.
+    """Warnings about the step and the drive's speed.
 
     Few steps in a period are said where the error of the step shows that something vibrates: others follow what moves.
 
     Parameters
     ----------
-    error : of the step, as far as it is known
+    error : of the step, if known
     """
     out = []
     if found is not None and found.steps_per_period < FEWEST and (error is None or error > UNFOLLOWED):
@@ -202,7 +202,7 @@ def resolution_warnings(found: Resolution | None, error: float | None = None) ->
 
 
 def fewest_steps(scene: Scene) -> float:
-    """Steps of an analysis below which it may grow: the drive then turns by more than 1 − ρ∞ in a step."""
+    """Steps of an analysis below which vibration may grow: the drive then rotates by more than 1 − ρ∞ in a step."""
     rho_inf = scene.analysis.rho_inf
     if rayleigh(scene.damping)[1] == 0.0 and not corotational(scene) and not _moving(scene):
         return 0.0

@@ -1,4 +1,4 @@
-"""Trial runs of changed copies of one scene with reduced links; parts that several runs share are made once."""
+"""Trial runs of modified copies of one scene with reduced links; common parts are made once."""
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
@@ -21,16 +21,16 @@ from kedfem.motion.path import Path
 from kedfem.results.recording import recording
 from kedfem.scene import Scene, spatial_beams, without_vibration
 
-TRIAL = 0.03  # error that the reduction of a trial run may cause, of the error asked for
+TRIAL = 0.03  # error of the reduction of a trial run, relative to the required accuracy
 
 Stage = Callable[[str], None]
 
 
 @dataclass
 class Trials:
-    """What trial runs found, and what they were made of: links by their text, modes of each.
+    """Results of trial runs, with the links by their text, and the modes of each.
 
-    asked : the accuracy
+    asked : the required accuracy
     """
 
     asked: float
@@ -56,12 +56,12 @@ class Trials:
         return self.runs[key]
 
     def balances(self, scene: Scene) -> None:
-        """Raise what keeps static positions from being found at all: it is not the mesh that fails."""
+        """Raise the error of a scene without any static position, so that the mesh is not blamed."""
         if without_vibration(scene):
             self.run(scene)
 
     def step(self, scene: Scene) -> tuple[StepEstimate, Collection[str]]:
-        """What a trial run of several levels in time knows of its step's error, and the channels that count."""
+        """The step estimate of a trial run of several levels in time, and the judged channels."""
         scene = shortened(scene)
         key = scene.model_dump_json()
         if key not in self.steps:
@@ -94,12 +94,12 @@ class Trials:
         return bare
 
     def links_of(self, scene: Scene) -> dict[str, Link]:
-        """Those links of a scene that trial runs had, by name: with the same meshes and matrices."""
+        """Links of a scene that earlier trial runs had, by name: with the same meshes and matrices."""
         known = ((name, self.links.get(_text(scene, name))) for name in scene.links)
         return {name: link for name, link in known if link is not None}
 
     def _reduced(self, full: Prepared) -> Prepared:
-        """With the modes of links that an earlier trial had too: the difference is then of the others alone."""
+        """Reduced with the modes of earlier trials, so that only the changed links cause a difference."""
         texts = _texts(full)
         known = [self.functions.get(text) for text in texts]
         ready = first_reduced(full, TRIAL * self.asked, known if any(Q is not None for Q in known) else None)
@@ -110,13 +110,13 @@ class Trials:
 
 
 def _texts(full: Prepared) -> list[str]:
-    """All that the modes of each link of a model depend on, or of each segment."""
+    """Keys of the modes: everything that those of each link or segment of a model depend on."""
     names = [link.name for link in full.model.links]
     number = [f"{names[:k].count(name)} of {names.count(name)}" for k, name in enumerate(names)]
     return [f"{_text(full.scene, name)} {place}" for name, place in zip(names, number, strict=True)]
 
 
 def _text(scene: Scene, name: str) -> str:
-    """All that a link's mesh and matrices depend on."""
+    """Key of a link: everything that its mesh and matrices depend on."""
     text = scene.links[name].model_dump_json(exclude={"reduction"})
     return f"{name} {name in spatial_beams(scene)} {text}"

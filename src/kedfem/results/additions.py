@@ -29,7 +29,7 @@ OF_SPOT = {
 
 
 def mark_unreliable(path: Path, why: str) -> None:
-    """Say that results mean nothing, and why."""
+    """Mark results as unreliable, with the reason."""
     with _changed(path) as file:
         write_facts(file, {"status": "unreliable", "reason": why})
 
@@ -44,7 +44,7 @@ def add_peaks(path: Path, peaks: Mapping[str, Peak]) -> None:
 
 
 def read_peaks(file: Any) -> dict[str, Peak]:
-    """What `add_peaks` stored."""
+    """The highest stresses that `add_peaks` stored."""
     return {name: _peak(group) for name, group in file.get(PEAKS, {}).items()}
 
 
@@ -66,7 +66,7 @@ def add_fatigue(path: Path, found: Fatigue) -> None:
 
 
 def read_fatigue(file: Any) -> Fatigue | None:
-    """What `add_fatigue` stored, if it did."""
+    """The damage that `add_fatigue` stored; None without any."""
     if FATIGUE not in file:
         return None
     links, without = file[FATIGUE], read_facts(file[FATIGUE])["links without data"]
@@ -101,7 +101,7 @@ def add_notes(path: Path, notes: Mapping[str, str | float]) -> None:
 
 
 def add_account(path: Path, warnings: Sequence[str], seconds: Mapping[str, float]) -> None:
-    """Store what is reported of a run, and the seconds of each of its stages."""
+    """Store the warnings of a run, and the seconds of each of its stages."""
     with _changed(path) as file:
         numbered = {f"warning {k}": text for k, text in enumerate(warnings, start=1)}
         for name, facts in ((WARNINGS, numbered), (TIMING, seconds)):
@@ -110,7 +110,7 @@ def add_account(path: Path, warnings: Sequence[str], seconds: Mapping[str, float
 
 
 def read_account(file: Any) -> tuple[tuple[str, ...], dict[str, float]]:
-    """What `add_account` stored."""
+    """The warnings and seconds that `add_account` stored."""
     facts = read_facts(file[WARNINGS]) if WARNINGS in file else {}
     numbered = sorted(facts, key=lambda key: int(key.rpartition(" ")[2]))
     return tuple(facts[key] for key in numbered), read_facts(file[TIMING]) if TIMING in file else {}
@@ -118,7 +118,7 @@ def read_account(file: Any) -> tuple[tuple[str, ...], dict[str, float]]:
 
 @contextmanager
 def _changed(path: Path) -> Iterator[Any]:
-    """A file that is whole, opened to change its texts."""
+    """A complete file, opened to change its texts."""
     try:
         with opened(path, "r+") as file:
             yield file

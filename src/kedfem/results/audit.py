@@ -40,8 +40,8 @@ from kedfem.results.forces.moments import Constants, RigidRates, constants, rate
 from kedfem.results.records import Channel
 
 Rows = Float[np.ndarray, "T c"]
-GROUP = 12  # links whose moments are examined together: of a thousand time points they fit into a cache
-LITTLE = 1e-3  # of the kinetic energy: where less is exchanged, shares of it would be of next to nothing
+GROUP = 12  # links whose moments are computed together: those of a thousand time points fit into a cache
+LITTLE = 1e-3  # of the kinetic energy: if less is exchanged, shares of it would be meaningless
 UNBALANCED = 0.02  # resolved motion leaves 1e-6 to 3e-3, too long steps 0.1 (docs/theory/evaluation.md)
 ENERGIES = (
     ("kinetic", ("kinetic",), "kinetic energy of the absolute motion of all links"),
@@ -57,7 +57,7 @@ NO_PORTS = Attachment(NONE, np.zeros((0, 0)), 3, np.zeros((0, 3)), (), NONE, NON
 
 @dataclass
 class _Sums:
-    """Time integrals that go on from block to block: by the trapezoidal rule of rates, and of what a step takes."""
+    """Time integrals over successive blocks: of rates by the trapezoidal rule, and sums of energy dissipated in steps."""
 
     t: float
     rates: Float[np.ndarray, " r"]
@@ -67,7 +67,7 @@ class _Sums:
     def add(
         self, t: Float[np.ndarray, " T"], rates: Float[np.ndarray, "T r"], taken: Float[np.ndarray, "T s"]
     ) -> tuple[Float[np.ndarray, "T r"], Float[np.ndarray, "T s"]]:
-        """Both, at the time points of one more block."""
+        """Both, at the time points of the next block."""
         before = np.concatenate([self.rates[None], rates[:-1]])
         h = np.diff(t, prepend=self.t)
         work = self.work + np.cumsum(0.5 * h[:, None] * (rates + before), axis=0)
@@ -77,7 +77,7 @@ class _Sums:
 
 
 class Account:
-    """Energy of all links from the first block on; a block that does not follow on begins anew."""
+    """Energy of all links from the first block on; a block that does not continue the last one starts anew."""
 
     REMEMBERED = ("_next", "_sums", "_start", "_stored", "_last", "_springs", "_largest")
 
@@ -123,7 +123,7 @@ class Account:
         return Balance(*(x / exchanged if exchanged else 0.0 for x in left))
 
     def _added(self, block: Block) -> dict[str, Rows]:
-        """Energies and sums of one more block."""
+        """Energies and sums of the next block."""
         flow, taken = self._flows(block)
         strain = np.sum([link.strain for link in block.links], axis=0)
         springs = joint_spring_work(block, self._springs) if self.model.rows else None
@@ -160,7 +160,7 @@ class Account:
         return {name: x[:, None] for name, x in rows.items()} | {"work": np.stack([loads, supports], axis=1)}
 
     def _stress(self, block: Block) -> Stress:
-        """Of geometric stiffening; nothing without."""
+        """Power and energy of geometric stiffening; zero without it."""
         stresses, none = self.stresses(), np.zeros(len(block))
         found = Stress(none, none)
         if stresses is None:
@@ -175,7 +175,7 @@ class Account:
         return found
 
     def _flows(self, block: Block) -> tuple[Flow, Float[np.ndarray, "T 2"]]:
-        """Of all links, and what damping takes in each step."""
+        """Energy and power of all links, and the energy that damping dissipates in each step."""
         motion, at, flows, taken = block.motion, rates_of_bodies(block.motion), [], np.zeros((len(block), 2))
         for k, group in enumerate(self._groups):
             of, links = [self.of[i] for i in group], [block.links[i] for i in group]
@@ -195,7 +195,7 @@ class Account:
     def _flow_of(
         self, k: int, of: list[Constants], links: Sequence[LinkHistory], motion: RigidMotion, at: RigidRates
     ) -> tuple[Flow, Float[np.ndarray, "T 2"] | float]:
-        """Of the links of a group, and what damping takes of them."""
+        """Energy and power of the links of a group, and their dissipation."""
         turns = [x.link.fit is None for x in of]
         made = [products(*each) for each in zip(of, links, turns, strict=True)]
         bodies = _bodies(of)

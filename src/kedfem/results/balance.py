@@ -1,4 +1,4 @@
-"""Energy and power of links, seen from the general equation, [KED, eq. (20)].
+"""Energy and power of links, by the general equation, [KED, eq. (20)].
 
 The absolute motion is R' = R0 + δ, its rate R0' + δ' with R0' = 1 ⊗ p' + X R'ᵀ.
 """
@@ -19,7 +19,7 @@ Scalars = Float[np.ndarray, " T"]
 
 @dataclass(frozen=True, slots=True)
 class Flow:
-    """Of one or several links at T time points.
+    """Energy and power of one or several links at T time points.
 
     kinetic : (T,) energy of the absolute motion [J]
     loads, supports : (T,) power of P and of the port forces [W]; that of joints between links cancels in the sum, but
@@ -27,7 +27,7 @@ class Flow:
     neglected : (T,) power on the rigid-body rotation of Σ δ × K δ, the moment that K's forces have on the bent link, as
         K turns with the rigid-body frame [W]
     constraint_joints : (T,) power of port forces of joints enforced by constraint equations, on the elastic motion [W]
-    mass_damping : (T,) power that damping in proportion to mass takes, α δ' · M δ' [W]
+    mass_damping : (T,) power dissipated by mass-proportional damping, α δ' · M δ' [W]
     """
 
     kinetic: Scalars
@@ -38,13 +38,13 @@ class Flow:
     mass_damping: Scalars
 
     def __add__(self, other: "Flow") -> "Flow":
-        """Both together."""
+        """The sum of both."""
         return Flow(*(getattr(self, each.name) + getattr(other, each.name) for each in fields(self)))
 
 
 @dataclass(frozen=True, slots=True)
 class Stress:
-    """Of geometric stiffening, all links together at T time points.
+    """Power and energy of geometric stiffening, of all links together at T time points.
 
     power : (T,) of its forces R (k g P) against the absolute motion R0' + δ' [W]
     stored : (T,) its energy ½ Σ g · k g P [J]
@@ -57,7 +57,7 @@ class Stress:
 def stress(
     of: Sequence[Constants], histories: Sequence[LinkHistory], made: Sequence[Callable[[int], Turning]], at: RigidRates
 ) -> Stress:
-    """Of links that are all planar or all in space.
+    """Geometric stiffening of links that are all planar or all in space.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def fields_of(
     of: Sequence[Constants], histories: Sequence[LinkHistory], made: Sequence[Products], turns: Sequence[bool],
     rows_work: bool = False,
 ) -> Fields:  # fmt: skip
-    """Of elastic links, all planar or all in space.
+    """Fields of elastic links, all planar or all in space.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def fields_of(
 
 
 def prescribed_fields(of: Sequence[Constants], forces: Sequence[Field]) -> Fields:
-    """Of rigid links that the drive prescribes; their supports give what their motion asks for, M R0'' − P."""
+    """Fields of rigid links that the drive prescribes; their supports exert the force of their motion, M R0'' − P."""
     S, T = len(of), len(forces[0])
     rows = np.zeros((3, of[0].fit.m, S, T))
     for i, (x, F) in enumerate(zip(of, forces, strict=True)):
@@ -130,7 +130,7 @@ def prescribed_fields(of: Sequence[Constants], forces: Sequence[Field]) -> Field
 
 
 def flow(of: Sequence[Constants], found: Fields, at: RigidRates) -> Flow:
-    """All links together, from their fields and their rigid-body motion."""
+    """Energy and power of all links, from their fields and their rigid-body motion."""
     gram, spin = np.stack([x.gram for x in of], axis=-1), np.array([x.spin for x in of])
     Mv, F, ports = found.rows[:, :-1].reshape(3, *at.rates.shape[1:])
     couples, turns = found.rows[:, -1], np.stack([at.omega[-1], at.alpha[-1]])
@@ -166,8 +166,8 @@ class Balance:
     """The largest residual of the energy account, relative to the largest energy exchanged.
 
     energy : of the integration [-]
-    neglected : energy that the neglected turning of K exchanges [-]
-    mass_damping : energy that damping in proportion to mass takes [-]
+    neglected : energy exchanged by the neglected rotation of K [-]
+    mass_damping : energy dissipated by mass-proportional damping [-]
     """
 
     energy: float = 0.0

@@ -9,7 +9,7 @@ from kedfem.results.records import Channel
 
 
 def require_channels(channels: Sequence[Channel], length: int, values: Mapping[str, Float[np.ndarray, "b c"]]) -> None:
-    """Names and shapes of a block; ValueError where they are others."""
+    """Check names and shapes of a block; ValueError if they differ."""
     expected = {channel.name: (length, len(channel.columns)) for channel in channels}
     found = {name: np.shape(block) for name, block in values.items()}
     if found != expected:
@@ -18,7 +18,7 @@ def require_channels(channels: Sequence[Channel], length: int, values: Mapping[s
 
 
 def not_finite(time: Float[np.ndarray, " b"], values: Mapping[str, Float[np.ndarray, "b c"]]) -> tuple[int, str] | None:
-    """The first row that holds something that is not finite, and what to say of it."""
+    """The first row with a value that is not finite, and the message about it."""
     first, message = len(time), ""
     for name, block in values.items():
         bad = ~np.isfinite(block).all(axis=1)

@@ -44,7 +44,7 @@ class _Pair:
     means: Float[np.ndarray, "2 c"] = field(default_factory=lambda: np.zeros((2, 1)))
 
     def add(self, e: Rows, r: Rows) -> None:
-        """More time points."""
+        """Add more time points."""
         self.count += len(e)
         self.products += [np.vdot(e, e), np.vdot(e, r), np.vdot(r, r)]
 
@@ -56,7 +56,7 @@ class _Pair:
         return float(np.sqrt(self.products[2] / max(self.count, 1)))
 
     def share(self) -> float | None:
-        """How much of the rigid effort the elastic one is, where the two contradict each other; None where they agree."""
+        """Ratio of the elastic to the rigid effort if the two contradict each other; None if they agree."""
         ee, er, rr = self.products / self.count
         c = float(er / rr)
         swing = float(np.sqrt(max(ee - c * er, 0.0) / rr))
@@ -70,7 +70,7 @@ class _Pair:
 
 
 class CrossChecks:
-    """Efforts over a run, block after block.
+    """Comparison of efforts over a run, block after block.
 
     account : of the same run's energy; the drives' work is compared with that of all port forces on the rigid-body
         motion. On the elastic motion constraint equations whose directions vary do work too, −μᵀ C' z, and springs in
@@ -98,7 +98,7 @@ class CrossChecks:
         self._rounding = 0.0  # work of the largest drive effort on what RESTING allows [J]
 
     def add(self, block: Block, values: dict[str, Rows]) -> None:
-        """The rows of one more block."""
+        """Add the rows of the next block."""
         motion = block.motion
         for each in self.pairs:
             each.add(values[each.elastic][:, each.columns], values[each.rigid])
@@ -120,7 +120,7 @@ class CrossChecks:
 
     @property
     def unworked(self) -> float:
-        """Work of the drives that the account of energy does not have, as a part of the energy exchanged [-].
+        """Work of the drives that is missing in the energy account, relative to the energy exchanged [-].
 
         Where all rests, of the least that a drive's effort would exchange if anything moved.
         """
@@ -128,7 +128,7 @@ class CrossChecks:
         return self.unbalanced / scale if scale else 0.0
 
     def warnings(self) -> tuple[str, ...]:
-        """Efforts that contradict each other."""
+        """Warnings of efforts that contradict each other."""
         out = []
         for each in self.pairs:
             most = max(other.size / self._arm(other) for other in self.pairs)
@@ -150,11 +150,11 @@ class CrossChecks:
         return tuple(out)
 
     def _arm(self, each: _Pair) -> float:
-        """By which moments are compared with forces [m]."""
+        """The arm by which moments are compared with forces [m]."""
         return 1.0 if each.unit == "N" else self.size
 
 
 def _rigid_name(name: str) -> str:
-    """The channel of rigid links beside one of elastic ones."""
+    """The channel of rigid links that corresponds to one of elastic links."""
     head, _, what = name.rpartition("/")
     return f"{head}/rigid_{what}" if what in {"force", "torque"} else ""

@@ -1,4 +1,4 @@
-"""Deflection of a point from a line between two others, and how a link moves as a whole."""
+"""Deflection of a point from a line between two others, and the mean rigid motion of a link."""
 
 from collections.abc import Callable
 
@@ -18,7 +18,7 @@ from kedfem.scene import Probe, Scene
 def deflection(
     scene: Scene, model: Model, linked: Linkage, name: str, probe: Probe, point: LinkPoint
 ) -> tuple[Callable[[Block], Rows], str]:
-    """Of a point in a frame that goes with its link: its chord, or its mean rigid motion, if it has no two joints."""
+    """Deflection of a point in the frame of its link: the chord, or the mean rigid motion if it has no two joints."""
     chord = probe.chord or _farthest(scene, probe.link)
     frame = _mean_motion(model, probe.link)
     axes = point.axes if probe.frame == "link" else None
@@ -51,7 +51,7 @@ def _farthest(scene: Scene, link: str) -> tuple[Point, Point] | None:
 
 
 def _along(R: Float[np.ndarray, "T 3 3"], drawn: Point, now: Rows) -> Float[np.ndarray, "T 3 3"]:
-    """The orientations nearest to R that take a drawn chord to the direction that it has now."""
+    """The orientations nearest to R that take a chord from its reference direction to its present one."""
     a = R @ (drawn / np.linalg.norm(drawn))
     b = now / np.linalg.norm(now, axis=1)[:, None]
     half = a + b

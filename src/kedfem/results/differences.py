@@ -1,4 +1,4 @@
-"""How runs differ: the channels that all of them have, over time or over the drive's position, against the first run."""
+"""Differences between runs in their common channels, over time or the drive's position, from the first run."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -12,18 +12,18 @@ from kedfem.results.records import Channel, Results, largest_by_unit
 
 Over = Literal["time", "drive"]
 NOTHING = 1e-9  # of the largest value of the same unit in the first run: rounding, which is not compared
-SAME = 1e-9  # of a range: grids, and motions of drives, that are one
+SAME = 1e-9  # of a range: tolerance within which grids, and motions of drives, are equal
 CUBIC = 3
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A channel of several runs at the rows of one of them that lie within all.
+    """A channel of several runs at those rows of one run that lie within all runs.
 
     values : runs × (T, c) [unit of the channel]
     peaks : (runs,) largest magnitude; of stress channels of the von Mises stress
-    largest, rms : (runs,) of the difference from the first run [of the first one's peak]
-    at : (runs,) where it is largest [s], or [rad], [m] over the drive
+    largest, rms : (runs,) of the difference from the first run [relative to the first run's peak]
+    at : (runs,) time or position of the largest difference [s], or [rad], [m] over the drive
     """
 
     channel: Channel
@@ -35,13 +35,13 @@ class Difference:
 
 
 def sparsest(runs: Sequence[Results]) -> int:
-    """The run at whose rows all are compared: the first; where some left out rows, the one with the longest gaps."""
+    """The run at whose rows all are compared: the first one, or with thinned runs the one with the longest gaps."""
     gaps = [float(np.ptp(run.time)) / max(len(run.time) - 1, 1) if run.every > 1 else 0.0 for run in runs]
     return int(np.argmax(gaps))
 
 
 def common_abscissa(runs: Sequence[Results], over: Over | None) -> tuple[Over, Float[np.ndarray, " T"]]:
-    """What runs are compared over, and the rows of one run, `sparsest`, that lie within all of them.
+    """The common abscissa of runs, and the rows of one run, `sparsest`, that lie within all of them.
 
     Over the drive where it keeps on in one direction in every run, and moves otherwise over time in some; else over time.
 
@@ -70,13 +70,13 @@ def _along(run: Results, over: Over) -> Float[np.ndarray, " n"]:
 
 
 def _rising(x: Float[np.ndarray, " n"]) -> bool:
-    """Whether it keeps on in one direction."""
+    """Whether the values are monotonic."""
     steps = np.diff(x)
     return len(x) > CUBIC and bool((steps > 0).all() or (steps < 0).all())
 
 
 def _moved_alike(runs: Sequence[Results]) -> bool:
-    """Whether the drives of all runs are at the same places at the same times, as far as they go."""
+    """Whether the drives of all runs have the same positions at the same times, over their common time."""
     first = runs[sparsest(runs)]
     size = float(np.ptp(first.angle)) or 1.0
     for run in (run for run in runs if run is not first):
@@ -90,7 +90,7 @@ def _moved_alike(runs: Sequence[Results]) -> bool:
 
 
 def _smooth(x: Float[np.ndarray, " n"], y: Float[np.ndarray, "n c"], at: Float[np.ndarray, " T"]) -> np.ndarray:
-    """Values between rows: the rows themselves where they are there, else the cubic spline through them."""
+    """Values at given points: the rows themselves where they coincide, else the cubic spline through them."""
     order = np.argsort(x)
     x, y = x[order], y[order]
     near = np.clip(np.searchsorted(x, at), 1, len(x) - 1)
@@ -105,7 +105,7 @@ def _smooth(x: Float[np.ndarray, " n"], y: Float[np.ndarray, "n c"], at: Float[n
 
 
 def differences(runs: Sequence[Results], over: Over, at: Float[np.ndarray, " T"]) -> list[Difference]:
-    """Of all channels that every run has with the same columns, in the first one's order; rounding is left out."""
+    """Differences in all common channels, in the first run's order; channels that are rounding are left out."""
     out, highest = [], largest_by_unit(runs[0].channels.values())
     thinned = any(run.every > 1 for run in runs)
     for name in in_common(runs):
@@ -123,7 +123,7 @@ def differences(runs: Sequence[Results], over: Over, at: Float[np.ndarray, " T"]
 
 
 def _largest(run: Results, channel: Channel, over: Over, at: Float[np.ndarray, " T"]) -> float:
-    """The largest of all time points of a run on a stretch, where runs are not compared at each."""
+    """The largest value of all time points of a run in an interval, also of those that are not rows."""
     time, angle, values = run.largest_rows(channel.name)
     x = time if over == "time" else angle
     sizes = magnitude(channel, values)[(x >= at[0]) & (x <= at[-1])]
@@ -131,7 +131,7 @@ def _largest(run: Results, channel: Channel, over: Over, at: Float[np.ndarray, "
 
 
 def in_common(runs: Sequence[Results]) -> list[str]:
-    """Channels that all runs have, with the same columns and unit."""
+    """The common channels of all runs: those with the same columns and unit."""
     return [
         name for name, (channel, _) in runs[0].channels.items()
         if all(name in run.channels and _same(channel, run.channels[name][0]) for run in runs[1:])
@@ -152,7 +152,7 @@ def magnitude(channel: Channel, values: Float[np.ndarray, "T c"]) -> Float[np.nd
 
 
 def differing_keys(runs: Sequence[Results]) -> dict[str, tuple[Any, ...]]:
-    """Keys of the scenes, dotted, that are not the same in all runs, with their values; None where a key is missing."""
+    """Dotted keys of the scenes that differ between runs, with their values; None if a key is missing."""
     scenes = [_flat(json.loads(run.scene_json)) for run in runs]
     keys = dict.fromkeys(key for scene in scenes for key in scene)
     every = {key: tuple(scene.get(key) for scene in scenes) for key in keys}
@@ -160,7 +160,7 @@ def differing_keys(runs: Sequence[Results]) -> dict[str, tuple[Any, ...]]:
 
 
 def _flat(x: Any, name: str = "") -> Mapping[str, Any]:
-    """Tables of tables as one, keys joined by dots."""
+    """Nested tables as one table with dotted keys."""
     if not isinstance(x, dict) or not x:
         return {name: x}
     out: dict[str, Any] = {}

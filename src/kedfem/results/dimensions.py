@@ -20,7 +20,7 @@ NAMED = {XYZ: "xyz", XYZ[:2]: "xy", STRESS: "stress_component"}
 
 
 def columns_dimension(columns: Sequence[str]) -> str:
-    """What the dimension of a channel's columns is called; "" of one column, which has none.
+    """Name of the dimension of a channel's columns; "" of a single column, which has none.
 
     >>> columns_dimension(("x", "y", "z")), columns_dimension(("loads", "supports")), columns_dimension(("torque",))
     ('xyz', 'loads_supports', '')
@@ -31,12 +31,12 @@ def columns_dimension(columns: Sequence[str]) -> str:
 
 
 def cf_attributes(channel: Channel) -> dict[str, str]:
-    """A channel's unit, as CF has it 1 where there is none, and what it is."""
+    """A channel's unit, which is 1 in CF if there is none, and its description."""
     return {"units": channel.unit or "1", "long_name": channel.description}
 
 
 def lay_dimensions(file: Any, drive: Channel, channels: Sequence[Channel]) -> None:
-    """Name rows and columns of all channels, which are there, with units and what they mean."""
+    """Attach dimensions, units and descriptions to the rows and columns of all existing channels."""
     import h5py
 
     write_facts(file, {"Conventions": CONVENTIONS, "coordinates": drive.name})

@@ -1,4 +1,4 @@
-"""Folders and files that can be written, files that appear only when they are whole, packages that some outputs need."""
+"""Writable folders and files, files that appear only when they are complete, packages that some outputs need."""
 
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -16,7 +16,7 @@ DATA = "data"  # the extra with xarray, pandas and what they write files with
 
 
 def unwritable(path: Path, error: OSError | RuntimeError) -> OutputError:
-    """Why a results file cannot be written, as the user reads it."""
+    """The error of a results file that cannot be written, with a message for the user."""
     if isinstance(error, BlockingIOError):
         return OutputError(f"{path}: must not be in use, got another run that is writing it")
     return OutputError(f"{path}: must be a file that can be written, got {reason(error)}")
@@ -29,18 +29,18 @@ def reason(error: OSError | RuntimeError) -> str:
 
 
 def results_file(given: Path) -> Path:
-    """The results file that is meant: `results.h5` of a folder, or the file itself."""
+    """The path of a results file: `results.h5` in a given folder, or the given file."""
     given = Path(given)
     return given / "results.h5" if given.is_dir() else given
 
 
 def beside(folder: Path, what: str) -> Path:
-    """The folder of another command beside that of a run's results, which leaves these alone: NAME-frequencies."""
+    """The folder of another command beside that of a run's results, such as NAME-frequencies."""
     return folder.with_name(f"{folder.name.removesuffix('-results')}-{what}")
 
 
 def ready_folder(folder: Path) -> Path:
-    """A folder that exists and takes files; made where it is missing, with its parents.
+    """A writable folder, made with its parents if it does not exist.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def ready_folder(folder: Path) -> Path:
 
 
 def _in_the_way(folder: Path) -> str:
-    """What stands where a folder is wanted, and what to do; "" if nothing does."""
+    """A message about a file in the place of a folder, and what to do; "" if there is none."""
     with suppress(OSError):
         for place in (folder, *folder.parents):
             there = place.exists()
@@ -71,7 +71,7 @@ def _in_the_way(folder: Path) -> str:
 
 
 def require_space(folder: Path, size: int) -> None:
-    """Make sure that `size` bytes can be written in a folder, disk and quota allowing; OSError if not.
+    """Ensure that `size` bytes can be written in a folder, within disk and quota; OSError if not.
 
     HDF5 cannot close a file after a refused write (it takes the process down, and the file with it): space is
     asked for before, on a file without a name that is gone at once.
@@ -82,7 +82,7 @@ def require_space(folder: Path, size: int) -> None:
 
 @contextmanager
 def claimed(folder: Path, within: Sequence[str] = ()) -> Iterator[Path]:
-    """A folder that belongs to one run until the block ends; what killed runs left of unfinished files is removed.
+    """A folder that belongs to one run until the block ends; unfinished files of killed runs are removed.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def claimed(folder: Path, within: Sequence[str] = ()) -> Iterator[Path]:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary path beside `path` that takes its place when the block ends without an error.
+    """A temporary path beside `path` that replaces it when the block ends without an error.
 
     Readers see the old file or the new one, never a part of it.
 

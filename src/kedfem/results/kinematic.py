@@ -20,7 +20,7 @@ from kedfem.results.recorded import Rows
 from kedfem.results.records import XYZ, Channel
 from kedfem.scene import Scene
 
-FLAT = 1e-9  # of the fastest turn: what leaves the common plane is rounding
+FLAT = 1e-9  # of the fastest rotation: smaller out-of-plane components are rounding
 RATES = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 TRANSMISSION = "/transmission_angle"
 TURNS = (("angular_velocity", "rad/s", "omega"), ("angular_acceleration", "rad/s^2", "alpha"))
@@ -49,7 +49,7 @@ class Kinematics:
 
 
 def kinematics_of(scene: Scene, linkage: Linkage, along: Path, inertias: Inertias) -> Kinematics:
-    """What a scene's rigid motion is recorded as."""
+    """The channels of a scene's rigid motion."""
     normal = plane_normal(along)
     every: list[tuple[Channel, Callable[[RigidMotion], Rows]]] = []
     for name in scene.links:
@@ -79,7 +79,7 @@ def kinematics_of(scene: Scene, linkage: Linkage, along: Path, inertias: Inertia
 
 
 def plane_normal(along: Path) -> Float[np.ndarray, "3"] | None:
-    """The direction that all links turn about, and none moves along; None if they move in space."""
+    """The normal of the plane in which all links move; None if they move in space."""
     v, omega = along.first
     flat = omega.reshape(-1, 3)
     size = np.linalg.norm(flat, axis=1)
@@ -92,7 +92,7 @@ def plane_normal(along: Path) -> Float[np.ndarray, "3"] | None:
 
 
 def rotation_vector(R: Float[np.ndarray, "T 3 3"]) -> Float[np.ndarray, "T 3"]:
-    """θ of R = exp([θ]×), of the size 0 to π [rad]."""
+    """Rotation vector θ of R = exp([θ]×), of magnitude 0 to π [rad]."""
     from scipy.spatial.transform import Rotation
 
     return np.asarray(Rotation.from_matrix(R).as_rotvec())

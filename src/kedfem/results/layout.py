@@ -1,4 +1,4 @@
-"""How a results file is laid out in HDF5, and how damage to it is noticed.
+"""Layout of a results file in HDF5, and detection of damage to it.
 
 Numbers carry HDF5's own checksum (Fletcher's), its tables those of the layout of HDF5 1.8 and later. Texts lie where HDF5
 checks nothing: their digest is stored beside them.
@@ -21,21 +21,21 @@ CACHED = 2**18  # bytes of chunks of each series: some chunks; HDF5 would hold 8
 CHUNK_ROWS = 512
 MANY, MOST_CHUNK_ROWS = 100_000, 4096  # rows from which on chunks are larger, as HDF5 keeps a list of them; and how large
 PEAKS, WARNINGS, TIMING, FATIGUE = "peaks", "warnings", "timing", "fatigue"
-ADDED = (PEAKS, WARNINGS, TIMING, FATIGUE)  # groups that come after the rows
+ADDED = (PEAKS, WARNINGS, TIMING, FATIGUE)  # groups that are written after the rows
 BETWEEN, LARGEST = "steps between rows", "largest_rows"  # a note, and an attribute of channels, of files without all
 OF_CHANNELS, OF_NOTES = "digest_of_channels", "digest_of_notes"
 CHECKSUM = 4  # bytes of a chunk
 
 
 def opened(path: Path, mode: str, locking: bool | str = "best-effort") -> Any:
-    """The file, locked against a second writer where the disk knows locks; OSError as HDF5 says."""
+    """The file, locked against a second writer if the disk supports locks; OSError with the reason of HDF5."""
     import h5py
 
     return h5py.File(path, mode, locking=locking, libver=("v108", "v110"), rdcc_nbytes=CACHED)
 
 
 def refuse_another_run(path: Path) -> None:
-    """OutputError where a run is at work on a file, which is only replaced when none is."""
+    """OutputError if a run is writing a file, which must not be replaced then."""
     try:
         if path.is_dir():
             raise IsADirectoryError(21, "a folder of that name")
@@ -64,7 +64,7 @@ def installed_version() -> str:
 
 
 def chunk_rows(expected: int) -> int:
-    """Rows of a chunk where so many are expected: of few no more than they are, of very many more at a time."""
+    """Rows per chunk for an expected number of rows: at most that number, and larger chunks for very many rows."""
     return CHUNK_ROWS if CHUNK_ROWS <= expected <= MANY else min(max(expected, 1), MOST_CHUNK_ROWS)
 
 
@@ -164,14 +164,14 @@ def all_rows(rows: Any, n: int) -> Float[np.ndarray, "n ..."]:
 
 
 def seal(file: Any) -> None:
-    """Store the digests of the file's texts as they are now; those of channels and scene are written once."""
+    """Store the digests of the file's present texts; those of channels and scene are written once."""
     if OF_CHANNELS not in file.attrs:
         file.attrs[OF_CHANNELS] = _digest(_channel_texts(file))
     file.attrs[OF_NOTES] = _digest(_note_texts(file))
 
 
 def sealed(file: Any) -> bool:
-    """Whether the texts are those that were written."""
+    """Whether the texts are unchanged since they were sealed."""
     digests = {OF_CHANNELS: _channel_texts(file), OF_NOTES: _note_texts(file)}
     return all(np.array_equal(file.attrs[name], _digest(texts)) for name, texts in digests.items())
 

@@ -14,13 +14,13 @@ from kedfem.links.record import Link, in_space
 from kedfem.motion.linkage import Linkage
 from kedfem.results.recorded import Rows
 
-HELD = 1e-6  # of a link's size: a point as near to where a joint holds it is that one
+HELD = 1e-6  # of a link's size: a point that near to a joint's point is that point
 Point = Float[np.ndarray, "3"]
 
 
 @dataclass(frozen=True, slots=True)
 class LinkPoint:
-    """A point of a link, as a run knows it.
+    """A point of a link in a run.
 
     body, X : number of its link in the linkage, the point in the reference position [m]
     elastic : δ, δ' or δ'' there by their letter, world components (T, 3)
@@ -39,11 +39,11 @@ class LinkPoint:
         return np.asarray(block.motion.position(self.body, self.X) + self.elastic(block, "u"))
 
     def velocity(self, block: Block) -> Rows:
-        """Of both motions together [m/s]."""
+        """Velocity of rigid and elastic motion together [m/s]."""
         return np.asarray(block.motion.velocity(self.body, self.X) + self.elastic(block, "v"))
 
     def acceleration(self, block: Block) -> Rows:
-        """Of both motions together [m/s²]."""
+        """Acceleration of rigid and elastic motion together [m/s²]."""
         return np.asarray(block.motion.acceleration(self.body, self.X) + self.elastic(block, "a"))
 
 
@@ -119,7 +119,7 @@ def _value(link: Link, where: str, at: Point) -> tuple[Float[np.ndarray, " n"], 
 
 
 def seen_from(x: Rows, R: Float[np.ndarray, "T 3 3"], X: Point, axes: Float[np.ndarray, "3 3"] | None) -> Rows:
-    """What x differs by from the rigid X, in axes that turn with the frame, or in the world's."""
+    """Difference of x from the rigid X, in axes that rotate with the frame, or in the world's."""
     if axes is None:
         return np.asarray(x - R @ X)
     return np.asarray(((x[:, None] @ R)[:, 0] - X) @ axes)

@@ -1,4 +1,4 @@
-"""Channels of a large results file, each read when it is asked for: a long run ends with the memory that it had."""
+"""Channels of a large results file, each read on demand, so that the memory of a long run does not grow at its end."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -13,8 +13,8 @@ from kedfem.results.files import reason
 from kedfem.results.layout import all_rows, opened_to_read, read_text
 from kedfem.results.records import Channel
 
-AT_ONCE = 64_000_000  # bytes: rows of files that have no more are all read with the file
-KEPT = 32_000_000  # bytes of rows that were asked for last, at hand if they are again
+AT_ONCE = 64_000_000  # bytes: smaller files are read at once
+KEPT = 32_000_000  # bytes of the rows read last, which are kept in memory
 
 Series = tuple[Channel, Float[np.ndarray, "n c"]]
 
@@ -77,7 +77,7 @@ class OnDemand(Mapping[str, Series]):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChannelSelection(Mapping[str, Series]):
-    """Some of the channels, by their names."""
+    """A selection of channels by name."""
 
     every: Mapping[str, Series]
     names: tuple[str, ...]

@@ -27,7 +27,7 @@ def probe_channels(scene: Scene, model: Model, linked: Linkage | None = None) ->
 
     Parameters
     ----------
-    linked : the scene's linkage, where that is at hand
+    linked : the scene's linkage, if available
     """
     if not scene.output.probes:
         return []
@@ -55,7 +55,7 @@ def _place(link: str, X: Point) -> str:
 
 
 def _words(linked: Linkage, probe: Probe) -> str:
-    """What a probe of motion measures, and from where."""
+    """Quantity and frame of a probe of motion."""
     match probe.quantity:
         case "position":
             return "position"

@@ -54,7 +54,7 @@ def read_results(path: Path) -> Results:
 
 
 def abandoned_rows(path: Path) -> int | None:
-    """How many rows a run left whose process was killed; None if there is no such run."""
+    """Number of rows of a run whose process was killed; None if there is no such run."""
     try:
         with opened_to_read(path) as file:
             if read_facts(file).get("status") != "running":
@@ -66,7 +66,7 @@ def abandoned_rows(path: Path) -> int | None:
 
 
 def run_status(path: Path) -> str:
-    """What a results file says of its run, without its rows; "" of a file that cannot be read."""
+    """Status of the run of a results file, without its rows; "" for a file that cannot be read."""
     try:
         with opened_to_read(path) as file:
             return str(read_facts(file)["status"])
@@ -84,7 +84,7 @@ def foreign(path: Path) -> bool:
 
 
 def _alive(path: Path) -> bool:
-    """Whether a process holds the lock of a file that says that its run is under way; yes, where nobody can determine."""
+    """Whether a process holds the lock of a file with status ``running``; True if that cannot be determined."""
     try:
         opened(path, "r", True).close()
     except OSError:
@@ -93,7 +93,7 @@ def _alive(path: Path) -> bool:
 
 
 def _refuse_foreign(file: Any, path: Path) -> None:
-    """Only files of kedfem, of a layout that is known here."""
+    """Refuse files of other programs or of another layout."""
     layout = file.attrs.get("format")
     if layout is None or "kedfem_version" not in file.attrs:
         raise OutputError(f"{path}: must be {WANTED}, got another HDF5 file")
@@ -131,7 +131,7 @@ def _results(file: Any, path: Path) -> Results:
 
 
 def _status(found: str) -> Status:
-    """One of the words that a file may say."""
+    """The status of a file; ValueError for an unknown word."""
     for known in get_args(Status):
         if found == known:
             return cast(Status, known)

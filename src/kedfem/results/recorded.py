@@ -24,7 +24,7 @@ class Recorded:
 
 
 def once(of: Callable[[Block], T]) -> Callable[[Block], T]:
-    """What is made of a block, once though several channels show parts of it."""
+    """A function of a block that is evaluated once, though several channels show parts of its result."""
     last: tuple[Block, T] | None = None
 
     def made(block: Block) -> T:
@@ -37,18 +37,18 @@ def once(of: Callable[[Block], T]) -> Callable[[Block], T]:
 
 
 def drive_prefix(scene: Scene, driven: str) -> str:
-    """How channels of the drive of a joint begin: `drive/`, or `drive/JOINT/` where there are several."""
+    """Prefix of the channels of a joint's drive: `drive/`, or `drive/JOINT/` with several drives."""
     return f"drive/{driven}/" if len(scene.driven_joints) > 1 else "drive/"
 
 
 def drive_effort(scene: Scene, driven: str, rigid: str = "") -> tuple[str, str, str]:
-    """Name of the channel of what the drive of a joint exerts, or `rigid_` links would ask of it; quantity and unit."""
+    """Channel name of the effort of a joint's drive, or with `rigid_` of that with rigid links; quantity and unit."""
     quantity, unit = ("force", "N") if driven_travel(scene, driven) else ("torque", "N m")
     return f"{drive_prefix(scene, driven)}{rigid}{quantity}", quantity, unit
 
 
 def drive_channel(scene: Scene) -> Channel:
-    """What the position of a scene's drive is called; of several drives that of the first."""
+    """The channel of the position of a scene's drive; of several drives that of the first."""
     names = list(scene.driven_joints)
     if not names:
         return ANGLE

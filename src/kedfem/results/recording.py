@@ -1,4 +1,4 @@
-"""From the elastic motion to rows of channels: probes, joint forces, drive torque; block by block."""
+"""Rows of channels from the elastic motion, block by block: probes, joint forces, drive torque."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -31,9 +31,9 @@ def recording(
 
     Parameters
     ----------
-    account : of energy, if one is kept already
+    account : the energy account, if there is one
     along : path of the rigid motion, if joint forces of rigid links are wanted beside those of elastic ones
-    linked : the scene's linkage, where that is at hand
+    linked : the scene's linkage, if available
 
     Raises
     ------
@@ -63,7 +63,7 @@ def rows(recorded: Sequence[Recorded], block: Block) -> dict[str, Rows]:
 
 
 def _rigid(scene: Scene, model: Model, along: Path | None, linked: Linkage | None) -> list[Recorded]:
-    """What joints and drive would bear were all links rigid."""
+    """Forces of joints and drive if all links were rigid."""
     if scene.driven is None:
         return []
     linked = linked or linkage(scene)

@@ -1,4 +1,4 @@
-"""What a results file holds: channels of columns over time and drive angle."""
+"""Contents of a results file: channels of columns over time and drive angle."""
 
 import json
 import math
@@ -45,7 +45,7 @@ TRAVEL = Channel("drive_travel", (), "m", "", "drive travel from the reference p
 
 
 def largest_by_unit(channels: Iterable[tuple[Channel, Float[np.ndarray, "T c"]]], size: float = 0.0) -> dict[str, float]:
-    """Unit → the largest magnitude of all channels that have it: what is nothing beside that is rounding.
+    """Unit → the largest magnitude of all channels with this unit, beside which negligible values are rounding.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class FatigueSpot:
     damage : Miner's sum in a period; 1 is failure
     utilisation : of the endurable amplitude for the required life, with the safety factor
     amplitude, mean : of the cycle that does most damage [Pa]
-    disproportion : what the best proportional history leaves of the stresses, of the highest [-]
+    disproportion : residual of the best proportional history, relative to the highest stress [-]
     support : the factor by which a stress gradient raises the endurable amplitude
     cycles : in a period
     """
@@ -115,14 +115,14 @@ class FatigueSpot:
 
 @dataclass(frozen=True, slots=True)
 class Fatigue:
-    """Damage by the stresses of a motion that repeats itself.
+    """Damage by the stresses of a periodic motion.
 
-    period, revolutions : [s], and turns of the drive in it; 0 of a drive that does not go on turning
+    period, revolutions : [s], and revolutions of the drive in it; 0 if the drive does not rotate continuously
     repeats : by how much stresses differ between the last period and the one before, or its beginning, of each link's
         highest
     unreliable : why the numbers are unreliable, else empty
     spots : link → places of the highest damage, apart from each other, the highest first
-    strengths : link → what its material withstands, in words
+    strengths : link → fatigue strength of its material, in words
     left_out : link → points of its surface that were not examined, as they are near corners, point forces or joints
     without : elastic links without data
     """
@@ -152,7 +152,7 @@ class Fatigue:
         return self.period / spot.damage / 3600 if spot.damage else math.inf
 
     def turns(self, spot: FatigueSpot) -> float:
-        """Life at a place in revolutions of the drive, or in periods of one that does not go on turning."""
+        """Life at a place in revolutions of the drive, or in periods if the drive does not rotate continuously."""
         return (self.revolutions or 1.0) / spot.damage if spot.damage else math.inf
 
 
@@ -169,8 +169,8 @@ class Results:
     notes : what the run reported about itself
     reason : why the run was interrupted or is unreliable, else empty
     version : the kedfem that wrote the file
-    warnings : what was reported to the user; of a run that came to its end
-    seconds : stage → what it took [s]; of a run that came to its end
+    warnings : as reported to the user; of a complete run
+    seconds : stage → duration [s]; of a complete run
     peaks : link → its highest stress over all steps; of a whole elastic run, of links that have stress
     drive : name and unit of `angle`; of several drives it is the first one's
     links : link → what it was modelled as: `model` in words, `elements`, `unknowns`, and with what is attached `mass
@@ -211,7 +211,7 @@ class Results:
     def largest_rows(
         self, name: str
     ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"], Float[np.ndarray, "k c"]]:
-        """Time, drive and values of rows of a channel among which its largest values of all time points are."""
+        """Time, drive and values of rows of a channel that include its largest values of all time points."""
         if (found := self.largest.get(name)) is not None:
             return found[:, 0], found[:, 1], found[:, 2:]
         return self.time, self.angle, self.channels[name][1]
@@ -245,7 +245,7 @@ class Results:
 
 
 def rounding(results: Results) -> dict[str, float]:
-    """Unit → what is rounding beside the largest value that has it; of moments, beside forces where joints are, too."""
+    """Unit → level of rounding beside the largest value; of moments also beside forces times the distance of joints."""
     joints = json.loads(results.scene_json).get("joints", {}).values()
     places = [each["at"] for each in joints if each.get("at")]
     size = float(np.linalg.norm(np.ptp(places, axis=0))) if places else 0.0

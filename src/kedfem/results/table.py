@@ -37,7 +37,7 @@ def write_csv(results: Results, path: Path) -> None:
 
 @contextmanager
 def text_file(path: Path) -> Iterator[TextIO]:
-    """A table's file, which takes its place when it is whole."""
+    """A table's file, which appears when it is complete."""
     with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as file:
         yield file
 

@@ -14,7 +14,7 @@ Rows = dict[str, Float[np.ndarray, "b ..."]]
 
 @dataclass
 class Thinning:
-    """What one run gives its file.
+    """Selection of the rows that one run writes to its file.
 
     channels : of the run
     every : n
@@ -33,11 +33,11 @@ class Thinning:
 
     @property
     def rows(self) -> int:
-        """How many of the time points so far are written as they come."""
+        """Number of time points so far that are written immediately."""
         return -(-self.steps // self.every)
 
     def chosen(self, rows: Rows, when: tuple[str, str]) -> tuple[Rows, Rows | None]:
-        """Of more time points the rows that are to be written now, and the last one if it is to wait.
+        """The rows to be written now of more time points, and the last one if it has to wait.
 
         Parameters
         ----------

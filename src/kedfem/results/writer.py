@@ -35,7 +35,7 @@ from kedfem.results.reader import read_results
 from kedfem.results.records import ANGLE, TIME, Channel
 from kedfem.results.thinning import Rows, Thinning
 
-SPARE_SPACE = 1_000_000  # bytes kept for HDF5's own tables and for the last words of an interrupted run
+SPARE_SPACE = 1_000_000  # bytes kept for HDF5's own tables and for the status of an interrupted run
 
 
 class ResultsWriter:
@@ -93,7 +93,7 @@ class ResultsWriter:
         self._file: Any = None
 
     def of_run(self, run: str, steps: int) -> Self:
-        """The same writer, of a run with a name that no other one has.
+        """The same writer, for a run with a unique name.
 
         Parameters
         ----------
@@ -103,13 +103,13 @@ class ResultsWriter:
         return self
 
     def thinned(self, every: int, steps: int) -> Self:
-        """The same writer, which writes the rows of each so many time points alone, the first and the last among them.
+        """The same writer, which writes only each n-th time point, and the first and the last.
 
         For each channel it also writes what is largest of all.
 
         Parameters
         ----------
-        steps : time points that are expected: by them space is laid out
+        steps : expected number of time points, for the allocation of space
         """
         self.thinning.every, self._chunk = every, chunk_rows(-(-steps // every) + 1)
         self._notes |= {BETWEEN: every} if every > 1 else {}
@@ -186,7 +186,7 @@ class ResultsWriter:
         self.rows += count
 
     def note(self, notes: Mapping[str, str | float]) -> None:
-        """Store more facts about the run, e.g. what is known only at its end."""
+        """Store more facts about the run, e.g. those that are known only at its end."""
         try:
             write_facts(self._file["notes"], notes)
             seal(self._file)
@@ -264,7 +264,7 @@ class ResultsWriter:
         self._file = opened(self.path, "r+")
 
     def _end(self, status: str, why: str) -> None:
-        """Close the file, all channels cut to the rows that were written whole."""
+        """Close the file with all channels cut to the rows that were written completely."""
         if not self._file:  # stopped while it was being put in place
             self._file = opened(self.path, "r+")
         try:
