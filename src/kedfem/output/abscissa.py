@@ -1,4 +1,4 @@
-"""What curves are drawn over: the drive's position, or time where the drive does not keep on or there is none."""
+"""The abscissa of curves: the drive's position, or time if the drive changes its direction or there is none."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -28,7 +28,7 @@ class Abscissa:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Left and right end; a drive that turns backwards still runs from left to right."""
+        """Left and right end; also for a drive that rotates backwards, time runs from left to right."""
         steps = np.diff(self.values)
         if steps.size and (steps >= 0).all() | (steps <= 0).all():
             return float(self.values[0]), float(self.values[-1])
@@ -36,7 +36,7 @@ class Abscissa:
 
 
 def abscissa(time: Float[np.ndarray, " n"], angle: Float[np.ndarray, " n"]) -> Abscissa:
-    """The drive angle in degrees when it keeps on in one direction, else time.
+    """The drive angle in degrees if it is monotonic, else time.
 
     It keeps on when it never turns back and stands still (a thousandth of its greatest speed) for less than a tenth
     of the steps.
@@ -50,7 +50,7 @@ def abscissa(time: Float[np.ndarray, " n"], angle: Float[np.ndarray, " n"]) -> A
 
 
 def over_positions(angle: Float[np.ndarray, " n"], slides: bool) -> Abscissa | None:
-    """The drive's position, by which static positions differ; None where the drive rests.
+    """The drive's position, by which static positions differ; None if the drive rests.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def over_positions(angle: Float[np.ndarray, " n"], slides: bool) -> Abscissa | N
 
 
 def draw_abscissa(top: Any, bottom: Any, along: Abscissa) -> None:
-    """Label, ticks and limits; above, turns where there is more than one.
+    """Label, ticks and limits; above, revolutions if there is more than one.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def _ticks(span: float) -> Any:
 
 
 def _turn_ticks(revolutions: float) -> Any:
-    """Ticks at half turns where there are few, else at whole ones."""
+    """Ticks at half revolutions if there are few, else at whole ones."""
     from matplotlib.ticker import MaxNLocator, MultipleLocator
 
     return MultipleLocator(0.5) if revolutions < 4 else MaxNLocator(MOST_TICKS, integer=True)

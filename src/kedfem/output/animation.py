@@ -21,7 +21,7 @@ TAIL = b"  </Collection>\n</VTKFile>\n"  # of a PVD file
 
 
 class AnimationWriter:
-    """Writes frames as they are made; each is whole, and so is the list of them, at any moment.
+    """Writes frames one by one; each frame and the list of frames are complete at any time.
 
     The first frame removes the frames that an earlier run left under the same stem, and nothing else.
 
@@ -40,7 +40,7 @@ class AnimationWriter:
 
     @property
     def missing(self) -> Path | None:
-        """A frame that was written and is there no more."""
+        """A frame that was written and no longer exists."""
         return next((path for _, _, name in self.entries if not (path := self.folder / name).is_file()), None)
 
     def add(self, time: float, fields: Sequence[Block], angle: float = 0.0) -> list[Path]:
@@ -67,7 +67,7 @@ class AnimationWriter:
         return [self.folder / name for name in files]
 
     def _extended(self, path: Path, more: bytes) -> bool:
-        """Whether rows could be put before the end of the list that this writer left; else it stays as it is."""
+        """Insert rows before the end of this writer's list, if it is unchanged; whether that was possible."""
         with suppress(OSError), path.open("r+b", buffering=0) as file:
             if file.seek(0, os.SEEK_END) == self._listed:
                 end = file.seek(-len(TAIL), os.SEEK_END)
@@ -106,7 +106,7 @@ def read_collection(path: Path) -> list[tuple[float, list[Path]]]:
 
 
 def _file_names(fields: Sequence[Block]) -> list[str]:
-    """Names for files, all different whatever the letters of the blocks' own."""
+    """Different names of files for all blocks, whatever letters their own names have."""
     out: list[str] = []
     for field in fields:
         name = re.sub(r"[^A-Za-z0-9.-]", "_", field.name)

@@ -28,7 +28,7 @@ Points = Float[np.ndarray, "n 3"]
 
 @dataclass(frozen=True, slots=True)
 class Carriers:
-    """Links at one time point, to find where they take what they carry.
+    """Links at one time point, which determine the positions of attached masses and springs.
 
     fields : of all links of the model, prescribed ones last
     X : (n, 3) the points of each in the reference position [m]
@@ -42,12 +42,12 @@ class Carriers:
     deformation_scale: float
 
     def place(self, name: str, at: Point) -> tuple[Point, Point] | None:
-        """Where the nearest point of a link takes a drawn point, and its displacement; None of no link that is drawn."""
+        """Position and displacement of a reference point, by its link's nearest point; None for links that are not drawn."""
         found = self.pose(name, at)
         return None if found is None else found[:2]
 
     def pose(self, name: str, at: Point) -> tuple[Point, Point, Float[np.ndarray, "3 3"]] | None:
-        """As :meth:`place`, and how the link is turned there from the reference position."""
+        """As :meth:`place`, and the rotation of the link there from the reference position."""
         if name == GROUND:
             return at, np.zeros(3), np.eye(3)
         for slider in self.model.sliders:
@@ -63,7 +63,7 @@ class Carriers:
         return self.fields[i].points[n] + R @ (at - self.X[i][n]), self.fields[i].displacement[n], R
 
     def turn(self, i: int) -> Float[np.ndarray, "3 3"]:
-        """How the frame of a link is turned from the reference position."""
+        """Rotation of a link's frame from the reference position."""
         motion, k, count = self.snapshot.motion, self.snapshot.k, len(self.model.links)
         if i >= count:
             return np.asarray(motion.R[k, self.model.prescribed[i - count].body])
@@ -84,17 +84,17 @@ class Carriers:
 
 
 def every_link(model: Model) -> list[Link]:
-    """Those with unknowns, then those that the drive moves."""
+    """Links with unknowns, then links that the drive prescribes."""
     return [*model.links, *(x.link for x in model.prescribed)]
 
 
 def slider_drawn(model: Model, slider: Slider) -> Point:
-    """Where a slider without a shape is joined to its link, in the reference position [m]."""
+    """Joint of a slider without a shape to its link, in the reference position [m]."""
     return np.asarray(slider.weights @ model.links[slider.carrier].X)
 
 
 def slider_place(model: Model, slider: Slider, snapshot: Snapshot, deformation_scale: float) -> tuple[Point, Point]:
-    """Where it is at one time point, and its elastic displacement."""
+    """Position of that joint at one time point, and its elastic displacement."""
     link, body = model.links[slider.carrier], model.bodies[slider.carrier]
     motion, k = snapshot.motion, snapshot.k
     moved = slider.weights @ in_space(link, snapshot.states[slider.carrier].u)
@@ -120,7 +120,7 @@ def balls(carriers: Carriers, bodies: Mapping[str, Body]) -> list[LinkField]:
 def unstressed(
     name: str, kind: str, cells: Int[np.ndarray, "e k"], points: Points, moved: Points, **more: Any
 ) -> LinkField:
-    """What is drawn without stresses."""
+    """A field of a shape without stresses."""
     none = np.full((len(points), 6), np.nan)
     return LinkField(name, kind, cells, points, moved, none, none[:, 0], none[:, :2], **more)
 
@@ -191,7 +191,7 @@ def _size(points: Sequence[Float[np.ndarray, "n 3"]]) -> float:
 
 
 def ball_words(name: str, body: Body) -> str:
-    """What stands beside a mass; a flywheel may have inertia alone."""
+    """Label of a mass; a flywheel may have inertia alone."""
     if isinstance(body, Flywheel) and not body.mass:
         return f"{name}, {body.inertia:.4g} kg m²"
     return f"{name}, {body.mass:.4g} kg"

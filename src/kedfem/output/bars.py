@@ -1,4 +1,4 @@
-"""Beams that a frame has as lines, drawn with their sections."""
+"""Beams, which are lines in a frame, drawn with their sections."""
 
 from typing import Any
 
@@ -36,7 +36,7 @@ def bars(lines: Any, sizes: Float[np.ndarray, "e 2"]) -> Any:
 def rims(
     lines: Any, sizes: Float[np.ndarray, "e 2"]
 ) -> tuple[Float[np.ndarray, "k 3"], list[int], Float[np.ndarray, " k"]]:
-    """Points of the sections along beams, faces between them as VTK counts them, and what "MPa" is there.
+    """Points of the sections along beams, faces between them in VTK's order, and the stress "MPa" there.
 
     Lines of the same elements have the same faces, however they are bent.
     """

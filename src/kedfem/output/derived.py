@@ -35,7 +35,7 @@ WHOLE = (
 
 
 def peak_warning(peak: Peak | None, since: float) -> tuple[str, ...]:
-    """Warnings where the highest stress is not what it seems, with the highest one elsewhere, and not of all steps.
+    """Warnings if the highest stress is at a singular place, with the highest one elsewhere, or not of all steps.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def peak_warning(peak: Peak | None, since: float) -> tuple[str, ...]:
 
 
 def fatigue_warning(found: Fatigue | None) -> tuple[str, ...]:
-    """Warnings where damage is unreliable, incomplete, or more than is allowed."""
+    """Warnings if damage is unreliable, incomplete, or larger than allowed."""
     if found is None:
         return ()
     out = [f"fatigue: {found.unreliable}"] if found.unreliable else []
@@ -72,7 +72,7 @@ def fatigue_warning(found: Fatigue | None) -> tuple[str, ...]:
 
 
 def fields(scene: Scene, model: Model, recoveries: Sequence[StressRecovery], snapshot: Snapshot) -> list[LinkField]:
-    """What a frame shows of each link, deformed as the animation exaggerates it."""
+    """Fields of all links for a frame, with the animation's deformation scale."""
     return link_fields(model, recoveries, snapshot, _scale(scene), scene)
 
 
@@ -81,7 +81,7 @@ def _scale(scene: Scene) -> float:
 
 
 def refuse_foreign(folder: Path) -> None:
-    """OutputError where a folder has files of the names that a run replaces, but no results of kedfem."""
+    """OutputError if a folder has files with names that a run replaces, but no results of kedfem."""
     file = folder / "results.h5"
     names = [*WHOLE, f"{STEM}.pvd"]
     found = [] if file.exists() else [name for name in names if (folder / name).exists()]
@@ -92,7 +92,7 @@ def refuse_foreign(folder: Path) -> None:
 
 
 def remove_derived(folder: Path) -> None:
-    """Delete what an earlier run drew and tabulated: it does not belong to the new results."""
+    """Delete pictures and tables of an earlier run, which do not belong to the new results."""
     for name in WHOLE:
         (folder / name).unlink(missing_ok=True)
     remove_plots(folder / PLOTS)
@@ -103,7 +103,7 @@ def remove_derived(folder: Path) -> None:
 def write_vibration(
     scene: Scene, model: Model, recoveries: Sequence[StressRecovery], found: Vibration, folder: Path
 ) -> tuple[str, ...]:
-    """A vibration that grows, as animation and picture, if the scene wants any; one that cannot be drawn is a warning."""
+    """Write a growing vibration as animation and picture, if the scene asks for them; a failure to draw is a warning."""
     if scene.output.animation is None and not scene.output.picture:
         return ()
 

@@ -1,4 +1,4 @@
-"""What frames show: links, rigid links and joints, with values at their points."""
+"""Contents of frames: links, rigid links and joints, with values at their points."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -79,7 +79,7 @@ class RigidField:
 
 @dataclass(frozen=True, slots=True)
 class JointField:
-    """What joints and drives exert in one frame, at points for arrows.
+    """Forces of joints and drives in one frame, at points for arrows.
 
     names : of the joints
     points : (n, 3) where they are in the rigid-body motion [m]
@@ -98,7 +98,7 @@ class JointField:
         return np.arange(len(self.points))[:, None]
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """What each joint has, by names with units."""
+        """Values of each joint, by names with units."""
         return dict(self.vectors)
 
 
@@ -106,7 +106,7 @@ Block = LinkField | RigidField | JointField
 
 
 def numbered(field: Block) -> str:
-    """What a file calls the number of a block."""
+    """Name of a block's number in a file."""
     if isinstance(field, JointField):
         return field.name
     if field.spring:

@@ -1,4 +1,4 @@
-"""Animation frames: elastic links with their stresses, rigid links, and what joints and drives exert as vectors."""
+"""Animation frames: elastic links with their stresses, rigid links, and forces of joints and drives as vectors."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ from kedfem.scene import Scene, driven_travel
 
 Place = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]
 Rows = Mapping[str, Float[np.ndarray, "T c"]]
-BLOCK = 0.8  # width of the block that stands for a slider without a shape, of the link that it is joined to
+BLOCK = 0.8  # width of the block that represents a slider without a shape, relative to that of its link
 STOUT = 0.25  # of that link's length: most that its width is taken for
 
 
@@ -94,7 +94,7 @@ def link_fields(
 def link_field(
     link: Link, recovery: StressRecovery, place: Place, moment: LinkMoment, deformation_scale: float
 ) -> LinkField:
-    """One elastic link where its displacement takes it, which is exaggerated.
+    """One elastic link with its scaled displacement.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def _blocks(model: Model, snapshot: Snapshot, deformation_scale: float) -> list[
 
 
 def width_across(link: Link) -> float:
-    """Of a link across its length: of its section, else of all of it [m]."""
+    """Width of a link across its length: that of its section, else of the whole link [m]."""
     whole = link.full or link
     if whole.section is not None:
         return max(whole.section.height, whole.section.thickness)
@@ -155,7 +155,7 @@ def width_across(link: Link) -> float:
 
 @dataclass(frozen=True, slots=True)
 class DrawnBody:
-    """What is seen of a link, or of a mass that it carries.
+    """Visible geometry of a link, or of a mass attached to it.
 
     body : its number
     points : (n, 3) in the reference position [m]
@@ -172,7 +172,7 @@ class DrawnBody:
 
 
 def drawn_bodies(scene: Scene, linkage: Linkage, links: Mapping[str, Link]) -> list[DrawnBody]:
-    """Of all links and what they carry; links without a record are sticks between their joints."""
+    """Geometry of all links and attached masses; links without a record are lines between their joints."""
     out = []
     for name in scene.links:
         link = links.get(name)

@@ -47,14 +47,14 @@ def _write(path: Path, columns: Columns, results: Results, rows: Bool[np.ndarray
 
 
 def write_summary(path: Path, what: str, every: Mapping[str, Mapping[str, float]]) -> None:
-    """One line a joint or drive, empty where a number is not known."""
+    """One line per joint or drive; unknown numbers are empty."""
     names = list(dict.fromkeys(name for found in every.values() for name in found))
     rows = ([key, *(found.get(name, np.nan) for name in names)] for key, found in every.items())
     write_rows(path, [what, *names], rows)
 
 
 def write_polar(path: Path, load: JointLoad, rows: Bool[np.ndarray, " T"]) -> bool:
-    """Polar diagram of a hinge's radial load, as each of its links bears it in its own axes; whether there is one."""
+    """Polar diagram of a hinge's radial load on each of its links, in the link's axes; whether there is one."""
     if not has_polar(load):
         return False
     with figure_saved(path, polar_title(load, rows)) as figure:
@@ -68,7 +68,7 @@ def has_polar(load: JointLoad) -> bool:
 
 
 def polar_title(load: JointLoad, rows: Bool[np.ndarray, " T"]) -> str:
-    """What a polar diagram shows, with its unit."""
+    """Title of a polar diagram, with the unit."""
     return f"Joint {load.joint}: radial load ({_polar_unit(load, rows)[1]}) about axis {_vector(np.asarray(load.axis))}"
 
 

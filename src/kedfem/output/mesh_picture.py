@@ -1,4 +1,4 @@
-"""Pictures of meshes: elements coloured by their quality, beside them how many there are of each."""
+"""Pictures of meshes: elements coloured by their quality, with a histogram."""
 
 import tempfile
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from kedfem.mesh.elements.shape_functions import QUAD9, TRI6, shape_functions
 from kedfem.mesh.elements.tetrahedra import FORMS
 from kedfem.output.picture import draw_apart
 
-FINENESS = 4  # straight pieces that a side of an element is drawn in
+FINENESS = 4  # straight segments for a side of an element
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +85,7 @@ def write_mesh_picture(
 
 
 def _numbers(mesh: SolidMesh, found: Sequence[PartCandidate]) -> dict[str, np.ndarray]:
-    """Where the numbers of faces may stand: on a plane at one place, else on any side of an element; and normals."""
+    """Possible positions of the numbers of faces, with normals: one on a plane, else on any side of an element."""
     places, numbers, normals = [], [], []
     for each in found:
         plane = each.kind == "plane"

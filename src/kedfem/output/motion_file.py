@@ -18,11 +18,11 @@ QUANTITIES = (
     ("angular_velocity", "xyz", "rad/s"), ("acceleration", "xyz", "m/s^2"),
     ("angular_acceleration", "xyz", "rad/s^2"),
 )  # fmt: skip
-"""Of each link, in world components."""
+"""Quantities of each link, in world components."""
 
 
 def write_motion(path: Path, scene: Scene, linkage: Linkage, blocks: Iterable[RigidMotion]) -> int:
-    """Write the motion of all links as comma-separated values, one row per time point; how many there are.
+    """Write the motion of all links as comma-separated values, one row per time point; the number of rows.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def write_motion(path: Path, scene: Scene, linkage: Linkage, blocks: Iterable[Ri
 
 
 def reference_point(scene: Scene, name: str) -> Float[np.ndarray, "3"]:
-    """The place, in the reference position, of a link's first joint; the origin of a link without one [m]."""
+    """Point of a link's first joint in the reference position; the origin for a link without joints [m]."""
     at = (joint.at for joint in scene.joints.values() if name in joint.links)
     return np.asarray(next(at, (0.0, 0.0, 0.0)), float)
 
@@ -54,7 +54,7 @@ def reference_point(scene: Scene, name: str) -> Float[np.ndarray, "3"]:
 def continuous_quaternions(
     R: Float[np.ndarray, "T 3 3"], before: Float[np.ndarray, "4"] | None = None
 ) -> Float[np.ndarray, "T 4"]:
-    """Unit quaternions w, x, y, z of rotations, each with the sign that is nearer to the one before it.
+    """Unit quaternions w, x, y, z of rotations, each with the sign nearer to the previous one.
 
     Parameters
     ----------

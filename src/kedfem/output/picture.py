@@ -1,4 +1,4 @@
-"""One rendered picture of a frame of the animation, and how VTK draws."""
+"""One rendered picture of a frame of the animation, by VTK in a process of its own."""
 
 import subprocess
 import sys
@@ -52,7 +52,7 @@ def draw_apart(
     wanted: str,
     meanwhile: Callable[[], object] | None = None,
 ) -> None:
-    """Have VTK draw in a process of its own.
+    """Run VTK in a process of its own.
 
     Without any way to open a window VTK ends by a segmentation fault, and graphics drivers talk on the terminal.
 
@@ -89,7 +89,7 @@ def draw_apart(
 
 
 def _fault(wanted: str, code: int, output: str) -> str:
-    """Why there is no picture: VTK cannot draw here, or cannot draw this."""
+    """The reason why there is no picture: VTK cannot draw on this machine, or not this frame."""
     lines = output.strip().splitlines()
     if "Traceback (most recent call last):" not in lines:
         how = f"signal {-code}" if code < 0 else f"exit code {code}"

@@ -33,7 +33,7 @@ FLAT_CELLS = {QUADRILATERAL, *LINES}
 
 
 def render(vtu: str, png: str, title: str, deformation_scale: str = "1", *gravity: str) -> None:
-    """Draw a frame, as :func:`kedfem.output.picture.write_picture` is asked to."""
+    """Draw a frame for :func:`kedfem.output.picture.write_picture`."""
     import pyvista
 
     grid: Any = pyvista.read(vtu)
@@ -91,7 +91,7 @@ def _flat(lines: Any, width: float, colour: str) -> Any:
 
 
 def window(size: Float[np.ndarray, " 2"]) -> list[int]:
-    """Pixels that show a linkage of that width and height without much empty space."""
+    """Window size in pixels for a linkage of that width and height, without much empty space."""
     aspect = size[0] / size[1]
     high = int(np.clip((WIDTHS[1] - LEFT - RIGHT) / aspect + TOP + BOTTOM, *HEIGHTS))
     return [int(np.clip((high - TOP - BOTTOM) * aspect + LEFT + RIGHT, *WIDTHS)), high]
@@ -147,7 +147,7 @@ def draw_springs(plotter: Any, grid: Any, words: Mapping[int, str], shown: View)
 
 
 def name(plotter: Any, place: Any, word: str, shown: View) -> None:
-    """A word that is read whatever is before it, from its place on; to the left of it where axes would be under it."""
+    """A label in front of everything, to the right of its point, or to the left if it would cover the axes."""
     wide, high = plotter.window_size
     pixel = np.max(shown.size / [wide - LEFT - RIGHT, high - TOP - BOTTOM])
     begins = LEFT + (wide - LEFT - RIGHT) / 2 + (np.asarray(place) @ shown.across - shown.middle[0]) / pixel

@@ -1,4 +1,4 @@
-"""Mode shapes: a cycle of each for ParaView, and a picture at its largest."""
+"""Mode shapes: a cycle of each for ParaView, and a picture at the largest displacement."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class Shape:
 
 
 def write_shapes(folder: Path, shapes: Sequence[Shape], gravity: Gravity = (0, 0, 0)) -> None:
-    """``shape_1.pvd`` with its frames over a cycle, ``shape_1.png``, ...; those of an earlier command go.
+    """Write ``shape_1.pvd`` with its frames over a cycle, ``shape_1.png``, ...; files of an earlier command are removed.
 
     Shapes are written with a largest displacement of AMPLITUDE, stresses with it.
     """
@@ -89,7 +89,7 @@ def _write(folder: Path, name: str, title: str, frames: Sequence[tuple[float, Fi
 
 
 def _along(fields: Sequence[LinkField]) -> str:
-    """The world's axis along which nearly everything moves, which a picture may be looked along."""
+    """The world's axis along which nearly everything moves, which may be the view direction of a picture."""
     parts = sum((each.displacement**2).sum(axis=0) for each in fields)
     k = int(np.argmax(parts))
     return f", along {'xyz'[k]}" if np.asarray(parts)[k] > MOSTLY * np.sum(parts) else ""

@@ -1,4 +1,4 @@
-"""How springs and dampers are drawn: coils and cylinders from one end to the other, windings about hinges."""
+"""Shapes of springs and dampers: coils and cylinders from one end to the other, windings about hinges."""
 
 import math
 

@@ -47,7 +47,7 @@ def prefixed(peak: float, unit: str) -> tuple[float, str]:
 
 
 def number_in(row: Mapping[str, float], name: str) -> str:
-    """A number of a row with its unit, which is in its name; what is rounding beside others of that unit is about zero.
+    """A number of a row with the unit of its name; values that are rounding beside others of that unit are ≈ 0.
 
     >>> number_in({"force [N]": 2e3, "moment [N m]": 3.0, "axial [N]": 1e-8}, "axial [N]")
     '≈ 0'
@@ -76,7 +76,7 @@ def with_prefix(value: float, unit: str) -> str:
 
 
 def clock(scene: Scene, frozen: bool = False) -> str:
-    """What shows a moment: the only drive's angle or travel where it keeps on in one direction; else the time.
+    """The clock of a run: the angle or travel of a single drive if it is monotonic, else the time.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def clock(scene: Scene, frozen: bool = False) -> str:
 
 
 def _keeps_on(scene: Scene) -> bool:
-    """Whether its drive is at one place but once, so that this says when; positions of a static analysis have no time."""
+    """Whether the drive has each position only once, so that it determines the time; static positions have no time."""
     if scene.analysis.kind == "static":
         return True
     t = np.linspace(0.0, time_grid(scene).end, SAMPLES)
@@ -112,7 +112,7 @@ def place_of(point: Iterable[float]) -> str:
 
 
 def stress_at(peak: Peak) -> str:
-    """How high, in which link, and where."""
+    """Highest stress in words, with link and place."""
     return f"{with_prefix(peak.stress, 'Pa')} in link {peak.link} at {place_of(peak.place)} in the reference position"
 
 

@@ -24,7 +24,7 @@ FRAMES = 120
 
 @dataclass(frozen=True, slots=True)
 class Animated:
-    """What the frames of a run show.
+    """The surfaces of all links in the frames of a run.
 
     times : (f,) of the frames [s]
     surfaces : of all links
@@ -112,7 +112,7 @@ def _read(paths: Sequence[Path]) -> Any:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """VTK, and those who pass its messages on, say nothing on the terminal."""
+    """Suppress messages of VTK on the terminal, and of libraries that forward them."""
     import pyvista
 
     with pyvista.vtk_verbosity("off"), warnings.catch_warnings():
@@ -125,7 +125,7 @@ def _quiet() -> Iterator[None]:
 
 
 def extent(surfaces: Sequence[Surface]) -> Float[np.ndarray, "3"]:
-    """What all links take up along x, y and z, in the reference position and in all frames [m]."""
+    """Extent of all links along x, y and z, in the reference position and in all frames [m]."""
     low, high = bounds(surfaces, np.eye(3))
     return np.asarray(high - low)
 

@@ -1,4 +1,4 @@
-"""Curves of a run as SVG, with what a cursor on them needs."""
+"""Curves of a run as SVG, with the data for a cursor on them."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ GROUPS = {
     "probes": "Probes", "drive": "Drive", "joints": "Joints", "energy": "Energy", "gears": "Gears",
     "motors": "Motors", "springs": "Springs", "limits": "Limits", "links": "Links",
 }  # fmt: skip
-"""What the first part of a channel's name means to a reader, in the order of the page."""
+"""Headings for the first part of channel names, in the order of the page."""
 
 # pictures of several channels: to which group they belong, and that they come before the others there
 FIRST = {"joint_angles": "joints", "joint_travels": "joints", "energies": "energy"}
@@ -64,7 +64,7 @@ def polar_curves(loads: list[JointLoad], rows: Bool[np.ndarray, " T"]) -> Iterat
 
 
 def cursor_places(results: Results, times: Float[np.ndarray, " f"]) -> list[float]:
-    """Where the cursor stands in each frame, as a part of the axes' width; empty without curves."""
+    """Position of the cursor in each frame, relative to the axes' width; empty without curves."""
     if len(results.time) < 2:
         return []
     along: Abscissa = drawn_over(results)

@@ -1,4 +1,4 @@
-"""What a report shows in tables, from results and the scene that they are of."""
+"""Tables of a report, from results and their scene."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Fact:
-    """A number of the first look: its name, the number in words, more about it."""
+    """A key figure: its name, its value in words, more about it."""
 
     name: str
     value: str
@@ -43,7 +43,7 @@ class Fact:
 
 
 def facts(results: Results, highest: Peak | None, moment: Callable[[float, float], str]) -> list[Fact]:
-    """The numbers of the first look."""
+    """The key figures of a run."""
     out = []
     if highest is not None:
         more = f"link {highest.link}, {moment(highest.time, highest.angle)}"
@@ -73,7 +73,7 @@ def facts(results: Results, highest: Peak | None, moment: Callable[[float, float
 def _largest(
     results: Results, beginning: str, endings: tuple[str, ...]
 ) -> tuple[str, float, str, tuple[float, float]] | None:
-    """What the channel is, largest magnitude, unit, time and drive among channels of elastic links, or of rigid ones."""
+    """Name, largest magnitude, unit, time and drive of the largest channel of elastic links, or of rigid ones."""
     found = None
     for name in results.channels:
         if not (name.startswith(beginning) and name.endswith(endings)) or "rigid_" in name:
@@ -88,7 +88,7 @@ def _largest(
 
 
 def links_table(scene: Mapping[str, Any], results: Results) -> Table:
-    """What each link is and was made of."""
+    """Model and material of each link."""
     rows: Rows = []
     for name, link in scene["links"].items():
         message = results.links.get(name, {})
@@ -110,7 +110,7 @@ def _count(number: Any) -> str:
 
 
 def joints_table(scene: Mapping[str, Any]) -> Table:
-    """Where joints are in the reference position."""
+    """Joints and their points in the reference position."""
     rows: Rows = [
         (name, joint["kind"], " – ".join(joint["links"]), place_of(joint["at"]), _axis(joint))
         for name, joint in scene["joints"].items()
@@ -182,7 +182,7 @@ def loads_tables(joints: Mapping[str, Mapping[str, float]], drives: Mapping[str,
 
 
 def _numbers(title: str, what: str, reported: Mapping[str, Mapping[str, float]], note: str) -> Table:
-    """A line for each name; columns that no line has are left out."""
+    """A line per name; columns without any entry are left out."""
     every = dict.fromkeys(key for numbers in reported.values() for key in numbers)
     keys = [key for key in every if any(np.isfinite(x.get(key, np.nan)) for x in reported.values())]
     rows: Rows = [(name, *(number_in(x, key) for key in keys)) for name, x in reported.items()]
@@ -207,12 +207,12 @@ def budget_table(notes: Mapping[str, str | float]) -> list[Table]:
 
 
 def _noted(notes: Mapping[str, str | float], beginning: str) -> dict[str, float]:
-    """Numbers whose names begin so, by what follows."""
+    """Numbers with a common prefix of their names, by the rest of the name."""
     return {key.removeprefix(beginning): float(x) for key, x in notes.items() if key.startswith(beginning)}
 
 
 def steady_table(notes: Mapping[str, str | float]) -> list[Table]:
-    """A motion that repeats itself: its period, and what a period leaves of vibrations about it."""
+    """A steady motion: its period, and the growth of vibrations about it in a period."""
     if f"{STEADY}period [s]" not in notes:
         return []
     keys = "period [s]", "revolutions", "marches", "residual"
@@ -230,7 +230,7 @@ def steady_table(notes: Mapping[str, str | float]) -> list[Table]:
 
 
 def notes_table(notes: Mapping[str, str | float]) -> Table:
-    """All else that the run reported of itself."""
+    """All other notes of the run."""
     reported = (OF_SOURCE, TOGETHER, UNKNOWN, STEADY)
     plain = {key: x for key, x in notes.items() if not key.startswith(reported)}
     return named_table("What the run reported of itself", plain.items())
@@ -243,14 +243,14 @@ def named_table(title: str, items: Iterable[tuple[str, str | float]]) -> Table:
 
 
 def life_of(damage: float, found: Fatigue) -> str:
-    """Life in turns of the drive, or periods, and hours, by the damage in a period."""
+    """Life in revolutions of the drive, or periods, and in hours, by the damage in a period."""
     turns, what = (found.revolutions, "revolutions") if found.revolutions else (1.0, "periods")
     hours = found.period / 3600
     return "endless" if damage * ENDLESS < turns else f"{turns / damage:.3g} {what}, {hours / damage:.3g} h"
 
 
 def fatigue_notes(found: Fatigue) -> list[str]:
-    """What a reader of the table has to know, in words."""
+    """Notes below the table, in words."""
     turns = f", {found.revolutions:.6g} revolutions" if found.revolutions else ""
     lines = [f"Period {with_prefix(found.period, 's')}{turns}; stresses repeat to {percent(found.repeats)}."]
     lines += [f"UNRELIABLE: {found.unreliable}."] if found.unreliable else []

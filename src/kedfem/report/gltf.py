@@ -179,7 +179,7 @@ class _Made:
 
 @dataclass(frozen=True, slots=True)
 class PlacedShape:
-    """How a node moves: x = p + R (scale * own)."""
+    """Motion of a node: x = p + R (scale * own)."""
 
     own: Float[np.ndarray, "n 3"]
     p: Float[np.ndarray, "f 3"]
@@ -188,7 +188,7 @@ class PlacedShape:
 
 
 def placed_shape(surface: Surface) -> PlacedShape:
-    """Of a rigid link its placements; a spring is stretched along z, on which it lies in its own axes."""
+    """Shape and motion of a surface: of a rigid link its placements; a spring is stretched along z of its own axes."""
     X, count = surface.points[0], len(surface.placements)
     p = np.array([placed.p for placed in surface.placements]).reshape(count, 3)
     R = np.array([placed.R for placed in surface.placements]).reshape(count, 3, 3)

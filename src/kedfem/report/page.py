@@ -1,4 +1,4 @@
-"""One HTML file about a run: what was modelled, what moves, curves, loads, warnings; it needs no network."""
+"""One HTML file about a run, with model, animation, curves, loads and warnings; it needs no network."""
 
 import json
 from base64 import b64encode
@@ -51,7 +51,7 @@ class Report:
 
 
 def require_report(where: str) -> None:
-    """OutputError unless what a report needs is installed."""
+    """OutputError unless the packages for a report are installed."""
     for package in ("jinja2", "k3d"):
         of_extra(package, where, EXTRA)
 
@@ -88,7 +88,7 @@ def _template() -> Any:
 
 
 def _content(results: Results, folder: Path, missing: list[str]) -> dict[str, Any]:
-    """All that the template shows; what cannot be shown is added to what is missing, in words."""
+    """The contents of the template; missing parts are listed in words."""
     scene: Mapping[str, Any] = json.loads(results.scene_json)
     highest = max(results.peaks.values(), key=lambda peak: peak.stress, default=None)
     if not len(results.time):
@@ -122,7 +122,7 @@ def _content(results: Results, folder: Path, missing: list[str]) -> dict[str, An
 
 
 def _frequencies(results: Results, folder: Path, missing: list[str]) -> dict[str, Any] | None:
-    """Table and plots of `kedfem frequencies`, where these are of the same text of the scene."""
+    """Table and plots of `kedfem frequencies`, if they are of the same text of the scene."""
     known = beside(folder, FREQUENCIES)
     found = read_summary(known)
     if found is None:
@@ -139,7 +139,7 @@ def _frequencies(results: Results, folder: Path, missing: list[str]) -> dict[str
 
 
 def instant_in_words(scene: Mapping[str, Any], results: Results, time: float, angle: float) -> str:
-    """A time, with the drive's position if there is one drive; of several results have that of the first alone."""
+    """A time, with the drive's position if there is one drive; of several drives, results have the first one's alone."""
     caption = f"t = {with_prefix(time, 's')}"
     if bool(scene.get("drive")) + len(scene.get("drives") or ()) != 1 or np.isnan(angle):
         return caption
@@ -149,7 +149,7 @@ def instant_in_words(scene: Mapping[str, Any], results: Results, time: float, an
 def _moving(
     scene: Mapping[str, Any], results: Results, folder: Path, highest: Peak | None, missing: list[str]
 ) -> dict[str, Any] | None:
-    """The viewer, what each frame is, where the cursor is in it, the first that is shown, numbers at the colour bar."""
+    """The viewer, captions and cursor positions of the frames, the first frame shown, numbers at the colour bar."""
     animation = scene.get("output", {}).get("animation") or {}
     scale = float(animation.get("deformation_scale", 1.0))
     gravity = tuple(scene.get("gravity") or (0.0, 0.0, 0.0))
@@ -179,7 +179,7 @@ def _moving(
 
 
 def _frames(scene: Mapping[str, Any], results: Results, shown: Animated, highest: Peak | None) -> Sequence[str]:
-    """What each frame is; after the last one links are in the reference position, and no instant."""
+    """Captions of the frames; the last one is the reference position, which has no time."""
     angles = _angles(results, shown.times)
     captions = [instant_in_words(scene, results, float(t), float(x)) for t, x in zip(shown.times, angles, strict=True)]
     stresses = ", with the highest stress of each point over all steps" if highest else ""

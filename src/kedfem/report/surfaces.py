@@ -1,4 +1,4 @@
-"""The surfaces of a mechanism's links over an animation, from its frames: what a browser draws."""
+"""The surfaces of a mechanism's links over an animation, from its frames, for drawing in a browser."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -20,7 +20,7 @@ Places = Float[np.ndarray, "n 3"]
 
 @dataclass(frozen=True, slots=True)
 class Placement:
-    """Where the rigid-body motion takes a link: x = p + R X.
+    """Rigid-body position of a link: x = p + R X.
 
     p : (3,) [m]
     R : (3, 3)
@@ -56,14 +56,14 @@ class Surface:
         return any(np.isfinite(each).any() for each in self.stress)
 
     def world(self) -> Iterator[Places]:
-        """(n, 3) its points in the reference position, and where they are in each frame [m]."""
+        """(n, 3) its points in the reference position, and their positions in each frame [m]."""
         yield self.points[0]
         for points, placed in zip(self.points[1:], self.placements, strict=True):
             yield placed.p + points @ placed.R.T
 
 
 class _Source:
-    """Where a link's surface is in the frames: its points there, and how surface points follow from them.
+    """A link's surface in the frames: its points there, and the relation of surface points to them.
 
     name : as :func:`links_of` has it
     part : its elements

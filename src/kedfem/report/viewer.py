@@ -1,4 +1,4 @@
-"""The moving mechanism as a document that a browser draws, with nothing to fetch: a full snapshot of k3d."""
+"""The moving mechanism as a self-contained document for a browser: a full snapshot of k3d."""
 
 import json
 import warnings
@@ -41,12 +41,12 @@ look();
 K3DInstance.setTime(flat.first);
 window.parent.postMessage({ready: true}, '*');
 """
-"""What the viewer does when the page around it sends it a frame, or asks for the first view again."""
+"""Reaction of the viewer to messages of its page: a frame, or the first view again."""
 
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A point that goes with a link, with its name.
+    """A point fixed in a link, with its name.
 
     name, link : the link is None for a point of the ground
     at : (3,) in the reference position [m]
@@ -119,7 +119,7 @@ def _mesh(k3d: Any, surface: Surface, highest: float, fine: float) -> Any:
 
 
 def _mark(k3d: Any, mark: Mark, shown: Animated, size: float) -> list[Any]:
-    """A ball and a name where a point of a link is in each frame."""
+    """A ball and a name at the position of a link's point in each frame."""
     of = next((each for each in shown.surfaces if each.name == mark.link), None)
     if mark.link is not None and of is None:
         return []
@@ -138,7 +138,7 @@ def _mark(k3d: Any, mark: Mark, shown: Animated, size: float) -> list[Any]:
 
 
 def _series(frames: Sequence[Any]) -> Any:
-    """A value for each frame, or one where there is a single one."""
+    """A value for each frame, or a single value for a single frame."""
     return frames[0] if len(frames) == 1 else {str(float(k)): x for k, x in enumerate(frames)}
 
 

@@ -1,4 +1,4 @@
-"""How curves over the drive angle are drawn; `groups` says which pictures there are."""
+"""Drawing of curves over the drive angle; the pictures are those of `groups`."""
 
 import io
 import json
@@ -39,10 +39,9 @@ DARKER = 0.5  # what is left of a color in the curve of rigid links
 
 
 def worth_drawing(results: Results) -> list[Picture]:
-    """All pictures but those of rounding, which the table of a run reports as ≈ 0; nothing at all is drawn, once.
+    """All pictures except those of rounding, which the table of a run reports as ≈ 0.
 
-    Of what stands side by side in one picture, what is faint there has none of its own. Panels of one quantity have
-    one scale.
+    Channels that are faint in a picture of several have no picture of their own. Panels of one quantity have one scale.
     """
     least, every = rounding(results), list(pictures(results))
     beside = {path: each for each in every for path in each.together}
@@ -66,7 +65,7 @@ def _peak(panel: Panel) -> float:
 
 
 def _on_one_scale(every: Sequence[Picture]) -> list[Picture]:
-    """Pictures whose panels of one quantity have common limits, but for those that would be hard to read there."""
+    """Pictures whose panels of one quantity have common limits, except panels that would be illegible with them."""
     spans: dict[tuple[str, str, str, int], list[tuple[float, float]]] = {}
     for key, panel in ((key, panel) for each in every for key, panel in _keyed(each)):
         spans.setdefault(key, []).append(_span(panel))
@@ -240,7 +239,7 @@ def heading(text: str, channel: Channel | None, results: Results) -> str:
 
 
 def _plain(text: str) -> str:
-    """Text that matplotlib does not take for a formula."""
+    """Text escaped for matplotlib, which would read it as a formula."""
     return text.replace("$", r"\$")
 
 
@@ -256,7 +255,7 @@ def figure_saved(
 
 
 def figure_svg(title: str, draw: Callable[[Any], T]) -> tuple[str, T]:
-    """A figure as SVG for a page, and what drawing it returned; the places of its axes are final then."""
+    """A figure as SVG for a page, and the result of drawing it, when the positions of its axes are final."""
     figure = _figure(PAGE_SIZE)
     drawn = draw(figure)
     file = io.BytesIO()

@@ -129,7 +129,7 @@ def _draw_panel(ax: Any, along: Abscissa, title: str, panel: Panel | None) -> No
 
 
 def shown(picture: Picture) -> tuple[str, Panel]:
-    """What a panel is of, as short as results name it, and its curves: no more than have a place in its legend."""
+    """Short title of a panel, and its curves, at most as many as its legend has room for."""
     title = picture.channel.name if picture.channel else picture.title
     panel = picture.panels[0]
     for first, words in ALL.items() if len(picture.panels) > 1 else ():

@@ -24,10 +24,10 @@ MOTIONS = {
     "motion": ("position", "velocity", "acceleration"),
     "rotation": ("rotation", "angular_velocity", "angular_acceleration"),
 }
-"""Channels of one thing that are drawn above each other."""
+"""Channels of one object that are drawn above each other."""
 
 ALL = {"position": "position, velocity and acceleration", "rotation": "rotation and its rates"}
-"""What their titles say of them, by the first."""
+"""Title of such a picture, by its first channel."""
 
 COORDINATES = {"angle": "Turns of the joints", "travel": "Travels of the joints"}
 
@@ -63,7 +63,7 @@ class Picture:
 
     @property
     def group(self) -> str:
-        """How the names of its channels begin."""
+        """Common prefix of the names of its channels."""
         name = self.channel.name if self.channel else self.name.replace("-", "/")
         return (self.together or (name,))[0].split("/")[0]
 
@@ -153,7 +153,7 @@ def _beside(results: Results, key: tuple[str, str, str, str], family: Mapping[st
 
 
 def largest(values: Float[np.ndarray, "..."]) -> float:
-    """Of all magnitudes that are finite."""
+    """The largest finite magnitude."""
     return float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
 
 
@@ -169,7 +169,7 @@ def _file(name: str) -> str:
 
 
 def _shared(channel: Channel, kind: str) -> str:
-    """What a description of the first says of all: ``position of the joint …`` → ``motion of the joint …``."""
+    """Common description, from that of the first: ``position of the joint …`` → ``motion of the joint …``."""
     title = channel.description
     for beginning in ("rotation vector", "turn", kind):
         if title.startswith(beginning):
@@ -178,7 +178,7 @@ def _shared(channel: Channel, kind: str) -> str:
 
 
 def _single(channel: Channel, values: Float[np.ndarray, "n c"]) -> list[Panel]:
-    """What is drawn of a channel on its own."""
+    """The picture of a single channel."""
     curves = dict(zip(channel.columns, values.T, strict=True))
     quantity = channel.name.rsplit("/", 1)[-1].replace("_", " ")
     if channel.columns == XYZ:
