@@ -1,4 +1,4 @@
-"""What an accuracy chooses by trial runs: frames, elements of beams, the step."""
+"""Choices by trial runs for a required accuracy: frames, elements of beams, the step."""
 
 import math
 from collections.abc import Sequence
@@ -16,8 +16,8 @@ from kedfem.dynamics.stepping.levels import most_levels
 from kedfem.errors import KedfemError
 from kedfem.scene import LinkScene, Scene, scene_from, states_step, time_grid, turn_steps, without_vibration
 
-FOLLOWED = 0.5  # of the accuracy: rigid-body frames that err by more give way to co-rotational frames, in scenes of beams
-DEARER = 1.5  # the same where solid or plane links would follow too: it costs them more, and the estimate is cautious
+FOLLOWED = 0.5  # of the accuracy: above this error of rigid-body frames, scenes of beams have co-rotational frames
+DEARER = 1.5  # the same for solid or plane links: these frames cost them more, and the estimate is cautious
 ELEMENTS = ("beam3", 1), *(("beam5", count) for count in (1, 2, 3, 4, 6))  # tried, coarsest first
 COUNTS = 1, 2, 3, 4, 6, 8, 12, 16, 24  # tried of an element that the scene states
 FINEST = 2  # times the elements of the last one tried: the reference of beams
@@ -30,8 +30,8 @@ MOST_STEPS = 200_000  # of the analysis
 TRIES = 5  # steps tried
 CHEAP = 2e7  # steps times unknowns that take seconds
 SHORTER, PATIENCE = 2.0, 2  # by which steps are made shorter that do not resolve what vibrates, and how often
-LEAP = 4  # times the steps of a trial, the next one has at most: what a coarse one foretells is not believed further
-CLOSE = 0.15  # of the steps: as many more are not worth another trial
+LEAP = 4  # times the steps of a trial, at most, for the next one: predictions of a coarse trial are not used further
+CLOSE = 0.15  # of the steps: fewer additional steps need no further trial
 
 
 def open_frames(scene: Scene) -> bool:
@@ -43,7 +43,7 @@ def open_frames(scene: Scene) -> bool:
 
 
 def open_step(scene: Scene) -> bool:
-    """Whether it leaves its step open; positions that are found each by itself have none."""
+    """Whether it leaves its step open; independent static positions have none."""
     return not states_step(scene) and not without_vibration(scene)
 
 
@@ -59,12 +59,12 @@ def beams_only(scene: Scene) -> bool:
 
 
 def elastic(link: LinkScene, *families: str) -> bool:
-    """Whether a link is elastic and of one of some families, stated so."""
+    """Whether a link states that it is elastic and of one of some families."""
     return link.shape is not None and link.model not in {"rigid", "auto"} and link.family in families
 
 
 def chosen_frames(search: Trials, scene: Scene) -> tuple[Scene, float]:
-    """The scene with co-rotational frames where links bend too far for rigid-body ones, and the error of these else."""
+    """The scene with co-rotational frames if links bend too far for rigid-body ones; else with the error of these."""
     if not open_frames(scene):
         return scene, 0.0
     trial = shortened(with_beams(scene, open_beams(scene), ELEMENTS[2]))
@@ -100,7 +100,7 @@ def _least(scene: Scene) -> float:
 
 
 def with_beams(scene: Scene, names: Sequence[str], choice: tuple[str, int]) -> Scene:
-    """The scene with so many elements of a kind in some beams; an element that a beam states stays."""
+    """The scene with a number of elements of a kind in some beams; an element that a beam states is kept."""
     links = {}
     for name in names:
         link = scene.links[name]
@@ -111,7 +111,7 @@ def with_beams(scene: Scene, names: Sequence[str], choice: tuple[str, int]) -> S
 
 
 def chosen_beams(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, float]:
-    """The scene with the fewest elements in its open beams whose error is allowed, and that error: against a fine one."""
+    """The scene with the fewest elements in its open beams whose error is allowed, and that error, against fine beams."""
     names = open_beams(scene)
     if not names:
         return scene, 0.0
@@ -199,7 +199,7 @@ def chosen_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, fl
 def _resolving(
     search: Trials, scene: Scene, steps: int, allowed: float, levels: range, longest: float
 ) -> tuple[StepChoice | None, str]:
-    """The step in which all that vibrates is followed, if a run in it costs seconds; else what it would be, in words.
+    """The step that resolves all vibration, if a run with it takes seconds; else that step in words.
 
     Parameters
     ----------
@@ -230,13 +230,13 @@ def _resolving(
 
 
 def _fewest_rows(trial: Scene) -> int:
-    """Time points of a trial, at the least, for curves and animations to be smooth."""
+    """Least number of time points of a trial, for smooth curves and animations."""
     turn = turn_steps(trial)
     return FEWEST if turn is None else max(FEWEST, math.ceil(ROWS * time_grid(trial).steps / turn))
 
 
 def _possible_levels(search: Trials, scene: Scene) -> range:
-    """How many levels there may be: those stated, or as many as the memory holds factors of."""
+    """Possible numbers of levels: the stated one, or as many as have factors that fit in memory."""
     stated = scene.analysis.extrapolation_levels
     if stated is not None:
         return range(stated, stated + 1)

@@ -27,7 +27,7 @@ PAIRS = 3  # of marches that are compared before anything is claimed: two ratios
 
 @dataclass(frozen=True, slots=True)
 class _Halved:
-    """The march in the shortest steps so far, and what marches differ by, of a channel's peak, the finest pair last."""
+    """The march in the shortest steps so far, and differences of marches, relative to a channel's peak, finest last."""
 
     steps: int
     coarse: Histories
@@ -83,7 +83,7 @@ def free_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, floa
 
 
 def finest_error(differences: Sequence[float]) -> float:
-    """Of the finest march, from what successive ones differ by: by the order that they show, at most 2."""
+    """Error of the finest march, from differences of successive ones and their order, at most 2."""
     D = np.maximum(differences, 1e-300)
     if len(D) < PAIRS or not np.isfinite(D).all():
         return 1.0
@@ -108,7 +108,7 @@ def _unreached(found: _Halved, asked: float, until: float, error: float) -> str:
 
 
 def _agree_until(found: _Halved, asked: float) -> float:
-    """Time until which the two finest marches agree in every channel that counts [s]."""
+    """Time until which the two finest marches agree in every judged channel [s]."""
     time, until = found.coarse.time, math.inf
     for name, size in counted(found.fine).items():
         coarse, fine = found.coarse.channels[name][1], found.fine.channels[name][1][::2]

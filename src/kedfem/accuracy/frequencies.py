@@ -1,4 +1,4 @@
-"""Meshes that are fine enough for natural frequencies: results of a mesh compared with those of smaller elements."""
+"""Meshes for natural frequencies, by comparison of a mesh with one of smaller elements."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ FEW = 6  # modes that a warning lists
 
 
 class Solved(Protocol):
-    """What has been meshed and solved: its lowest frequencies [Hz], and its unknowns."""
+    """A solved model: its lowest frequencies [Hz], and its unknowns."""
 
     @property
     def frequencies(self) -> Float[np.ndarray, " f"]: ...  # noqa: D102
@@ -46,7 +46,7 @@ LetGo = Callable[[Scene], Scene]
 
 
 def resolved(made: T, finer: Finer[T], chosen: Finer[T] | None, allowed: float) -> tuple[T, Float[np.ndarray, " f"]]:
-    """What is made, with smaller elements where these are left open, until the error of the frequencies is allowed.
+    """The model, with smaller elements where these are left open, until the error of the frequencies is allowed.
 
     Two meshes show the error of the coarser one, as frequencies converge at ORDER at least (Strang and Fix, An Analysis
     of the Finite Element Method, 6.3), though more slowly at edges that point inwards. Elements are made smaller up to
@@ -87,7 +87,7 @@ def unsimplified(scene: Scene) -> Scene:
 
 @dataclass(frozen=True, slots=True)
 class FrozenLinkage:
-    """A scene's linkage and system, what finds its modes, and its motion and frequencies at a position [Hz]."""
+    """A scene's linkage and system, the solver of its modes, and its motion and frequencies at a position [Hz]."""
 
     scene: Scene
     linkage: Linkage
@@ -99,14 +99,14 @@ class FrozenLinkage:
 
     @property
     def unknowns(self) -> int:
-        """Of all links, before joints share any."""
+        """Unknowns of all links, before joints share any."""
         return int(self.system.model.unknowns)
 
 
 def frozen(
     scene: Scene, modes: int, at: float, let_go: LetGo | None = None
 ) -> tuple[FrozenLinkage, Float[np.ndarray, " f"], tuple[str, ...]]:
-    """A scene's linkage, unreduced, with meshes that resolve its lowest vibrations where they are left open.
+    """A scene's linkage, unreduced; meshes that are left open resolve its lowest vibrations.
 
     Parameters
     ----------
@@ -144,12 +144,12 @@ def _frozen(scene: Scene, modes: int, at: float, let_go: LetGo | None) -> Frozen
 
 
 def allowed_error(scene: Scene) -> float:
-    """What its accuracy allows."""
+    """The error that its accuracy allows."""
     return USUAL if scene.analysis.accuracy == "quick" else float(scene.analysis.accuracy)
 
 
 def remedy(scene: Scene) -> str:
-    """What makes the frequencies of a scene more exact."""
+    """Advice for more exact frequencies of a scene."""
     stated = any("mesh" in link.model_fields_set for link in scene.links.values())
     if scene.analysis.accuracy == "quick" and not stated:
         return 'leave analysis.accuracy = "quick" out'
@@ -157,7 +157,7 @@ def remedy(scene: Scene) -> str:
 
 
 def mesh_warning(errors: Float[np.ndarray, " f"], allowed: float, remedy: str) -> tuple[str, ...]:
-    """A warning of frequencies that the meshes do not resolve, or of which that is not known."""
+    """A warning of frequencies that the meshes do not resolve, or whose error is unknown."""
     if np.isnan(errors).any():
         why = f"models of more than {UNKNOWNS:,} unknowns are not meshed more finely to see it"
         return (f"frequencies: how far off they are by the mesh is not known, as {why}: compare with another mesh",)
@@ -174,12 +174,12 @@ def mesh_warning(errors: Float[np.ndarray, " f"], allowed: float, remedy: str) -
 
 
 def error_words(errors: Float[np.ndarray, " f"]) -> str:
-    """What a table says of them; nothing where they are not known."""
+    """The errors in words for a table; empty if they are unknown."""
     known = errors.size and not np.isnan(errors).any()
     return f"error by the mesh, estimated: {percent(errors.max())} at most" if known else ""
 
 
 def file_warning(scene: Scene) -> tuple[str, ...]:
-    """A warning of links whose meshes come from files, which are not made finer."""
+    """A warning of links with meshes from files, which are not refined."""
     names = [name for name, link in scene.links.items() if link.model != "rigid" and isinstance(link.shape, MeshFile)]
     return (f"frequencies: errors by the meshes from files are not known: links {', '.join(names)}",) if names else ()

@@ -99,7 +99,7 @@ def slices(link: Link, joint: Attachment) -> Slices:
 
 
 def _numbers(s: Float[np.ndarray, " k"]) -> Int[np.ndarray, " k"]:
-    """The slice of each node, from its place along the link; slices too near to the one before are joined to it."""
+    """The slice of each node, by its position along the link; slices too near to the previous one are merged with it."""
     length = float(np.ptp(s)) or 1.0
     of = np.clip(np.floor(SLICES * (s - s.min()) / length + SAME).astype(int), 0, SLICES - 1)
     used, of = np.unique(of, return_inverse=True)
@@ -113,7 +113,7 @@ def _numbers(s: Float[np.ndarray, " k"]) -> Int[np.ndarray, " k"]:
 
 @dataclass
 class GeometricError:
-    """Largest sums over time of a run, examined block by block, over links with rigid-body frames: others do not err so.
+    """Largest sums over time of a run, block by block, over links with rigid-body frames; others do not have this error.
 
     stiffened : whether the motion stiffens links
     stopped : whether joints have limits
@@ -140,7 +140,7 @@ class GeometricError:
         self._of = [slices(link, joint) if link.fit is None else None for link, joint in joined]
 
     def add(self, block: Block) -> None:
-        """Look at some time points of a block."""
+        """Evaluate some time points of a block."""
         both = zip(self._of, block.links, strict=True)
         looked_at = [history.strain for of, history in both if of is not None]
         if not looked_at:
@@ -162,7 +162,7 @@ class GeometricError:
 
     @property
     def estimate(self) -> float:
-        """Of the peak stress."""
+        """Estimated error relative to the peak stress."""
         share = self.axial / (2 * self.strain) if self.strain else 0.0
         error = AXIAL * share + TURN * self.turn**2
         known = self.stiffened and not self._slides and not self.stopped
@@ -170,12 +170,12 @@ class GeometricError:
 
     @property
     def worst(self) -> float:
-        """Of the peak of anything: of displacements and joint forces where slides keep their directions."""
+        """Largest relative error of any quantity, also of displacements and joint forces at slides of fixed direction."""
         return self.estimate + self.slid
 
     @property
     def sliding(self) -> tuple[str, ...]:
-        """Joints that slide along bent links, if most of the error is theirs."""
+        """Joints that slide along bent links, if they cause most of the error."""
         most = self.slid > self.estimate
         return tuple(dict.fromkeys(f"joints.{name}" for name, _ in self._slides)) if most else ()
 
@@ -211,7 +211,7 @@ def axial_forces(
 
 
 def geometric_warning(found: GeometricError) -> tuple[str, ...]:
-    """A warning where the linear equation is not enough, and what is."""
+    """A warning if the linear equation is not sufficient, with the remedy."""
     error = found.worst
     if error < LARGE:
         return ()
@@ -223,7 +223,7 @@ def geometric_warning(found: GeometricError) -> tuple[str, ...]:
 
 
 def bent(found: GeometricError) -> str:
-    """How far links bend, and what slides along them as if they did not, in words."""
+    """Bending of links, and slides on them whose direction neglects it, in words."""
     names = found.sliding
     verb = "slides" if len(names) == 1 else "slide"
     sliding = f" ({', '.join(names)} {verb} along the undeformed link)" if names else ""
@@ -231,7 +231,7 @@ def bent(found: GeometricError) -> str:
 
 
 def _remedy(found: GeometricError, error: float) -> str:
-    """What is right where the linear equation is not."""
+    """The remedy if the linear equation is not sufficient."""
     corotational = 'analysis.frames = "co-rotational"'
     if error >= MODERATE:
         return f"take {corotational}, which is right at any deflection"

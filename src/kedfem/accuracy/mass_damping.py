@@ -1,4 +1,4 @@
-"""A warning where damping in proportion to mass resists motions that no drive prescribes."""
+"""A warning if mass-proportional damping resists motions that no drive prescribes."""
 
 import numpy as np
 
@@ -12,13 +12,13 @@ LOST = 0.01
 
 
 def mass_damping_warning(ready: Prepared, taken: float | None = None) -> tuple[str, ...]:
-    """What alpha takes of motions that no drive prescribes: their speed falls as exp(−α t), vibrations as exp(−α t/2).
+    """Effect of alpha on motions that no drive prescribes: their speed falls as exp(−α t), vibrations as exp(−α t/2).
 
     Rods that idly spin between balls, and mechanisms that the drive moves altogether, are not meant.
 
     Parameters
     ----------
-    taken : energy that alpha took, of the largest exchanged; None before the run
+    taken : energy dissipated by alpha, relative to the largest exchanged; None before the run
     """
     scene, damping, end = ready.scene, ready.model.damping, time_grid(ready.scene).end
     lost = 1.0 - float(np.exp(-damping.alpha * end))

@@ -1,4 +1,4 @@
-"""The error of elements: what twice as many change, or what their stresses indicate."""
+"""The error of elements: the change by twice as many, or the indicator of their stresses."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -39,7 +39,7 @@ def mesh_errors(small: Prepared, base: Histories, eta: Mapping[str, float]) -> d
 
 
 def _separate(small: Prepared, base: Histories, finer: Scene, eta: Mapping[str, float]) -> dict[str, float]:
-    """Of a scene with both beams and meshed links: each by itself, added up."""
+    """Error of a scene with both beams and meshed links: the sum of their separate errors."""
     soft = relative_errors(base, histories(replace(small, model=softened(small.model, eta)), near=base.begun))
     if any(link.meshed and link.fit is not None for link in small.model.links):
         return soft
@@ -50,7 +50,7 @@ def _separate(small: Prepared, base: Histories, finer: Scene, eta: Mapping[str, 
 
 
 def softened(model: Model, eta: Mapping[str, float]) -> Model:
-    """A model whose meshed links give by what their meshes are too stiff: K0 (1 − 2 η²)."""
+    """A model whose meshed links are softer by the error of their meshes: K0 (1 − 2 η²)."""
     factors = (max(1 - SOFT * eta.get(link.name, 0.0) ** 2, 0.2) for link in model.links)
     return replace(model, links=tuple(map(_softer, model.links, factors)))
 
@@ -62,7 +62,7 @@ def _softer(link: Link, factor: float) -> Link:
 
 
 def link_errors(model: Model, found: Mapping[int, Indicator]) -> dict[str, float]:
-    """Link → η, all its segments together."""
+    """Link → η of all its segments together."""
     sums: dict[str, np.ndarray] = {}
     for k, each in found.items():
         name = model.links[k].name
@@ -71,7 +71,7 @@ def link_errors(model: Model, found: Mapping[int, Indicator]) -> dict[str, float
 
 
 def plain_mesh_share(eta: Mapping[str, float], kinds: tuple[str, ...]) -> Share | None:
-    """Of a model without a companion: η² of what moves, η of stress."""
+    """Share of a model without a companion: η² for motion, η for stress."""
     if not eta:
         return None
     worst = max(eta.values())
@@ -80,7 +80,7 @@ def plain_mesh_share(eta: Mapping[str, float], kinds: tuple[str, ...]) -> Share 
 
 
 def mesh_share(small: Prepared, base: Histories, eta: Mapping[str, float]) -> Share:
-    """What elements of beams, and of solid and plane links, leave out, as a share of the error."""
+    """The error of the elements of beams, and of solid and plane links, as a share of the budget."""
     errors = by_kind(mesh_errors(small, base, eta))
     if eta and "stress" in errors:
         errors["stress"] += LOCAL * max(eta.values())

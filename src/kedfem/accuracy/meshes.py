@@ -1,4 +1,4 @@
-"""What an accuracy chooses for links by trial runs: meshes, segments, simpler models, and whether they are reduced."""
+"""Choices for links by trial runs for a required accuracy: meshes, segments, simpler models, reduction."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -102,7 +102,7 @@ def chosen_meshes(search: Trials, scene: Scene, allowed: float, auto: Sequence[s
 
 
 def _mesh_error(ready: Prepared, names: Sequence[str]) -> tuple[float, dict[str, float]]:
-    """The error that some meshes cause in a trial run, and the indicators of all."""
+    """The error of some meshes in a trial run, and the indicators of all."""
     strained = PeakStrainStates(ready.model)
     base = histories(ready, look=strained.add)
     eta = link_errors(ready.model, strained.indicators)
@@ -110,7 +110,7 @@ def _mesh_error(ready: Prepared, names: Sequence[str]) -> tuple[float, dict[str,
 
 
 def with_modes(search: Trials, scene: Scene, names: Sequence[str]) -> Scene:
-    """The scene with links on modes where all its unreduced steps would take longer than to find these."""
+    """The scene with reduced links if all unreduced steps would take longer than the computation of the modes."""
     ready = search.ready(shortened(scene))
     if not names or ready.linkage.mobility:
         return scene
@@ -144,7 +144,7 @@ def with_segments(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, 
 
 
 def first_enough(search: Trials, ladder: Sequence[tuple[float, Scene]], allowed: float, finer: str) -> tuple[int, float]:
-    """Which of ever finer scenes, each with how fine it is, is the first whose error is allowed, and that error.
+    """The first of successively finer scenes whose error is allowed, with its fineness, and that error.
 
     What two of them differ by shows what is left beyond the finer one; infinite if these two could not be compared.
     """
@@ -168,13 +168,13 @@ def first_enough(search: Trials, ladder: Sequence[tuple[float, Scene]], allowed:
 
 
 def _segmented(scene: Scene, most: Mapping[str, int], count: int) -> Scene:
-    """Links in segments, none in more than do not soften it."""
+    """Links in segments, each in at most as many as do not soften it."""
     links = {name: {"segments": min(count, least)} for name, least in most.items()}
     return with_links(scene, {n: scene.links[n].model_copy(update=x) for n, x in links.items()})
 
 
 def stubby_warning(model: Model) -> tuple[str, ...]:
-    """A warning of links that are cut into slices shorter than they are wide, which soften them."""
+    """A warning of links with segments shorter than the link is wide, which soften it."""
     stubby = []
     for name, parts in segments(model).items():
         if len(parts) > 1 and parts[0].meshed:
@@ -191,7 +191,7 @@ def stubby_warning(model: Model) -> tuple[str, ...]:
 
 
 def with_simpler_links(search: Trials, scene: Scene, left_open: list[str], allowed: float) -> tuple[Scene, float]:
-    """The scene with links made rigid, beams or plane as far as that changes little, and by how much it does.
+    """The scene with links made rigid, beams or plane as far as that changes little, and the change.
 
     Allowed is what the mesh left of both shares: a simpler link is compared with the one on that mesh.
     """

@@ -1,4 +1,4 @@
-"""The cheapest model of a scene that is near enough: `analysis.accuracy`.
+"""The cheapest model of a scene with a required accuracy: `analysis.accuracy`.
 
 Everything is found by short trial runs of the scene itself, with reduced links: the frames from how far links bend,
  beams by elements of few and many nodes against a fine one, the step from the order that three steps show,
@@ -43,12 +43,12 @@ from kedfem.store import itself, kept
 STEP, MESH, MODEL, REDUCTION = 0.3, 0.4, 0.2, 0.1  # shares of the error asked for
 SEGMENTS = 0.2  # of the mesh's share, where links with co-rotational frames leave their number open
 VAIN = 0.1  # error of the step beyond which finer meshes would be in vain
-ROUGH = "beam5", 2  # elements of beams where the first step of a motion without a drive is looked for
+ROUGH = "beam5", 2  # elements of beams for the first search of the step of a motion without a drive
 
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """One part of the error: what of, how much (relative, worst channel), how much was allowed."""
+    """One part of the error: its source, its size (relative, worst channel), and the size allowed."""
 
     what: str
     error: float
@@ -57,13 +57,13 @@ class Share:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What was chosen for a scene with `analysis.accuracy`, and why.
+    """The choices for a scene with `analysis.accuracy`, with their reasons.
 
     scene : the scene with everything chosen
-    asked : the accuracy
-    finer : of the usual meshes, by which factor elements are smaller
+    asked : the required accuracy
+    finer : factor by which elements are smaller than those of default meshes
     shares : parts of the error; the reduction's is what it may cause
-    notes : what was tried, left out, and what limits the accuracy
+    notes : trials, omissions, and limits of the accuracy
     links : of its trials, those that the scene has; not kept between runs
     """
 
@@ -76,17 +76,17 @@ class Plan:
 
     @property
     def error(self) -> float:
-        """Estimated error of the run, all shares together."""
+        """Estimated error of the run, the sum of all shares."""
         return sum(share.error for share in self.shares)
 
     @property
     def reached(self) -> bool:
-        """Whether the estimate is within what was asked for."""
+        """Whether the estimate is within the required accuracy."""
         return self.error <= self.asked
 
 
 def plan_for(scene: Scene, stage: Stage = lambda name: None) -> Plan | None:
-    """The plan of a scene that leaves something open; None of one that asks for plain defaults.
+    """The plan of a scene that leaves something open; None for a scene with plain defaults.
 
     Of solid and plane links that move freely the step alone, and how finely fillets are divided: they are not reduced;
     each trial is as dear as a run. The plan of a steady motion is that of the motion from the start on, over its period.
@@ -119,7 +119,7 @@ def ready_to_step(
 
 
 def anything_open(scene: Scene) -> bool:
-    """Whether a scene leaves something for an accuracy to choose."""
+    """Whether a scene leaves anything open that an accuracy chooses."""
     auto = any(link.model == "auto" for link in scene.links.values())
     return auto or any(f(scene) for f in (open_frames, open_beams, open_meshes, open_step, open_segments))
 
@@ -140,7 +140,7 @@ def planned(scene: Scene, stage: Stage = lambda name: None) -> Plan:
 
 
 def found_plan(search: Trials, scene: Scene) -> Plan:
-    """The cheapest model of a scene that is near enough, by trial runs: what no plan kept from an earlier run has."""
+    """The cheapest model of a scene with the required accuracy, by trial runs, without any kept plan."""
     asked, stage = search.asked, search.stage
     if not scene.driven_joints and not beams_only(scene):
         return _step_alone(search, scene)
@@ -195,7 +195,7 @@ def found_plan(search: Trials, scene: Scene) -> Plan:
 
 
 def _step_alone(search: Trials, scene: Scene) -> Plan:
-    """Of solid and plane links that move freely: they keep the meshes that they have."""
+    """A note on solid and plane links that move freely, which keep their meshes."""
     search.stage("plan: step")
     chosen, step = chosen_step(search, scene, STEP * search.asked)
     share = Share("time step", step, STEP * search.asked)
@@ -213,13 +213,13 @@ def _limits(plan: Plan) -> Iterator[str]:
 
 
 def _opened(scene: Scene, left_open: list[str]) -> Scene:
-    """Links that leave their model open as the best that their shape allows, reduced."""
+    """Links that leave their model open, with the best model for their shape, reduced."""
     named = {name: scene.links[name] for name in left_open}
     best = {name: _remeshed(link, of_family(link, families(link)[-1], True)) for name, link in named.items()}
     return with_links(scene, best)
 
 
 def _remeshed(link: LinkScene, other: LinkScene) -> LinkScene:
-    """Another model of a link with the mesh that the link states, if it does."""
+    """Another model of a link, with the mesh that the link states, if any."""
     stated = link.model_fields_set & {"mesh", "element"}
     return other.model_copy(update={key: getattr(link, key) for key in stated})

@@ -17,7 +17,7 @@ AROUND = 2  # positions on both sides of the highest one at which the curve's be
 
 
 def positions_share(found: Histories, sizes: Mapping[str, float]) -> Share:
-    """By how much the largest value of each channel may be larger between two positions.
+    """Relative excess of the largest value of each channel between two positions.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def positions_share(found: Histories, sizes: Mapping[str, float]) -> Share:
 
 
 def missed(values: Float[np.ndarray, " n"]) -> float:
-    """How far a curve may rise above its largest value between the points where it is known; none at its ends.
+    """Possible rise of a curve above its largest value between its points; 0 if that is at an end.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Links reduced as far as a tolerance allows, with an estimate of what the reduction costs.
+"""Links reduced as far as a tolerance allows, with an estimate of the reduction error.
 
 The estimate: the residual of the reduced run in the full equation, at some moments, is answered by static deflections of
 the full linkage; these are added to the modes, and the run is repeated. What changes, times a factor found on full
@@ -69,7 +69,7 @@ def prepared(
     scene: Scene, stage: Stage = lambda name: None, ends: Sequence[Scene] = (),
     known: Mapping[str, Link] | None = None,
 ) -> tuple[Prepared, Reduction | None]:  # fmt: skip
-    """Everything of a scene that does not need a time step; links that ask for it are reduced.
+    """Everything of a scene that does not depend on a time step, with links reduced as the scene says.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ Stored = tuple[Linkage, Path, Model, dict[str, float]]
 
 
 def _packed(reduction: Reduction) -> Stored | None:
-    """A reduction as it is kept between runs; None if links are left unreduced."""
+    """A reduction in the form that is kept between runs; None if links are left unreduced."""
     ready, model = reduction.ready, stored_model(reduction.ready.model)
     return None if model is None else (ready.linkage, ready.path, model, reduction.estimate)
 
@@ -164,13 +164,13 @@ def reduced(
 
 
 def _beginning(full: Prepared) -> Prepared:
-    """A prepared scene whose run shows what the modes leave out: it vibrates, and is not long."""
+    """A prepared scene for the estimate of the reduction error: with vibration, and short."""
     scene = full.scene if without_vibration(full.scene) else with_analysis(full.scene, kind="transient")
     return replace(full, scene=shortened(scene))
 
 
 def _same(Q: Functions, share: float) -> Functions:
-    """Modes that serve already, whatever share of a tolerance is asked for."""
+    """The given modes, for any share of a tolerance."""
     return Q
 
 
@@ -181,14 +181,14 @@ def reducible(model: Model) -> set[str]:
 
 
 def _count(link: Link, basis: Basis, tolerance: float) -> int:
-    """How many modes serve a tolerance to begin with; those of segments are sorted by what they are needed for."""
+    """Initial number of modes for a tolerance; those of segments are sorted by their purpose."""
     return basis.count(FIRST * tolerance if link.fit is None else tolerance)
 
 
 def first_reduced(
     full: Prepared, tolerance: float, known: Sequence[Float[np.ndarray, "_ _"] | None] | None = None
 ) -> Prepared:
-    """All large links of a prepared scene reduced about as far as a tolerance allows, on known modes where there are any.
+    """All large links of a prepared scene reduced about as far as a tolerance allows, on known modes if there are any.
 
     None is where the drive leaves motions free; the error is not examined.
     """
@@ -235,7 +235,7 @@ def _settled(
 
 
 def _closer(model: Model, now: Functions, next_ones: Functions, richer: Functions) -> Functions:
-    """The next modes of segments, of which few count, as long as there are any; else those of the richer run."""
+    """The next modes of segments, which are few, as long as there are any; else those of the larger run."""
     lengths = [[0 if Q is None else Q.shape[1] for Q in each] for each in (now, next_ones)]
     more = lengths[0] != lengths[1]
     every = zip(model.links, next_ones, richer, strict=True)
@@ -249,7 +249,7 @@ def _run(full: Prepared, Q: Functions, moments: Collection[int]) -> tuple[Prepar
 
 
 def _enriched(full: Prepared, parts: Sequence[Substructure], small: Prepared, kept: Sequence[Snapshot]) -> Functions:
-    """Functions with the answers to the residual at some moments added."""
+    """Modes with the responses to the residual at some instants added."""
     answers = residual_deflections(full.model, parts, small.model, kept)
     links = zip(full.model.links, small.model.links, zip(*answers, strict=True), strict=True)
     return [None if link is whole else enriched(link, each, ADDED) for whole, link, each in links]

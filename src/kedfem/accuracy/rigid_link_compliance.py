@@ -22,7 +22,7 @@ INSTANTS = 256  # of a block that are examined
 
 @dataclass
 class RigidLinkCompliance:
-    """The largest that each such link gave so far, and the largest displacement at joints of all links and their ends.
+    """Largest deformation of each such link so far, and the largest displacement of joints and ends of all links.
 
     displacement : (L,) change of the vector between two of a link's joints or outermost nodes [m]
     moved : from the reference position [m]
@@ -42,7 +42,7 @@ class RigidLinkCompliance:
         ]
 
     def add(self, block: Block) -> None:
-        """Look at some time points of a block."""
+        """Evaluate some time points of a block."""
         some, motion = slice(None, None, max(1, len(block) // INSTANTS)), block.motion
         for k, (weights, nodes) in enumerate(self._places):
             link, body, history = self.model.links[k], self.model.bodies[k], block.links[k]
@@ -57,7 +57,7 @@ class RigidLinkCompliance:
 
     @property
     def relative(self) -> float:
-        """The most that a link gave, of the largest displacement."""
+        """The largest deformation of a link, relative to the largest displacement."""
         most = float(self.displacement.max(initial=0.0))
         return most / self.moved if self.moved else 0.0
 
@@ -73,7 +73,7 @@ def ends(link: Link, joint: Attachment) -> Float[np.ndarray, "p n"]:
 
 
 def compliance_warning(found: RigidLinkCompliance, asked: float | None = None) -> tuple[str, ...]:
-    """A warning where rigid links give by more than the accuracy that is asked for, of the largest displacement."""
+    """A warning if rigid links deform by more than the required accuracy, relative to the largest displacement."""
     allowed = WARNED if asked is None else asked
     if found.relative <= allowed:
         return ()

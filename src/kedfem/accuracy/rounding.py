@@ -47,7 +47,7 @@ INSTANTS = 64  # of a block that are examined
 
 
 def rigid_part(link: Link) -> Float[np.ndarray, "r N"]:
-    """What takes the rigid motions out of a state, the nearest in the norm of the mass."""
+    """The projection that removes rigid motions from a state, orthogonal in the mass norm."""
     flat = rigid_modes(link)
     weighed = [mass_times(link.mass, x.reshape(link.n, link.d)).ravel() for x in np.ascontiguousarray(flat.T)]
     return np.asarray(np.linalg.pinv(np.stack(weighed) @ flat) @ np.stack(weighed))
@@ -75,7 +75,7 @@ def nodal_defect(link: Link) -> Float[np.ndarray, "r r"]:
 
 @dataclass
 class Rounding:
-    """Of each link: what a rigid motion leaves, and the largest such force so far [N].
+    """The residual force of rigid motions of each link, and its largest value so far [N].
 
     defects, parts : of links with rigid-body frames, else None
     stiffest : (L,) FOLLOWED · max |S| of co-rotational links, else 0 [N/m, N/rad]
@@ -92,7 +92,7 @@ class Rounding:
 
     @classmethod
     def of(cls, model: Model, solvers: Sequence[Steps]) -> "Rounding":
-        """Of the links of a model, as its solver factored them."""
+        """The record for the links of a model, as its solver factored them."""
         first = solvers[0] if solvers else None
         stiffest = np.zeros(len(model.links))
         if first is not None and first.corotational:
@@ -115,7 +115,7 @@ class Rounding:
         return cls(model, defects, parts, stiffest, np.zeros(len(model.links)))
 
     def add(self, block: Block) -> None:
-        """Look at the steps of a block."""
+        """Evaluate the steps of a block."""
         some = slice(None, None, max(1, len(block) // INSTANTS))
         for k, (defect, part) in enumerate(zip(self.defects, self.parts, strict=True)):
             history = block.links[k]
@@ -131,11 +131,11 @@ class Rounding:
 
     @property
     def relative(self) -> float:
-        """The largest such force of a link, of the largest force at a port [-]."""
+        """The largest such force of a link, relative to the largest force at a port [-]."""
         return float(self.forces.max(initial=0.0)) / self.largest if self.largest else 0.0
 
     def share(self, kinds: Sequence[str]) -> Share | None:
-        """Its part of the error; None where it is next to nothing."""
+        """Its share of the error; None if it is negligible."""
         if not self.relative > REPORTED:
             return None
         link = self.model.links[int(self.forces.argmax())].name

@@ -29,7 +29,7 @@ CLOSER = 0.3  # of the largest value so far, below which all are examined
 
 @dataclass
 class LoopSingularity:
-    """The smallest singular value, of the largest one, of constraints of closed loops that a run comes to.
+    """The smallest singular value, relative to the largest one, of constraints of closed loops during a run.
 
     part, rank : the loops, and the rank of their constraints in the reference position
     least, when : the value there, and the time [s]
@@ -45,7 +45,7 @@ class LoopSingularity:
 
     @property
     def of_largest(self) -> float:
-        """The least, of the largest; 1 before anything was examined."""
+        """The least value relative to the largest; 1 before anything was examined."""
         return self.least / self.largest if self.largest else 1.0
 
     def add(self, values: Float[np.ndarray, " T"], t: Float[np.ndarray, " T"]) -> None:
@@ -58,7 +58,7 @@ class LoopSingularity:
 
 @dataclass
 class SingularPasses:
-    """What closed loops of an undriven mechanism come to in a run, block after block."""
+    """Singular values of closed loops of an undriven mechanism during a run, block after block."""
 
     ready: Prepared
     loops: list[LoopSingularity] = field(default_factory=list, repr=False)
@@ -76,7 +76,7 @@ class SingularPasses:
             self.loops = [LoopSingularity(part, rank) for part, rank in every if rank < part.freedoms]
 
     def add(self, block: Block) -> None:
-        """The time points of one more block."""
+        """Add the time points of the next block."""
         if not self.loops:
             return
         stride = max(1, len(block) // LOOKED_AT)
@@ -115,7 +115,7 @@ class SingularPasses:
         return min(self.loops, key=lambda loop: loop.of_largest, default=None)
 
     def warnings(self) -> tuple[str, ...]:
-        """What a user should know of such a pass."""
+        """Warnings of such a pass."""
         if self.worst is None or self.worst.of_largest > NEAR:
             return ()
         return (

@@ -17,7 +17,7 @@ GROWS = 1e-6  # by which a period multiplies more than one: rounding and the ste
 SLOW = 0.999  # a vibration that falls by less in a period is as good as undamped
 APART = 0.1  # of logarithms of growth, by which levels of a step that resolves what grows differ at most
 FALLEN = 0.5  # what falls to less in a period is stable, whatever its last digit
-KNOWN = 1e-3  # error of the state that is not worth a word
+KNOWN = 1e-3  # error of the state that needs no warning
 SETTLED = 0.01  # what is left of a vibration that has died away
 
 
@@ -25,9 +25,9 @@ SETTLED = 0.01  # what is left of a vibration that has died away
 class Steady:
     """A steady motion.
 
-    period : [s]; revolutions : of the drive in it, 0 of one that does not go on turning
+    period : [s]; revolutions : of the drive in it, 0 if it does not rotate continuously
     marches : periods that were marched to find it, at all levels in time
-    residual : what a period leaves of the size of its state, at worst of all levels
+    residual : change of the state in a period, relative to its size, at worst of all levels
     growth : by which a period multiplies the least damped vibration, combined of all levels; None if not asked for, or
         if the levels do not agree: then it is the method's own
     certain : whether that was found to the tolerance
@@ -63,19 +63,19 @@ class Steady:
 
     @property
     def periods(self) -> int | None:
-        """After which a vibration has fallen to SETTLED; None where none falls, or it is not known."""
+        """Number of periods after which a vibration has fallen to SETTLED; None if none falls, or if it is unknown."""
         if self.growth is None or self.growth >= 1 - GROWS:
             return None
         return max(1, ceil(log(SETTLED) / log(max(self.growth, 1e-300))))
 
     @property
     def error(self) -> float:
-        """What the residual adds up to in all periods to come, of the state; 0 where it is not known how it falls."""
+        """Sum of the residual over all further periods, relative to the state; 0 if its decay is unknown."""
         return self.residual / max(1 - self.growth, GROWS) if self.growth is not None else 0.0
 
     @property
     def notes(self) -> dict[str, str | float]:
-        """As a results file keeps them."""
+        """As notes of a results file."""
         known: dict[str, str | float] = {}
         known |= {} if self.growth is None else {"steady growth in a period": self.growth}
         known |= {"steady vibration that grows": self.vibration} if self.vibration and not self.passed else {}
@@ -86,7 +86,7 @@ class Steady:
 
 
 def steady_of(scene: Scene, solvers: Sequence[Steps]) -> Steady | None:
-    """What the solvers of all levels found; None of another motion."""
+    """The steady motion that the solvers of all levels found; None for other motions."""
     found = [x for x in (getattr(each, "steady", None) for each in solvers) if isinstance(x, Periodic)]
     if not found:
         return None
@@ -103,7 +103,7 @@ def steady_of(scene: Scene, solvers: Sequence[Steps]) -> Steady | None:
 
 
 def unstable(steady: Steady | None) -> str:
-    """Why a machine does not run as its steady motion says; empty if it does, or nothing is known of that."""
+    """The reason why a machine does not run in its steady motion; empty if it does, or if that is unknown."""
     if steady is None or steady.growth is None or not steady.unstable:
         return ""
     sure = "; that the steps are short enough for this only extrapolation_levels = 2 shows"
@@ -115,7 +115,7 @@ def unstable(steady: Steady | None) -> str:
 
 
 def steady_warning(steady: Steady | None) -> tuple[str, ...]:
-    """What the user should know."""
+    """Warnings about the steady motion."""
     if steady is None:
         return ()
     if steady.growth is None and steady.passed:

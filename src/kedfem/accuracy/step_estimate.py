@@ -1,4 +1,4 @@
-"""The error of the time step in every channel, from what the levels in time differ by."""
+"""The error of the time step in every channel, from the differences between levels in time."""
 
 import math
 from collections.abc import Collection, Mapping, Sequence
@@ -22,7 +22,7 @@ IN_STEP = 0.3  # largest disagreement about the fastest motion at which orders 4
 ALIKE = 1e-6  # relative difference of work that means nothing
 LEAST_ORDER = 0.7  # at which an error must fall with the step, or no step will do
 SLOW = 1e-3  # |D''|/|D| of a difference without vibration: that of 200 steps to a period
-SURE = 0.7  # of the error asked for, that a step is chosen for
+SURE = 0.7  # of the required accuracy, for which a step is chosen
 SINGLE = 2.0  # forces and stresses have more of fast motion, which is less exact, than displacements
 TWO, THREE = 0.8, 1.2  # docs/performance/levels.md has estimates beside the true errors
 Rows = Float[np.ndarray, "T c"]
@@ -34,7 +34,7 @@ class StepEstimate:
 
     h : step of the coarsest level, which is the analysis's own [s]
     levels : 1, 2 or 3
-    errors : channel → estimated error of its values, at worst in time, of the channel's peak [-]
+    errors : channel → estimated error of its values, at the worst time, relative to the channel's peak [-]
     differences : channel → what successive levels differ by, at worst in time, of the peak, coarsest pair first; none of
         a single level
     fast : channel → by which share the finest pair of levels disagrees about its fastest motion, that with the largest
@@ -53,7 +53,7 @@ class StepEstimate:
 
     @property
     def notes(self) -> dict[str, str | float]:
-        """As a results file keeps them."""
+        """As notes of a results file."""
         errors = {f"step error of {name}": error for name, error in self.errors.items()}
         return {"levels in time": self.levels, "step error, running": self.running, **errors}
 
@@ -88,8 +88,8 @@ def cheapest(
     ----------
     found : of a run of two or three levels
     wanted : relative error
-    channels : that count, all that were followed if not given
-    levels : how many there may be
+    channels : judged ones; all with an estimate if not given
+    levels : possible numbers of them
     longest : step that may be chosen [s]
     """
     names = [x for x in found.differences if channels is None or x in channels]
@@ -134,7 +134,7 @@ def _work(levels: int) -> float:
 
 
 def watched(name: str) -> bool:
-    """Whether a channel's error is followed: those of the budget, and moments of joints."""
+    """Whether a channel's error is estimated: those of the budget, and moments of joints."""
     return kind_of_name(name) is not None or (name.startswith("joints/") and name.endswith("/moment"))
 
 
@@ -164,7 +164,7 @@ class _Sizes:
         return min(q, float(self.differences[-1]) / self.peak) if slow and self.peak else q
 
     def add(self, values: Rows, levels: Sequence[Rows]) -> None:
-        """More time points, as combined and as each level has them."""
+        """Add time points, as combined and of each level."""
         self.peak = max(self.peak, largest_row(values))
         steps = [b - a for a, b in pairwise(levels)]
         if not len(self.differences):
@@ -181,10 +181,10 @@ class _Sizes:
 
 @dataclass
 class StepWatch:
-    """Follows the step's error of a run, block after block.
+    """Monitor of a run's step error, block after block.
 
     recorded : the run's channels
-    running : local errors of its steps, which somebody else adds up
+    running : local errors of its steps, which another monitor sums
     """
 
     ready: Prepared
@@ -197,7 +197,7 @@ class StepWatch:
         self.recorded = [each for each in self.recorded if watched(each.channel.name)]
 
     def add(self, block: Block, values: Mapping[str, Rows]) -> None:
-        """Look at the time points of a block and their rows."""
+        """Evaluate the time points of a block and their rows."""
         for each in self.recorded:
             name = each.channel.name
             if block.levels:
@@ -209,7 +209,7 @@ class StepWatch:
 
     @property
     def estimate(self) -> StepEstimate:
-        """Of what was examined so far."""
+        """The estimate for the time points so far."""
         analysis = self.ready.scene.analysis
         running, h = self.running.total, time_grid(self.ready.scene).step
         if (analysis.extrapolation_levels or 1) == 1:
@@ -224,7 +224,7 @@ class StepWatch:
 
 
 def _error(x: _Sizes) -> float:
-    """Of the combined values, of the peak.
+    """Error of the combined values, relative to the peak.
 
     Of two levels, D = x_{h/2} − x_h: fast motion goes wrong first, and second differences in time weigh it most. By
     q = |D''|/|x''| of it the levels disagree; the next power of the step leaves about q D, and where q is near 1, D

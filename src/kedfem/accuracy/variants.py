@@ -7,7 +7,7 @@ from typing import Any, Literal
 from kedfem.errors import MotionError
 from kedfem.scene import Bar, Cad, Extrusion, LinkScene, MeshFile, Part, PlateLink, Ramp, Scene, time_grid, turn_steps
 
-TRIAL_STEPS = 20_000  # of a trial run: longer analyses are judged by their beginning
+TRIAL_STEPS = 20_000  # of a trial run: of longer analyses only the beginning is run
 TURNS = 2  # of a trial run
 Family = Literal["solid", "plane", "beam", "rigid"]
 CHOSEN = {"element", "mesh", "model", "reduction"}
@@ -44,12 +44,12 @@ def moved(scene: Scene) -> Scene:
 
 
 def with_steps(scene: Scene, steps: int) -> Scene:
-    """The scene in so many equal steps over the same time."""
+    """The scene with a number of equal steps over the same time."""
     return with_analysis(scene, step=time_grid(scene).end / steps, steps_per_revolution=None)
 
 
 def shortened(scene: Scene) -> Scene:
-    """The beginning of an analysis that is too long for trials: TURNS of a drive that turns, after it has sped up."""
+    """The beginning of an analysis that is too long for trials: TURNS of a rotating drive, after its run-up."""
     grid, turn = time_grid(scene), turn_steps(scene)
     span = grid.end
     if turn is not None:

@@ -42,7 +42,7 @@ class Carriers:
     deformation_scale: float
 
     def place(self, name: str, at: Point) -> tuple[Point, Point] | None:
-        """Position and displacement of a reference point, by its link's nearest point; None for links that are not drawn."""
+        """Position and displacement of a reference point, by its link's nearest point; None for other links."""
         found = self.pose(name, at)
         return None if found is None else found[:2]
 

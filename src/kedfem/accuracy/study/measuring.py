@@ -42,7 +42,7 @@ class Seconds:
 
 @dataclass(frozen=True, slots=True)
 class MeasuredVariant:
-    """One variant of a study.
+    """One variant of a study, as measured.
 
     steps, unknowns : how many
     seconds : None where it was not run; then the note says why
@@ -60,12 +60,12 @@ class MeasuredVariant:
 
     @property
     def error(self) -> float:
-        """The worst channel's."""
+        """Error of the worst channel."""
         return worst(self.errors)
 
     @property
     def worst_channel(self) -> str:
-        """Its name."""
+        """Name of the worst channel."""
         return max(self.errors, key=lambda name: self.errors[name], default="")
 
 
@@ -95,7 +95,7 @@ class _LateError(Exception):
 
 @dataclass
 class _Bench:
-    """What was measured so far, and the time that is left."""
+    """The measurements so far, and the remaining time."""
 
     scene: Scene
     most: float
@@ -112,7 +112,7 @@ class _Bench:
         return self.most - (perf_counter() - self.since)
 
     def tick(self) -> None:
-        """Raises when the budget is spent."""
+        """Raise when the budget is spent."""
         if self.left < 0.0:
             raise _LateError
 
@@ -164,7 +164,7 @@ class _Bench:
         return prepared - begun, perf_counter() - prepared, ready.model.unknowns
 
     def expected(self, variant: Variant) -> float:
-        """Seconds that a variant may take, judged by the most similar one that ran; infinite without one."""
+        """Expected seconds of a variant, from the most similar one that ran; infinite without one."""
         ran = (row for row in self.rows.values() if row.seconds)
         alike = [row for row in ran if row.variant.model_kind == variant.model_kind]
         if not alike:
@@ -268,7 +268,7 @@ def _compared(bench: _Bench, reference: Variant) -> Study:
 
 
 def pareto_front(points: Sequence[tuple[float, float]]) -> set[int]:
-    """Numbers of the points (time, error) that no other one beats in both.
+    """Numbers of the Pareto-optimal points (time, error).
 
     >>> sorted(pareto_front([(1.0, 0.1), (2.0, 0.2), (3.0, 0.05), (3.0, 0.05)]))
     [0, 2]

@@ -1,4 +1,4 @@
-"""What a study of speed against error tries: kinds of models, finenesses of the mesh, tolerances of modes, steps."""
+"""Variants of a study of speed against error: kinds of models, finenesses of the mesh, tolerances of modes, steps."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

@@ -1,1 +1,1 @@
-"""Damage at the surfaces of links by stresses that repeat themselves."""
+"""Fatigue damage at the surfaces of links by periodic stresses."""

@@ -1,4 +1,4 @@
-"""Cycles of repeating histories of stress and the damage that they do, compiled by numba.
+"""Cycle counting of periodic stress histories, and their damage, compiled by numba.
 
 h (q, T) : histories over one period, the end of which is its beginning
 S, N (m,) : natural logarithms of amplitudes [Pa] of an S-N curve, rising, and of its cycles; straight on beyond both ends
@@ -36,7 +36,7 @@ def turning_points(h, q, out):  # type: ignore[no-untyped-def]
 
 @inner
 def reversed_amplitude(a, m, M):  # type: ignore[no-untyped-def]
-    """The amplitude with mean 0 that does the same as a with mean m: Haigh's diagram of the FKM guideline."""
+    """The amplitude with mean 0 that is equivalent to a with mean m: Haigh's diagram of the FKM guideline."""
     if m <= -a:
         return a * (1 - M)
     if m <= a:
@@ -46,7 +46,7 @@ def reversed_amplitude(a, m, M):  # type: ignore[no-untyped-def]
 
 @inner
 def damage_of(a, S, N, floor):  # type: ignore[no-untyped-def]
-    """Of one cycle with an amplitude a and mean 0."""
+    """Damage of one cycle with an amplitude a and mean 0."""
     if a <= floor or a <= 0.0:
         return 0.0
     x, j = np.log(a), 1
@@ -57,7 +57,7 @@ def damage_of(a, S, N, floor):  # type: ignore[no-untyped-def]
 
 @inner
 def added(first, second, M, S, N, floor, q, found):  # type: ignore[no-untyped-def] # noqa: PLR0913, PLR0917
-    """One cycle more of a history."""
+    """Add one cycle of a history."""
     a, m = 0.5 * abs(second - first), 0.5 * (first + second)
     equal = reversed_amplitude(a, m, M)
     found[q, 0] += damage_of(equal, S, N, floor)

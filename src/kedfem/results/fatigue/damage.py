@@ -1,4 +1,4 @@
-"""Damage at the surfaces of links by the stresses of the last period of a motion that repeats itself.
+"""Damage at the surfaces of links by the stresses of the last period of a periodic motion.
 
 The stress of a link over the period is a product of a few modes' stresses and their coordinates, which the envelope
 keeps; it is made for a few points at a time (`surface`).
@@ -24,7 +24,7 @@ REPEATS = 0.01  # of a link's highest stress: by how much two periods may differ
 
 
 def kept_since(scene: Scene, period: float) -> float:
-    """Time [s] from which on histories are kept, for two periods and a step more; never where nobody asks for damage."""
+    """Time [s] from which on histories are kept, for two periods and a step; infinite without fatigue."""
     if scene.fatigue is None:
         return np.inf
     grid = time_grid(scene)
@@ -70,7 +70,7 @@ def fatigue_of(
 
 
 def link_strengths(scene: Scene, asked: FatigueSettings) -> dict[str, Strength]:
-    """Of all links with data, their own or of their material."""
+    """Strength of all links with data, their own or of their material."""
     out = {}
     for name, link in scene.links.items():
         data = asked.links.get(name) or asked.materials.get(link.material or "")
@@ -98,7 +98,7 @@ def _why_unreliable(scene: Scene, period: Period, repeats: float) -> str:
 def _spots(
     surfaces: Mapping[int, SurfaceHistory], fields: Mapping[int, LinkFatigue], asked: FatigueSettings, period: Period
 ) -> tuple[FatigueSpot, ...]:
-    """The places of a link with the highest damage, as pyLife judges them."""
+    """The places of a link with the highest damage, evaluated by pyLife."""
     if not surfaces:
         return ()
     every = [fields[k] for k in surfaces]

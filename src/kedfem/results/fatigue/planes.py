@@ -45,7 +45,7 @@ def dominant(moments: Float[np.ndarray, "k 6 6"], mean: Float[np.ndarray, "k 6"]
 
 
 def disproportion(H: Float[np.ndarray, "k 6 T"], d: Float[np.ndarray, "k 6"]) -> Float[np.ndarray, " k"]:
-    """What is left of the stresses without their part along d, at most over time, of the highest stress."""
+    """Residual of the stresses without their part along d, its maximum over time relative to the highest stress."""
     size = np.einsum("kqt,kqt->kt", H, H)
     c = np.matmul(d[:, None], H)[:, 0]
     left = np.maximum(size - c**2, 0.0).max(axis=1)

@@ -1,4 +1,4 @@
-"""What a material withstands: S-N curves from data, the FKM guideline's steps for local stresses; through pyLife."""
+"""Fatigue strength of a material: S-N curves from data, the FKM guideline's steps for local stresses, by pyLife."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -49,12 +49,12 @@ class Strength:
     data: FatigueData
 
     def without_mean(self) -> "Strength":
-        """The same for amplitudes in which mean stress is already."""
+        """The same for amplitudes that include the effect of mean stress."""
         return replace(self, M=0.0, data=self.data.model_copy(update={"mean_stress_sensitivity": 0.0}))
 
     @property
     def words(self) -> str:
-        """What it is, for tables."""
+        """The curve in words, for tables."""
         known = self.data
         if known.strain_life is not None:
             source = "strain-life data with Neuber's rule"
@@ -67,7 +67,7 @@ class Strength:
 
 
 def require_fatigue(where: str) -> None:
-    """OutputError unless what fatigue needs is installed."""
+    """OutputError unless the packages for fatigue are installed."""
     of_extra("pylife", where, EXTRA)
 
 
@@ -140,7 +140,7 @@ def material_factors(data: FatigueData, gradient: float = 0.0, cycle: tuple[floa
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What pyLife makes of one history.
+    """Evaluation of one history by pyLife.
 
     damage : in a period
     cycles : in a period
@@ -155,7 +155,7 @@ class Verdict:
 
 
 def collective(h: Float[np.ndarray, " T"]) -> Any:
-    """The cycles of a history that repeats itself, as pyLife counts them: range, mean and cycles."""
+    """The cycles of a periodic history, counted by pyLife: range, mean and cycles."""
     import pandas as pd
     from pylife.stress.rainflow import FourPointDetector, LoopValueRecorder
 

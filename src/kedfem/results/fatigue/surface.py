@@ -1,4 +1,4 @@
-"""The surface of a link over a period: the history of the stress at its points, and the damage that it does."""
+"""The surface of a link over a period: the stress histories at its points, and their damage."""
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -24,7 +24,7 @@ SIGNED, NORMAL, FINDLEY = range(3)
 
 @dataclass(frozen=True, slots=True)
 class LinkFatigue:
-    """What was found at the points of a link or segment; nan within it, where it was left out or has no data.
+    """Damage at the points of a link or segment; nan inside it, and where points were left out or have no data.
 
     damage : Miner's sum in a period
     utilisation : of the endurance stress without a stress gradient, with the safety factor
@@ -84,7 +84,7 @@ class Period:
 
 
 class SurfaceHistory:
-    """At one link or segment: its surface, and the history of its stress.
+    """The surface of one link or segment, and its stress history.
 
     near : what each of its points is near to, in words
     highest : stress over the period, of all that is examined [Pa]
@@ -143,7 +143,7 @@ class SurfaceHistory:
         self, kind: int, H: Float[np.ndarray, "k 6 T"], d: Float[np.ndarray, "k 6"],
         axes: Float[np.ndarray, "k 3 3"],
     ) -> tuple[Float[np.ndarray, "k 4"], Float[np.ndarray, "k T"]]:  # fmt: skip
-        """The worst history of each point, and what counting found."""
+        """The worst history of each point, with its counted cycles."""
         from kedfem.results.fatigue.counting_kernel import counted
 
         known = self.strength

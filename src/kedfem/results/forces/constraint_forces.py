@@ -1,4 +1,4 @@
-"""Joints enforced by constraint equations: which of their forces statics determine, and the energy of springs in them."""
+"""Joints enforced by constraint equations: their statically determinate forces, and the energy of springs in them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -85,7 +85,7 @@ def of_joint(joints: Sequence[ConstraintJoint], name: str) -> tuple[ConstraintJo
 
 @dataclass(frozen=True, slots=True)
 class ConstraintWork:
-    """Over a block of T time points.
+    """Work of springs and dampers over a block of T time points.
 
     stored : (T,) ½ Σ k e² [J]
     dissipated : (T,) in the step that ends there, Σ c (Δe)²/h [J]
@@ -102,7 +102,7 @@ class ConstraintWork:
 def joint_spring_work(
     block: Block, before: tuple[float, Float[np.ndarray, " s"], Float[np.ndarray, " s"]] | None
 ) -> ConstraintWork | None:
-    """Of all springs in joints; None without any.
+    """Work of all springs in joints; None without any.
 
     Parameters
     ----------

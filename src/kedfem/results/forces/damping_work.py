@@ -24,7 +24,7 @@ Scalars = Float[np.ndarray, " T"]
 
 @dataclass(frozen=True, slots=True)
 class DampingWork:
-    """What damping takes of all links in each of the steps that end at T time points.
+    """Energy that damping dissipates in all links, in each of the steps that end at T time points.
 
     dissipated : (T,) h ġᵀ C0 ġ with ġ = (g1 − g0)/h [J]
     drag : (T,) work of the damping forces against the rigid-body motion, where these turn with it [J]
@@ -47,7 +47,7 @@ def damping_work(
     of: Sequence[Constants], histories: Sequence[LinkHistory], made: Sequence[Products], turns: Sequence[bool],
     now: tuple[Scalars, RigidRates], before: PreviousPoint,
 ) -> DampingWork:  # fmt: skip
-    """Of damped links over a block, from the time point before it on.
+    """Work of damped links over a block, from the previous time point on.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def previous_of(
     t: Scalars, at: RigidRates, of: Sequence[Constants], histories: Sequence[LinkHistory], made: Sequence[Products],
     which: int,
 ) -> PreviousPoint:  # fmt: skip
-    """What the next block needs of one time point of this one."""
+    """The data of one time point that the next block needs."""
     first = which % len(t)
     one = slice(first, first + 1)
     then = at.every(one)

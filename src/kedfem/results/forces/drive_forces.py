@@ -1,4 +1,4 @@
-"""Channels of what drives and gears exert."""
+"""Channels of the forces and torques of drives and gears."""
 
 import numpy as np
 
@@ -49,13 +49,13 @@ def _prescribed_drive(scene: Scene, model: Model, prescribed: PrescribedBody, fo
 
 
 def _drive_channel(scene: Scene, driven: str, on: str) -> Channel:
-    """What the drive of a joint exerts on its first link."""
+    """Force or torque of a joint's drive on its first link."""
     key, quantity, unit = drive_effort(scene, driven)
     return Channel(key, (quantity,), unit, "world", f"{quantity} of the drive on link {on}")
 
 
 def gear_channel(model: Model, name: str) -> Recorded:
-    """What gears exert on the first joint's link."""
+    """Torque or force of gears on the first joint's link."""
     row, _ = of_joint(model.rows, f"gears.{name}")
     share = row.plus[0][0]
     text = f"torque of gears {name} on the link whose rotation the first joint's angle is, about that joint's axis"

@@ -1,4 +1,4 @@
-"""What a rigid link that a drive prescribes exerts on its drive joint."""
+"""Forces of a rigid link that a drive prescribes on its drive joint."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Channels of motors, springs and limits, and of how far hinges have turned."""
+"""Channels of motors, springs and limits, and of rotations of hinges."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -98,7 +98,7 @@ def element_forces(scene: Scene, model: Model) -> ElementForces:
 
 
 def acting(scene: Scene, measured: ElementForces) -> list[Recorded]:
-    """How motors, springs, limits and, without a drive, hinges move, and what force they exert."""
+    """Coordinates and forces of motors, springs, limits and, without a drive, of hinges."""
     every = ((name, *each) for name, element in measured.every.items() for each in _channels(name, element))
     elements = [Recorded(channel, partial(_column, name, which, sign)) for name, channel, which, sign in every]
     return elements + [

@@ -14,7 +14,7 @@ from kedfem.scene import GROUND, Scene
 
 
 def indeterminate_channels(scene: Scene, model: Model, channels: Collection[str]) -> dict[str, str]:
-    """The channels of joints and drives that a run does not have, each with the reason."""
+    """The missing channels of joints and drives of a run, each with the reason."""
     out, rows = {}, ConstraintForces(model)
     for name in scene.joints:
         for what in ("force", "moment"):

@@ -1,4 +1,4 @@
-"""Channels of what joints exert on links, from their port forces; block by block."""
+"""Channels of the forces of joints on links, from their port forces, block by block."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -43,7 +43,7 @@ def joint_channels(scene: Scene, model: Model, name: str, forces: Forces) -> lis
 
 
 def _constraint_joint(scene: Scene, name: str, forces: Forces) -> list[Recorded]:
-    """Of a joint enforced by constraint equations, about its point on the first link, of a slot the pin."""
+    """Wrench of a joint enforced by constraint equations, about its point on the first link, of a slot the pin."""
     on, other = moving_pair(scene.joints[name])
     sign = 1.0 if ordered(scene.joints[name])[0] == on else -1.0
     label = f"of joint {name} on link {on} from {other}"

@@ -153,7 +153,7 @@ def _damping(link: Link, full: Link, of: Rayleigh, now: LinkMoment, omega: Float
 
 
 def _force_elements(model: Model, k: int, at: Snapshot, now: LinkMoment) -> Forces:
-    """What springs, motors and limits exert: the part of the link's forces that loads and inertia are not."""
+    """Forces of springs, motors and limits: the link's forces without loads and inertia."""
     link = model.links[k]
     motion = at.motion.part(at.k, at.k + 1)
     left = now.F - applied(link, model.loads[k], motion, model.bodies[k])[0]

@@ -1,4 +1,4 @@
-"""Loads of joints and drives as suppliers of bearings and motors ask for them: link axes, mean by a power, peak, rms.
+"""Loads of joints and drives for suppliers of bearings and motors: in link axes, equivalent load, peak, rms.
 
 Equivalent bearing load [ISO 281, and catalogues of the makers]: bearings of constant load P live P^−p revolutions, so one
 of varying load lives as with P_m = (∫ P^p |ω| dt / ∫ |ω| dt)^(1/p), ω the speed of shaft against housing.
@@ -69,7 +69,7 @@ class JointLoad:
 
 @dataclass(frozen=True, slots=True)
 class DriveLoad:
-    """What a drive exerts.
+    """The effort of a drive.
 
     joint : that it drives
     effort : (T,) torque [N m], of a slide force [N], as `unit` says
@@ -161,7 +161,7 @@ def _load(
 
 
 def acted_links(name: str, joint: Joint, description: str) -> tuple[str, str]:
-    """The link that a joint's force acts on, and the one that it is from, as its channel's description says.
+    """The link that a joint's force acts on, and the link that exerts it, by the description of its channel.
 
     A ValueError says that it says neither.
     """
@@ -200,7 +200,7 @@ def drive_rate(scene: Scene, name: str, linked: Linkage, motion: RigidMotion) ->
 
 
 def last_turns(results: Results, turns: float | None) -> Bool[np.ndarray, " T"]:
-    """The rows of the last so many revolutions of the drive; all, where it is not said."""
+    """The rows of the last revolutions of the drive; all if their number is not given."""
     if turns is None:
         return np.ones(len(results.time), bool)
     gone = np.abs(results.angle - results.angle[-1])

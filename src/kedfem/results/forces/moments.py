@@ -25,7 +25,7 @@ Field = Float[np.ndarray, "_ _ _"]
 
 @dataclass(frozen=True, slots=True)
 class Weights:
-    """What makes moments of nodal vectors.
+    """Weights for moments of nodal vectors.
 
     rows : (1 + k, n) of each of the first k components
     couple : (n,) of the third component of a planar beam, else None
@@ -50,7 +50,7 @@ class Weights:
 
 @dataclass(frozen=True, slots=True)
 class Constants:
-    """What the audit needs of a link, constant.
+    """Constants of a link for the energy account.
 
     k : 2 of planar links, which move in a plane, else 3
     fit, weighted, ports : for moments of nodal forces y, of M u, and of port forces
@@ -75,7 +75,7 @@ class Constants:
 
 
 def constants(link: Link, joint: Attachment, body: int, damping: Rayleigh) -> Constants:
-    """Of a link that is body number `body` of the motion."""
+    """The constants of a link that is body number `body` of the motion."""
     k = 2 if link.planar else 3
     fit = np.column_stack([link.one, link.X[:, :k]])
     weighted = np.column_stack([link.m1[:, 0], link.mX[:, :k]])

@@ -110,7 +110,7 @@ def loose(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> tuple
 
 
 def negligible(indeterminate: Float[np.ndarray, "..."]) -> bool:
-    """Whether what a joint leaves open of a port force is nothing beside what it would carry."""
+    """Whether the indeterminate part of a port force is negligible beside the force that the joint would transmit."""
     return bool(np.abs(indeterminate).max(initial=0.0) < INDETERMINATE)
 
 

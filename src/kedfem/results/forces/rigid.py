@@ -22,15 +22,15 @@ from kedfem.results.records import XYZ, Channel
 from kedfem.scene import GROUND, ConstantSpeed, Joint, Scene, turn_steps
 
 Responses = Float[np.ndarray, "T c k"]
-OPEN = 1e-9  # of squares: a share that small of what a joint bears is rounding
+OPEN = 1e-9  # of squares: a smaller share of a joint's force is rounding
 ALONG = 1e-6  # sine of an angle between axes that are the same
-FEW = 4  # poses of a linkage of many bodies at which it is seen what statics determine of its joints
+FEW = 4  # poses of a linkage of many bodies at which the determinate forces of its joints are found
 KEPT = 4000  # time points of a revolution whose responses are kept, some kilobytes each
 
 
 @dataclass(frozen=True, slots=True)
 class RigidChannel:
-    """A channel of what a joint or drive bears.
+    """A channel of the force of a joint or drive.
 
     which : 0 force, 1 moment, 2 effort of the drive
     body, at : the body that it acts on, and the point that moments are about, in the reference position [m]
@@ -47,7 +47,7 @@ class RigidChannel:
 
 @dataclass(slots=True)
 class RigidForces:
-    """Rigid inverse dynamics of a scene; worked out once for each motion.
+    """Rigid inverse dynamics of a scene, computed once for each motion.
 
     force_elements : motors and springs, if any, which are loads of given motion
     turn : time steps after which all poses return; 0 if they do not
@@ -132,7 +132,7 @@ class RigidForces:
 
 
 def rigid_forces(scene: Scene, linkage: Linkage, inertias: Inertias, along: Path | None = None) -> RigidForces:
-    """What can be determined of a driven scene: drives, and with a path all joints; nothing where links move freely too.
+    """The determinate channels of a driven scene: drives, and with a path all joints; none if links move freely too.
 
     A free motion is held in the rigid linkage, by what no link has there.
     """
@@ -157,7 +157,7 @@ def returning(scene: Scene, along: Path | None) -> int:
 
 
 def stated_link(scene: Scene, joint: Joint) -> str:
-    """The link that a joint's force is said of: the first that is neither the ground nor a slider beside another link."""
+    """The link on which a joint's force is reported: the first that is neither the ground nor a slider beside another."""
     links = [name for name in joint.links if name != GROUND]
     return min(links, key=lambda name: len(links) > 1 and slider_axis(scene, name) is not None)
 
