@@ -14,7 +14,7 @@ from kedfem.links.beams import metric
 from kedfem.scene import scene_from
 from tests.cells import as_a_run
 from tests.moving import channels, ran, turned
-from tests.random_scenes import driven
+from tests.random_scenes import by_other_coordinates, driven
 from tests.systems import against_oracle, begun
 
 Raw = dict[str, Any]
@@ -153,9 +153,16 @@ STANDING = {"rigid", "frames"}
 """Laws of quasi-static positions."""
 
 
-def tried(law: str, seed: int, frames: str = "rigid-body", most: int = 6) -> Found:
-    """What becomes of one mechanism by one law: fine, differs, no mechanism, or refused; and how far it is from it."""
+def tried(law: str, seed: int, frames: str = "rigid-body", most: int = 6, elsewhere: bool = False) -> Found:
+    """What becomes of one mechanism by one law: fine, differs, no mechanism, or refused; and how far it is from it.
+
+    Parameters
+    ----------
+    elsewhere : whether drives, gears and laws are on coordinates of the joints in its loops
+    """
     raw = driven(seed, most, frames)
+    if elsewhere:
+        raw = by_other_coordinates(raw, seed)
     if law not in {*STANDING, "oracle"}:
         raw = varied(raw, seed)
     try:

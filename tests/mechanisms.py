@@ -134,7 +134,7 @@ def bounded(seed: int, given: argparse.Namespace) -> tuple[str, dict[str, float]
     try:
         with compiling(paused):
             if given.driven:
-                return tried(given.law, seed, given.driven, min(given.most, 6))
+                return tried(given.law, seed, given.driven, min(given.most, 6), given.elsewhere)
             return outcome(seed, given.most)
     except TimeoutError:
         return "takes too long", {}
@@ -152,6 +152,7 @@ def main() -> None:
     for name, usual in (("count", 200), ("first", 0), ("most", 12)):
         parser.add_argument(f"--{name}", type=int, default=usual)
     parser.add_argument("--driven", choices=FRAMES)
+    parser.add_argument("--elsewhere", action="store_true", help="driven ones at coordinates of joints in their loops")
     parser.add_argument("--law", choices=LAWS, default="rigid", help="of driven ones")
     parser.add_argument("--seconds", type=float, default=60.0, help="processor time of one, compiling aside")
     given = parser.parse_args()

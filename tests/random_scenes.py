@@ -1,5 +1,6 @@
 """Random driven mechanisms: arms, welds, loops, wheels and racks of all kinds of joints and links, with all laws."""
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -113,3 +114,57 @@ def driven(seed: int, most: int = 8, frames: str = "rigid-body") -> Raw:
     raw["output"] = {"probes": probes}
     raw["analysis"] = {"kind": "quasi-static", "end_time": 0.03, "step": 0.015, "accuracy": "quick", "frames": frames}
     return {key: x for key, x in raw.items() if x or key == "links"}
+
+
+def by_other_coordinates(raw: Raw, seed: int) -> Raw:
+    """A mechanism that is driven where its loops have joints, at any of their coordinates; gears and laws there too."""
+    random, raw = np.random.default_rng(seed + 2_000_000), copy.deepcopy(raw)
+    spared = {x["joint"] for key in ("springs", "motors", "limits") for x in raw.get(key, {}).values() if "joint" in x}
+    spared |= {name for gear in raw.get("gears", {}).values() for name in gear["joints"]}
+    spared |= {name for name, x in raw["joints"].items() if "bushing" in x}
+    spared |= {x["joint"] for x in raw["drives"].values()}
+    left = {name: x for name, x in raw["joints"].items() if name not in spared}
+
+    def taken(*kinds: str) -> str | None:
+        fit = [name for name, x in left.items() if x["kind"] in kinds]
+        if not fit:
+            return None
+        name = str(random.choice(fit))
+        del left[name]
+        return name
+
+    for drive in raw["drives"].values():
+        at = taken("cylindrical", "screw", "universal", "planar", "prismatic", "revolute")
+        if at is not None:
+            drive.clear()
+            drive |= {"joint": at, **coordinate(raw["joints"][at], random)}
+            kind = raw["joints"][at]["kind"]
+            slides = kind == "prismatic" or drive.get("coordinate") == "travel" or "along" in drive
+            speed = float(random.uniform(1, 4) * random.choice((1, -1)) * (0.1 if slides else 1))
+            drive["motion"] = {"kind": "constant_speed", "speed": speed}
+    for gear in raw.get("gears", {}).values():
+        at = taken("cylindrical", "screw", "planar")
+        if at is not None:
+            gear["joints"][0] = at
+    law = {"stiffness": 30.0, "damping": 0.3, "preload": 0.3}
+    if (at := taken("universal", "planar")) is not None:
+        on = coordinate(raw["joints"][at], random)
+        raw.setdefault("springs", {})["of"] = {"kind": "spring" if "along" in on else "torsion", "joint": at, **law, **on}
+    if (at := taken("universal", "planar")) is not None:
+        on = coordinate(raw["joints"][at], random)
+        table = {"over": "speed", "at": [-1.0, 1.0], "value": [6.0, -4.0]}
+        raw.setdefault("motors", {})["of"] = {"joint": at, "force" if "along" in on else "torque": table, **on}
+    return raw
+
+
+def coordinate(joint: Raw, random: np.random.Generator) -> Raw:
+    """The keys that choose one of a joint's coordinates."""
+    kind = joint["kind"]
+    if kind in {"cylindrical", "screw"}:
+        return {"coordinate": str(random.choice(["angle", "travel"]))}
+    if kind == "universal":
+        return {"about": str(random.choice(joint["links"]))}
+    if kind == "planar" and random.random() < 0.5:
+        across = np.cross(joint["axis"], random.normal(size=3))
+        return {"along": (across / np.linalg.norm(across)).tolist()}
+    return {}

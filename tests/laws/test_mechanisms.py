@@ -110,6 +110,29 @@ def test_a_driven_mechanism_vibrates_alike_by_both_solvers(seed: int) -> None:
     assert found
 
 
+#: what is on a coordinate of a joint in a loop, and cheap: drives, springs, motors, gears
+COORDINATES = [
+    ("solvers", 10, "rigid-body"),  # drive of a universal joint
+    ("oracle", 68, "co-rotational"),  # drive of a screw's angle, spring about an axis of a universal joint
+    *(
+        pytest.param(*each, marks=pytest.mark.long)
+        for each in (
+            ("solvers", 8, "rigid-body"),  # drive of a planar joint's travel, spring about an axis of a universal one
+            ("solvers", 104, "rigid-body"),  # drive of a screw's travel
+            ("turned", 101, "rigid-body"),  # drive of a planar joint's angle, spring about an axis, gears
+            ("turned", 80, "co-rotational"),  # drive of a cylindrical joint's travel
+        )
+    ),
+]
+
+
+@pytest.mark.parametrize(("law", "seed", "frames"), COORDINATES)
+def test_a_mechanism_driven_at_a_joint_of_a_loop_keeps_a_law(law: str, seed: int, frames: str) -> None:
+    what, found = tried(law, seed, frames, elsewhere=True)
+    assert what == "fine", found
+    assert found
+
+
 @pytest.mark.parametrize("seed", [2, 11, 16])
 def test_a_driven_mechanism_with_corotational_frames_moves_as_by_the_oracle(seed: int) -> None:
     """11 and 16: loads in the axes of rigid links."""

@@ -95,17 +95,23 @@ def rotation(i, kind, fit, y, Q, angle, A, U, change):  # type: ignore[no-untype
             for j in range(n):
                 x += y[b, j] * fit[i, m, j]
             A[b, m] = x
+    nearest(A, Q[i], U, change)
+
+
+@inner
+def nearest(A, Q, U, change):  # type: ignore[no-untyped-def]
+    """Q of A = Q U in place, from an earlier one."""
     for _ in range(TURNS):
         for b in range(3):
             for m in range(3):
-                U[b, m] = Q[i, 0, b] * A[0, m] + Q[i, 1, b] * A[1, m] + Q[i, 2, b] * A[2, m]
+                U[b, m] = Q[0, b] * A[0, m] + Q[1, b] * A[1, m] + Q[2, b] * A[2, m]
         change[0], change[1], change[2] = U[2, 1] - U[1, 2], U[0, 2] - U[2, 0], U[1, 0] - U[0, 1]
         turn_of(U, change)
         size = max(abs(change[0]), abs(change[1]), abs(change[2]))
         if size > 0.5:  # a slender segment shows its twist by small numbers: Newton's step may be far too long
             for b in range(3):
                 change[b] *= 0.5 / size
-        rodrigues(change, Q[i], U)
+        rodrigues(change, Q, U)
         if size <= 1e-8:  # the next, quadratically smaller, is rounding
             break
 

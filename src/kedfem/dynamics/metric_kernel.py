@@ -6,9 +6,7 @@ Tables are those of `dynamics.metric.Elements`, room is that of `dynamics.metric
 import numpy as np
 
 from kedfem.compiled import inner
-from kedfem.dynamics.frames_kernel import SPACE, rodrigues, rotation, turn_of
-
-TURNS = 50
+from kedfem.dynamics.frames_kernel import SPACE, nearest, rotation, turn_of
 
 
 @inner
@@ -200,21 +198,3 @@ def pulled_back(e, elements, room, U, w):  # type: ignore[no-untyped-def]
             on_i, on_j = y * g[j, b], y * g[i, b]
             on_g[i, b] += on_i
             on_g[j, b] += on_j
-
-
-@inner
-def nearest(A, Q, U, change):  # type: ignore[no-untyped-def]
-    """Q of A = Q U in place, from an earlier one."""
-    for _ in range(TURNS):
-        for b in range(3):
-            for m in range(3):
-                U[b, m] = Q[0, b] * A[0, m] + Q[1, b] * A[1, m] + Q[2, b] * A[2, m]
-        change[0], change[1], change[2] = U[2, 1] - U[1, 2], U[0, 2] - U[2, 0], U[1, 0] - U[0, 1]
-        turn_of(U, change)
-        size = max(abs(change[0]), abs(change[1]), abs(change[2]))
-        if size > 0.5:
-            for b in range(3):
-                change[b] *= 0.5 / size
-        rodrigues(change, Q, U)
-        if size <= 1e-8:  # the next, quadratically smaller, is rounding
-            break
