@@ -67,7 +67,7 @@ def beam_element(
                        np.zeros(len(stiffness)), np.zeros((len(stiffness), 3 * len(X))),
                        np.zeros((3 * len(X), len(stiffness))))  # fmt: skip
     made = replace(made, drawn_strains=strains_of(made, X))
-    rows = np.stack([pulled_back(made, X, e).ravel() for e in np.eye(len(stiffness))])
+    rows = pulled_back(made, X, np.eye(len(stiffness))).reshape(len(stiffness), -1)
     made = replace(made, rows=rows, share=np.linalg.pinv(rows))
     read_only(made.drawn_strains, made.rows, made.share)
     return made
@@ -91,8 +91,10 @@ def strains_of(element: BeamElement, y: Vectors) -> Column:
     return np.asarray(np.concatenate(every, axis=-1) - element.drawn_strains)
 
 
-def pulled_back(element: BeamElement, y: Vectors, stress: Column) -> Vectors:
-    """Nodal forces (…, n, 3) of stress resultants (…, s): (∂ strains / ∂ y)ᵀ stress."""
+def pulled_back(
+    element: BeamElement, y: Float[np.ndarray, "*#b n 3"], stress: Float[np.ndarray, "*#b s"]
+) -> Float[np.ndarray, "*#b n 3"]:
+    """Nodal forces (…, n, 3) of stress resultants (…, s), also of many at one position: (∂ strains / ∂ y)ᵀ stress."""
     g, x = element.gradients @ y, element.tangents @ y
     Q = node_rotations(element, g)
     d = _directors(element, Q)
@@ -113,9 +115,12 @@ def pulled_back(element: BeamElement, y: Vectors, stress: Column) -> Vectors:
     return np.asarray(element.tangents.T @ on_x + element.gradients.T @ on_g)
 
 
-def _turning(element: BeamElement, g: Vectors, Q: Float[np.ndarray, "*b m 3 3"], torque: Vectors) -> Vectors:
+def _turning(
+    element: BeamElement, g: Float[np.ndarray, "*#b k 3"], Q: Float[np.ndarray, "*#b m 3 3"],
+    torque: Float[np.ndarray, "*#b m 3"],
+) -> Float[np.ndarray, "*#b k 3"]:  # fmt: skip
     """Forces on gradient functions that do what torques (…, m, 3) do on the nodes' rotations."""
-    out = np.zeros_like(g)
+    out = np.zeros((*np.broadcast_shapes(g.shape[:-2], torque.shape[:-2]), *g.shape[-2:]))
     for a in range(Q.shape[-3]):
         mine, q = np.flatnonzero(element.node == a), Q[..., a, :, :]
         back = np.swapaxes(q, -1, -2)
