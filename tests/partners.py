@@ -163,7 +163,7 @@ def chain(
         if "axes" in made:
             made["axes"] = [vector(x) for x in made["axes"]]
         joints[each if each == "J" else f"K{k}"] = made
-    slides = driven == "travel" or (bool(driven) and kind == "prismatic")
+    slides = driven == "travel" or (bool(driven) and kind in ("prismatic", "slot"))
     motion = {"kind": "cycloidal", "travel" if slides else "angle": 0.02 if driven else 0.3, "rise": 0.03}
     analysis = {"end_time": 0.002, "step": 5e-4, "rho_inf": 0.8, "initial": "quasi-static", "accuracy": "quick"}
     on = "J" if driven else "A"

@@ -20,6 +20,7 @@ from kedfem.dynamics.system.forces.poses import forces_in_place, value
 from kedfem.dynamics.system.forces.supports import Pushed, exerted
 from kedfem.dynamics.system.record import ANGLE, Curve, End, Law, Spring, Stop, Term, Times, stiffness_factors
 from kedfem.links.record import Link
+from kedfem.links.stations import Stations
 from kedfem.motion.constraints import cross
 from kedfem.motion.counted_turns import turn_of
 from kedfem.motion.linkage import Linkage
@@ -72,6 +73,9 @@ def on_links(model: Model, joint: ConstraintJoint, at: Sequence[Float[np.ndarray
         if side is None:
             found.append(OnLink(rigid_end(body, point)))
             continue
+        if len(set(side.keys)) > 1:  # a line of several segments: their own frames know what their stresses do
+            found.append(OnLink(rigid_end(body, point)))
+            continue
         k = rider.carrier if rider else keys.index(side.keys[0])
         d = (2 if model.links[k].planar else 3) if rider else side.components
         c = d * len(side.points)
@@ -82,9 +86,28 @@ def on_links(model: Model, joint: ConstraintJoint, at: Sequence[Float[np.ndarray
 
 
 def links_of(model: Model, names: Sequence[str]) -> tuple[dict[str, Link], LinkageLayout]:
-    """What joints ask of a model without slots."""
-    layout = LinkageLayout({name: n for n, name in enumerate(names)}, {})
+    """What joints ask of a model: its links by their keys, and lines of slots as they are there."""
+    layout = LinkageLayout({name: n for n, name in enumerate(names)}, _lines(model))
     return dict(zip(link_keys(model), model.links, strict=True)), layout
+
+
+def _lines(model: Model) -> dict[str, Stations]:
+    """Stations of all slots on the links that carry them."""
+    out, keys = {}, link_keys(model)
+    for row in model.rows:
+        side = row.sides[1]
+        if side is not None and side.stations is not None:
+            found: dict[int, tuple[str, np.ndarray]] = {}
+            for key, link, joint, body in zip(keys, model.links, model.joints, model.bodies, strict=True):
+                for port, name in enumerate(joint.joints) if body == side.body else ():
+                    if name == row.name:
+                        weights = np.zeros(link.n)
+                        weights[joint.nodes] = joint.weights[port]
+                        away = np.linalg.norm(side.points - joint.points[port], axis=1)
+                        found[int(away.argmin())] = key, weights
+            on, every = zip(*(found[k] for k in range(len(side.points))), strict=True)
+            out[row.name] = replace(side.stations, weights=every, keys=on)
+    return out
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.motion.joint_equations import coordinate_axis, moving_pair, ordered
+from kedfem.motion.joint_equations import coordinate_axis, ordered
 from kedfem.output.springs import WIDTH, Shape, spring_shape, winding_shape
 from kedfem.scene import Joint, LineSpring, Scene, SpringEnd, TorsionSpring
 
@@ -71,11 +71,11 @@ def _along(
 ) -> tuple[tuple[SpringEnd, SpringEnd], float]:
     """Ends of a spring along a slide, and the radius of what is inside it [m].
 
-    One end is on the moving link, at the joint; the other on the link that it moves against, on that side from which a
-    pressed spring pushes as this one does.
+    One end is on the moving link, of a slot that with the pin, at the joint; the other on the link that it moves
+    against, on that side from which a pressed spring pushes as this one does.
     """
     joint = scene.joints[spring.joint or ""]
-    link, other = moving_pair(joint)
+    link, other = ordered(joint)
     side = 1.0 if spring.free < 0.0 else -1.0
     stops = [x.range for x in scene.limits.values() if x.kind == "travel" and x.joint == spring.joint]
     lengths = [MARGIN * max(side * end for end in each) for each in stops]

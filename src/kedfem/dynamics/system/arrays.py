@@ -125,7 +125,7 @@ class Ends(namedtuple("Ends", (
 
     line, line_at, full_at, full : ends on lines of slots, where their stations' weights begin, and what these stations
         have of z: a step makes `onto` of them
-    number : (E,) of each end's line, −1: none; free : whether its pin is where both links are, an OFFSET
+    number : (E,) of each end's line, −1: none; free : whether its pin is where both links are, as for `ON_LINES`
     axis, knots : (L, 3) their reference directions, and (n,) places of all stations; cubic_at, cubics : (p − 1, 4, p) of
         each the cardinal functions from each station on
     weights, slopes, pin : (n,) and (L,), where a step puts the stations' weights with their slopes, and the pins' places

@@ -24,6 +24,7 @@ from kedfem.motion.path import Path
 from kedfem.scene import Scene
 
 Vector = Float[np.ndarray, "3"]
+HALF = 0.5  # of a cosine: gaps of a line are along it, or at right angles
 
 
 def system_of(scene: Scene, linkage: Linkage, along: Path | None = None, model: Model | None = None) -> System:
@@ -111,17 +112,21 @@ class _Builder:
         """The law of a spring, motor or limit on its coordinate, which its links' own motion shows."""
         i, j = (self.end(joint, k, at) for k, (_, at) in enumerate(places(self.scene, element)))
         term = replace(term_of(self.scene, element, self.ends[i], self.ends[j]), i=i, j=j)
-        self.constraints.append(Constraint(joint.name, (term,), law_of(element), linear=False))
+        self.constraints.append(Constraint(joint.name, (self.on_line(term),), law_of(element), linear=False))
 
     def add(self, name: str, terms: Sequence[Term], law: Law, *joints: ConstraintJoint) -> None:
         """A constraint, linear where the frames of all its links are rigid-body ones; else pins are where both are."""
         linear = not {n for joint in joints for n in joint.bodies} & self.own
         if not linear:
-            terms = [
-                replace(x, kind=record.OFFSET) if x.kind == record.GAP and self.ends[x.j].form == record.LINE else x
-                for x in terms
-            ]
+            terms = [self.on_line(x) for x in terms]
         self.constraints.append(Constraint(name, tuple(terms), law, linear))
+
+    def on_line(self, term: Term) -> Term:
+        """A gap along or across a line as the pin and the bent line show it; others as they are."""
+        line = self.ends[term.j].line
+        if term.kind != record.GAP or line is None:
+            return term
+        return replace(term, kind=record.ARC if abs(term.b @ line.axis) > HALF else record.OFFSET)
 
     def numbered(self, term: Term, joint: ConstraintJoint, at: Vector) -> Term:
         """A term between both ends of a joint."""

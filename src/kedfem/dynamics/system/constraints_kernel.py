@@ -7,8 +7,9 @@ import numpy as np
 
 from kedfem.compiled import inner
 from kedfem.dynamics.system.ends_kernel import borne, cross, dot, times
-from kedfem.dynamics.system.measures_kernel import borne_by_line, off_line, rotation_along, tilt_along
+from kedfem.dynamics.system.measures_kernel import along_line, borne_by_line, off_line, rotation_along, tilt_along
 from kedfem.dynamics.system.record import (
+    ARC,
     CURVE,
     DISTANCE,
     DRIVEN,
@@ -38,8 +39,11 @@ def coordinate(ends, of, r, rigid_motion, place, turned, row, y, w):  # type: ig
     x, Q, _, _, _ = place
     for t in range(of.term_at[r], of.term_at[r + 1]):
         i, j, kind, factor = of.i[t], of.j[t], of.kind[t], of.factor[t]
-        if kind == OFFSET:
-            value, turning = off_line(ends.knots, ends, of, t, rigid_motion, place, w)
+        if kind in (OFFSET, ARC):
+            if kind == OFFSET:
+                value, turning = off_line(ends.knots, ends, of, t, rigid_motion, place, w)
+            else:
+                value, turning = along_line(ends.knots, ends, of, t, place, w), 0.0
             total += factor * value
             rate += factor * turning
             rate += borne(ends, i, w[6], w[7], factor, rigid_motion, place, row, y, w)

@@ -147,7 +147,7 @@ def end_arrays(system: System, number: Int[np.ndarray, " k"]) -> Ends:
     of_lines = [(end.line.axis, end.line.stations) for end in ends if end.line is not None]
     cubics = [_cardinal(along.s) for _, along in of_lines]
     terms = [term for each in system.constraints for term in each.terms]
-    free = {term.j for term in terms if term.kind == record.OFFSET}
+    free = {term.j for term in terms if term.kind in record.ON_LINES}
     return Ends(
         body=np.array([end.body for end in ends], int), form=np.array(forms, int),
         origin=_rows([end.origin for end in ends]),

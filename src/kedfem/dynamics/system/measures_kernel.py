@@ -15,7 +15,11 @@ its axis a to the tangent: n = b − 2 h (h · b) / h · h, h = a + t/|t|. With 
 
     δ(n · d) = F · δx + Σ (N'_k (q + κ d) − N_k F) · δx_k
 
-On the line d, q and κ are zero: as the pin slides, and as n turns, no force does work.
+On the line d, q and κ are zero: as the pin slides, and as n turns, no force does work. The place s itself changes by
+
+    δs = (t · δx + Σ (N'_k d − N_k t) · δx_k) / (t · t − c'' · d)
+
+so that a force along it acts on the pin along the tangent, and on the line's link against that where the pin is.
 """
 
 import numpy as np
@@ -89,16 +93,10 @@ def off_line(knots, ends, of, t, rigid_motion, place, w):  # type: ignore[no-unt
     """
     if knots is None:
         return 0.0, 0.0
-    x, Q, _, _, X = place
     R, _, omega = rigid_motion
-    i, j = of.i[t], of.j[t]
+    j = of.j[t]
     n, body = ends.number[j], ends.body[j]
-    for m in range(3):
-        w[4, m] = of.a[t, m] - ends.origin[i, m]
-    times(Q[i], w[4], w[10])
-    for m in range(3):
-        w[11, m] = x[i, m] + w[10, m]
-    ends.pin[n] = foot(ends, n, X, w)
+    pin_placed(ends, of, t, n, place, w)
     d, tangent, bend = w[9], w[5], w[8]
     size = np.sqrt(dot(tangent, tangent))
     times(R[body], of.b[t], w[6])
@@ -124,6 +122,34 @@ def off_line(knots, ends, of, t, rigid_motion, place, w):  # type: ignore[no-unt
         w[8, m] = w[11, m] + kappa * d[m]
     cross(w[10], w[6], w[7])
     return value, turning
+
+
+@inner
+def along_line(knots, ends, of, t, place, w):  # type: ignore[no-untyped-def]
+    """The place of the pin i on the line of j; w[6:9] as in `off_line`, of δs."""
+    if knots is None:
+        return 0.0
+    n = ends.number[of.j[t]]
+    pin_placed(ends, of, t, n, place, w)
+    d, tangent, bend = w[9], w[5], w[8]
+    steep = dot(tangent, tangent) - dot(bend, d)
+    for m in range(3):
+        w[6, m], w[8, m] = tangent[m] / steep, d[m] / steep
+    cross(w[10], w[6], w[7])
+    return ends.pin[n]
+
+
+@inner
+def pin_placed(ends, of, t, n, place, w):  # type: ignore[no-untyped-def]
+    """ends.pin becomes the place of a term's pin on line n, w[10] its arm from its end; the rest as in `spline_at`."""
+    x, Q, _, _, X = place
+    i = of.i[t]
+    for m in range(3):
+        w[4, m] = of.a[t, m] - ends.origin[i, m]
+    times(Q[i], w[4], w[10])
+    for m in range(3):
+        w[11, m] = x[i, m] + w[10, m]
+    ends.pin[n] = foot(ends, n, X, w)
 
 
 @inner

@@ -13,7 +13,8 @@ from kedfem.scene import Pieces
 HELD, DRIVEN, SPRING, CURVE, STOP = range(5)
 TIME, RATE, COORDINATE = range(3)
 OVER = {"time": TIME, "speed": RATE, "angle": COORDINATE, "travel": COORDINATE, "length": COORDINATE}
-GAP, TURN, ANGLE, DISTANCE, ROTATION, TILT, OFFSET = range(7)
+GAP, TURN, ANGLE, DISTANCE, ROTATION, TILT, OFFSET, ARC = range(8)
+ON_LINES = (OFFSET, ARC)  # of a pin and a line as both are
 RIGID, POINT, PLANAR_BEAM, PLANAR, FACE, SOLID, LINE = range(7)
 NOMINAL, STRESSED, COROTATIONAL, TANGENTIAL = range(4)
 RIGID_BODY = STRESSED  # frames up to it are those of the rigid-body motion
@@ -116,7 +117,8 @@ class End:
     body : number in the linkage
     form : RIGID: moves with the rigid-body motion; POINT: no orientation of its own; PLANAR_BEAM: (u, v, ψ) of a node;
         PLANAR, FACE, SOLID: a coupling surface of which one or two directions in a plane, two or three in space are
-        known; LINE: the stations of a line, among which the pin is where the rigid-body motion shows, or an OFFSET
+        known; LINE: the stations of a line, among which the pin is where the rigid-body motion shows, or for `ON_LINES`
+        where both links are
     origin : (3,) its point in the reference position [m]
     directions : (3, 3) rows e_k in the reference position, of which the first `known` are followed by interface points
     lengths : (3,) how far off the origin these points are [m]
@@ -142,7 +144,7 @@ class Term:
         j to a in i (see `motion.values`); DISTANCE: |x_i − x_j|; ROTATION: component along b of the rotation vector of i
         against j, less than half a turn; TILT: the same of the shortest rotation of an axis a from where it is in j to
         where it is in i; OFFSET: b · (x_i − c), c the point of the line of j, as it is, at which x_i stands square to it,
-        b across it
+        b across it; ARC: the place of c along the line, from its station at s = 0 on, by the line's length unstrained
     a, a_j : points of i and j [m], or directions [-]
     """
 

@@ -13,12 +13,12 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Forcing, LinkHistory, Multipliers, Products
-from kedfem.dynamics.joints.constraint_ports import LinkageLayout
 from kedfem.dynamics.joints.coupling import joined
 from kedfem.dynamics.joints.ports import port_columns, turned_ports
 from kedfem.dynamics.loads import initial_forces
 from kedfem.dynamics.matrices.dense import coordinates
-from kedfem.dynamics.model import Model, link_keys
+from kedfem.dynamics.model import Model
+from kedfem.dynamics.rigid_elements import links_of
 from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.dynamics.stiffening import Stiffening
 from kedfem.dynamics.system.build import system_of
@@ -37,7 +37,6 @@ from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.dynamics.system.starts.instant import Instant, renumbered
 from kedfem.dynamics.system.starts.internal_forces import own
 from kedfem.dynamics.system.state import History, State, empty_history
-from kedfem.links.stations import Stations
 from kedfem.motion.linkage import body_names, linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import Scene, corotational
@@ -62,30 +61,10 @@ def scene_system(scene: Scene, model: Model, stresses: Stiffening | None = None)
     """
     rigid = linkage(scene)
     if scene.springs or scene.motors or scene.limits:
-        links = dict(zip(link_keys(model), model.links, strict=True))
-        layout = LinkageLayout({name: k for k, name in enumerate(rigid.bodies)}, _lines(model))
+        links, layout = links_of(model, rigid.bodies)
         held = joined(scene, links, model.cuts, layout, elements=True)
         model = replace(model, joints=tuple(held.attachments.values()), rows=held.rows)
     return replace(system_of(scene, rigid, model=model), stiffening=stresses)
-
-
-def _lines(model: Model) -> dict[str, Stations]:
-    """Stations of all slots on the links that carry them."""
-    out, keys = {}, link_keys(model)
-    for row in model.rows:
-        side = row.sides[1]
-        if side is not None and side.stations is not None:
-            found: dict[int, tuple[str, np.ndarray]] = {}
-            for key, link, joint, body in zip(keys, model.links, model.joints, model.bodies, strict=True):
-                for port, name in enumerate(joint.joints) if body == side.body else ():
-                    if name == row.name:
-                        weights = np.zeros(link.n)
-                        weights[joint.nodes] = joint.weights[port]
-                        away = np.linalg.norm(side.points - joint.points[port], axis=1)
-                        found[int(away.argmin())] = key, weights
-            on, every = zip(*(found[k] for k in range(len(side.points))), strict=True)
-            out[row.name] = replace(side.stations, weights=every, keys=on)
-    return out
 
 
 class Steps:

@@ -19,15 +19,23 @@ Facts = Mapping[str, str]
 
 KINDS: tuple[str, ...] = get_args(JointKind)
 TURNED = ("revolute", "cylindrical", "screw", "planar", "universal")  # kinds with angles, which torques act on
-SLID = ("prismatic", "cylindrical", "screw", "planar")  # and with travels along directions fixed in a link
-DRIVEN = ("revolute", "prismatic", "cylindrical", "screw", "universal", "planar")  # with one that a drive may prescribe
+SLID = ("prismatic", "cylindrical", "screw", "planar", "slot")  # and with travels, which forces act along
+DRIVEN = (
+    "revolute",
+    "prismatic",
+    "cylindrical",
+    "screw",
+    "universal",
+    "planar",
+    "slot",
+)  # with one that a drive may prescribe
 GEARED = ("revolute", "cylindrical", "screw", "planar")  # with one angle, which gears couple
 RACKED = ("prismatic", "cylindrical", "screw")  # with one travel, along which a rack is
 ON_ANGLE, ON_TRAVEL, ON_DRIVE, ON_GEAR, ON_RACK = (
     f"{', '.join(kinds[:-1])} or {kinds[-1]}" for kinds in (TURNED, SLID, DRIVEN, GEARED, RACKED)
 )
 NO_ANGLE = "no other joint has an angle about an axis of its links"
-NO_TRAVEL = "no other joint has a travel along a direction that is fixed in a link"
+NO_TRAVEL = "no other joint has a travel along a direction, or a line, of a link"
 CONSTRAINED = "constraint equations"  # how a joint is enforced that moves with both of its links
 SHARED = "shared points"  # and one whose links share points
 
@@ -84,7 +92,7 @@ REFUSALS = (
         "there is none that it could resist", "a {kind} joint, which leaves all free",
         "leave it out, or take another kind of joint"),
     Refusal("drives", {"joint": others(*DRIVEN)}, "{where}.joint", f"name a {ON_DRIVE} joint",
-        "no other joint has an angle about an axis, or a travel along a direction, that is fixed in a link",
+        "no other joint has an angle about an axis, or a travel along a direction or a line, of a link",
         "{name!r}, which is {kind}", "drive a hinge or a slide beside it"),
     Refusal("drives", {"moves": ("travel",), "shaft": ("given",)}, "{where}.shaft_stiffness",
         "be given for an angle", "a shaft gives as it is twisted", "one for a travel of {name!r}, which is {kind}",

@@ -190,7 +190,7 @@ class Drive(Record):
 
 def prescribes_travel(kind: str, coordinate: object, along: object) -> bool:
     """Whether a drive prescribes the travel of a joint of some kind, not its angle, by two of its keys."""
-    return kind == "prismatic" or coordinate == "travel" or along is not None
+    return kind in ("prismatic", "slot") or coordinate == "travel" or along is not None
 
 
 class Gear(Record):

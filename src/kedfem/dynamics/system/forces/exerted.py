@@ -3,11 +3,11 @@
 A multiplier is a force along its coordinate; `Supports` turns it into forces and moments at the displaced ends.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from kedfem.arrays import Float
+from kedfem.arrays import Float, Int
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side
 from kedfem.dynamics.system.ends import end_of, same_end
@@ -76,32 +76,36 @@ def on_links(forces: Supports, riders: Mapping[int, tuple[int, np.ndarray]]) -> 
             if side is None:
                 continue
             if side.axis is None:
-                k, W = _placed(model.joints, model.bodies, row.name, side)
                 y = forces.on_end(row.name, end_of(side, row))
-                f = np.einsum("pn,tpd->tnd", W, y)
-                nodes = model.joints[k].nodes
+                every = [
+                    (k, model.joints[k].nodes, np.einsum("pn,tpd->tnd", W, y[:, points]))
+                    for k, points, W in _placed(model.joints, model.bodies, row.name, side)
+                ]
             else:
                 k, weights = riders[side.body]
                 end, pull = end_of(side, row), np.zeros((len(forces), 3))
                 for _, _, ends in forces.pushes(row.name):
                     pull += sum(f for other, _, f, _ in ends if same_end(other, end))
                 pull[:, 2] *= not model.links[k].planar
-                f = np.einsum("n,td->tnd", weights, pull)
-                nodes = np.arange(len(weights))
-            link = model.links[k]
-            total = out.setdefault(k, np.zeros((len(forces), link.n, link.d)))
-            total[:, nodes] += f[:, :, : link.d]
+                every = [(k, np.arange(len(weights)), np.einsum("n,td->tnd", weights, pull))]
+            for k, nodes, f in every:
+                link = model.links[k]
+                total = out.setdefault(k, np.zeros((len(forces), link.n, link.d)))
+                total[:, nodes] += f[:, :, : link.d]
     return out
 
 
 def _placed(
     joints: Sequence[Attachment], bodies: Sequence[int], name: str, side: Side
-) -> tuple[int, Float[np.ndarray, "p b"]]:
-    """The link that has the points of one side of a force element, and their weights on its nodes."""
+) -> Iterator[tuple[int, Int[np.ndarray, " q"], Float[np.ndarray, "q b"]]]:
+    """Links, or segments of one, with points of one side of a force element: which, and their weights on its nodes."""
+    left = np.ones(len(side.points), bool)
     for k, joint in enumerate(joints):
         here = np.flatnonzero([each == name for each in joint.joints])
         if bodies[k] == side.body and len(here):
             gaps = np.linalg.norm(joint.points[here][:, None] - side.points[None], axis=2)
-            if (gaps.min(axis=0) == 0.0).all():
-                return k, joint.weights[here[gaps.argmin(axis=0)]]
-    raise KeyError(name)
+            points = np.flatnonzero(left & (gaps.min(axis=0) == 0.0))
+            left[points] = False
+            yield k, points, joint.weights[here[gaps[:, points].argmin(axis=0)]]
+    if left.any():
+        raise KeyError(name)

@@ -9,7 +9,7 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.system.ends import line_of
-from kedfem.dynamics.system.record import CLOSE, FEET, TURNED, End
+from kedfem.dynamics.system.record import ARC, CLOSE, FEET, TURNED, End, Term
 from kedfem.links.stations import Stations
 from kedfem.motion.rigid import RigidMotion
 
@@ -17,8 +17,8 @@ Vectors = Float[np.ndarray, "T 3"]
 
 
 @dataclass(frozen=True, slots=True)
-class OffLine:
-    """A pin x beside its line, over time.
+class OnLine:
+    """A pin x on or beside its line, over time.
 
     s : (T,) its place [m]; c, tangent : (T, 3) of the line there
     force : (T, 3) on the pin, its negative on the line; slope : (T, 3) what the line's slopes bear [m]
@@ -36,15 +36,16 @@ class OffLine:
         return np.asarray(N1 * self.slope[:, None] - N * self.force[:, None])
 
 
-def off_line(
-    b: Float[np.ndarray, "3"], x: Vectors, end: End, motion: RigidMotion, z: Float[np.ndarray, "T k"]
-) -> OffLine:
-    """What a unit force along b, across the line of an end in the reference position, does to a pin at x and the line."""
+def on_line(term: Term, x: Vectors, end: End, motion: RigidMotion, z: Float[np.ndarray, "T k"]) -> OnLine:
+    """What a unit multiplier of an OFFSET or an ARC does to a pin at x and the line of an end."""
     line, R = line_of(end), motion.R[:, end.body]
     X = stationed(end, R, motion.p[:, end.body], z)
     s = feet(line.stations, X, x)
     c, t, bend = (np.einsum("tp,tpm->tm", line.stations.at(s, k), X) for k in range(3))
-    size, away, beside = _dot(t, t), x - c, R @ b
+    size, away, beside = _dot(t, t), x - c, R @ term.b
+    if term.kind == ARC:
+        steep = size - _dot(bend, away)
+        return OnLine(s, c, t, t / steep, away / steep)
     h = R @ line.axis + t / np.sqrt(size)
     twice = _dot(h, h)
     share = np.where(twice > TURNED, 1 / np.maximum(twice, TURNED), 0.0)
@@ -52,7 +53,7 @@ def off_line(
     g = (4 * on_b * on_d * share * h - 2 * (beside * on_d + away * on_b)) * share
     q = (g - _dot(g, t) / size * t) / np.sqrt(size)
     kappa = _dot(q, bend) / (size - _dot(bend, away))
-    return OffLine(s, c, t, beside - 2 * on_b * share * h + kappa * t, q + kappa * away)
+    return OnLine(s, c, t, beside - 2 * on_b * share * h + kappa * t, q + kappa * away)
 
 
 def stationed(

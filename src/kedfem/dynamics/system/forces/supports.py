@@ -12,9 +12,9 @@ from kedfem.arrays import Float
 from kedfem.dynamics.history import Block, Multipliers
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
 from kedfem.dynamics.system.ends import corners, end_of, same_end
-from kedfem.dynamics.system.forces.lines import off_line
+from kedfem.dynamics.system.forces.lines import on_line
 from kedfem.dynamics.system.forces.poses import Vectors, point_forces, poses, turning
-from kedfem.dynamics.system.record import DISTANCE, GAP, OFFSET, Constraint, End, Term
+from kedfem.dynamics.system.record import DISTANCE, GAP, ON_LINES, Constraint, End, Term
 from kedfem.motion.constraints import cross
 from kedfem.motion.rigid import RigidMotion
 
@@ -92,9 +92,9 @@ class Supports:
                 for other, _, f, t in self.exerted(each, term):
                     if not same_end(other, end):
                         continue
-                    if term.kind == OFFSET and end.line is not None:
+                    if term.kind in ON_LINES and end.line is not None:
                         pin = self.point(each, term.i, term.a)
-                        on = off_line(term.b, pin, end, self.motion, self.of.z).at_stations(end.line.stations)
+                        on = on_line(term, pin, end, self.motion, self.of.z).at_stations(end.line.stations)
                         y += m * on[:, :, : end.onto.shape[1]]
                     else:
                         y += m * point_forces(end, self.motion, self.z(each), f, t)
@@ -106,15 +106,15 @@ def exerted(term: Term, ends: tuple[End, End], motion: RigidMotion, z: Float[np.
 
     Parameters
     ----------
-    z : interface unknowns, that an OFFSET needs; without them ends are where the rigid-body motion shows
+    z : interface unknowns, that terms `ON_LINES` need; without them ends are where the rigid-body motion shows
     """
     (x_i, Q_i), (x_j, Q_j) = (poses(end, motion, z) for end in ends)
-    if term.kind not in (GAP, DISTANCE, OFFSET):
+    if term.kind not in (GAP, DISTANCE, *ON_LINES):
         turn = turning(term, Q_i, Q_j)
         return [(ends[0], x_i, 0 * x_i, turn), (ends[1], x_j, 0 * x_j, -turn)]
     a_i = Q_i @ (term.a - ends[0].origin)
-    if term.kind == OFFSET and z is not None:
-        of = off_line(term.b, x_i + a_i, ends[1], motion, z)
+    if term.kind in ON_LINES and z is not None:
+        of = on_line(term, x_i + a_i, ends[1], motion, z)
         return [(ends[0], x_i, of.force, cross(a_i, of.force)), (ends[1], of.c, -of.force, cross(of.tangent, of.slope))]
     a_j = Q_j @ (term.a_j - ends[1].origin)
     gap = x_i + a_i - x_j - a_j

@@ -1,6 +1,7 @@
 """Lines of slots in the reference solver: places of pins by bisection, directions across by rotations."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from kedfem.arrays import Float
 from kedfem.dynamics.system.ends import line_of
 from kedfem.dynamics.system.oracle.monolithic_places import of_rows, placed, point, valued
-from kedfem.dynamics.system.record import ANGLE, GAP, OFFSET, TURN, End, System, Term
+from kedfem.dynamics.system.record import ANGLE, ARC, GAP, ON_LINES, TURN, End, System, Term
 from kedfem.errors import SolveError
 
 NEAR = 1e-15  # of places by bisection
@@ -36,18 +37,34 @@ def measured(
         value[rows], gradient[rows], near[rows] = of_rows(system, [terms[n] for n in rows], poses, near[rows])
     for n in set(range(len(terms))).difference(rows):
         term, end = terms[n], system.ends[terms[n].j]
-        if term.kind == OFFSET:
+        if term.kind in ON_LINES:
             pin = point(poses[term.i], system.ends[term.i], term.a)
-            value[n], gradient[n] = off_line(term, *pin, end, (R[end.body], p[end.body], z))
+            on = _foot(*pin, end, (R[end.body], p[end.body], z))
+            value[n], gradient[n] = (on.s, on.slides) if term.kind == ARC else off_line(term, on, end, R[end.body])
         else:
             value[n], gradient[n] = valued(system, term, poses[term.i], poses[term.j])
     return value, gradient, near
 
 
-def off_line(
-    term: Term, pin: Float[np.ndarray, "3"], by_pin: Float[np.ndarray, "3 k"], end: End, pose: tuple[Any, Any, Column]
-) -> tuple[float, Column]:
-    """How far a pin is off a line along a direction across it, and the gradient by z.
+@dataclass(frozen=True, slots=True)
+class _Foot:
+    """Where a pin stands square to a line: the place s, the tangent of length one, the way from there to the pin.
+
+    slides, moves, turns : how s, that way with s constant, and the tangent change with z
+    """
+
+    s: float
+    tangent: Float[np.ndarray, "3"]
+    away: Float[np.ndarray, "3"]
+    slides: Column
+    moves: Float[np.ndarray, "3 k"]
+    turns: Float[np.ndarray, "3 k"]
+
+
+def _foot(
+    pin: Float[np.ndarray, "3"], by_pin: Float[np.ndarray, "3 k"], end: End, pose: tuple[Any, Any, Column]
+) -> _Foot:
+    """Where a pin is on the line of an end.
 
     Parameters
     ----------
@@ -66,15 +83,21 @@ def off_line(
     X = p + line.stations.points @ R.T + onto @ z
     curve, cardinal = CubicSpline(line.stations.s, X), CubicSpline(line.stations.s, np.eye(count))
     s = _place(curve, pin)
-    tangent = curve(s, 1) / np.linalg.norm(curve(s, 1))
-    axis, away = R @ line.axis, pin - curve(s)
-    n = _turned(axis, tangent) @ R @ term.b
+    away = pin - curve(s)
     moved, turned = (np.einsum("p,pmk->mk", cardinal(s, k), onto) for k in (0, 1))
     slides = away @ turned + curve(s, 1) @ (by_pin - moved)
     slides = slides / (curve(s, 1) @ curve(s, 1) - curve(s, 2) @ away)
-    by_tangent = (turned + np.outer(curve(s, 2), slides)) / np.linalg.norm(curve(s, 1))
-    spin = np.cross(axis, tangent) / (1 + axis @ tangent) @ by_tangent  # about the tangent, of the smallest rotation
-    return float(n @ away), n @ (by_pin - moved) - (away @ np.cross(tangent, n)) * spin
+    size = np.linalg.norm(curve(s, 1))
+    by_tangent = (turned + np.outer(curve(s, 2), slides)) / size
+    return _Foot(s, curve(s, 1) / size, away, slides, by_pin - moved, by_tangent)
+
+
+def off_line(term: Term, on: _Foot, end: End, R: Float[np.ndarray, "3 3"]) -> tuple[float, Column]:
+    """How far a pin is off a line along a direction across it, and the gradient by z; R of the line's body."""
+    axis, tangent = R @ line_of(end).axis, on.tangent
+    n = _turned(axis, tangent) @ R @ term.b
+    spin = np.cross(axis, tangent) / (1 + axis @ tangent) @ on.turns  # about the tangent, of the smallest rotation
+    return float(n @ on.away), n @ on.moves - (on.away @ np.cross(tangent, n)) * spin
 
 
 def _place(curve: CubicSpline, x: Float[np.ndarray, "3"]) -> float:

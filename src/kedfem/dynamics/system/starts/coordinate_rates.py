@@ -17,11 +17,12 @@ from kedfem.arrays import Float
 from kedfem.dynamics.system.forces.rotations import arc
 from kedfem.dynamics.system.record import (
     ANGLE,
+    ARC,
     DISTANCE,
     FACE,
     GAP,
     LINE,
-    OFFSET,
+    ON_LINES,
     PLANAR,
     PLANAR_BEAM,
     POINT,
@@ -35,7 +36,7 @@ from kedfem.dynamics.system.record import (
     System,
     Term,
 )
-from kedfem.dynamics.system.starts.offsets import offset
+from kedfem.dynamics.system.starts.offsets import foot, offset
 from kedfem.dynamics.system.starts.series import Series, inverse, product, root
 from kedfem.motion.newton import cross_matrix, rotation
 from kedfem.motion.rigid import RigidMotion
@@ -101,9 +102,9 @@ def angles(system: System, at: Places, z: Float[np.ndarray, " k"]) -> Float[np.n
 def pins(system: System, at: Places, z: Float[np.ndarray, " k"]) -> dict[int, float]:
     """Places of pins on lines as they are, by the numbers of the lines' ends [m]."""
     poses, out = _Poses(system, at, np.stack([z, 0 * z, 0 * z])), dict[int, float]()
-    for term in (term for each in system.constraints for term in each.terms if term.kind == OFFSET):
-        found = offset(term, _point(system, term, poses), system.ends[term.j], at, poses.z)
-        out[term.j] = found[1]
+    for term in (term for each in system.constraints for term in each.terms if term.kind in ON_LINES):
+        found = foot(_point(system, term, poses), system.ends[term.j], at, poses.z)
+        out[term.j] = float(found.s[0])
     return out
 
 
@@ -141,9 +142,11 @@ def _summed(system: System, each: Constraint, poses: _Poses) -> Series:
 
 
 def _of_term(system: System, term: Term, poses: _Poses) -> Series:
-    if term.kind != OFFSET:
+    if term.kind not in ON_LINES:
         return value(system, term, poses(term.i), poses(term.j))
-    return offset(term, _point(system, term, poses), system.ends[term.j], poses.at, poses.z)[0]
+    end = system.ends[term.j]
+    found = foot(_point(system, term, poses), end, poses.at, poses.z)
+    return found.s if term.kind == ARC else offset(term, found, end, poses.at)
 
 
 def _point(system: System, term: Term, poses: _Poses) -> Series:

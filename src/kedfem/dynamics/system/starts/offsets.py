@@ -1,8 +1,9 @@
-"""How far pins are off the lines of their slots, as series in time; see `coordinate_rates`.
+"""Where pins are on the lines of their slots, and how far off these, as series in time; see `coordinate_rates`.
 
 The place s of the pin as a series makes t · (x − c(s)) zero at each order; n is as in `measures_kernel`.
 """
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,10 +18,17 @@ if TYPE_CHECKING:
     from kedfem.dynamics.system.starts.coordinate_rates import Places
 
 
-def offset(
-    term: Term, x: Float[np.ndarray, "3 3"], end: End, at: "Places", z: Float[np.ndarray, "3 k"]
-) -> tuple[Series, float]:
-    """An OFFSET as a series (3,), and the place of its pin on the line [m].
+@dataclass(frozen=True, slots=True)
+class Foot:
+    """The place s of a pin on a line, the tangent there, and the way from the line to the pin, as series."""
+
+    s: Series
+    tangent: Series
+    away: Series
+
+
+def foot(x: Float[np.ndarray, "3 3"], end: End, at: "Places", z: Float[np.ndarray, "3 k"]) -> Foot:
+    """Where a pin stands square to its line.
 
     Parameters
     ----------
@@ -40,12 +48,17 @@ def offset(
     steep = tangent[0] @ tangent[0] - weights[2] @ X[0] @ away[0]
     for order in (1, 2):
         s[order] += product(np.dot, of_line(1), x - of_line(0))[order] / steep
-    tangent, away = of_line(1), x - of_line(0)
+    return Foot(s, of_line(1), x - of_line(0))
+
+
+def offset(term: Term, on: Foot, end: End, at: "Places") -> Series:
+    """An OFFSET as a series (3,)."""
+    R, tangent, away = at.R[:, end.body], on.tangent, on.away
     size = root(product(np.dot, tangent, tangent))
     h = R @ line_of(end).axis + product(np.multiply, tangent, inverse(size)[:, None])
     on_b, on_d = product(np.dot, h, b := R @ term.b), product(np.dot, h, away)
     twice = product(np.dot, h, h)
     if twice[0] < TURNED:
-        return product(np.dot, b, away), float(s[0])
+        return product(np.dot, b, away)
     share = product(np.multiply, product(np.multiply, on_b, on_d), inverse(twice))
-    return product(np.dot, b, away) - 2 * share, float(s[0])
+    return product(np.dot, b, away) - 2 * share
