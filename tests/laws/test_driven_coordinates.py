@@ -33,6 +33,7 @@ COORDINATES = [
     ("revolute", "angle", "angle"), ("prismatic", "travel", "travel"), ("cylindrical", "angle", "angle"),
     ("cylindrical", "travel", "travel"), ("screw", "angle", "angle"), ("screw", "travel", "travel"),
     ("universal", "angle", "about the first"), ("planar", "angle", "angle"), ("planar", "travel", ""),
+    ("slot", "travel", "travel"),
 ]  # fmt: skip
 DIRECTIONS = ("x", "y", "z", "oblique")
 ENDS = ("beam", "beam")

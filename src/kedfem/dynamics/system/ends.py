@@ -22,11 +22,18 @@ def corners(side: Side) -> list[End]:
 
 
 def same_end(one: End, other: End) -> bool:
-    """Whether two ends are one: on the same points of the same body."""
-    return one.body == other.body and all(
+    """Whether two ends are one: on the same points of the same body, of a line with the same pin."""
+    return one.body == other.body and _pinned_alike(one.line, other.line) and all(
         x.shape == y.shape and np.array_equal(x, y)
         for x, y in ((one.origin, other.origin), (one.columns, other.columns), (one.onto, other.onto))
     )
+
+
+def _pinned_alike(one: Line | None, other: Line | None) -> bool:
+    """Whether two lines have one pin, whose place is from one point on; also of none."""
+    if one is None or other is None:
+        return one is other
+    return one.pin == other.pin and np.array_equal(one.at, other.at) and np.array_equal(one.axis, other.axis)
 
 
 def _selected(
