@@ -148,7 +148,7 @@ def scene_of(cell: Cell) -> Raw:
     raw["analysis"] |= {"frames": "co-rotational" if cell.frames == "co-rotational" else "rigid-body"}
     if cell.frames == "stiffening":
         raw["analysis"]["stiffening"] = True
-    slow = travel or (on_joint and cell.joint == "prismatic") or (cell.joint, cell.links) in FAST
+    slow = travel or (on_joint and cell.joint in {"prismatic", "slot"}) or (cell.joint, cell.links) in FAST
     speed = 0.3 if slow else 3.0
     raw["drive"]["motion"] = {"kind": "constant_speed", "speed": speed}
     if not cell.driven:
@@ -182,7 +182,7 @@ def sections(cell: Cell, crank: Any, J: Raw) -> Raw:
     torque = {"over": "speed", "at": [-50, 50], "value": [5, -5]}
     away = [crank[0] + 0.05, crank[1] + 0.1, *crank[2:]]
     ends = [{"link": "crank", "at": crank}, {"link": "ground", "at": away}]
-    along, slides = cell.joint in SLID, cell.joint in {"prismatic", "planar"}
+    along, slides = cell.joint in SLID, cell.joint in {"prismatic", "planar", "slot"}
     on = {"joint": "J"}
     if cell.joint == "universal":
         on["about"] = J["links"][0]

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from kedfem.dynamics.system.ends import left_line
+from kedfem.dynamics.system.record import ON_LINES
 from kedfem.output.joint_springs import line_springs
 from kedfem.scene import scene_from
 from tests.driven_mechanisms import off_rigid, stiffer
@@ -198,6 +200,16 @@ CELLS = [
 def test_the_oracle_has_the_same(partners: tuple[str, str], plane: bool, frames: str, driven: bool) -> None:
     """Which finds places by bisection, and rates by differences: 4e-10 found."""
     assert against_oracle(begun(acted_on(partners, plane, frames, driven)), keeps=True) < 1e-8
+
+
+@pytest.mark.parametrize("frames", FRAMES)
+def test_a_pin_beyond_its_line_is_told_by_the_joint(frames: str) -> None:
+    """Whichever of what is on it finds it there."""
+    system = begun(acted_on(("planar beam", "planar beam"), True, frames)).ready.system
+    lines = {term.j for each in system.constraints for term in each.terms if term.kind in ON_LINES}
+    assert lines
+    for end in lines:
+        assert left_line(system, end, 0.0).startswith("joints.J: the pin must stay on link 'link 1'")
 
 
 def long(partners: tuple[str, str], plane: bool, frames: str, driven: bool, step: float = 2.5e-4) -> Raw:

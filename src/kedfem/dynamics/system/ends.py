@@ -23,9 +23,13 @@ def corners(side: Side) -> list[End]:
 
 def same_end(one: End, other: End) -> bool:
     """Whether two ends are one: on the same points of the same body, of a line with the same pin."""
-    return one.body == other.body and _pinned_alike(one.line, other.line) and all(
-        x.shape == y.shape and np.array_equal(x, y)
-        for x, y in ((one.origin, other.origin), (one.columns, other.columns), (one.onto, other.onto))
+    return (
+        one.body == other.body
+        and _pinned_alike(one.line, other.line)
+        and all(
+            x.shape == y.shape and np.array_equal(x, y)
+            for x, y in ((one.origin, other.origin), (one.columns, other.columns), (one.onto, other.onto))
+        )
     )
 
 
@@ -93,9 +97,11 @@ def line_weights(end: End, motion: RigidMotion) -> Float[np.ndarray, "T p"]:
 
 def left_line(system: System, end: int, t: float) -> str:
     """The message where a pin slides beyond the line of an end."""
-    name = next(each.name for each in system.constraints if any(term.j == end for term in each.terms))
+    line = line_of(system.ends[end])
+    every = ((each.name, system.ends[term.j].line) for each in system.constraints for term in each.terms)
+    name = next(name for name, other in every if _pinned_alike(line, other))  # joints stand before springs along them
     carrier = system.model.links[system.model.bodies.index(system.ends[end].body)].name
-    s = line_of(system.ends[end]).stations.s
+    s = line.stations.s
     return (
         f"joints.{name}: the pin must stay on link '{carrier}', which reaches from {s[0]:.6g} to {s[-1]:.6g} m along the "
         f"line, got one that slides off it at t = {t:.6g} s: draw a longer line, or hold the pin"

@@ -42,8 +42,8 @@ class Motor(Record):
     exactly_one = ("torque", "force"), " [N*m], or force [N] of a slider"
     only_with = ("about", "torque"), ("along", "force")
     joint: JointName
-    """the joint: revolute, cylindrical, screw, planar or universal for a torque, prismatic, cylindrical, screw or planar
-    for a force"""
+    """the joint: revolute, cylindrical, screw, planar or universal for a torque, prismatic, cylindrical, screw, planar
+    or slot for a force"""
     about: EndName | None = None
     """of a torque on a universal joint: the link about whose axis it is"""
     along: Axis | None = None
@@ -124,8 +124,8 @@ class _Elastic(Record):
 class LineSpring(_Elastic):
     """A spring and a damper between two points, or along a slide: it pulls with k (l − l0) + c l' + F.
 
-    Along a slide l is the travel of the joint's first link that is not the ground against the other, from the drawn
-    position, and what it pulls back is that link.
+    Along a slide l is the travel of the joint's first link that is not the ground against the other, along a slot that of
+    its pin, from the drawn position, and what it pulls back is that link.
     """
 
     effort = "force"
@@ -135,7 +135,7 @@ class LineSpring(_Elastic):
     between: tuple[SpringEnd, SpringEnd] | None = None
     """its two ends, each `{ link = "...", at = point }`"""
     joint: JointName | None = None
-    """a prismatic, cylindrical, screw or planar joint that it lies along, instead of two ends"""
+    """a prismatic, cylindrical, screw, planar or slot joint that it lies along, instead of two ends"""
     along: Axis | None = None
     """of a planar joint: the direction in its plane that it lies along, as that of a motor"""
     stiffness: Stiffness = 0.0
@@ -145,7 +145,7 @@ class LineSpring(_Elastic):
     free_length: FreeLength | None = None
     """l0 between two points, at which it does not pull; as long in the reference position if not given"""
     free_travel: Length | None = None
-    """l0 along a slide, at which it does not pull; 0, the reference position, if not given"""
+    """l0 along a slide or slot, at which it does not pull; 0, the reference position, if not given"""
     preload: Force | None = None
     """with what it pulls in the reference position, instead of l0; negative: it pushes"""
     force: PullOver | None = None
@@ -245,14 +245,14 @@ class _Range(Record):
 
 
 class TravelLimit(_Range):
-    """Stops along a slide: beyond one they push back with k s + c s', s how far beyond, and never pull.
+    """Stops along a slide or slot: beyond one they push back with k s + c s', s how far beyond, and never pull.
 
     The travel is that of the joint's first link that is not the ground against the other, from the reference position.
     """
 
     kind: Literal["travel"] = "travel"
     joint: JointName
-    """a prismatic, cylindrical, screw or planar joint that no drive moves"""
+    """a prismatic, cylindrical, screw, planar or slot joint that no drive moves"""
     along: Axis | None = None
     """of a planar joint: the direction in its plane along which the travel is, as that of a motor"""
     lower: Length | None = None
