@@ -212,6 +212,16 @@ def test_a_pin_beyond_its_line_is_told_by_the_joint(frames: str) -> None:
         assert left_line(system, end, 0.0).startswith("joints.J: the pin must stay on link 'link 1'")
 
 
+@pytest.mark.parametrize("frames", FRAMES)
+@pytest.mark.parametrize("plane", [True, pytest.param(False, marks=pytest.mark.long)])
+def test_off_its_line_too_the_oracle_has_the_same(plane: bool, frames: str) -> None:
+    """By 0.1 mm on soft bushings, where the line's slopes bear a part of what acts along it."""
+    raw = acted_on(("planar beam", "planar beam") if plane else ("beam", "beam"), plane, frames)
+    raw["joints"]["J"]["bushing"] = {"stiffness": 1e3, "damping": 1.0}
+    raw["motors"]["m"]["force"]["value"] = [2000.0, 4000.0]
+    assert against_oracle(begun(raw), 10, keeps=True) < 1e-8
+
+
 def long(partners: tuple[str, str], plane: bool, frames: str, driven: bool, step: float = 2.5e-4) -> Raw:
     """40 steps from a quasi-static start."""
     raw = acted_on(partners, plane, frames, driven)

@@ -59,6 +59,6 @@ def offset(term: Term, on: Foot, end: End, at: "Places") -> Series:
     on_b, on_d = product(np.dot, h, b := R @ term.b), product(np.dot, h, away)
     twice = product(np.dot, h, h)
     if twice[0] < TURNED:
-        return product(np.dot, b, away)
+        return np.asarray(product(np.dot, b, away))
     share = product(np.multiply, product(np.multiply, on_b, on_d), inverse(twice))
-    return product(np.dot, b, away) - 2 * share
+    return np.asarray(product(np.dot, b, away) - 2 * share)
