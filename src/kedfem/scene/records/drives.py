@@ -167,7 +167,8 @@ MotionLaw = Annotated[ConstantSpeed | Ramp | Table | Cycloidal | Polynomial | Ha
 
 
 class Drive(Record):
-    """A joint that turns or slides in a given way: its first link that is not the ground against the other."""
+    """A joint that turns or slides in a given way: its first link that is not the ground against the other, of a slot the
+    pin along the line."""
 
     only_with = (("shaft_damping", "shaft_stiffness"),)
     joint: JointName

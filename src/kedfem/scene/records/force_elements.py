@@ -125,7 +125,7 @@ class LineSpring(_Elastic):
     """A spring and a damper between two points, or along a slide: it pulls with k (l − l0) + c l' + F.
 
     Along a slide l is the travel of the joint's first link that is not the ground against the other, along a slot that of
-    its pin, from the drawn position, and what it pulls back is that link.
+    its pin, from the reference position, and what it pulls back is that link.
     """
 
     effort = "force"
@@ -247,7 +247,8 @@ class _Range(Record):
 class TravelLimit(_Range):
     """Stops along a slide or slot: beyond one they push back with k s + c s', s how far beyond, and never pull.
 
-    The travel is that of the joint's first link that is not the ground against the other, from the reference position.
+    The travel is that of the joint's first link that is not the ground against the other, along a slot that of its pin,
+    from the reference position.
     """
 
     kind: Literal["travel"] = "travel"
