@@ -28,7 +28,7 @@ from kedfem.motion.joint_equations import (
 )
 from kedfem.motion.parts import parts
 from kedfem.motion.redundancy import LOOSER, Looser, would_move
-from kedfem.motion.released_motions import RANK_TOLERANCE, Drawn, free_motions, listed, null_space, planar, rank, span
+from kedfem.motion.released_motions import RANK_TOLERANCE, Reference, free_motions, listed, null_space, planar, rank, span
 from kedfem.motion.released_motions import remedy as held_by
 from kedfem.motion.values import Poses, features, jacobian
 from kedfem.scene import Scene, corotational_links, driven_travel, plane_scene
@@ -46,7 +46,7 @@ class Linkage:
     rows : as arrays
     joints : for each row the joint's name, or that of the coupling as `gears.NAME`
     size : characteristic length, makes rows and columns comparable [m]
-    centre : of the joints; poses are those of points drawn there, so that the scene may lie far from the origin [m]
+    centre : of the joints, and reference point of all poses, so that the scene may lie far from the origin [m]
     drives : what is driven
     mobility : free motions that the drives leave, of a plane scene in its plane; as many rows, the last ones, hold these
     blocks : how rows are solved entry by entry, of linkages of many bodies
@@ -97,7 +97,7 @@ def linkage(scene: Scene) -> Linkage:
         wanted = "must be made by scene_from or read_scene"
         raise SceneError(f"the scene: {wanted}, got a record that nobody checked")
     if any(joint.open for joint in scene.joints.values()):
-        raise ValueError("a scene whose links are drawn apart must be assembled first")
+        raise ValueError("a scene whose links are apart in the reference position must be assembled first")
     rows, driven = _all_rows(scene)
     bodies, size, every = body_names(scene), scene_size(scene), stacked(rows)
     several = blocks(every, len(bodies), size) if driven and len(bodies) > MANY else None
@@ -107,13 +107,13 @@ def linkage(scene: Scene) -> Linkage:
         every_part = parts(stacked(held), [row.joint for row in held], len(bodies))
         free = 6 * (len(bodies) - 1) - sum(part.rank(rest, size) for part in every_part)
     elif several is None or not _well_driven(every, several, size):
-        drawn = reference_linkage(scene, rows)
+        reference = reference_linkage(scene, rows)
         if plane_scene(scene):
-            across = _across(drawn, bodies)
+            across = _across(reference, bodies)
             rows = rows + across
-            drawn = planar(reference_linkage(scene, rows) if across else drawn)
-        free = _check_mobility(scene, drawn)
-        rows = rows + _holding(scene, drawn, free)
+            reference = planar(reference_linkage(scene, rows) if across else reference)
+        free = _check_mobility(scene, reference)
+        rows = rows + _holding(scene, reference, free)
         every = stacked(rows)
         several = several and blocks(every, len(bodies), size)
     joints = tuple(row.joint for row in rows)
@@ -142,12 +142,12 @@ def _all_rows(scene: Scene) -> tuple[list[ConstraintEquation], Drives]:
     return undriven_rows(scene) + driving, driven
 
 
-def reference_linkage(scene: Scene, rows: list[ConstraintEquation] | None = None) -> Drawn:
+def reference_linkage(scene: Scene, rows: list[ConstraintEquation] | None = None) -> Reference:
     """A scene's linkage to first order in the reference position, with all its rows unless given; nothing is refused."""
     bodies, size, rows = body_names(scene), scene_size(scene), rows or _all_rows(scene)[0]
     J, names = reference_jacobian(rows, len(bodies), size), tuple(row.joint for row in rows)
     moves = np.array([row.drive is not None for row in rows], bool)
-    return Drawn(J, names, moves, bodies[1:], scene.joints, scene_centre(scene), size)
+    return Reference(J, names, moves, bodies[1:], scene.joints, scene_centre(scene), size)
 
 
 def undriven_rows(scene: Scene) -> list[ConstraintEquation]:
@@ -157,15 +157,15 @@ def undriven_rows(scene: Scene) -> list[ConstraintEquation]:
     return rows + [gear_row(scene, name, bodies) for name in scene.gears]
 
 
-def looser_rows(scene: Scene, drawn: Drawn) -> Looser:
+def looser_rows(scene: Scene, reference: Reference) -> Looser:
     """Rows that joints would have if they were of a kind that constrains less; driven joints are left as they are."""
-    bodies = (GROUND, *drawn.links)
+    bodies = (GROUND, *reference.links)
     out = {}
     every = sorted(scene.joints.items(), key=lambda each: GROUND in each[1].links)  # bearings stay, if they can
     for name, joint in every:
         for kind in LOOSER.get(joint.kind, ()) if name not in scene.driven_joints else ():
-            rows = rows_of(scene, name, bodies, drawn.centre, kind)
-            out[name, kind] = reference_jacobian(rows, len(bodies), drawn.size)
+            rows = rows_of(scene, name, bodies, reference.centre, kind)
+            out[name, kind] = reference_jacobian(rows, len(bodies), reference.size)
     return out
 
 
@@ -190,13 +190,13 @@ def resting_jacobian(rows: Rows, bodies: int, size: float) -> Float[np.ndarray, 
     return np.asarray(jacobian(rows, features(rows, resting_poses(bodies)), bodies, size)[0])
 
 
-def _check_mobility(scene: Scene, drawn: Drawn) -> int:
+def _check_mobility(scene: Scene, reference: Reference) -> int:
     """How many motions the drive releases; they must be of links with co-rotational frames."""
-    k, drives = int(drawn.J.shape[1]), int(drawn.driven.sum())
-    free, mobility = k - rank(drawn.J), k - rank(drawn.J[~drawn.driven])
+    k, drives = int(reference.J.shape[1]), int(reference.driven.sum())
+    free, mobility = k - rank(reference.J), k - rank(reference.J[~reference.driven])
     driven = ", ".join(f"joints.{name}" for name in scene.driven_joints)
     if mobility == 0:
-        moves = would_move(drawn, looser_rows(scene, drawn))
+        moves = would_move(reference, looser_rows(scene, reference))
         raise MotionError(
             f"{driven}: its drive must be able to move the linkage, got a structure without any mobility "
             f"({f'it would move {moves}' if moves else 'the joints constrain every link'}; "
@@ -209,12 +209,12 @@ def _check_mobility(scene: Scene, drawn: Drawn) -> int:
         return 0
     if mobility == drives:
         at = _at_reference(scene)
-        other = listed(_other_drives(scene, drawn), "or")
+        other = listed(_other_drives(scene, reference), "or")
         raise MotionError(
             f"{driven}: the linkage locks (dead point) at {at}the reference position: "
             f"draw it at another angle or drive {f'joint {other}' if other else 'another joint'}"
         )
-    motions = free_motions(drawn)
+    motions = free_motions(reference)
     if corotational_links(scene).issuperset(link for each in motions for link in each.links):
         return free
     words = "; ".join(each.words for each in motions)
@@ -236,38 +236,38 @@ def _at_reference(scene: Scene) -> str:
     return "drive travel 0 mm, " if driven_travel(scene, name) else "drive angle 0 deg, "
 
 
-def _other_drives(scene: Scene, drawn: Drawn) -> list[str]:
-    """Joints whose drive could move the linkage from where it is drawn."""
-    bodies = (GROUND, *drawn.links)
+def _other_drives(scene: Scene, reference: Reference) -> list[str]:
+    """Joints whose drive could move the linkage from its reference position."""
+    bodies = (GROUND, *reference.links)
     out = []
     for name, joint in scene.joints.items():
         if joint.kind in {"revolute", "prismatic"} and name not in scene.driven_joints:
             row = reference_jacobian(
-                [coordinate_row(scene, name, bodies, joint.kind == "revolute")], len(bodies), drawn.size
+                [coordinate_row(scene, name, bodies, joint.kind == "revolute")], len(bodies), reference.size
             )
-            if rank(np.concatenate([drawn.J[~drawn.driven], row])) == drawn.J.shape[1]:
+            if rank(np.concatenate([reference.J[~reference.driven], row])) == reference.J.shape[1]:
                 out.append(name)
     return out
 
 
-def _across(drawn: Drawn, bodies: tuple[str, ...]) -> list[ConstraintEquation]:
+def _across(reference: Reference, bodies: tuple[str, ...]) -> list[ConstraintEquation]:
     """Rows that hold the motions that only leave the plane of a plane scene: its links know none of them."""
-    released = null_space(drawn.J)
+    released = null_space(reference.J)
     if not released.shape[1]:
         return []
-    inside = null_space(planar(drawn).J)
+    inside = null_space(planar(reference).J)
     across = span(released - inside @ (inside.T @ released))
-    return _most_changed(plane_rows(bodies), across, len(bodies), drawn.size)
+    return _most_changed(plane_rows(bodies), across, len(bodies), reference.size)
 
 
-def _holding(scene: Scene, drawn: Drawn, free: int) -> list[ConstraintEquation]:
+def _holding(scene: Scene, reference: Reference, free: int) -> list[ConstraintEquation]:
     """Rows that hold as many joint motions as are free in the reference position."""
     if not free:
         return []
-    bodies, motions = (GROUND, *drawn.links), scipy.linalg.svd(drawn.J)[2][-free:].T
+    bodies, motions = (GROUND, *reference.links), scipy.linalg.svd(reference.J)[2][-free:].T
     undriven = (name for name in scene.joints if name not in scene.driven_joints)
-    rows = [row for name in undriven for row in _free_rows(scene, name, bodies, drawn.size, motions)]
-    return _most_changed(rows, motions, len(bodies), drawn.size)
+    rows = [row for name in undriven for row in _free_rows(scene, name, bodies, reference.size, motions)]
+    return _most_changed(rows, motions, len(bodies), reference.size)
 
 
 def _most_changed(

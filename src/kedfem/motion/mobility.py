@@ -38,16 +38,16 @@ class Mobility:
 
 def mobility(scene: Scene, link: Linkage, along: Path) -> Mobility:
     """Degrees of freedom, redundant equations, free motions and the nearest dead point of a linkage."""
-    drawn = reference_linkage(scene)
-    looser = looser_rows(scene, drawn)
+    reference = reference_linkage(scene)
+    looser = looser_rows(scene, reference)
     if plane := plane_scene(scene):
         looser = {key: in_plane(rows) for key, rows in looser.items()}
-        drawn = planar(drawn)
-    joined = ~drawn.of(PLANE) & ~drawn.driven
-    count, loops = redundancy(drawn), len(scene.joints) - len(scene.links)
+        reference = planar(reference)
+    joined = ~reference.of(PLANE) & ~reference.driven
+    count, loops = redundancy(reference), len(scene.joints) - len(scene.links)
     return Mobility(
-        freedom=drawn.J.shape[1] - rank(drawn.J[~drawn.driven]), drives=int(drawn.driven.sum()),
-        equations=int(joined.sum()), redundancy=count, redundant=tuple(redundant(drawn)) if count else (),
-        remedy=remedy(drawn, looser) if count else "", free=tuple(free_motions(drawn)),
-        dead_point=nearest_dead_point(scene, link, along) if loops and drawn.driven.any() else None, plane=plane,
+        freedom=reference.J.shape[1] - rank(reference.J[~reference.driven]), drives=int(reference.driven.sum()),
+        equations=int(joined.sum()), redundancy=count, redundant=tuple(redundant(reference)) if count else (),
+        remedy=remedy(reference, looser) if count else "", free=tuple(free_motions(reference)),
+        dead_point=nearest_dead_point(scene, link, along) if loops and reference.driven.any() else None, plane=plane,
     )  # fmt: skip

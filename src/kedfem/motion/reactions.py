@@ -93,7 +93,7 @@ class BlockReactions:
         """The least scaled λ that balance forces and moments on all bodies but the ground."""
         return self.blocks.least_norm(self.values, -self.column * wrench)
 
-    def borne(
+    def joint_wrench(
         self, joint: str, body: int, at: Float[np.ndarray, "3"], multipliers: Float[np.ndarray, "T m"]
     ) -> Float[np.ndarray, "2 T 3"]:
         """Force and moment that a joint, with its drive, exerts on a body, from its multipliers."""

@@ -21,8 +21,8 @@ Basis = Float[np.ndarray, "k n"]
 
 
 @dataclass(frozen=True, slots=True)
-class Drawn:
-    """A linkage to first order in its reference position.
+class Reference:
+    """A linkage linearised in its reference position.
 
     J : (m, k) derivatives of the rows by the links' twists (v, ω) at the centre; gaps and v in units of size
     rows : (m,) joint of each row, or coupling
@@ -74,14 +74,14 @@ def span(vectors: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k d"]:
 # -- the plane ----------------------------------------------------------------------------------------------
 
 
-def planar(drawn: Drawn) -> Drawn:
+def planar(reference: Reference) -> Reference:
     """A linkage whose links the xy plane holds: of each joint and drive what is left of its rows there."""
-    keys = list(zip(drawn.rows, drawn.driven.tolist(), strict=True))
-    rows = {key: in_plane(drawn.J[[each == key for each in keys]]) for key in dict.fromkeys(keys)}
-    held = np.eye(drawn.J.shape[1]).reshape(len(drawn.links), 6, -1)[:, ACROSS].reshape(-1, drawn.J.shape[1])
+    keys = list(zip(reference.rows, reference.driven.tolist(), strict=True))
+    rows = {key: in_plane(reference.J[[each == key for each in keys]]) for key in dict.fromkeys(keys)}
+    held = np.eye(reference.J.shape[1]).reshape(len(reference.links), 6, -1)[:, ACROSS].reshape(-1, reference.J.shape[1])
     names = [name for (name, _), J in rows.items() for _ in J] + [PLANE] * len(held)
     driven = [moves for (_, moves), J in rows.items() for _ in J] + [False] * len(held)
-    return replace(drawn, J=np.concatenate([*rows.values(), held]), rows=tuple(names), driven=np.array(driven, bool))
+    return replace(reference, J=np.concatenate([*rows.values(), held]), rows=tuple(names), driven=np.array(driven, bool))
 
 
 def in_plane(rows: Float[np.ndarray, "m k"]) -> Float[np.ndarray, "n k"]:
@@ -177,19 +177,19 @@ class FreeMotion:
     spin: tuple[str, ...] = ()
 
 
-def free_motions(drawn: Drawn) -> list[FreeMotion]:
+def free_motions(reference: Reference) -> list[FreeMotion]:
     """Motions that joints and drives release, sorted by the smallest groups of links that can move alone."""
-    return [_described(drawn, links, basis) for links, basis in _groups(drawn, null_space(drawn.J))]
+    return [_described(reference, links, basis) for links, basis in _groups(reference, null_space(reference.J))]
 
 
-def _groups(drawn: Drawn, free: Basis) -> list[tuple[tuple[str, ...], Basis]]:
+def _groups(reference: Reference, free: Basis) -> list[tuple[tuple[str, ...], Basis]]:
     """Free motions by the links that make them: first those of one link alone, then of two, and so on."""
-    found, out, n = np.zeros((free.shape[1], 0)), [], len(drawn.links)
+    found, out, n = np.zeros((free.shape[1], 0)), [], len(reference.links)
     sizes = range(1, n + 1) if n <= SEARCHED else (1, n)
-    for some in (group for size in sizes for group in combinations(drawn.links, size)):
+    for some in (group for size in sizes for group in combinations(reference.links, size)):
         if found.shape[1] == free.shape[1]:
             break
-        others = [free[drawn.block(link)] for link in drawn.links if link not in some]
+        others = [free[reference.block(link)] for link in reference.links if link not in some]
         _, s, Vt = np.linalg.svd(np.concatenate([np.zeros_like(free), *others]))
         within = Vt[(s > STILL).sum() :].T
         if (fresh := span(within - found @ (found.T @ within))).shape[1]:
@@ -198,26 +198,26 @@ def _groups(drawn: Drawn, free: Basis) -> list[tuple[tuple[str, ...], Basis]]:
     return out
 
 
-def _relative(drawn: Drawn, joint: str, basis: Basis) -> Float[np.ndarray, "6 n"]:
+def _relative(reference: Reference, joint: str, basis: Basis) -> Float[np.ndarray, "6 n"]:
     """Twists (v, ω) at a joint of its one link against the other."""
-    one, other = (_twists(drawn, link, joint, basis) for link in drawn.joints[joint].links)
+    one, other = (_twists(reference, link, joint, basis) for link in reference.joints[joint].links)
     return np.asarray(one - other)
 
 
-def _twists(drawn: Drawn, link: str, joint: str, basis: Basis) -> Float[np.ndarray, "6 n"]:
+def _twists(reference: Reference, link: str, joint: str, basis: Basis) -> Float[np.ndarray, "6 n"]:
     """Twists (v, ω) of a link at a joint's point."""
-    if link not in drawn.links:
+    if link not in reference.links:
         return np.zeros((6, basis.shape[1]))
-    v, omega = basis[drawn.block(link)].reshape(2, 3, -1)
-    return np.concatenate([v + cross(omega.T, np.broadcast_to(drawn.place(joint), omega.T.shape)).T, omega])
+    v, omega = basis[reference.block(link)].reshape(2, 3, -1)
+    return np.concatenate([v + cross(omega.T, np.broadcast_to(reference.place(joint), omega.T.shape)).T, omega])
 
 
-def _described(drawn: Drawn, links: tuple[str, ...], basis: Basis) -> FreeMotion:
-    links = tuple(link for link in links if np.abs(basis[drawn.block(link)]).max() > STILL)
-    joints = tuple(name for name in drawn.joints if np.abs(_relative(drawn, name, basis)).max() > STILL)
-    drivable = tuple(name for name in joints if drawn.joints[name].kind in {"revolute", "prismatic"})
+def _described(reference: Reference, links: tuple[str, ...], basis: Basis) -> FreeMotion:
+    links = tuple(link for link in links if np.abs(basis[reference.block(link)]).max() > STILL)
+    joints = tuple(name for name in reference.joints if np.abs(_relative(reference, name, basis)).max() > STILL)
+    drivable = tuple(name for name in joints if reference.joints[name].kind in {"revolute", "prismatic"})
     if len(links) == 1:
-        words, spin = _alone(drawn, links[0], joints, basis)
+        words, spin = _alone(reference, links[0], joints, basis)
         return FreeMotion(links, joints, basis, words, drivable, spin)
     count = f"{basis.shape[1]} ways" if basis.shape[1] > 1 else "one way"
     words = f"links {listed([repr(x) for x in links])} can move together in {count}"
@@ -225,21 +225,21 @@ def _described(drawn: Drawn, links: tuple[str, ...], basis: Basis) -> FreeMotion
     return FreeMotion(links, joints, basis, words, drivable)
 
 
-def _alone(drawn: Drawn, link: str, joints: tuple[str, ...], basis: Basis) -> tuple[str, tuple[str, ...]]:
+def _alone(reference: Reference, link: str, joints: tuple[str, ...], basis: Basis) -> tuple[str, tuple[str, ...]]:
     """Motions of one link in words; and the joints on the line about which it spins."""
-    twists = {name: _twists(drawn, link, name, basis) for name in joints}
+    twists = {name: _twists(reference, link, name, basis) for name in joints}
     still = [name for name in joints if np.abs(twists[name][:3]).max() < STILL]
     at = still[0] if still else next(iter(joints), None)
-    here = twists[at] if at else basis[drawn.block(link)]
+    here = twists[at] if at else basis[reference.block(link)]
     turns, slides = span(here[3:]), span(here[:3])
     parts = [directions("turn", "about", turns)] if turns.shape[1] else []
     parts += [directions("slide", "along", slides)] if slides.shape[1] else []
     words = f"link '{link}' can {' and '.join(parts)}"
     if basis.shape[1] == 1 and len(still) > 1:
-        kinds = {drawn.joints[name].kind for name in still}
+        kinds = {reference.joints[name].kind for name in still}
         which = f"both {kinds.pop()}" if len(kinds) == 1 and len(still) == 2 else "on one line"
         return f"{words}, the line through {of_joints(still)} ({which})", tuple(still)
-    return words + (f" at joint {at} ({drawn.joints[at].kind})" if at else ", constrained by no joint"), ()
+    return words + (f" at joint {at} ({reference.joints[at].kind})" if at else ", constrained by no joint"), ()
 
 
 def remedy(motion: FreeMotion) -> str:

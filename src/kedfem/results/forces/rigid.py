@@ -77,11 +77,11 @@ class RigidForces:
                 force[:, body] += f
                 moment[:, body] += m - cross(centre[:, body], f)
             wrench = np.concatenate([force, moment], axis=2)[:, 1:]
-            self._rows = self._borne(motion, step, wrench)
+            self._rows = self._joint_forces(motion, step, wrench)
             self._motion = motion
         return self._rows
 
-    def _borne(self, motion: RigidMotion, step: int | None, wrench: Float[np.ndarray, "T b 6"]) -> dict[str, Rows]:
+    def _joint_forces(self, motion: RigidMotion, step: int | None, wrench: Float[np.ndarray, "T b 6"]) -> dict[str, Rows]:
         """All channels where forces and moments act on the bodies; of many bodies without a matrix of responses."""
         names = [each.channel.name for each in self.every]
         if self.linkage.blocks is not None:
@@ -97,8 +97,8 @@ class RigidForces:
         multipliers = found.multipliers(wrench)
         for each in self.every:
             if each.which < 2:
-                borne = found.borne(each.joint, each.body, each.at, multipliers)
-                yield borne[each.which] @ each.project.T
+                exerted = found.joint_wrench(each.joint, each.body, each.at, multipliers)
+                yield exerted[each.which] @ each.project.T
             else:
                 drive = self.linkage.drives.joints.index(each.joint)
                 yield (multipliers @ effort(self.linkage, drive))[:, None]
@@ -180,7 +180,7 @@ def _joint(scene: Scene, linkage: Linkage, found: Reactions | BlockReactions, na
     sums = [found.open_directions(each) for each in found.on(name, body, at)]
     squares = (linkage.size**2, 1.0)  # forces count by the moments that they may make
     shares = [[x * square for x in each] for each, square in zip(sums, squares, strict=True)]
-    largest = max(*(float(np.trace(borne)) for _, borne in shares), np.finfo(float).tiny)
+    largest = max(*(float(np.trace(whole)) for _, whole in shares), np.finfo(float).tiny)
     out = []
     for which, (what, text, unit) in enumerate((("force", f"force {label}", "N"), ("moment", about, "N m"))):
         columns, project, left = determined(*(x / largest for x in shares[which]))
@@ -191,18 +191,18 @@ def _joint(scene: Scene, linkage: Linkage, found: Reactions | BlockReactions, na
 
 
 def determined(
-    loose: Float[np.ndarray, "3 3"], borne: Float[np.ndarray, "3 3"]
+    open_part: Float[np.ndarray, "3 3"], whole: Float[np.ndarray, "3 3"]
 ) -> tuple[tuple[str, ...], Float[np.ndarray, "c 3"], str]:
     """Columns of a joint's force that statics determine, from world components, and in words what they leave out.
 
     Parameters
     ----------
-    loose, borne : Σ D Dᵀ and Σ A Aᵀ of `Reactions.open_directions`, as parts of what the joint bears in all
+    open_part, whole : Σ D Dᵀ and Σ A Aᵀ of `Reactions.open_directions`, relative to the whole force of the joint
     """
-    size, axes = np.linalg.eigh(loose)
+    size, axes = np.linalg.eigh(open_part)
     lost = axes[:, size > OPEN]
     P = np.eye(3) - lost @ lost.T
-    if np.trace(P @ borne @ P) < OPEN or lost.shape[1] == 3:
+    if np.trace(P @ whole @ P) < OPEN or lost.shape[1] == 3:
         return (), np.zeros((0, 3)), ""
     if not lost.shape[1]:
         return XYZ, np.eye(3), ""
