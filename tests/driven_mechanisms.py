@@ -22,6 +22,7 @@ Found = tuple[str, dict[str, float]]
 STEPS, STEP = 20, 2e-4
 STIFFER, TEN, LIMIT = 3.0, 10.0, 1e-3
 LEAST, SPEED = 1e-12, 0.1  # N, N m; rad/s, m/s of coordinates: what is less is rounding
+ARM, PINNED = 0.15, 1e-9  # m, the length of a link; moments of joints that bear none, of those of forces: rounding
 PLACED = 1e-10  # m: displacements that are all less, as of points on the ground, are that of places, 1e-15 m
 WITHIN = 1e-7  # of the peak: what iterations leave
 ALIKE = 5e-5  # of the largest: what the monolithic step's rounding leaves of stiff hubs' forces, and iterations of laws
@@ -53,8 +54,7 @@ def off_rigid(raw: Raw) -> dict[str, float]:
         rigid = got.get(f"{head}/rigid_{what}")
         if rigid is not None and rigid.shape == elastic.shape:
             pairs[name] = elastic, rigid
-    arm = 0.15  # m, the length of a link
-    unit = {name: 1.0 if name.endswith("force") else arm for name in pairs}
+    unit = {name: 1.0 if name.endswith("force") else ARM for name in pairs}
     largest = max((float(np.abs(rigid).max()) / unit[name] for name, (_, rigid) in pairs.items()), default=1.0)
     return {name: float(np.abs(e - r).max()) / unit[name] / largest for name, (e, r) in pairs.items()}
 
@@ -187,6 +187,7 @@ def differences(got: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> dic
     floors = {"speed": SPEED, "displacement": PLACED}
     for name, values in other.items():
         sizes[_kind(name)] = max(sizes.get(_kind(name), 0.0), float(np.abs(values).max(initial=0.0)))
+    floors["moment"] = max(LEAST, PINNED * ARM * sizes.get("force", 0.0))
     return {
         name: float(np.abs(values - other[name]).max(initial=0.0))
         / max(sizes[_kind(name)], floors.get(_kind(name), LEAST))

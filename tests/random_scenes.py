@@ -134,12 +134,12 @@ def by_other_coordinates(raw: Raw, seed: int) -> Raw:
         return name
 
     for drive in raw["drives"].values():
-        at = taken("cylindrical", "screw", "universal", "planar", "prismatic", "revolute")
+        at = taken("cylindrical", "screw", "universal", "planar", "slot", "prismatic", "revolute")
         if at is not None:
             drive.clear()
             drive |= {"joint": at, **coordinate(raw["joints"][at], random)}
             kind = raw["joints"][at]["kind"]
-            slides = kind == "prismatic" or drive.get("coordinate") == "travel" or "along" in drive
+            slides = kind in {"prismatic", "slot"} or drive.get("coordinate") == "travel" or "along" in drive
             speed = float(random.uniform(1, 4) * random.choice((1, -1)) * (0.1 if slides else 1))
             drive["motion"] = {"kind": "constant_speed", "speed": speed}
     for gear in raw.get("gears", {}).values():
@@ -147,13 +147,15 @@ def by_other_coordinates(raw: Raw, seed: int) -> Raw:
         if at is not None:
             gear["joints"][0] = at
     law = {"stiffness": 30.0, "damping": 0.3, "preload": 0.3}
-    if (at := taken("universal", "planar")) is not None:
-        on = coordinate(raw["joints"][at], random)
-        raw.setdefault("springs", {})["of"] = {"kind": "spring" if "along" in on else "torsion", "joint": at, **law, **on}
-    if (at := taken("universal", "planar")) is not None:
-        on = coordinate(raw["joints"][at], random)
-        table = {"over": "speed", "at": [-1.0, 1.0], "value": [6.0, -4.0]}
-        raw.setdefault("motors", {})["of"] = {"joint": at, "force" if "along" in on else "torque": table, **on}
+    for key in ("springs", "motors"):
+        at = taken("universal", "planar", "slot")
+        if at is not None:
+            on = coordinate(raw["joints"][at], random)
+            slides = "along" in on or raw["joints"][at]["kind"] == "slot"
+            table = {"over": "speed", "at": [-1.0, 1.0], "value": [6.0, -4.0]}
+            made = {"force" if slides else "torque": table} if key == "motors" else law
+            kind = {} if key == "motors" else {"kind": "spring" if slides else "torsion"}
+            raw.setdefault(key, {})["of"] = {"joint": at, **kind, **made, **on}
     return raw
 
 
