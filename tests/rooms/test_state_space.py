@@ -172,7 +172,7 @@ def test_a_drive_that_lets_go_moves_all_inertia_that_it_moves(joint: str, law: s
     del raw["loads"]
     scene = scene_from(turned_scene(raw, Rotation.from_rotvec(turn).as_matrix(), (0.3, -0.2, 0.5)))
     space, _ = state_space(scene, 4, free=True)
-    slides = joint == "prismatic" or law == "drive of the travel"
+    slides = joint in {"prismatic", "slot"} or law == "drive of the travel"
     assert space.inputs == ("drive/force" if slides else "drive/torque",)
     assert space.outputs == (("drive/travel" if slides else "drive/angle"), "drive/speed")
     assert space.frequencies[0] == 0.0
