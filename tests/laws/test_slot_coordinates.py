@@ -219,7 +219,9 @@ def test_off_its_line_too_the_oracle_has_the_same(plane: bool, frames: str) -> N
     raw = acted_on(("planar beam", "planar beam") if plane else ("beam", "beam"), plane, frames)
     raw["joints"]["J"]["bushing"] = {"stiffness": 1e3, "damping": 1.0}
     raw["motors"]["m"]["force"]["value"] = [2000.0, 4000.0]
-    assert against_oracle(begun(raw), 10, keeps=True) < 1e-8
+    steps = 10 if plane else 30  # in space iterations of longer steps do not converge with so soft a bushing
+    raw["analysis"]["step"] = 5e-4 if plane else 1e-4
+    assert against_oracle(begun(raw), steps, keeps=True) < 1e-8
 
 
 def long(partners: tuple[str, str], plane: bool, frames: str, driven: bool, step: float = 2.5e-4) -> Raw:
