@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from kedfem.scene.records.drives import prescribes_travel
 from tests.random_drawing import FREEDOMS, FREEDOMS_IN_PLANE, Drawing
 from tests.random_laws import bodies, bushings, limits, loads, motors, springs
 
@@ -138,8 +139,7 @@ def by_other_coordinates(raw: Raw, seed: int) -> Raw:
         if at is not None:
             drive.clear()
             drive |= {"joint": at, **coordinate(raw["joints"][at], random)}
-            kind = raw["joints"][at]["kind"]
-            slides = kind in {"prismatic", "slot"} or drive.get("coordinate") == "travel" or "along" in drive
+            slides = prescribes_travel(raw["joints"][at]["kind"], drive.get("coordinate"), drive.get("along"))
             speed = float(random.uniform(1, 4) * random.choice((1, -1)) * (0.1 if slides else 1))
             drive["motion"] = {"kind": "constant_speed", "speed": speed}
     for gear in raw.get("gears", {}).values():
@@ -151,7 +151,7 @@ def by_other_coordinates(raw: Raw, seed: int) -> Raw:
         at = taken("universal", "planar", "slot")
         if at is not None:
             on = coordinate(raw["joints"][at], random)
-            slides = "along" in on or raw["joints"][at]["kind"] == "slot"
+            slides = prescribes_travel(raw["joints"][at]["kind"], None, on.get("along"))
             table = {"over": "speed", "at": [-1.0, 1.0], "value": [6.0, -4.0]}
             made = {"force" if slides else "torque": table} if key == "motors" else law
             kind = {} if key == "motors" else {"kind": "spring" if slides else "torsion"}

@@ -70,10 +70,7 @@ def on_links(model: Model, joint: ConstraintJoint, at: Sequence[Float[np.ndarray
     keys, first, found = link_keys(model), 0, list[OnLink]()
     for side, body, point in zip(joint.sides, joint.bodies, at, strict=True):
         rider = next((x for x in model.sliders if side is not None and x.name == side.slider), None)
-        if side is None:
-            found.append(OnLink(rigid_end(body, point)))
-            continue
-        if len(set(side.keys)) > 1:  # a line of several segments: their own frames know what their stresses do
+        if side is None or len(set(side.keys)) > 1:  # frames of a line's segments know what their stresses do
             found.append(OnLink(rigid_end(body, point)))
             continue
         k = rider.carrier if rider else keys.index(side.keys[0])

@@ -20,15 +20,7 @@ Facts = Mapping[str, str]
 KINDS: tuple[str, ...] = get_args(JointKind)
 TURNED = ("revolute", "cylindrical", "screw", "planar", "universal")  # kinds with angles, which torques act on
 SLID = ("prismatic", "cylindrical", "screw", "planar", "slot")  # and with travels, which forces act along
-DRIVEN = (
-    "revolute",
-    "prismatic",
-    "cylindrical",
-    "screw",
-    "universal",
-    "planar",
-    "slot",
-)  # with one that a drive may prescribe
+DRIVEN = tuple(kind for kind in KINDS if kind in TURNED + SLID)  # with one or the other, which a drive may prescribe
 GEARED = ("revolute", "cylindrical", "screw", "planar")  # with one angle, which gears couple
 RACKED = ("prismatic", "cylindrical", "screw")  # with one travel, along which a rack is
 ON_ANGLE, ON_TRAVEL, ON_DRIVE, ON_GEAR, ON_RACK = (
