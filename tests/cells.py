@@ -268,7 +268,7 @@ def apart(found: np.ndarray, wanted: np.ndarray) -> float:
 
 def as_a_run(of: Begun) -> Begun:
     """The same, begun as runs with co-rotational frames begin."""
-    rates = initial_rates(of.prepared.scene, of.prepared.linkage, of.ready.system.model)
+    rates = initial_rates(of.prepared.scene, of.prepared.linkage, of.prepared.path, of.ready.system.model)
     return replace(of, state=rest(of.ready, of.motion, rates, accelerated=accelerated_in_a_step))
 
 

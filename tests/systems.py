@@ -68,7 +68,7 @@ def begun(
     def motion(t: np.ndarray) -> RigidMotion:
         return rigid_motion(made.linkage, made.path, t, path_parameter(scene, t))
 
-    rates = initial_rates(scene, made.linkage, system.model)
+    rates = initial_rates(scene, made.linkage, made.path, system.model)
     return Begun(made, of, rest(of, motion, rates), motion)
 
 
@@ -77,7 +77,11 @@ def stiffened(of: Begun) -> Begun:
     scene, model = of.prepared.scene, of.prepared.model
     system = replace(of.ready.system, stiffening=steps_of(scene, model).stiffening)
     made = ready(system, of.ready.scheme)
-    return replace(of, ready=made, state=rest(made, of.motion, initial_rates(scene, of.prepared.linkage, system.model)))
+    return replace(
+        of,
+        ready=made,
+        state=rest(made, of.motion, initial_rates(scene, of.prepared.linkage, of.prepared.path, system.model)),
+    )
 
 
 def rows(of: Ready, x: np.ndarray) -> np.ndarray:

@@ -51,7 +51,7 @@ def test_free_bodies_on_a_screw_that_spin_together_stay_where_they_are(turn: lis
         "analysis": {"end_time": 0.01, "step": 1e-3, "initial_motions": {"one": spin, "two": spin}},
     })  # fmt: skip
     linked = linkage(scene)
-    v, omega = initial_twists(scene, linked)
+    v, omega = initial_twists(scene, *moving(scene))
     assert_allclose(omega[1:], np.tile(spin["angular_velocity"], (2, 1)), atol=1e-12)
     at_centre = v[1:] + np.cross(omega[1:], linked.centre)
     assert np.abs(at_centre).max() < 1e-12  # m/s: nothing is asked of it
@@ -62,7 +62,7 @@ def test_speeds_that_nobody_asked_for_are_the_same_in_a_scene_that_is_turned(tur
     """One joint of a loop has a speed; slides and rotations share what it leaves open by their size, a length."""
     R, shift, raw = (Rotation.from_rotvec(turn).as_matrix(), np.array([0.3, -0.2, 0.5]), mechanism(2039, most=6))
     one, other = (scene_from(each) for each in (raw, turned(raw, R, shift)))
-    (v, omega), (v2, omega2) = (initial_twists(scene, linkage(scene)) for scene in (one, other))
+    (v, omega), (v2, omega2) = (initial_twists(scene, *moving(scene)) for scene in (one, other))
     assert np.abs(omega).max() > 0.5
     assert_allclose(omega2, omega @ R.T, atol=1e-12)
     assert_allclose(v2 + np.cross(omega2, shift), v @ R.T, atol=1e-12)
@@ -73,7 +73,7 @@ def test_a_speed_that_a_loop_does_not_allow_is_refused(seed: int, unit: str) -> 
     """A sphere that closes the loop holds the joint; rounding of what it leaves must not be taken for a motion."""
     scene = scene_from(mechanism(seed, most=6))
     with pytest.raises(MotionError, match=f"initial_speeds.J0 = 2 {unit} .closest possible 0."):
-        initial_twists(scene, linkage(scene))
+        initial_twists(scene, *moving(scene))
 
 
 CHEAP = (

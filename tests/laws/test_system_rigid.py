@@ -38,7 +38,7 @@ def top(inertia: list[float], spin: list[float], step: float = 1e-3, **more: Any
         **more,
     }  # fmt: skip
     of = begun(raw, today=False)
-    rates = initial_rates(of.prepared.scene, of.prepared.linkage, of.ready.system.model)
+    rates = initial_rates(of.prepared.scene, of.prepared.linkage, of.prepared.path, of.ready.system.model)
     return Begun(of.prepared, of.ready, rest(of.ready, of.motion, rates), of.motion)
 
 
@@ -140,7 +140,7 @@ def test_a_rigid_link_strikes_no_higher_than_its_elastic_neighbour_rings() -> No
     }
     analysis = {"end_time": 0.02, "step": 1e-4, "rho_inf": 0.8, "initial_speeds": {"A": 20.0, "B": 0.0}}
     of = begun({"links": links, "joints": joints, "analysis": analysis})
-    rates = initial_rates(of.prepared.scene, of.prepared.linkage, of.ready.system.model)
+    rates = initial_rates(of.prepared.scene, of.prepared.linkage, of.prepared.path, of.ready.system.model)
     _, history = march(of.ready, rest(of.ready, of.motion, rates), of.steps(40))
     force = np.linalg.norm(joint_force(of, history, 0, "A"), axis=1)
     mass = 7850 * 0.03 * 0.02 * np.array([0.5, 0.02])

@@ -169,7 +169,7 @@ def free_rates(of: Begun) -> list[np.ndarray]:
     """The rates that its scene asks for."""
     from kedfem.dynamics.stepping.start import initial_rates
 
-    return initial_rates(of.prepared.scene, of.prepared.linkage, of.ready.system.model)
+    return initial_rates(of.prepared.scene, of.prepared.linkage, of.prepared.path, of.ready.system.model)
 
 
 def test_a_rigid_link_that_spins_begins_with_what_holds_it() -> None:

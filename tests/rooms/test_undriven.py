@@ -136,7 +136,7 @@ def test_links_start_with_velocities_that_close_the_joints() -> None:
     """Crank 0.2 m at ω: the arm, drawn along the slide, moves along itself with ω · 0.2 and does not turn."""
     ready = prepared()
     links, joints = ready.model.links, ready.model.joints
-    rates = initial_rates(ready.scene, ready.linkage, ready.model)
+    rates = initial_rates(ready.scene, ready.linkage, ready.path, ready.model)
     arm = [link.name for link in links].index("arm")
     np.testing.assert_allclose(rates[arm], np.outer(links[arm].one, [0.2 * 2 * np.pi, 0, 0]), atol=1e-12)
     ports = [joint.weights @ rate[joint.nodes] for joint, rate in zip(joints, rates, strict=True)]
@@ -152,7 +152,7 @@ def test_the_energy_at_the_start_is_that_of_a_rigid_bar(kind: str) -> None:
     raw = arm(bar(0.6, 0.03, 0.02, model=kind) | {"material": "aluminium"}, None)
     raw["analysis"] = {"end_time": 1, "step": 0.01, "initial_speeds": {"A": 3}}
     ready = meshed(scene_from(raw))
-    rates, links = initial_rates(ready.scene, ready.linkage, ready.model), ready.model.links
+    rates, links = initial_rates(ready.scene, ready.linkage, ready.path, ready.model), ready.model.links
     m = sum(float(link.one @ link.m1[:, 0]) for link in links)
     energy = 0.5 * sum(float(np.vdot(v, mass_times(x.mass, v))) for v, x in zip(rates, links, strict=True))
     assert energy == pytest.approx(0.5 * m * (4 * 0.6**2 + 0.03**2) / 12 * 3**2, rel=1e-9)
@@ -167,7 +167,9 @@ def test_a_scene_without_any_joint_can_be_built() -> None:
     ready = meshed(scene_from(raw))
     assert ready.linkage.mobility == 3  # in its plane
     assert ready.model.coordinates == 21  # of seven nodes
-    for link, rate in zip(ready.model.links, initial_rates(ready.scene, ready.linkage, ready.model), strict=True):
+    for link, rate in zip(
+        ready.model.links, initial_rates(ready.scene, ready.linkage, ready.path, ready.model), strict=True
+    ):
         x, one = link.X[:, 0], np.ones(link.n)
         np.testing.assert_allclose(rate, np.c_[one, 2 + 30 * (x - 0.5), 30 * one], atol=1e-12)
 

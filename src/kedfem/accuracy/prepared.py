@@ -74,8 +74,9 @@ def meshed(
 def moving(scene: Scene) -> tuple[Linkage, Path]:
     """The linkage of a scene, with consistent speeds at the start, and its rigid motion over the drive's range."""
     joined = linkage(scene)
-    initial_twists(scene, joined)
-    return joined, path(joined, *drive_range(scene))
+    along = path(joined, *drive_range(scene))
+    initial_twists(scene, joined, along)
+    return joined, along
 
 
 def with_models(scene: Scene, of: Scene) -> Scene:

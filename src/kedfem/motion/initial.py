@@ -1,19 +1,22 @@
 """Velocities of all bodies where a linkage starts to move by itself, from speeds that the scene asks for."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
 
 from kedfem.arrays import Float
 from kedfem.errors import MotionError
-from kedfem.motion.constraints import ANGLE, cross
-from kedfem.motion.joint_equations import joint_axis, joint_free_rows, moving_pair
-from kedfem.motion.linkage import Linkage, reference_jacobian, resting_jacobian
+from kedfem.motion.constraints import GAP, cross, stacked
+from kedfem.motion.joint_equations import coordinate_row, joint_free_rows
+from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import cross_matrix
+from kedfem.motion.path import Path
 from kedfem.motion.released_motions import RANK_TOLERANCE
-from kedfem.scene import Scene
+from kedfem.motion.rigid import RigidMotion, rigid_motion
+from kedfem.motion.values import Poses, features, jacobian
+from kedfem.scene import Scene, path_parameter
 
 TURNING = {"revolute", "screw"}  # joints whose speed is a rotation, of the others it is along the axis
 REACHED = 1e-6  # of the fastest speed: velocities that far off are not what was asked for
@@ -27,19 +30,37 @@ class Wanted:
     where, unit : for messages
     row : (6 B,) its row on the twists (v, ω) of all bodies, ground first, v at the linkage's centre
     value : [m/s or rad/s]
+    rigid : what the rigid-body motion gives of it
     """
 
     where: str
     unit: str
     row: Float[np.ndarray, " k"]
     value: float
+    rigid: float = 0.0
+
+    @property
+    def more(self) -> float:
+        """What is to be added to the rigid-body motion."""
+        return self.value - self.rigid
 
 
-def initial_twists(scene: Scene, linkage: Linkage) -> tuple[Float[np.ndarray, "B 3"], Float[np.ndarray, "B 3"]]:
-    """Velocities that all joints allow, with the speeds asked for, the drive held: they add to the rigid-body velocities.
+@dataclass(frozen=True, slots=True)
+class Start:
+    """The rigid-body motion where it begins: poses about the linkage's centre, twists there (6 B,), ground first."""
 
-    What these leave open: joints that are not named move as little against each other as can be, in the sum of squares
-    (slides per size of the linkage); after that bodies as little as can be.
+    poses: Poses
+    twists: Float[np.ndarray, " k"]
+
+
+def initial_twists(
+    scene: Scene, linkage: Linkage, along: Path
+) -> tuple[Float[np.ndarray, "B 3"], Float[np.ndarray, "B 3"]]:
+    """Velocities to add to those of the rigid-body motion, in its position at the start, for the speeds asked for.
+
+    All joints allow them with the drive held. What the speeds leave open: joints that are not named move as little
+    against each other as can be, in the sum of squares (slides per size of the linkage); after that bodies as little as
+    can be.
 
     Returns
     -------
@@ -51,22 +72,34 @@ def initial_twists(scene: Scene, linkage: Linkage) -> tuple[Float[np.ndarray, "B
     MotionError
         If the joints do not allow these speeds: naming them, with what was asked for and the closest that is possible.
     """
-    bodies, size = len(linkage.bodies), linkage.size
-    asked = list(_wanted(scene, linkage))
+    bodies, size, given = len(linkage.bodies), linkage.size, scene.analysis.initial_speeds
     twists = np.zeros((bodies, 6))
-    if any(each.value for each in asked):
+    if not (given or scene.analysis.initial_motions):
+        return twists[:, :3], twists[:, 3:]
+    t = np.zeros(1)
+    motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
+    start = _start(linkage, motion)
+    asked = [replace(each, rigid=float(each.row @ start.twists)) for each in _wanted(scene, linkage, start.poses)]
+    if any(each.more for each in asked):
         column = np.tile([size, size, size, 1.0, 1.0, 1.0], bodies - 1)
-        A, b = np.array([each.row[6:] * column for each in asked]), np.array([each.value for each in asked])
+        A, b = np.array([each.row[6:] * column for each in asked]), np.array([each.more for each in asked])
         sizes = np.linalg.norm(A, axis=1)
-        free = _allowed(linkage)
-        given = scene.analysis.initial_speeds
+        free = _allowed(linkage, start.poses)
         other = [row for name, joint in scene.joints.items() for row in joint_free_rows(scene, name, linkage.bodies)
-                 if name not in given or (row.kind == ANGLE and joint.kind not in TURNING)]  # fmt: skip
-        q = free @ _least(A / sizes[:, None] @ free, b / sizes, reference_jacobian(other, bodies, size) @ free)
+                 if name not in given or (row.kind != GAP and joint.kind not in TURNING)]  # fmt: skip
+        loose = stacked(other)
+        C = jacobian(loose, features(loose, start.poses), bodies, size)[0]
+        q = free @ _least(A / sizes[:, None] @ free, b / sizes, C @ free)
         _check_reached(asked, A @ q, size)
         twists[1:] = (q * column).reshape(-1, 6)
     v, omega = twists[:, :3], twists[:, 3:]
-    return v - cross(omega, np.broadcast_to(linkage.centre, omega.shape)), np.array(omega)
+    return v - cross(omega, motion.R[0] @ linkage.centre), np.array(omega)
+
+
+def _start(linkage: Linkage, motion: RigidMotion) -> Start:
+    arm = motion.R @ linkage.centre
+    v = motion.v[0] + cross(motion.omega[0], arm[0])
+    return Start((motion.R, motion.p - linkage.centre + arm), np.concatenate([v, motion.omega[0]], axis=1).ravel())
 
 
 def _least(
@@ -84,51 +117,51 @@ def _least(
     return np.asarray(x)
 
 
-def _allowed(linkage: Linkage) -> Float[np.ndarray, "k f"]:
-    """Orthonormal basis of the scaled twists that all joints allow at first, the drive held but nothing else."""
+def _allowed(linkage: Linkage, poses: Poses) -> Float[np.ndarray, "k f"]:
+    """Orthonormal basis of the scaled twists that all joints allow in a position, the drive held but nothing else."""
     bodies = len(linkage.bodies)
     held = len(linkage.joints) - (linkage.mobility if linkage.drive else 0)
     if not held:
         return np.eye(6 * (bodies - 1))
-    J = resting_jacobian(linkage.rows, bodies, linkage.size)
+    J = jacobian(linkage.rows, features(linkage.rows, poses), bodies, linkage.size)[0]
     return np.asarray(scipy.linalg.null_space(J[:held], rcond=RANK_TOLERANCE))
 
 
-def _wanted(scene: Scene, linkage: Linkage) -> Iterator[Wanted]:
+def _wanted(scene: Scene, linkage: Linkage, poses: Poses) -> Iterator[Wanted]:
+    """All speeds that a scene asks for, of joints and of links, where these are at the start."""
+    bodies = len(linkage.bodies)
     for name, value in scene.analysis.initial_speeds.items():
-        joint = scene.joints[name]
-        moving, other = moving_pair(joint)
-        i, j = linkage.bodies.index(moving), linkage.bodies.index(other)
-        row, axis = np.zeros((len(linkage.bodies), 2, 3)), joint_axis(joint)
-        if joint.kind in TURNING:
-            row[i, 1], row[j, 1] = axis, -axis
-        else:
-            arm = cross(np.asarray(joint.at) - linkage.centre, axis)
-            row[i], row[j] = (axis, arm), (-axis, -arm)
-        unit = "rad/s" if joint.kind in TURNING else "m/s"
-        yield Wanted(f"analysis.initial_speeds.{name}", unit, row.ravel(), value)
+        turns = scene.joints[name].kind in TURNING
+        row = stacked([coordinate_row(scene, name, linkage.bodies, turns)])
+        rates = np.append(np.zeros(6), jacobian(row, features(row, poses), bodies)[0, 0])
+        yield Wanted(f"analysis.initial_speeds.{name}", "rad/s" if turns else "m/s", rates, value)
     for name, motion in scene.analysis.initial_motions.items():
         k = linkage.bodies.index(name)
-        turn = -cross_matrix(np.asarray(motion.at) - linkage.centre)
+        turn = -cross_matrix(poses[0][0, k] @ (np.asarray(motion.at) - linkage.centre))
         for key, blocks, vector, unit in (
             ("velocity", (np.eye(3), turn), motion.velocity, "m/s"),
             ("angular_velocity", (np.zeros((3, 3)), np.eye(3)), motion.angular_velocity, "rad/s"),
         ):
             for c, value in enumerate(vector or ()):
-                row = np.zeros((len(linkage.bodies), 2, 3))
-                row[k] = blocks[0][c], blocks[1][c]
+                rates = np.zeros((bodies, 2, 3))
+                rates[k] = blocks[0][c], blocks[1][c]
                 where = f"analysis.initial_motions.{name}.{key} along {AXES[c]}"
-                yield Wanted(where, unit, row.ravel(), value)
+                yield Wanted(where, unit, rates.ravel(), value)
 
 
 def _check_reached(asked: list[Wanted], got: Float[np.ndarray, " w"], size: float) -> None:
-    """Raise an error for speeds that the joints do not allow together; of rotations at an arm of the linkage's size."""
+    """Raise an error for speeds that the joints do not allow together; of rotations at an arm of the linkage's size.
+
+    Parameters
+    ----------
+    got : what is added to the rigid-body motion
+    """
     arms = np.array([1.0 if each.unit == "m/s" else size for each in asked])
-    values = np.array([each.value for each in asked])
-    if (np.abs(values - got) * arms <= REACHED * np.abs(values * arms).max()).all():
+    more, values = np.array([each.more for each in asked]), np.array([[each.value, each.rigid] for each in asked])
+    if (np.abs(more - got) * arms <= REACHED * np.abs(values * arms[:, None]).max()).all():
         return
     lines = []
-    for each, x in zip(asked, got.tolist(), strict=True):
+    for each, x in zip(asked, (got + values[:, 1]).tolist(), strict=True):
         if each.value or abs(x) > REACHED:
             closest = f"(closest possible {round(x, 9) + 0.0:.6g})"
             lines.append(f"{each.where} = {each.value:.6g} {each.unit} {closest}")

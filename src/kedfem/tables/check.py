@@ -19,6 +19,7 @@ from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.joints.constraint_ports import element_joint
 from kedfem.dynamics.rigid_elements import links_of
 from kedfem.dynamics.stepping.cost import Cost, estimated_cost, tried_cost
+from kedfem.dynamics.stepping.start import motion_of
 from kedfem.dynamics.system.steps import Steps
 from kedfem.errors import KedfemError
 from kedfem.links.recovery import StressRecovery, stress_recovery
@@ -232,7 +233,9 @@ def _initial_speeds(ready: Prepared) -> list[tuple[str, str]]:
     analysis = ready.scene.analysis
     if not (analysis.initial_speeds or analysis.initial_motions):
         return []
-    v, omega = (np.linalg.norm(x, axis=1) for x in initial_twists(ready.scene, ready.linkage))
+    scene, linkage, along = ready.scene, ready.linkage, ready.path
+    begins, added = motion_of(scene, linkage, along)(np.zeros(1)), initial_twists(scene, linkage, along)
+    v, omega = (np.linalg.norm(x + y[0], axis=1) for x, y in zip(added, (begins.v, begins.omega), strict=True))
     turns = omega > NOTHING * omega.max()
     every = zip(v, omega, turns, strict=True)
     speeds = [f"{w:.4g} rad/s" if turning else f"{s:.4g} m/s" for s, w, turning in every]

@@ -63,24 +63,28 @@ def period_map(scene: Scene, linkage: Linkage, along: Path, model: Model, solver
 
 def begun(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> State:
     """The initial state that the scene asks for, as `started`; the search for a steady motion begins there."""
-    return solver.start(motion_of(scene, linkage, along), initial_rates(scene, linkage, model))
+    return solver.start(motion_of(scene, linkage, along), initial_rates(scene, linkage, along, model))
 
 
-def initial_rates(scene: Scene, linkage: Linkage, model: Model) -> list[Nodal]:
-    """δ' (n, d) of all links at the start, from the speeds that the scene asks for: rigid motions that the joints allow.
+def initial_rates(scene: Scene, linkage: Linkage, along: Path, model: Model) -> list[Nodal]:
+    """δ' (n, d) of all links at the start, from the speeds that the scene asks for: rigid motions that the joints allow,
+    beside the rigid-body motion.
 
     Raises
     ------
     MotionError
         If the joints do not allow these speeds together.
     """
-    v, omega = initial_twists(scene, linkage)
-    return [rigid_rates(link, v[k], omega[k]) for link, k in zip(model.links, model.bodies, strict=True)]
+    v, omega = initial_twists(scene, linkage, along)
+    R = motion_of(scene, linkage, along)(np.zeros(1)).R[0]
+    return [rigid_rates(link, R[k], v[k], omega[k]) for link, k in zip(model.links, model.bodies, strict=True)]
 
 
-def rigid_rates(link: Link, v: Float[np.ndarray, "3"], omega: Float[np.ndarray, "3"]) -> Nodal:
-    """The rate of a link's state in the reference position: v at the origin [m/s], turning by ω [rad/s]."""
-    rates = np.outer(link.one, v) + cross(omega[None], link.X)
+def rigid_rates(
+    link: Link, R: Float[np.ndarray, "3 3"], v: Float[np.ndarray, "3"], omega: Float[np.ndarray, "3"]
+) -> Nodal:
+    """The rate of the state of a link rotated by R: v of the point drawn at the origin [m/s], turning by ω [rad/s]."""
+    rates = np.outer(link.one, v) + cross(omega[None], link.X @ R.T)
     if link.kind == "beam":
         rates[:, 2] = omega[2] * link.one
     return np.asarray(rates[:, : link.d])

@@ -27,7 +27,12 @@ from kedfem.scene.records.units import Quantity, si_number
 
 ROUGH = 0.05  # share of a table's acceleration that may be noise
 AXES = {"revolute": TURNING, "prismatic": SLIDING}  # joints with one motion, and its speed
-STARTED = {**AXES, "cylindrical": SLIDING, "screw": TURNING}  # joints that a speed at the start may be of
+STARTED = {
+    **AXES,
+    "cylindrical": SLIDING,
+    "screw": TURNING,
+    "slot": SLIDING,
+}  # joints that a speed at the start may be of
 
 
 def drive_faults(parts: Parts) -> Iterator[Fault]:
@@ -189,7 +194,7 @@ def speed_faults(parts: Parts, joint: Entry, given: Any) -> Iterator[Fault]:
     kind = joint.word("kind")
     if joint.record is not None and kind not in STARTED:
         got = f"got {joint.name!r}, which is {kind}"
-        message = f"must be of a revolute, prismatic, cylindrical or screw joint, {got}; take initial_motions"
+        message = f"must be of a revolute, prismatic, cylindrical, screw or slot joint, {got}; take initial_motions"
     elif joint.name in parts.driven_joints:
         message = f"must be of a joint that the drive does not move, got {joint.name!r}"
     elif kind in STARTED and isinstance(given, str) and not in_unit(given, STARTED[kind]):

@@ -117,9 +117,9 @@ class Analysis(Record):
     initial_speeds: dict[JointName, JointSpeed] = Field(default_factory=dict)
     """speeds of joints at the start, by name of the joint, of what the drive does not move: of its first link that is not
     the ground against the other, of a hinge and a screw about its axis [rad/s], of a slide and a cylindrical joint along
-    it [m/s]; all else then moves as little as it can"""
+    it [m/s], of the pin along a slot [m/s]; all else then moves as little as it can"""
     initial_motions: dict[LinkName, InitialMotion] = Field(default_factory=dict)
-    """velocities of links at the start, by name of the link"""
+    """velocities of links at the start, by name of the link: those of the drive's motion included"""
     initial_deflection: dict[str, InitialForce] = Field(default_factory=dict)
     """forces that deflect the mechanism and are released at the start, by name: without a drive from static balance,
     with one beside the deflection of `initial = "quasi-static"`, at rest in links that turn; limits take the forces
