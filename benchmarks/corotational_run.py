@@ -16,7 +16,7 @@ from kedfem.dynamics.rigid_body import forcings, motions
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.start import started
 from kedfem.dynamics.stepping.transient import transient
-from kedfem.dynamics.system.march import Motion
+from kedfem.dynamics.system.ready import Motion
 from kedfem.dynamics.system.steps import Steps
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.results.recording import recording

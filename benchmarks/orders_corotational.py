@@ -21,7 +21,7 @@ from kedfem.dynamics.anderson import AndersonAcceleration
 from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.stepping.scheme import Scheme as Newmark
 from kedfem.dynamics.system.arrays import Coefficients
-from kedfem.dynamics.system.march import Ready, driving, ready
+from kedfem.dynamics.system.ready import Ready, driving, ready
 from kedfem.dynamics.system.reference import by_address
 from kedfem.dynamics.system.sparse import solver
 from kedfem.dynamics.system.state import copied, empty_trial, room

@@ -24,7 +24,8 @@ from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.start import motion_of, started
-from kedfem.dynamics.system.march import displacements, march, ready
+from kedfem.dynamics.system.march import march
+from kedfem.dynamics.system.ready import displacements, ready
 from kedfem.dynamics.system.starts.instant import Instant
 from kedfem.dynamics.system.state import State
 from kedfem.scene import scene_from

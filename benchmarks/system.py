@@ -19,7 +19,8 @@ from kedfem.dynamics.stepping.solvers import CONVERGED, steps_of
 from kedfem.dynamics.stepping.start import started
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.build import system_of
-from kedfem.dynamics.system.march import Ready, march, ready
+from kedfem.dynamics.system.march import march
+from kedfem.dynamics.system.ready import Ready, ready
 from kedfem.dynamics.system.sparse import SparsePart
 from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.dynamics.system.steps import Steps, scene_system

@@ -7,8 +7,8 @@ import re
 import sys
 from dataclasses import dataclass
 
+from kedfem.results.channels import Channel
 from kedfem.results.dimensions import columns_dimension
-from kedfem.results.records import Channel
 
 XYZ = ("x", "y", "z")
 STRESS = ("xx", "yy", "zz", "xy", "yz", "zx", "von_mises")

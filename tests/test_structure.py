@@ -3,6 +3,7 @@
 import ast
 import re
 from collections import Counter
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import kedfem
@@ -23,6 +24,35 @@ def test_no_file_is_long() -> None:
 def test_no_folder_has_many_files() -> None:
     count = Counter(str(path.parent.relative_to(PACKAGE)) for path in PACKAGE.rglob("*.py"))
     assert {folder: files for folder, files in count.items() if files > FILES} == {}, "group them in folders"
+
+
+def test_no_imports_go_in_circles() -> None:
+    """Those within functions count too; those for type checkers alone do not."""
+    depends: dict[str, set[str]] = {}
+    files = {module_of(path): path for path in PACKAGE.rglob("*.py")}
+    for module, path in files.items():
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        typed = [
+            node for node in ast.walk(tree) if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+        ]
+        left_out = {id(node) for each in typed for node in ast.walk(each)}
+        found = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and id(node) not in left_out]
+        names = {
+            full if (full := f"{node.module}.{alias.name}") in files else str(node.module)
+            for node in found
+            for alias in node.names
+        }
+        depends[module] = (names & files.keys()) - {module}
+    try:
+        order = list(TopologicalSorter(depends).static_order())
+    except CycleError as circle:
+        raise AssertionError(" → ".join(circle.args[1])) from None
+    assert len(order) == len(files)
+
+
+def module_of(path: Path) -> str:
+    """Name by which a file of the package is imported."""
+    return ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__")
 
 
 FOREIGN = {"_replace", "_fields", "_compiler", "_cache", "_cache_file", "_save_index", "_mesh", "_exit"}

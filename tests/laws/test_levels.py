@@ -13,9 +13,9 @@ from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.resolution import step_error
 from kedfem.accuracy.step_estimate import StepWatch, cheapest
 from kedfem.dynamics.history import Block
+from kedfem.dynamics.model import factor_bytes
 from kedfem.dynamics.stepping import levels as in_time
 from kedfem.dynamics.stepping.combined import LINEAR, level_weights
-from kedfem.dynamics.stepping.cost import factor_bytes
 from kedfem.dynamics.stepping.levels import level_steps, leveled, most_levels
 from kedfem.errors import SolveError
 from kedfem.results.recording import recording, rows

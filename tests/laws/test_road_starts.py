@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 from kedfem.accuracy.prepared import meshed
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.start import motion_of
-from kedfem.dynamics.system.march import Motion, march
+from kedfem.dynamics.system.march import march
+from kedfem.dynamics.system.ready import Motion
 from kedfem.dynamics.system.starts.deflected import static
 from kedfem.dynamics.system.starts.instant import Instant
 from kedfem.dynamics.system.starts.internal_forces import own, rows

@@ -9,7 +9,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from kedfem.dynamics.system.march import displacements, march, ready
+from kedfem.dynamics.system.march import march
+from kedfem.dynamics.system.ready import displacements, ready
 from kedfem.dynamics.system.record import COROTATIONAL, TANGENTIAL, Driven, Held, Spring, Stop
 from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.scene import Gear, Motor

@@ -9,7 +9,8 @@ from scipy.integrate import solve_ivp
 
 from kedfem.dynamics.stepping.start import initial_rates
 from kedfem.dynamics.system.forces.supports import Supports
-from kedfem.dynamics.system.march import displacements, march
+from kedfem.dynamics.system.march import march
+from kedfem.dynamics.system.ready import displacements
 from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.dynamics.system.state import History
 from kedfem.dynamics.system.steps import multipliers_of

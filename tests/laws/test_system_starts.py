@@ -7,7 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.dynamics.joints.attachments import interface_matrix
-from kedfem.dynamics.system.march import displacements, march
+from kedfem.dynamics.system.march import march
+from kedfem.dynamics.system.ready import displacements
 from kedfem.dynamics.system.starts import modified_newton
 from kedfem.dynamics.system.starts.coordinate_rates import coordinates, places
 from kedfem.dynamics.system.starts.deflected import plucked, quasi_static, static

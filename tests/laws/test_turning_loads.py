@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from kedfem.dynamics.system.forces.turning_loads import turned
-from kedfem.dynamics.system.march import displacements
+from kedfem.dynamics.system.ready import displacements
 from kedfem.frequencies import Wanted, frequencies
 from kedfem.scene import scene_from
 from tests.laws.test_capabilities import as_a_run

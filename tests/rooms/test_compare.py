@@ -16,8 +16,8 @@ from kedfem.cli import app
 from kedfem.compare import compare
 from kedfem.errors import OutputError
 from kedfem.results import Results
+from kedfem.results.channels import TRAVEL, Channel
 from kedfem.results.differences import common_abscissa, differences, differing_keys
-from kedfem.results.records import TRAVEL, Channel
 from kedfem.scene import scene_from
 from tests.reliability.mutations import short
 from tests.scenes import example

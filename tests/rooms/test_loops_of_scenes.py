@@ -16,7 +16,7 @@ pytest.importorskip("numba")
 from kedfem import compiled
 from kedfem.dynamics.system import reference
 from kedfem.dynamics.system.arrays import Bodies, Ends
-from kedfem.dynamics.system.march import ready
+from kedfem.dynamics.system.ready import ready
 from tests.laws.test_turning_loads import arm, moving
 from tests.moving import inverted, turning
 from tests.systems import Begun, begun, marched, stiffened

@@ -13,8 +13,8 @@ from kedfem.analysis import analyse
 from kedfem.errors import OutputError
 from kedfem.results import Channel, Results, ResultsWriter, on_demand, read_results, table, write_csv, write_parquet
 from kedfem.results.additions import add_account
+from kedfem.results.channels import ANGLE, TRAVEL
 from kedfem.results.dimensions import columns_dimension
-from kedfem.results.records import ANGLE, TRAVEL
 from kedfem.scene import scene_from
 from tests.scenes import example
 

@@ -12,7 +12,7 @@ from kedfem.output.plots.files import shown
 from kedfem.output.plots.groups import STIFF, Picture
 from kedfem.report.curves import cursor_places
 from kedfem.results import Channel, Results
-from kedfem.results.records import ANGLE, TRAVEL
+from kedfem.results.channels import ANGLE, TRAVEL
 
 LIMBS = {"foot": "universal", "slide": "prismatic", "head": "spherical"}
 

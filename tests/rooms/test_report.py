@@ -35,8 +35,8 @@ from kedfem.report.page import instant_in_words
 from kedfem.report.surfaces import placement
 from kedfem.report.viewer import first_view
 from kedfem.results import Results, read_results
+from kedfem.results.channels import TRAVEL
 from kedfem.results.frequencies import SUMMARY
-from kedfem.results.records import TRAVEL
 from kedfem.scene import read_scene, scene_from
 from tests.browser import Browser, needs_browser
 from tests.frames import frames

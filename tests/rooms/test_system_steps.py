@@ -13,8 +13,8 @@ from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.steps import Steps, scene_system
+from kedfem.results.channels import Channel
 from kedfem.results.recording import recording
-from kedfem.results.records import Channel
 from kedfem.scene import Scene, scene_from, time_grid
 from tests.moving import inverted
 from tests.rooms.test_acted import balance, four_bar, line, slider_crank

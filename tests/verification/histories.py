@@ -11,7 +11,8 @@ from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.scheme import Scheme, generalised_alpha
 from kedfem.dynamics.stepping.state import Rayleigh
-from kedfem.dynamics.system.march import displacements, march, ready
+from kedfem.dynamics.system.march import march
+from kedfem.dynamics.system.ready import displacements, ready
 from kedfem.dynamics.system.record import System
 from kedfem.dynamics.system.starts.initial_states import as_coordinates, begun
 from kedfem.dynamics.system.starts.instant import Instant

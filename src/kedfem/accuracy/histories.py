@@ -15,8 +15,8 @@ from kedfem.dynamics.system.period.map import StateArrays, state_arrays
 from kedfem.dynamics.system.period.search import Periodic, Search
 from kedfem.dynamics.system.steps import Steps
 from kedfem.results import Channel
+from kedfem.results.channels import largest_by_unit
 from kedfem.results.recording import recording, rows
-from kedfem.results.records import largest_by_unit
 
 # of the largest force at the linkage's size: a torque below is what is left of others that cancel
 FAINT = 3e-3

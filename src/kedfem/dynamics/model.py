@@ -15,6 +15,7 @@ from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.dynamics.stepping.step_limit import StepLimit
 from kedfem.dynamics.system.record import Driven, Held
 from kedfem.links.record import Link
+from kedfem.mesh.memory_forecast import least_bytes
 
 T = TypeVar("T")
 
@@ -130,3 +131,8 @@ def on_segment(links: Sequence[Link], name: str, at: Float[np.ndarray, "3"], fou
     """
     key, thing = on_part({str(k): link for k, link in enumerate(links)}, name, at, found)
     return int(key), thing
+
+
+def factor_bytes(model: Model) -> float:
+    """Memory of the factors of all links, for one step size."""
+    return sum(least_bytes(link.unknowns, plane=link.kind == "plane")[1] for link in model.links)

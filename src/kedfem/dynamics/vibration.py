@@ -8,9 +8,9 @@ import numpy as np
 
 from kedfem.arrays import Float, Int
 from kedfem.dynamics.history import Snapshot, bent
-from kedfem.dynamics.system.march import displacements
 from kedfem.dynamics.system.period.map import PeriodMap
 from kedfem.dynamics.system.period.search import Periodic
+from kedfem.dynamics.system.ready import displacements
 from kedfem.dynamics.system.starts.instant import TURN, Flat
 from kedfem.dynamics.system.steps import Steps
 from kedfem.links.record import Link, mass_times

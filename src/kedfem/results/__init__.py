@@ -14,8 +14,9 @@ Nothing half-done is ever taken for whole, and nothing old is lost for a run tha
 """
 
 from kedfem.results.additions import add_notes
+from kedfem.results.channels import Channel
 from kedfem.results.files import claimed, ready_folder, replacing, results_file
 from kedfem.results.reader import abandoned_rows, read_results, run_status
-from kedfem.results.records import Channel, Fatigue, FatigueSpot, Peak, Results
+from kedfem.results.records import Fatigue, FatigueSpot, Peak, Results
 from kedfem.results.table import write_csv, write_parquet
 from kedfem.results.writer import ResultsWriter

@@ -33,11 +33,11 @@ from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.dynamics.stiffening import Stiffening, StressModes, Turning
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.balance import Balance, Flow, Stress, fields_of, flow, prescribed_fields, stress
+from kedfem.results.channels import Channel
 from kedfem.results.forces.constraint_forces import joint_spring_work
 from kedfem.results.forces.damping_work import PreviousPoint, damping_work, previous_of, products
 from kedfem.results.forces.force_elements import ElementForces
 from kedfem.results.forces.moments import Constants, RigidRates, constants, rates_of_bodies
-from kedfem.results.records import Channel
 
 Rows = Float[np.ndarray, "T c"]
 GROUP = 12  # links whose moments are computed together: those of a thousand time points fit into a cache

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.results.records import Channel
+from kedfem.results.channels import Channel
 
 
 def require_channels(channels: Sequence[Channel], length: int, values: Mapping[str, Float[np.ndarray, "b c"]]) -> None:

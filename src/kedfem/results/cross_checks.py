@@ -16,9 +16,9 @@ from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
 from kedfem.motion.linkage import Linkage
 from kedfem.results.audit import Account
+from kedfem.results.channels import Channel
 from kedfem.results.forces.loads import drive_rate
 from kedfem.results.recorded import Rows, drive_effort
-from kedfem.results.records import Channel
 from kedfem.scene import Scene, driven_travel, without_vibration
 
 # c and the mean of e − r may be off by this part; runs of examples/ and tests stay below 0.2, a missing effort gives 1

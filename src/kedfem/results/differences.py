@@ -8,7 +8,8 @@ from typing import Any, Literal
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.results.records import Channel, Results, largest_by_unit
+from kedfem.results.channels import Channel, largest_by_unit
+from kedfem.results.records import Results
 
 Over = Literal["time", "drive"]
 NOTHING = 1e-9  # of the largest value of the same unit in the first run: rounding, which is not compared

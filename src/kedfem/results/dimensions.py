@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from kedfem.results.channels import STRESS, TIME, XYZ, Channel
 from kedfem.results.layout import write_facts
-from kedfem.results.records import STRESS, TIME, XYZ, Channel
 
 CONVENTIONS = "CF-1.11"
 NAMED = {XYZ: "xyz", XYZ[:2]: "xy", STRESS: "stress_component"}

@@ -15,9 +15,9 @@ from kedfem.motion.path import Path
 from kedfem.motion.released_motions import components
 from kedfem.motion.rigid import RigidMotion
 from kedfem.motion.transmission import Transmission, transmissions
+from kedfem.results.channels import XYZ, Channel
 from kedfem.results.forces.rigid import stated_link
 from kedfem.results.recorded import Rows
-from kedfem.results.records import XYZ, Channel
 from kedfem.scene import Scene
 
 FLAT = 1e-9  # of the fastest rotation: smaller out-of-plane components are rounding

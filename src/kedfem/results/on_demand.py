@@ -9,9 +9,9 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.errors import OutputError
+from kedfem.results.channels import Channel
 from kedfem.results.files import reason
 from kedfem.results.layout import all_rows, opened_to_read, read_text
-from kedfem.results.records import Channel
 
 AT_ONCE = 64_000_000  # bytes: smaller files are read at once
 KEPT = 32_000_000  # bytes of the rows read last, which are kept in memory

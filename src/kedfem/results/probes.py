@@ -12,10 +12,10 @@ from kedfem.links.point_rows import point_rows
 from kedfem.links.recovery import von_mises
 from kedfem.motion.linkage import Linkage, linkage
 from kedfem.motion.released_motions import components
+from kedfem.results.channels import STRESS, XYZ, Channel
 from kedfem.results.deflections import deflection
 from kedfem.results.link_points import LinkPoint, Point, link_point
 from kedfem.results.recorded import Recorded, Rows
-from kedfem.results.records import STRESS, XYZ, Channel
 from kedfem.scene import ForceLoad, Probe, Scene, TorqueLoad
 
 ELASTIC = {"displacement": "u", "velocity": "v", "acceleration": "a"}

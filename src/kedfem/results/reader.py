@@ -7,6 +7,7 @@ from typing import Any, cast, get_args
 from kedfem.errors import OutputError
 from kedfem.results import on_demand
 from kedfem.results.additions import read_account, read_fatigue, read_peaks
+from kedfem.results.channels import ANGLE, TIME, TRAVEL, Channel
 from kedfem.results.files import reason
 from kedfem.results.layout import (
     BETWEEN,
@@ -20,7 +21,7 @@ from kedfem.results.layout import (
     sealed,
     series,
 )
-from kedfem.results.records import ANGLE, TIME, TRAVEL, Channel, Results, Status
+from kedfem.results.records import Results, Status
 
 WANTED = "a results file of kedfem"
 

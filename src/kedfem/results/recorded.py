@@ -8,7 +8,7 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
-from kedfem.results.records import ANGLE, TRAVEL, Channel
+from kedfem.results.channels import ANGLE, TRAVEL, Channel
 from kedfem.scene import Scene, driven_travel
 
 Rows = Float[np.ndarray, "T c"]

@@ -7,14 +7,17 @@ import csv
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.results.dimensions import cf_attributes, columns_dimension
 from kedfem.results.files import of_extra, replacing
-from kedfem.results.records import TIME, Channel, Results
+
+if TYPE_CHECKING:
+    from kedfem.results.records import Results
+from kedfem.results.channels import TIME, Channel
 
 ROWS = 100_000  # of a table, put together at a time
 # of numbers in tables: more than any result is exact to, half as long as what gives back the same float
@@ -22,7 +25,7 @@ DIGITS = "%.9g"
 EVERY = slice(None)
 
 
-def write_csv(results: Results, path: Path) -> None:
+def write_csv(results: "Results", path: Path) -> None:
     """Write all channels as comma-separated values, one row per step.
 
     The header names every column with its unit, e.g. ``probes/rocker_mid/stress von_mises [Pa]``;
@@ -62,7 +65,7 @@ def cell(x: float) -> str:
     return "" if np.isnan(x) else DIGITS % x
 
 
-def write_parquet(results: Results, path: Path) -> None:
+def write_parquet(results: "Results", path: Path) -> None:
     """Write the table of `write_csv` as Parquet, all digits kept, time as index; how the run ended is in its `attrs`."""
     require_parquet("output.parquet")
     table = as_data_frame(results)
@@ -77,7 +80,7 @@ def require_parquet(where: str) -> None:
         of_extra(package, where)
 
 
-def as_data_tree(results: Results) -> Any:
+def as_data_tree(results: "Results") -> Any:
     """An xarray.DataTree with the groups and names of the results file."""
     xarray = of_extra("xarray", "Results.to_xarray")
     time = xarray.Variable("time", results.time, cf_attributes(TIME))
@@ -97,7 +100,7 @@ def as_data_tree(results: Results) -> Any:
     return xarray.DataTree.from_dict({"/": xarray.Dataset(coords=along, attrs=run), **sets})
 
 
-def as_data_frame(results: Results) -> Any:
+def as_data_frame(results: "Results") -> Any:
     """A pandas.DataFrame with the columns of the table, over time [s]."""
     pandas = of_extra("pandas", "Results.to_pandas")
     first, *names = header(results)
@@ -109,7 +112,7 @@ def drive_heading(drive: Channel) -> str:
     return f"{drive.name.replace('_', ' ')} [{drive.unit}]"
 
 
-def header(results: Results) -> list[str]:
+def header(results: "Results") -> list[str]:
     """Names of all columns with their units, time and drive first."""
     out = ["time [s]", drive_heading(results.drive)]
     for channel, _ in results.channels.values():
@@ -117,7 +120,7 @@ def header(results: Results) -> list[str]:
     return out
 
 
-def columns_of(results: Results, rows: slice = EVERY) -> np.ndarray:
+def columns_of(results: "Results", rows: slice = EVERY) -> np.ndarray:
     """All columns (n, c) of some rows, time and drive first."""
     blocks = [results.time[rows, None], results.angle[rows, None]]
     return np.hstack([*blocks, *(values[rows] for _, values in results.channels.values())])

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.results.records import Channel
+from kedfem.results.channels import Channel
 
 Rows = dict[str, Float[np.ndarray, "b ..."]]
 

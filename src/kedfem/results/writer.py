@@ -12,6 +12,7 @@ from kedfem.arrays import Float
 from kedfem.errors import OutputError, SolveError
 from kedfem.folders import own_part
 from kedfem.results.blocks import not_finite, require_channels
+from kedfem.results.channels import ANGLE, TIME, Channel
 from kedfem.results.dimensions import lay_dimensions
 from kedfem.results.files import ready_folder, require_space, unwritable
 from kedfem.results.layout import (
@@ -32,7 +33,6 @@ from kedfem.results.layout import (
     write_text,
 )
 from kedfem.results.reader import read_results
-from kedfem.results.records import ANGLE, TIME, Channel
 from kedfem.results.thinning import Rows, Thinning
 
 SPARE_SPACE = 1_000_000  # bytes kept for HDF5's own tables and for the status of an interrupted run

@@ -13,8 +13,8 @@ from kedfem.load_cases import LoadCases
 from kedfem.loads import Loads
 from kedfem.motion.coordinates import driven_name
 from kedfem.output.words import NOTHING, clock, moment, number_in, with_prefix
+from kedfem.results.channels import largest_by_unit
 from kedfem.results.kinematic import transmission_key
-from kedfem.results.records import largest_by_unit
 from kedfem.scene import Scene
 from kedfem.scene.records.units import RPM
 from kedfem.tables.layout import facts, left, listed, right

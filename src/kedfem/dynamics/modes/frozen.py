@@ -22,7 +22,7 @@ from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.dynamics.system.arrays import Coefficients
 from kedfem.dynamics.system.layout import as_arrays, coefficients, factored
-from kedfem.dynamics.system.march import Ready
+from kedfem.dynamics.system.ready import Ready
 from kedfem.dynamics.system.record import TIME, Stop, System, curve_of
 from kedfem.dynamics.system.sparse import SparsePart, momentum
 from kedfem.dynamics.system.starts.instant import Instant, sizes

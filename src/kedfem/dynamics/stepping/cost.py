@@ -8,11 +8,11 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.matrices.dense import SMALL
-from kedfem.dynamics.model import Model
+from kedfem.dynamics.model import Model, factor_bytes
 from kedfem.dynamics.stepping.levels import level_steps
 from kedfem.dynamics.stepping.solvers import block_length
 from kedfem.dynamics.system.steps import Steps
-from kedfem.mesh.memory_forecast import ASSEMBLY_BYTES, FACTOR_BYTES, LINK_BYTES, PLANE_FILL
+from kedfem.mesh.memory_forecast import ASSEMBLY_BYTES, LINK_BYTES, PLANE_FILL
 from kedfem.scene import Scene, time_grid
 
 # of a link of N unknowns, from `benchmarks.growth` and slender bars (27-node hexahedra, CHOLMOD)
@@ -67,11 +67,6 @@ def _blocks(scene: Scene, model: Model) -> float:
     """Bytes of the time points that are kept together, and of what is made of them."""
     states = 9 * 8 * model.unknowns * min(block_length(model), time_grid(scene).steps)
     return (4.0 if any(link.fit is not None for link in model.links) else 2.0) * states
-
-
-def factor_bytes(model: Model) -> float:
-    """Memory of the factors of all links, for one step size."""
-    return FACTOR_BYTES * float(_fill(model).sum())
 
 
 def factor_words(model: Model) -> str:

@@ -23,7 +23,7 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Block, joined, multipliers_together
-from kedfem.dynamics.model import Model
+from kedfem.dynamics.model import Model, factor_bytes
 from kedfem.dynamics.rigid_links import for_steps
 from kedfem.dynamics.stepping.combined import Combination, level_weights
 from kedfem.dynamics.stepping.marks import Mark, Marks
@@ -55,8 +55,6 @@ def level_scenes(scene: Scene) -> list[Scene]:
 
 def most_levels(model: Model) -> int:
     """How many levels' factors fit in this machine's memory, at most 3; of links so large that none would, 1."""
-    from kedfem.dynamics.stepping.cost import factor_bytes
-
     return max(1, min(MOST, int(memory() / max(factor_bytes(model), 1.0))))
 
 
@@ -68,8 +66,6 @@ def level_steps(scene: Scene, model: Model) -> list[Steps]:
     SolveError
         If the factors of all levels do not fit in memory, or an effective matrix is not positive definite.
     """
-    from kedfem.dynamics.stepping.cost import factor_bytes
-
     need = factor_bytes(model)
     if need > (free := free_memory()):
         fits = unknowns_that_fit(model.unknowns, need, free)

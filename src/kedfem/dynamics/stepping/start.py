@@ -7,9 +7,9 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.coarse import coarse_model
 from kedfem.dynamics.stepping.solvers import block_length, steps_of
 from kedfem.dynamics.stepping.state import Nodal
-from kedfem.dynamics.system.march import Motion
 from kedfem.dynamics.system.period.map import PeriodMap
 from kedfem.dynamics.system.period.search import periodic
+from kedfem.dynamics.system.ready import Motion
 from kedfem.dynamics.system.state import State
 from kedfem.dynamics.system.steps import Steps
 from kedfem.links.record import Link

@@ -1,49 +1,23 @@
 """The public march of a system: from any state, over any stretch of its rigid-body motion, to the state at its end."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
 
-from kedfem.arrays import Float
-from kedfem.dynamics.matrices.dense import rows_of, work_over_time
-from kedfem.dynamics.rigid_body import forcing_of, forcings
-from kedfem.dynamics.stepping.scheme import Scheme
-from kedfem.dynamics.system.arrays import Bodies, Coefficients, Constraints, Ends
-from kedfem.dynamics.system.ends import left_line, line_weights
-from kedfem.dynamics.system.forces.stresses import NO_TERMS, Stressed, stressed
-from kedfem.dynamics.system.forces.turning_loads import turning
-from kedfem.dynamics.system.layout import TOLERANCE, as_arrays, coefficients, factored
-from kedfem.dynamics.system.record import System, is_affine, stiffness_factors, without_unknowns
-from kedfem.dynamics.system.sparse import Part, solver
+from kedfem.dynamics.system.ends import left_line
+from kedfem.dynamics.system.ready import Loads, Motion, Ready, driving, shortened
+from kedfem.dynamics.system.reference import by_address
+from kedfem.dynamics.system.sparse import solver
+from kedfem.dynamics.system.starts.impacts import apart_from, met_at, pushed, without
 from kedfem.dynamics.system.state import Driving, History, State, copied, empty_history, empty_trial, room
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import RigidMotion
 
 MET, LEFT = -2, -3  # of `step_kernel`
 HALVINGS = 6  # a step is taken in up to 2⁶ parts
-Motion = Callable[[Float[np.ndarray, " T"]], RigidMotion]
-"""Rigid-body motion at given times."""
-
-
-@dataclass(frozen=True, slots=True)
-class Ready:
-    """A system made ready for steps of one length: all bodies factored once, everything as flat arrays.
-
-    stressed : stress stiffness on the coordinates, if geometric stiffening counts
-    halves : the same for steps half as long, once these have been needed
-    """
-
-    system: System
-    scheme: Scheme
-    c: Coefficients
-    parts: list[Part]
-    bodies: Bodies
-    ends: Ends
-    constraints: Constraints
-    stressed: Stressed | None = None
-    halves: list["Ready"] = field(default_factory=list)
+NEAR = 1e-2  # of a step: a stop that is met so near to its beginning or end is met there
 
 
 class ConvergenceError(SolveError):
@@ -71,48 +45,6 @@ class LeftLineError(ConvergenceError):
         self.said, self.state, self.history, self.taken, self.moves = said, state, history, taken, ""
 
 
-def ready(system: System, scheme: Scheme, tolerance: float = TOLERANCE) -> Ready:
-    """Factor all bodies of a system for a scheme."""
-    model = system.model
-    linear = all(without_unknowns(system, each) or is_affine(system, each) for each in system.constraints)
-    single = linear and all(link.fit is None for link in model.links) and system.stiffening is None
-    c = coefficients(scheme, model.damping, model.links, single, tolerance)
-    parts = factored(model.links, model.joints, c)
-    modes = None if system.stiffening is None else stressed(system.stiffening, parts)
-    return Ready(system, scheme, c, parts, *as_arrays(system, parts), modes)
-
-
-Loads = Sequence[Float[np.ndarray, "T _ _"]]
-"""P − M R0'' of all bodies over time, world components."""
-
-
-def driving(of: Ready, motion: RigidMotion, loads: Loads | None = None) -> Driving:
-    """The rigid-body motion and loads on all coordinates over the times of a motion.
-
-    Parameters
-    ----------
-    loads : if they are there already
-    """
-    model = of.system.model
-    forcing = forcings(model, motion) if loads is None else forcing_of(model, motion, loads)
-    F = [work_over_time(part, x.F).reshape(len(motion.t), -1) for part, x in zip(of.parts, forcing, strict=True)]
-    drives = motion.drives if motion.drives.shape[1] else np.zeros((len(motion.t), 1))
-    stations = [line_weights(end, motion) for end in of.system.ends if end.line is not None]
-    weights = np.concatenate([np.zeros((len(motion.t), 0)), *stations], axis=1)
-    varied = [getattr(each.law, "factor", None) for each in of.system.constraints]
-    springs = stiffness_factors(varied, motion.t, motion.phi)
-    rows = (motion.t, motion.R, motion.p, motion.v, motion.omega, drives, np.concatenate(F, axis=1), amounts(of, motion))
-    terms = NO_TERMS if of.stressed is None else of.stressed.over(forcing, motion)
-    # other strides would be compiled for anew
-    return Driving(*(np.ascontiguousarray(x) for x in (*rows, weights, springs, *terms)))
-
-
-def amounts(of: Ready, motion: RigidMotion) -> Float[np.ndarray, "T w"]:
-    """Amounts of the loads that turn with bodies over time."""
-    every = [load.factor(motion.t, motion.phi) for _, load in turning(of.system.model.loads)]
-    return np.stack(every, axis=1) if every else np.zeros((len(motion.t), 0))
-
-
 def march(
     of: Ready, state: State, motion: RigidMotion, between: Motion | None = None, halvings: int = HALVINGS,
     loads: Loads | None = None,
@@ -133,8 +65,6 @@ def march(
     LeftLineError
         If a pin slides beyond the line of its slot.
     """
-    from kedfem.dynamics.system.reference import by_address
-
     constraints = of.constraints
     if between is None or not halvings:
         constraints = constraints._replace(jumps=np.zeros_like(constraints.jumps))
@@ -192,23 +122,39 @@ def compiled_steps(of: Ready) -> Callable[..., tuple[int, int]]:
 def _in_parts(of: Ready, state: State, last: float, between: Motion, halvings: int, met: bool) -> tuple[State, History]:
     """One step in two, each of these in two again where it must be; where a stop is met if that is why."""
     if met:
-        from kedfem.dynamics.system.starts.impacts import divided  # which marches
-
-        return divided(of, state, last, between, halvings)
+        return _divided_at_stop(of, state, last, between, halvings)
     if not of.halves:
         of.halves.append(shortened(of, of.scheme.h / 2))
     finer = of.halves[0]
     return march(finer, state, between(last - finer.c.h * np.array([1.0, 0.0])), between, halvings - 1)
 
 
-def shortened(of: Ready, h: float) -> Ready:
-    """The same for steps of another length."""
-    made = ready(of.system, replace(of.scheme, h=h), of.c.tolerance)
-    return replace(made, constraints=of.constraints)
+def _divided_at_stop(of: Ready, state: State, last: float, between: Motion, halvings: int) -> tuple[State, History]:
+    """One step in which a stop with damping is met, in two parts; shorter ones would end with accelerations that predict
+    nothing of the next step.
 
-
-def displacements(of: Ready, k: int, x: Float[np.ndarray, "T N"]) -> Float[np.ndarray, "T n d"]:
-    """Rows of body k's state, or of its rates, over time from the coordinates of all bodies."""
-    link, bodies = of.system.model.links[k], of.bodies
-    own = x[:, bodies.at[k] : bodies.at[k + 1]].reshape(len(x), link.d, link.n)
-    return rows_of(link, of.parts[k], own)
+    Parameters
+    ----------
+    last : end of the step [s]
+    between : rigid-body motion at any times
+    halvings : how often parts may be divided
+    """
+    begins = float(state.time[0])
+    h = last - begins
+    apart = apart_from(of.constraints, state.e[0]) & (state.multiplier == 0.0)
+    free = replace(of, constraints=without(of.constraints, apart), halves=[])
+    alone, reached = march(free, state, between(np.array([last])), between, halvings - 1)
+    share = np.where(apart, met_at(of.constraints, state, reached, h), np.inf)
+    first = float(share.min())
+    if not np.isfinite(first):  # another force brings it there, such as that of a stop which is met in the same step
+        return march(of, state, between(np.array([last])), between, 0)
+    met = share <= first + NEAR
+    if first >= 1 - NEAR:
+        return pushed(of, alone, between, met), reached
+    if first > NEAR:
+        to = np.array([begins + first * h])
+        state, _ = march(shortened(free, first * h), state, between(to), between, halvings - 1)
+        h *= 1 - first
+    rest = shortened(of, h)
+    state = pushed(rest, state, between, met)
+    return march(rest, state, between(np.array([last])), between, halvings - 1)

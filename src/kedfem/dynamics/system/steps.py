@@ -26,10 +26,11 @@ from kedfem.dynamics.system.forces.exerted import on_links
 from kedfem.dynamics.system.forces.supports import Supports
 from kedfem.dynamics.system.forces.turning_loads import turned, turning
 from kedfem.dynamics.system.layout import points_of
-from kedfem.dynamics.system.march import Motion, Ready, displacements, march, ready
+from kedfem.dynamics.system.march import march
 from kedfem.dynamics.system.period.krylov import Watch
 from kedfem.dynamics.system.period.map import PeriodMap
 from kedfem.dynamics.system.period.search import Periodic, Search
+from kedfem.dynamics.system.ready import Motion, Ready, displacements, ready
 from kedfem.dynamics.system.record import TANGENTIAL, System
 from kedfem.dynamics.system.starts.accelerations import accelerated_in_a_step, accelerations
 from kedfem.dynamics.system.starts.deflected import plucked, quasi_static

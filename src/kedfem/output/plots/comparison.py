@@ -10,8 +10,8 @@ from kedfem.output.plots.drawing import draw_legend, envelope, figure_saved
 from kedfem.output.plots.files import remove_plots
 from kedfem.output.words import prefixed
 from kedfem.results import ready_folder
+from kedfem.results.channels import Channel
 from kedfem.results.differences import Difference, Over, magnitude
-from kedfem.results.records import Channel
 from kedfem.results.table import write_rows
 
 LOOKS = ("-", "--", ":", "-.")

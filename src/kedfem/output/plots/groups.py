@@ -8,7 +8,8 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.results import Channel, Results
-from kedfem.results.records import XYZ, rounding
+from kedfem.results.channels import XYZ
+from kedfem.results.records import rounding
 
 Curves = Mapping[str, Float[np.ndarray, " n"]]
 SEVERAL = ("drive", "joints", "motors", "springs", "limits", "gears")  # how names of things of one kind begin

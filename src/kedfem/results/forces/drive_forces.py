@@ -7,11 +7,11 @@ from kedfem.dynamics.model import Model, PrescribedBody
 from kedfem.dynamics.system.forces.exerted import effort
 from kedfem.dynamics.system.forces.supports import supports
 from kedfem.motion.joint_equations import joint_axis, moving_pair, ordered
+from kedfem.results.channels import Channel
 from kedfem.results.forces.constraint_forces import of_joint
 from kedfem.results.forces.drive_joint_forces import drive_joint_wrench, partner
 from kedfem.results.forces.port_forces import Forces, holder, loose, negligible, port_wrench
 from kedfem.results.recorded import Recorded, Rows, drive_effort
-from kedfem.results.records import Channel
 from kedfem.scene import Scene
 
 

@@ -21,8 +21,8 @@ from kedfem.motion.constraints import cross
 from kedfem.motion.coordinates import counted_on
 from kedfem.motion.joint_equations import moving_pair
 from kedfem.motion.linkage import body_names
+from kedfem.results.channels import Channel
 from kedfem.results.recorded import Recorded, Rows
-from kedfem.results.records import Channel
 from kedfem.scene import LineSpring, Scene
 
 POSITION, SPEED, EFFORT = "e", "rate", "multiplier"  # of `Multipliers`

@@ -11,10 +11,10 @@ from kedfem.dynamics.model import Model, PrescribedBody, Slider
 from kedfem.links.record import in_space
 from kedfem.motion.constraints import cross
 from kedfem.motion.joint_equations import moving_pair, ordered
+from kedfem.results.channels import XYZ, Channel
 from kedfem.results.forces.drive_joint_forces import constrained_joints, drive_joint_wrench, partner
 from kedfem.results.forces.port_forces import Forces, determinate, holder, loose, negligible, port_wrench
 from kedfem.results.recorded import Recorded, Rows, once
-from kedfem.results.records import XYZ, Channel
 from kedfem.scene import ForceLoad, Scene
 
 

@@ -17,8 +17,8 @@ from kedfem.motion.path import Path, path
 from kedfem.motion.reactions import BlockReactions, Reactions, effort, reactions
 from kedfem.motion.released_motions import components
 from kedfem.motion.rigid import RigidMotion
+from kedfem.results.channels import XYZ, Channel
 from kedfem.results.recorded import Rows, drive_effort
-from kedfem.results.records import XYZ, Channel
 from kedfem.scene import GROUND, ConstantSpeed, Joint, Scene, turn_steps
 
 Responses = Float[np.ndarray, "T c k"]

@@ -17,7 +17,8 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.system.arrays import ends_of
-from kedfem.dynamics.system.march import Ready, march
+from kedfem.dynamics.system.march import march
+from kedfem.dynamics.system.ready import Ready
 from kedfem.dynamics.system.starts.instant import TURN, Flat, Instant, Motion, turned
 from kedfem.dynamics.system.starts.internal_forces import own, put_momenta, store_internal_state
 from kedfem.dynamics.system.state import History, State, copied

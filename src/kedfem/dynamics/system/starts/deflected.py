@@ -16,7 +16,7 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.dynamics.matrices.bordered import ConstraintTerms
 from kedfem.dynamics.matrices.dense import work_on
-from kedfem.dynamics.system.march import Ready
+from kedfem.dynamics.system.ready import Ready
 from kedfem.dynamics.system.starts.accelerations import accelerations, own_spin
 from kedfem.dynamics.system.starts.initial_states import as_coordinates, begun
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned

@@ -1,58 +1,23 @@
-"""Steps that are divided where a stop with damping is met: its push begins at once, with c e'.
+"""Stops with damping that a step meets: when, and the state in which their push begins, with c e'.
 
-Before that time the stop is left out, so that both parts of the step are smooth; between them the push changes
-accelerations as the matrix of the step after it lets them. Where a push ends, and where it begins without damping, it is
-continuous: steps keep their order there undivided.
+`march` divides the step there. Before that time the stop is left out, so that both parts of the step are smooth; between
+them the push changes accelerations as the matrix of the step after it lets them. Where a push ends, and where it begins
+without damping, it is continuous: steps keep their order there undivided.
 """
-
-from dataclasses import replace
 
 import numpy as np
 
 from kedfem.arrays import Bool, Float
 from kedfem.dynamics.matrices.bordered import ConstraintTerms
 from kedfem.dynamics.system.arrays import Constraints
-from kedfem.dynamics.system.march import Motion, Ready, march, shortened
+from kedfem.dynamics.system.ready import Motion, Ready
 from kedfem.dynamics.system.sparse import SparsePart, momentum
 from kedfem.dynamics.system.starts.accelerations import in_a_step
 from kedfem.dynamics.system.starts.instant import Instant
 from kedfem.dynamics.system.starts.internal_forces import own
 from kedfem.dynamics.system.state import History, State, copied
 
-NEAR = 1e-2  # of a step: a stop that is met so near to its beginning or end is met there; see `divided`
-
 Coordinates = Float[np.ndarray, " r"]
-
-
-def divided(of: Ready, state: State, last: float, between: Motion, halvings: int) -> tuple[State, History]:
-    """One step in which a stop with damping is met, in two parts; shorter ones would end with accelerations that predict
-    nothing of the next step.
-
-    Parameters
-    ----------
-    last : end of the step [s]
-    between : rigid-body motion at any times
-    halvings : how often parts may be divided
-    """
-    begins = float(state.time[0])
-    h = last - begins
-    apart = apart_from(of.constraints, state.e[0]) & (state.multiplier == 0.0)
-    free = replace(of, constraints=without(of.constraints, apart), halves=[])
-    alone, reached = march(free, state, between(np.array([last])), between, halvings - 1)
-    share = np.where(apart, _met(of.constraints, state, reached, h), np.inf)
-    first = float(share.min())
-    if not np.isfinite(first):  # another force brings it there, such as that of a stop which is met in the same step
-        return march(of, state, between(np.array([last])), between, 0)
-    met = share <= first + NEAR
-    if first >= 1 - NEAR:
-        return _pushed(of, alone, between, met), reached
-    if first > NEAR:
-        to = np.array([begins + first * h])
-        state, _ = march(shortened(free, first * h), state, between(to), between, halvings - 1)
-        h *= 1 - first
-    rest = shortened(of, h)
-    state = _pushed(rest, state, between, met)
-    return march(rest, state, between(np.array([last])), between, halvings - 1)
 
 
 def apart_from(of: Constraints, e: Coordinates) -> Bool[np.ndarray, " r"]:
@@ -67,7 +32,7 @@ def without(of: Constraints, which: Bool[np.ndarray, " r"]) -> Constraints:
     return of._replace(numbers=numbers, jumps=of.jumps & ~which)
 
 
-def _met(of: Constraints, state: State, reached: History, h: float) -> Coordinates:
+def met_at(of: Constraints, state: State, reached: History, h: float) -> Coordinates:
     """When each coordinate first passes a limit, of a step in which none pushes: on the cubic through both ends."""
     out = np.full(len(of.law), np.inf)
     for n in np.flatnonzero(of.jumps):
@@ -81,7 +46,7 @@ def _met(of: Constraints, state: State, reached: History, h: float) -> Coordinat
     return out
 
 
-def _pushed(of: Ready, state: State, between: Motion, met: Bool[np.ndarray, " r"]) -> State:
+def pushed(of: Ready, state: State, between: Motion, met: Bool[np.ndarray, " r"]) -> State:
     """The state at which stops begin to push, with −c e' each."""
     state = copied(state)
     now = Instant(of, between, float(state.time[0]))

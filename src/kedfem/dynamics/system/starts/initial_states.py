@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from kedfem.dynamics.matrices.bordered import ConstraintTerms
 from kedfem.dynamics.matrices.dense import coordinates
-from kedfem.dynamics.system.march import Ready
+from kedfem.dynamics.system.ready import Ready
 from kedfem.dynamics.system.starts.accelerations import accelerations
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
 from kedfem.dynamics.system.starts.internal_forces import own, put_momenta, store_internal_state

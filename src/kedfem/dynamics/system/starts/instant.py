@@ -17,7 +17,7 @@ from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.system.ends import left_line, line_of
 from kedfem.dynamics.system.forces.turning_loads import turned as turned_load
 from kedfem.dynamics.system.forces.turning_loads import turning
-from kedfem.dynamics.system.march import Ready, driving
+from kedfem.dynamics.system.ready import Ready, driving
 from kedfem.dynamics.system.record import ANGLE, Driven, Held, law_at
 from kedfem.dynamics.system.sparse import SparsePart, softening
 from kedfem.dynamics.system.starts.coordinate_rates import angles, coordinates, pins, places, travels

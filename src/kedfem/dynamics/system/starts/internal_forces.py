@@ -11,7 +11,7 @@ from kedfem.dynamics.frames import Deformed, frame_force, frames_of, mean_orient
 from kedfem.dynamics.matrices.dense import component_first, coordinates, rows_of, work_on
 from kedfem.dynamics.stepping.state import Nodal
 from kedfem.dynamics.system.layout import points_of
-from kedfem.dynamics.system.march import Ready
+from kedfem.dynamics.system.ready import Ready
 from kedfem.dynamics.system.record import RIGID_BODY
 from kedfem.dynamics.system.sparse import SparsePart, momentum
 from kedfem.dynamics.system.state import State, empty_state, empty_trial, room
@@ -56,7 +56,7 @@ class StaticForces:
         bodies, trial = self.of.bodies, self._trial
         trial.u[:] = u
         if (bodies.frame > RIGID_BODY).any():  # else nothing has to be compiled
-            from kedfem.dynamics.system.static_kernel import static_forces
+            from kedfem.dynamics.system.starts.static_kernel import static_forces
 
             c, constant, state, end, work = self._of_forces
             static_forces(c, constant, R, amounts, state, end, work)
@@ -107,7 +107,7 @@ class StaticForces:
         """
         trial = self._trial
         if len(trial.e):
-            from kedfem.dynamics.system.static_kernel import static_gradients
+            from kedfem.dynamics.system.starts.static_kernel import static_gradients
 
             omega = np.ascontiguousarray(motion.omega[0])  # laid out as in steps: compiled once for both
             turning = motion.R[0], motion.v[0], omega

@@ -23,7 +23,7 @@ from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.ports import port_rotation
 from kedfem.dynamics.matrices.bordered import Bordered, ConstraintTerms
 from kedfem.dynamics.matrices.substructure import Substructure, mass_substructure
-from kedfem.dynamics.system.march import Ready
+from kedfem.dynamics.system.ready import Ready
 from kedfem.dynamics.system.sparse import SparsePart, sparse_part
 from kedfem.errors import SolveError
 from kedfem.links.record import Link

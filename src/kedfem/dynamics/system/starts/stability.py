@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kedfem.dynamics.system.march import Ready
+from kedfem.dynamics.system.ready import Ready
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion
 from kedfem.dynamics.system.starts.internal_forces import moved
 from kedfem.dynamics.system.starts.linear_equations import LinearEquations
