@@ -15,7 +15,7 @@ from kedfem.dynamics.matrices.substructure import mass_matrix
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.stepping.scheme import Scheme
-from kedfem.dynamics.system.oracle.monolithic_tangent import rotated_stiffness
+from kedfem.dynamics.system.monolithic.monolithic_tangent import rotated_stiffness
 from kedfem.links.record import Link
 from kedfem.motion.rigid import RigidMotion
 

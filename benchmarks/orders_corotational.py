@@ -203,7 +203,7 @@ class Coupled:
             for link, part, (a, b) in parts
         ]) @ inverse.T  # fmt: skip
         self.force = Force(of, ((np.arange(steps)[:, None] + self.c) * self.h).ravel())
-        self.mixing, self.passes = AndersonAcceleration(), 0
+        self.anderson, self.passes = AndersonAcceleration(), 0
 
     def marched(self) -> tuple[Float[np.ndarray, "S N"], float]:
         """Coordinates at `SEEN` instants, and the work in passes: by what forces, and solves of either kind, cost."""
@@ -226,7 +226,7 @@ class Coupled:
         slope = (before[1] - before[0]) / (c[1] - c[0])
         a = before[1] + np.outer(1 + c - c[1], slope)
         solve = self._inverse(self.force.turns(2 * k, Q @ (q + h * c[0] * v + h * h * (A @ A @ a)[0])))
-        self.mixing.begin()
+        self.anderson.begin()
         for _ in range(ITERATIONS):
             X, V = q + h * np.outer(c, v) + h * h * A @ A @ a, v + h * A @ a
             left = np.array([Q.T @ self.force(2 * k + i, Q @ X[i], Q @ V[i]) for i in range(2)]) - a
@@ -236,7 +236,7 @@ class Coupled:
             if not np.isfinite(size):
                 return np.full_like(a, np.nan)
             settled = size <= self.of.of.c.tolerance * moved + self.of.of.c.floor
-            taken = change if settled else self.mixing.step(change.ravel()).reshape(change.shape)
+            taken = change if settled else self.anderson.step(change.ravel()).reshape(change.shape)
             a = a + np.linalg.solve(h * h * A @ A, taken)
             if settled:
                 return np.asarray(a)

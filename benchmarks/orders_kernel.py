@@ -85,7 +85,7 @@ def staged(c, c_inside, bodies, ends, of, driving, tableau, size, seen_every, st
 @inner
 def stage(c, c_inside, bodies, ends, of, driving, t, before, size, state, trial, work, solved):  # type: ignore[no-untyped-def]
     """Pass after pass from trial.u; how many."""
-    R, memory = driving.R[t], (state.pairs, state.products, state.last, trial.mixing)
+    R, memory = driving.R[t], (state.pairs, state.products, state.last, trial.memory)
     inside(c, c_inside, bodies, driving, t, size, state, trial, work)
     for i in range(len(bodies.motion)):
         orientation(bodies, i, R, trial.u, trial, trial.Rp[i])

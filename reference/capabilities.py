@@ -23,9 +23,9 @@ key of a kind of link, a surface at a joint, points of planar links in one plane
 
 It is executed (`python -m tests.cells`). Of {all} cells, each kind of joint with all frames, with and without a drive, on
 13 pairs of kinds of links, drives of all coordinates of joints, and each pair of these with one of 21 loads and laws,
-{ran} ran three steps from a loaded, moving start: as by the oracle, which assembles all tangents anew, to 1e-8 of the
-peak, 1e-7 with co-rotational frames, 5e-7 with rigid-body ones and beams in space, where rounding beside the stiff rigid
-parts at their ends is 2e-7. {refused} were refused by lines of the table.
+{ran} ran three steps from a loaded, moving start: as by the monolithic solver, which assembles all tangents anew, to 1e-8
+of the peak, 1e-7 with co-rotational frames, 5e-7 with rigid-body ones and beams in space, where rounding beside the stiff
+rigid parts at their ends is 2e-7. {refused} were refused by lines of the table.
 
 The page is made by `python -m reference.capabilities > docs/capabilities.md`.
 """

@@ -57,7 +57,7 @@ CHANNELS: dict[str, tuple[Entry, ...]] = {
         Entry("probes/NAME/displacement|velocity|acceleration", XYZ, "m|m/s|m/s^2", "either",
              f"Elastic motion of the point against the rigid motion of its link; without a drive against the free motions held in the reference position; {FLAT}."),
         Entry("probes/NAME/position|travel", XYZ, "m", "world",
-             f"Where the point is; how far it is from where it is drawn. Rigid and elastic motion together; {FLAT}."),
+             f"Where the point is; how far it is from its reference position. Rigid and elastic motion together; {FLAT}."),
         Entry("probes/NAME/total_velocity|total_acceleration", XYZ, "m/s|m/s^2", "world",
              f"Of rigid and elastic motion together; {FLAT}."),
         Entry("probes/NAME/deflection", XYZ, "m", "either",
@@ -134,7 +134,7 @@ brackets). Energies apart, nothing is summed up over time.
 | group | attributes |
 |---|---|
 | `/` | `status` (`complete`, `unreliable`, `interrupted`, `running`), `reason`, `kedfem_version`, `Conventions` |
-| `/notes` | what the run reported of itself: unknowns, step, estimated errors (`error of mesh, stress` ...), the residual of energy; `steps between rows` of a file without all |
+| `/notes` | notes of the run: unknowns, step, estimated errors (`error of mesh, stress` ...), the residual of energy; `steps between rows` of a file without all |
 | `/notes/LINK` | what a link was modelled as: `model`, `elements`, `unknowns`; with what is attached `mass [kg]`, `centre of mass [m]` in the reference position, `inertia [kg m^2]` about it: xx, yy, zz, xy, yz, zx |
 | `/warnings`, `/timing` | what was reported to the user; seconds of each stage; both of a run that came to its end |
 | `/peaks/LINK` | highest von Mises stress over all steps, its place in the reference position, time, step and drive; `away` from places where it means little |

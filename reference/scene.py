@@ -41,7 +41,7 @@ from reference.scene_examples import EXAMPLES
 INTRODUCTION = """\
 # The scene file
 
-A scene is a TOML file: a linkage drawn assembled, its drive and loads, and what to find out.
+A scene is a TOML file: an assembled linkage in its reference position, its drive and loads, and what to compute.
 `kedfem new four-bar` writes a commented one to start from. All faults of a scene are reported at once, each
 as *where: what was wanted, what was got*.
 
@@ -62,7 +62,7 @@ as *where: what was wanted, what was got*.
   `at = {{ between = ["A", "B"], fraction = 0.3 }}`. **Axes** are `"x"`, `"y"`, `"z"`, a vector of any length, or two
   points: `axis = {{ from = "A", to = "B" }}`.
   **Vectors** are two or three components; the third is 0 if left out.
-* **One reference position:** all points, shapes and axes hold where the linkage is drawn; the drive's angle
+* **One reference position:** all points, shapes and axes are those of the linkage in this position; the drive's angle
   counts from there. Where joints have points of their own on each link, this position is the closed one.
 * **Names** (of points, links, joints ...) are made of letters, digits, `_`, `-` and inner spaces. `ground` is
   the frame.

@@ -86,7 +86,7 @@ def by_march_and_oracle(raw: Raw) -> dict[str, float]:
     """
     analysis = {"kind": "transient", "initial": "rest", "end_time": 3 * STEP, "step": STEP}
     of = as_a_run(begun(raw | {"analysis": raw["analysis"] | analysis}))
-    return {"oracle": against_oracle(of, 3, keeps=True) / WITHIN}
+    return {"monolithic": against_oracle(of, 3, keeps=True) / WITHIN}
 
 
 def when_turned(raw: Raw) -> dict[str, float]:
@@ -143,7 +143,7 @@ def between_frames(raw: Raw) -> dict[str, float]:
 LAWS: dict[str, Callable[[Raw], dict[str, float]]] = {
     "rigid": limit,
     "solvers": by_both_solvers,
-    "oracle": by_march_and_oracle,
+    "monolithic": by_march_and_oracle,
     "turned": when_turned,
     "energy": energy,
     "frames": with_small_deflections,
@@ -163,7 +163,7 @@ def tried(law: str, seed: int, frames: str = "rigid-body", most: int = 6, elsewh
     raw = driven(seed, most, frames)
     if elsewhere:
         raw = by_other_coordinates(raw, seed)
-    if law not in {*STANDING, "oracle"}:
+    if law not in {*STANDING, "monolithic"}:
         raw = varied(raw, seed)
     try:
         moving(scene_from(raw))

@@ -15,9 +15,9 @@ from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.start import initial_rates
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.march import march
-from kedfem.dynamics.system.oracle.monolithic import Monolithic
-from kedfem.dynamics.system.oracle.monolithic_steps import begun as as_the_oracle_begins
-from kedfem.dynamics.system.oracle.monolithic_tangent import inverse, rotated_stiffness
+from kedfem.dynamics.system.monolithic.monolithic import Monolithic
+from kedfem.dynamics.system.monolithic.monolithic_steps import begun as as_the_oracle_begins
+from kedfem.dynamics.system.monolithic.monolithic_tangent import inverse, rotated_stiffness
 from kedfem.dynamics.system.ready import Ready, displacements, ready
 from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.dynamics.system.state import History, State

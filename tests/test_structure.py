@@ -74,3 +74,21 @@ def test_tests_use_no_private_name_of_the_package() -> None:
                 names = [texts[0].rpartition(".")[2]] if texts else []
             used += [f"{file.name}: {name}" for name in names if re.match("_[^_]", name) and name not in FOREIGN]
     assert used == []
+
+
+def test_where_changes_begin_names_files_that_exist() -> None:
+    """The table of CONTRIBUTING.md: paths from the root or within the package, or beside what its row named before."""
+    root = Path(__file__).parents[1]
+    rows = (root / "CONTRIBUTING.md").read_text(encoding="utf-8").split("\n| change | first file | then |\n")[1]
+    missing = []
+    for row in rows.splitlines()[1:]:
+        named = [each for each in re.findall(r"`([\w./]+)`", row) if each.endswith((".py", "/"))]
+        places = [root, PACKAGE]
+        for each in named:
+            found = next((place / each for place in places if (place / each).exists()), None)
+            if found is None:
+                missing.append(each)
+            else:
+                places.append(found if each.endswith("/") else found.parent)
+        assert named, row
+    assert missing == []

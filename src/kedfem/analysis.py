@@ -112,7 +112,7 @@ def analyse(
     Parameters
     ----------
     scene : validated scene
-    watch : reported of progress
+    watch : called with each stage of the run and its progress
     resumes : whether to go on from the last state that an earlier run of the same scene stored
     every : seconds between stored states
     stresses_since : time [s] before which stresses do not count as highest

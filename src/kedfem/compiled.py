@@ -104,7 +104,7 @@ def compiling(report: Callable[[bool], None]) -> Iterator[None]:
 
 
 class _Compiling(event.Listener):
-    """Told of each function; those that a function calls are compiled within it."""
+    """Called once for each function; those that a function calls are compiled within it."""
 
     def __init__(self, report: Callable[[bool], None]) -> None:
         self.report, self.depth = report, 0

@@ -109,7 +109,7 @@ def _steps(path: FilePath, results: Results, link: str, at: Sequence[float]) -> 
 
 
 def _refuse(scene: Scene, name: str) -> None:
-    """Links whose load is none of a static analysis in three dimensions about its drawn shape."""
+    """Links whose load is none of a static analysis in three dimensions about its reference shape."""
     if name not in scene.links:
         known = ", ".join(repr(each) for each in scene.links)
         raise SceneError(f"--link: must be a link of the scene ({known}), got '{name}'")

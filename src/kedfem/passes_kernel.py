@@ -45,7 +45,7 @@ class _Passes(PassManager):
 
 
 class Quick(CompilerBase):
-    """A pipeline of these passes, as numba is told of it."""
+    """The pipeline of these passes, in the form in which numba takes one."""
 
     def define_pipelines(self) -> list[Any]:
         """It alone."""

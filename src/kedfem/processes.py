@@ -32,7 +32,7 @@ _asked: list[int] = []  # the signals that have interrupted this process
 
 
 def end_as_interrupted() -> None:
-    """Let the system's wish that this process end do what Ctrl-C does, unless the process was told to ignore it.
+    """Handle the system's request to end this process as Ctrl-C, unless the process ignores that signal.
 
     SIGBREAK is that wish on Windows; SIGHUP is sent when a terminal is closed. Raised where Python drops what is raised
     (finalizers, functions that a library calls back), an interruption is raised again a little later.
@@ -93,7 +93,7 @@ def caught_in(call: CodeType, caught: Callable[[BaseException], None]) -> Iterat
 
         return on_signal
 
-    main = threading.current_thread() is threading.main_thread()  # no other one is told of signals
+    main = threading.current_thread() is threading.main_thread()  # Python handles signals in the main thread alone
     numbers = [getattr(signal, name) for name in ("SIGINT", *INTERRUPTIONS) if main and hasattr(signal, name)]
     before = {number: each for number in numbers if callable(each := signal.getsignal(number))}
     try:

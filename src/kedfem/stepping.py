@@ -43,7 +43,7 @@ AHEAD, HELD = 16, 100e6  # instants, and bytes of them, that wait to be drawn as
 
 T = TypeVar("T")
 Watch = Callable[[str, int, int], None]
-"""Told of progress: (stage, done, total)."""
+"""Called as a run proceeds: (stage, done, total)."""
 
 
 def frame_steps(scene: Scene) -> Int[np.ndarray, " f"]:

@@ -30,7 +30,7 @@ T = TypeVar("T")
 
 def kept(what: str, key: str, made: Callable[[], T], packed: Callable[[T], Any],
          unpacked: Callable[[Any], T]) -> T:  # fmt: skip
-    """What was made before under a key, or is made now and kept.
+    """The stored value of a key; if there is none it is made and stored.
 
     Parameters
     ----------

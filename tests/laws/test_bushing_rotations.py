@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from kedfem.dynamics.system.forces import rotations
 from kedfem.dynamics.system.march import march
 from kedfem.dynamics.system.measures_kernel import rotation_along, tilt_along
-from kedfem.dynamics.system.oracle import monolithic_places as oracle
+from kedfem.dynamics.system.monolithic import monolithic_places as by_monolithic
 from kedfem.dynamics.system.record import ROTATION, TILT, Term
 from kedfem.dynamics.system.starts.coordinate_rates import value
 from kedfem.motion.newton import cross_matrix
@@ -102,7 +102,7 @@ def test_values_gradients_and_rates_are_one_rotation(kind: int, angle: float) ->
     term, room = Term(kind, 0, 1, axis, axis, b), np.zeros((12, 3))
     by_hand = angle * float(n @ b)
     step = along_kernel(kind == TILT, Qi, Qj, axis, b, room)
-    apart, gradient = (oracle.rotation_along if kind == ROTATION else oracle.tilt_along)(term, Qi, Qj)
+    apart, gradient = (by_monolithic.rotation_along if kind == ROTATION else by_monolithic.tilt_along)(term, Qi, Qj)
     omega, alpha = rng.normal(size=(2, 3))
     spin = cross_matrix(omega)
     moving = np.stack([Qi, spin @ Qi, (cross_matrix(alpha) + spin @ spin) @ Qi])
@@ -118,7 +118,7 @@ def test_values_gradients_and_rates_are_one_rotation(kind: int, angle: float) ->
     h, slopes = 1e-4, []  # the rate's rate by differences: h² of it, and rounding over h
     for s in (h, -h):
         turned = Rotation.from_rotvec(s * omega + s * s / 2 * alpha).as_matrix() @ Qi
-        by = (oracle.rotation_along if kind == ROTATION else oracle.tilt_along)(term, turned, Qj)[1]
+        by = (by_monolithic.rotation_along if kind == ROTATION else by_monolithic.tilt_along)(term, turned, Qj)[1]
         slopes.append(float(by @ (omega + s * alpha)))
     np.testing.assert_allclose(series[2], (slopes[0] - slopes[1]) / (2 * h), rtol=0, atol=1e-6)
 

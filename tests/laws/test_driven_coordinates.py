@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 from kedfem.dynamics.joints.constraint_matrices import constraint_matrices
 from kedfem.dynamics.rigid_body import drive_range
-from kedfem.dynamics.system.oracle.monolithic import Monolithic
+from kedfem.dynamics.system.monolithic.monolithic import Monolithic
 from kedfem.motion.coordinates import coordinates, driven_name
 from kedfem.motion.counted_turns import turn_of
 from kedfem.motion.joint_equations import ordered

@@ -16,8 +16,8 @@ from kedfem.dynamics.modes.frozen import Frozen, Modes
 from kedfem.dynamics.modes.lanczos import lanczos
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.system.build import system_of
-from kedfem.dynamics.system.oracle.monolithic import Monolithic
-from kedfem.dynamics.system.oracle.monolithic_tangent import rotated_stiffness
+from kedfem.dynamics.system.monolithic.monolithic import Monolithic
+from kedfem.dynamics.system.monolithic.monolithic_tangent import rotated_stiffness
 from kedfem.dynamics.system.record import Driven, Held, Spring, System
 from kedfem.frequencies import Wanted, frequencies
 from kedfem.motion.rigid import RigidMotion, rigid_motion

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from skfem.models.elasticity import linear_elasticity
 
-from kedfem.dynamics.system.oracle.monolithic_tangent import rotated_stiffness
+from kedfem.dynamics.system.monolithic.monolithic_tangent import rotated_stiffness
 from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
 from kedfem.links.recovery import (

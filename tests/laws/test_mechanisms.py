@@ -113,7 +113,7 @@ def test_a_driven_mechanism_vibrates_alike_by_both_solvers(seed: int) -> None:
 #: what is on a coordinate of a joint in a loop, and cheap: drives, springs, motors, gears
 COORDINATES = [
     ("solvers", 10, "rigid-body"),  # drive of a universal joint
-    ("oracle", 68, "co-rotational"),  # drive of a screw's angle, spring about an axis of a universal joint
+    ("monolithic", 68, "co-rotational"),  # drive of a screw's angle, spring about an axis of a universal joint
     *(
         pytest.param(*each, marks=pytest.mark.long)
         for each in (
@@ -136,7 +136,7 @@ def test_a_mechanism_driven_at_a_joint_of_a_loop_keeps_a_law(law: str, seed: int
 @pytest.mark.parametrize("seed", [2, 11, 16])
 def test_a_driven_mechanism_with_corotational_frames_moves_as_by_the_oracle(seed: int) -> None:
     """11 and 16: loads in the axes of rigid links."""
-    what, found = tried("oracle", seed, "co-rotational")
+    what, found = tried("monolithic", seed, "co-rotational")
     assert what == "fine", found
 
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from skfem.models.elasticity import linear_elasticity
 
 from kedfem.dynamics.loads import applied
-from kedfem.dynamics.system.oracle.monolithic_tangent import rotated_stiffness
+from kedfem.dynamics.system.monolithic.monolithic_tangent import rotated_stiffness
 from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body
 from kedfem.links.plane import plane_basis, plane_link, plane_stress
 from kedfem.links.point_rows import point_rows

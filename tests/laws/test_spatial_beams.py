@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from kedfem.dynamics.system.oracle.monolithic_tangent import rotated_stiffness
+from kedfem.dynamics.system.monolithic.monolithic_tangent import rotated_stiffness
 from kedfem.links.beams.beam_axis import Axis, smooth_axis, straight_axis
 from kedfem.links.beams.section import rectangle
 from kedfem.links.beams.spatial_beam import (

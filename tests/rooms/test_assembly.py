@@ -1,4 +1,4 @@
-"""Links that are drawn a little apart: the least motions that close them, what moves with them, what is refused."""
+"""Links that are given a little apart: the least motions that close them, what moves with them, what is refused."""
 
 from pathlib import Path
 from typing import Any
@@ -464,7 +464,7 @@ def test_a_run_warns_that_links_were_moved(tmp_path: Path) -> None:
     done = analyse(scene_from(quick(apart_four_bar()), tmp_path))
     (warning,) = [each for each in done.warnings if each.startswith("joints.C:")]
     assert warning == (
-        "joints.C: its links are drawn 0.0001 m apart; closed by moving links up to 0.000115 m (kedfem check shows which)"
+        "joints.C: its links are given 0.0001 m apart; closed by moving links up to 0.000115 m (kedfem check shows which)"
     )
 
 
@@ -500,8 +500,8 @@ def test_check_and_kinematics_tell_how_links_were_closed(run_kedfem: Command, tm
     status, said, _ = run_kedfem("check", file)
     assert status == 0
     assert "Assembly" in said
-    assert "drawn 100 µm apart" in said
+    assert "given 100 µm apart" in said
     assert "link rocker" in said
     status, _, said = run_kedfem("kinematics", file)
     assert status == 0
-    assert "its links are drawn 0.0001 m apart" in " ".join(said.split())
+    assert "its links are given 0.0001 m apart" in " ".join(said.split())

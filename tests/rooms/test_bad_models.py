@@ -77,7 +77,7 @@ def test_probe_outside_its_link(model: str, quantity: str) -> None:
     raw = arm(model)
     raw["output"] = {"probes": {"tip": {"link": "arm", "at": [0.5, 0.05], "quantity": quantity}}}
     at = "output.probes.tip.at: must lie in link 'arm', got (0.5, 0.05, 0), 0.04 m outside it"
-    bore = ", or for a motion the centre of a bore that a joint holds" * (model == "solid")
+    bore = ", or for a motion the centre of a bore with a joint" * (model == "solid")
     assert fault(raw) == at + MATERIAL + bore
 
 

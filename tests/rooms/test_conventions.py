@@ -70,3 +70,26 @@ def test_springs_push_back_and_pull_in_tension() -> None:
     got = found(hinge, None, springs={"s": line})
     assert got["springs/s/force"][0, 0] == pytest.approx(0.5 * WEIGHT, rel=1e-2)
     assert got["springs/s/length"][0, 0] > 0.3
+
+
+@pytest.mark.parametrize(("key", "gravity", "sign"), [("lower", -9.81, 1.0), ("upper", 9.81, -1.0)])
+def test_a_stop_pushes_the_coordinate_back_between_its_limits(key: str, gravity: float, sign: float) -> None:
+    """It bears the moment of the weight about the hinge, m g L/2."""
+    stop = {"kind": "angle", "joint": "A", key: 0.0, "stiffness": 1e7}
+    hinge = {"kind": "revolute", "links": ["rod", "ground"]}
+    run = found(hinge, None, gravity=[0, gravity], limits={"stop": stop})
+    assert run["limits/stop/torque"][-1] == pytest.approx(sign * WEIGHT * 0.2, rel=1e-4)
+
+
+def test_gears_that_lift_a_rod_exert_a_positive_torque_on_it() -> None:
+    """The moment of the weight about the hinge, m g L/2, as in a drive on the hinge itself."""
+    wheel = {"shape": {**ROD, "between": [[1, 0], [1.4, 0]]}, "model": "rigid", "material": "steel"}
+    links = {"rod": {"model": "beam", "material": "steel", "shape": ROD, "mesh": {"elements": 2}}, "wheel": wheel}
+    joints = {"A": {"at": [0, 0], "links": ["rod", "ground"], "kind": "revolute"},
+              "B": {"at": [1, 0], "links": ["wheel", "ground"], "kind": "revolute"}}  # fmt: skip
+    drive = {"joint": "B", "motion": {"kind": "constant_speed", "speed": -1.0}}
+    analysis = {"kind": "static", "end_time": 0.1, "step": 0.05}
+    gears = {"pair": {"joints": ["A", "B"], "ratio": -1.0}}
+    run = found({}, None, links=links, joints=joints, drive=drive, analysis=analysis, gears=gears)
+    assert run["probes/end/position"][-1, 1] > 0.03
+    assert run["gears/pair/torque"][0] == pytest.approx(WEIGHT * 0.2, rel=1e-4)

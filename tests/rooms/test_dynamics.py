@@ -65,7 +65,7 @@ def run(raw: Mapping[str, Any]) -> tuple[Model, Steps, list[Snapshot]]:
 def test_condensed_is_monolithic_over_a_whole_turn(kind: str, steps: int, bound: float, rho_inf: float) -> None:
     model, solver, fast = run(four_bar(kind, rho_inf=rho_inf, steps_per_revolution=steps))
     _, monolithic, slow = run(four_bar(kind, rho_inf=rho_inf, steps_per_revolution=steps, solver="monolithic"))
-    assert monolithic.oracle is not None
+    assert monolithic.monolithic is not None
     assert solver.factorisations == len(model.links) == 3  # one per link, for the whole revolution
     peak = max(np.abs(s.u).max() for snapshot in slow for s in snapshot.states)
     for a, b in zip(fast, slow, strict=True):

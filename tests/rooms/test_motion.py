@@ -101,7 +101,7 @@ def test_a_linkage_drawn_in_its_dead_point_is_refused() -> None:
     }
     assert refusal(joints) == (
         "joints.A: the linkage locks (dead point) at drive angle 0 deg, the reference position: "
-        "draw it at another angle or drive joint B, C or D"
+        "give it at another angle or drive joint B, C or D"
     )
 
 
@@ -112,7 +112,8 @@ def without(name: str) -> JointTable:
 def test_a_missing_joint_leaves_free_motion_and_the_message_says_of_what() -> None:
     message = refusal(without("D"))
     assert message.startswith(
-        "joints: every motion must be held or driven, got free motion left at drive angle 0 deg, the reference position:"
+        "joints: every motion must be constrained or driven, got free motion left at drive angle 0 deg, the reference "
+        "position:"
     )
     assert "link 'rocker' can turn about z at joint C (revolute)" in message
     assert "links 'coupler' and 'rocker' can move together in one way, by joints B and C; free motions: 2" in message

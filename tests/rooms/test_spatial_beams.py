@@ -262,7 +262,7 @@ def test_a_hinge_along_a_beam_needs_an_end_or_a_corner() -> None:
 def test_a_joint_off_the_axis_of_a_beam() -> None:
     assert fault(simple(joint={"axis": "y", "at": [0, 0, 0.01]})) == (
         "joints.A: must sit on a node of link 'arm' at (0, 0, 0.01), got none there (nearest node (0, 0, 0), 10 mm "
-        "away); the parts do not meet: they are drawn 10 mm apart; move the joint onto the beam, or give "
+        "away); the parts do not meet: they are given 10 mm apart; move the joint onto the beam, or give "
         "the beam a point there"
     )
 

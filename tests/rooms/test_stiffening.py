@@ -104,7 +104,7 @@ def test_only_a_scene_that_asks_for_stiffening_has_it(kind: str, solver: str) ->
     ready = meshed(scene_from(raw))
     for scene, wanted in ((ready.scene, False), (scene_from(stiff(raw)), True)):
         found = steps_of(scene, ready.model)
-        assert (found.oracle is not None) is (solver == "monolithic")
+        assert (found.monolithic is not None) is (solver == "monolithic")
         assert (found.stiffening is not None) is wanted
 
 

@@ -89,7 +89,7 @@ def test_all_that_is_recorded_is_as_by_the_oracle(name: str) -> None:
     raw["analysis"]["revolutions"] = 0.06
     solver, found = channels(raw, steps_of)
     _, wanted = channels(raw, oracle_of)
-    assert solver.oracle is None
+    assert solver.monolithic is None
     assert apart(found, wanted) <= 1e-8
     assert any(each.name.startswith(("springs/", "motors/")) for each in found)
 

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.state import Rayleigh
-from kedfem.dynamics.system.oracle.monolithic_tangent import rotated_stiffness
+from kedfem.dynamics.system.monolithic.monolithic_tangent import rotated_stiffness
 from kedfem.links.beams.beam import beam_link
 from kedfem.links.beams.section import rectangle
 from kedfem.links.record import Link, mass_times

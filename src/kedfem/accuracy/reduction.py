@@ -2,7 +2,7 @@
 
 The estimate: the residual of the reduced run in the full equation, at some moments, is answered by static deflections of
 the full linkage; these are added to the modes, and the run is repeated. What changes, times a factor found on full
-runs, is the estimate: the residual measured in the norm dual to the energy's, carried through time. If it is above the
+runs, is the estimate: the residual measured in the norm dual to the energy's, integrated over time. If it is above the
 tolerance, the richer modes are kept and the same is done again.
 
 Scenes that differ in the speed of their drive and in damping alone can share one reduction (`shared_modes`): modes are

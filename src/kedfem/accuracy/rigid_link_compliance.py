@@ -51,8 +51,8 @@ class RigidLinkCompliance:
                 apart = np.linalg.norm(x[:, :, None] - x[:, None], axis=3)
                 self.displacement[k] = max(self.displacement[k], float(apart.max(initial=0.0)))
             X = weights @ link.X[nodes]
-            carried = motion.p[some, body, None] + X @ motion.R[some, body].transpose(0, 2, 1) - X
-            moved = carried + in_space(link, weights @ history.u[some][:, nodes])
+            rigid = motion.p[some, body, None] + X @ motion.R[some, body].transpose(0, 2, 1) - X
+            moved = rigid + in_space(link, weights @ history.u[some][:, nodes])
             self.moved = max(self.moved, float(np.linalg.norm(moved, axis=2).max(initial=0.0)))
 
     @property

@@ -100,7 +100,7 @@ class Rounding:
             for k, (part, link) in enumerate(zip(ready.parts, model.links, strict=True)):
                 if not link.rigid:
                     stiffest[k] = FOLLOWED[link.kind] * np.abs(part.S).max(initial=0.0) / ready.c.c_K
-        solver = None if first is None or first.corotational or first.oracle is not None else first
+        solver = None if first is None or first.corotational or first.monolithic is not None else first
         defects: list[np.ndarray | None] = []
         for k, link in enumerate(model.links):
             if link.fit is not None or link.rigid:

@@ -40,7 +40,7 @@ class Trials:
     steps: dict[str, tuple[StepEstimate, Collection[str]]] = field(default_factory=dict)
     models: dict[str, Prepared] = field(default_factory=dict)
     links: dict[str, Link] = field(default_factory=dict)
-    functions: dict[str, Float[np.ndarray, "_ _"]] = field(default_factory=dict)
+    modes: dict[str, Float[np.ndarray, "_ _"]] = field(default_factory=dict)
     motion: tuple[Linkage, Path] | None = None
 
     def difference(self, scene: Scene, better: Scene) -> float:
@@ -101,11 +101,11 @@ class Trials:
     def _reduced(self, full: Prepared) -> Prepared:
         """Reduced with the modes of earlier trials, so that only the changed links cause a difference."""
         texts = _texts(full)
-        known = [self.functions.get(text) for text in texts]
+        known = [self.modes.get(text) for text in texts]
         ready = first_reduced(full, TRIAL * self.asked, known if any(Q is not None for Q in known) else None)
         for link, text in zip(ready.model.links, texts, strict=True):
             if link.Q is not None and not link.rigid:
-                self.functions[text] = link.Q
+                self.modes[text] = link.Q
         return ready
 
 

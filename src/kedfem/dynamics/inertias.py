@@ -175,7 +175,7 @@ def acting(inertias: Inertias, motion: RigidMotion) -> Wrenches:
 
 
 def load_wrench(load: RigidLoad, motion: RigidMotion) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"]]:
-    """Force and moment of a load over time, about the point drawn at the linkage's centre."""
+    """Force and moment of a load over time, about the point with its reference position at the linkage's centre."""
     R, factor = motion.R[:, load.body], load.factor(motion.t, motion.phi)
     factor = (factor * shares(load.share, motion, load.body))[:, None]
     N = R @ load.moment

@@ -200,7 +200,7 @@ def free_states(link: Link, part: Substructure, F: Float[np.ndarray, "k u"]) -> 
     """g with K0 g = F of loads in balance, up to rigid motion.
 
     y = Ã⁻¹ F leaves K0 y = F − E m at the anchors; what Ã⁻¹ E takes away there makes it good, in least squares because
-    anchors in balance can be told apart by what deforms only.
+    only deformation distinguishes anchors in balance.
     """
     y = np.stack([part.solve(f.reshape(-1, link.d)).ravel().copy() for f in F.T], axis=1)
     held = part.Y[:, len(part.attachment.keep) :]

@@ -153,10 +153,10 @@ def _check(scene: Scene, name: str, joint: str) -> None:
         raise SceneError(f"--hold: {wanted or f'must be left out for a link without joints, got {joint!r}'}")
     kind = scene.joints[joint].kind
     if kind not in HELD:
-        got = f"got '{joint}', which is {kind}"
+        got = f"got '{joint}', a {kind} joint"
         raise SceneError(f"--hold: must be a joint of kind {either(list(HELD))}, {got}")
     if scene.joints[joint].bushing is not None:
-        raise SceneError(f"--hold: must be a joint that holds rigidly, got '{joint}', which has a bushing")
+        raise SceneError(f"--hold: must be a joint without a bushing, got '{joint}', which has a bushing")
 
 
 def _turns(scene: Scene, joint: str) -> Float[np.ndarray, "r 3"]:

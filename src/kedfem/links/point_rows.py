@@ -196,5 +196,5 @@ def _outside(link: Link, where: str, point: Float[np.ndarray, "3"], gap: float) 
     shown = ", ".join(f"{v:.6g}" for v in point)
     advice = "take a point of its material"
     if link.meshed and where.startswith("output"):
-        advice += ", or for a motion the centre of a bore that a joint holds"
+        advice += ", or for a motion the centre of a bore with a joint"
     return f"{where}: must lie in link '{link.name}', got ({shown}), {gap:.3g} m outside it: {advice}"

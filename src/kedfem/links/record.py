@@ -119,7 +119,7 @@ class Link:
     frames : of a segment that several frames follow: its strain energy in parts, K0 their sum
     element : of a segment of a beam in space: its strains, exact for any turn, K0 their linearisation
     faces : those with names, of a solid from CAD or from a mesh file with groups
-    method : how the mesh of a part from CAD was made, or what is to be reported of another's, in words
+    method : how the mesh of a part from CAD was made, or what the report says of another's, in words
     cuts : (c,) facets of the basis at which a segment ends and another one begins: no surface of the link
     """
 

@@ -27,9 +27,9 @@ Change = Float[np.ndarray, "n 6"]
 
 @dataclass(frozen=True, slots=True)
 class Assembly:
-    """How links that were drawn apart have been closed; nothing where none were.
+    """How links that were given apart have been closed; nothing where none were.
 
-    misfits : by joint [m], how far its links were drawn apart in the directions that it holds
+    misfits : by joint [m], how far its links were given apart in the directions that it constrains
     moved : by link, how far the farthest of its joints' points went [m] and how far it turned [rad]
     """
 
@@ -38,7 +38,7 @@ class Assembly:
 
     @property
     def worst(self) -> tuple[str, float]:
-        """The joint whose links were drawn farthest apart, and how far [m]."""
+        """The joint whose links were given farthest apart, and how far [m]."""
         return max(self.misfits.items(), key=lambda each: each[1])
 
 
@@ -57,7 +57,7 @@ def assembled(scene: Scene) -> tuple[Scene, Assembly]:
 
 
 def _closed(scene: Scene) -> tuple[Scene, Assembly]:
-    """A scene with all joints closed; the scene itself where no links are drawn apart.
+    """A scene with all joints closed; the scene itself where no links are given apart.
 
     Links are moved as rigid bodies, with all that is on them: of all motions that close the rows of joints and couplings
     those of the least Σ |d|²/size² + |θ|², d the displacement of the mean of a link's joints, θ its turn. The drive's
@@ -75,14 +75,14 @@ def _closed(scene: Scene) -> tuple[Scene, Assembly]:
     misfits = _misfits(scene, rows)
     if too_far := [name for name, misfit in misfits.items() if misfit > MOST * size]:
         wanted = f"must be one point for both links, up to 1 % of the linkage's size {size:.6g} [m]"
-        raise MotionError("\n".join(_told(scene, name, wanted, misfits[name]) for name in too_far))
+        raise MotionError("\n".join(_refusal(scene, name, wanted, misfits[name]) for name in too_far))
     centres = _centres(scene)
     change, left = least_change(stacked(rows), centres, size)
     open_rows = np.flatnonzero(~(left <= CLOSED))
     if len(open_rows):
         still = ", ".join(dict.fromkeys(rows[k].joint for k in open_rows))
         wanted = f"must be a point to which small motions of the links bring both [m] (open still: {still})"
-        raise MotionError("\n".join(_told(scene, name, wanted, misfit) for name, misfit in misfits.items()))
+        raise MotionError("\n".join(_refusal(scene, name, wanted, misfit) for name, misfit in misfits.items()))
     middle = scene_centre(scene)
     shifts = {
         name: Shift(c + middle, size * x[:3], x[3:]) for name, c, x in zip(scene.links, centres, change, strict=True)
@@ -98,7 +98,7 @@ def assembly_warning(assembly: Assembly) -> tuple[str, ...]:
     (joint, misfit), way = assembly.worst, max(assembly.moved.values())[0]
     several = "" if len(assembly.misfits) == 1 else f", the most of {len(assembly.misfits)} joints"
     return (
-        f"joints.{joint}: its links are drawn {misfit:.3g} m apart{several}; "
+        f"joints.{joint}: its links are given {misfit:.3g} m apart{several}; "
         f"closed by moving links up to {way:.3g} m (kedfem check shows which)",
     )
 
@@ -172,7 +172,7 @@ def _points(scene: Scene, link: str) -> Iterator[tuple[float, float, float]]:
 
 
 def _misfits(scene: Scene, rows: list[ConstraintEquation]) -> dict[str, float]:
-    """How far each joint whose links are drawn apart is open, in the directions that it holds [m]."""
+    """Misfit of each joint whose links are given apart, in the directions that it constrains [m]."""
     bodies, square = (GROUND, *scene.links), {name: 0.0 for name, joint in scene.joints.items() if joint.open}
     for row in rows:
         if row.joint in square and row.kind == GAP and not row.plus:
@@ -182,7 +182,7 @@ def _misfits(scene: Scene, rows: list[ConstraintEquation]) -> dict[str, float]:
     return {name: float(np.sqrt(each)) for name, each in square.items()}
 
 
-def _told(scene: Scene, name: str, wanted: str, misfit: float) -> str:
+def _refusal(scene: Scene, name: str, wanted: str, misfit: float) -> str:
     """The refusal of one joint, with both of its points."""
     points = (
         f"({', '.join(f'{part:.6g}' for part in point)}) on {link!r}" for link, point in scene.joints[name].points.items()

@@ -212,7 +212,7 @@ def _check_mobility(scene: Scene, reference: Reference) -> int:
         other = listed(_other_drives(scene, reference), "or")
         raise MotionError(
             f"{driven}: the linkage locks (dead point) at {at}the reference position: "
-            f"draw it at another angle or drive {f'joint {other}' if other else 'another joint'}"
+            f"give it at another angle or drive {f'joint {other}' if other else 'another joint'}"
         )
     motions = free_motions(reference)
     if corotational_links(scene).issuperset(link for each in motions for link in each.links):
@@ -220,9 +220,9 @@ def _check_mobility(scene: Scene, reference: Reference) -> int:
     words = "; ".join(each.words for each in motions)
     remedies = ["; ".join(held_by(each) for each in motions), 'let these links have frames = "co-rotational"']
     if scene.springs or scene.motors:
-        remedies = [f"{remedies[1]}, if springs or motors hold them", remedies[0]]
+        remedies = [f"{remedies[1]}, if springs or motors constrain them", remedies[0]]
     raise MotionError(
-        "joints: every motion must be held or driven, got free motion left at "
+        "joints: every motion must be constrained or driven, got free motion left at "
         f"{_at_reference(scene)}the reference position: "
         f"{words}; free motions: {free} (remedy: {'; or '.join(remedies)})"
     )

@@ -20,7 +20,7 @@ class RigidMotion:
     """Poses and accelerations of all bodies (ground first) at T times.
 
     t, phi : (T,) time [s] and drive angle [rad]
-    R, p : (T, B, 3, 3), (T, B, 3): a point drawn at X is at p + R X
+    R, p : (T, B, 3, 3), (T, B, 3): the point with reference position X is at p + R X
     omega, alpha : (T, B, 3) angular velocity and acceleration, world components [rad/s, rad/s²]
     v : (T, B, 3) p' [m/s]
     R2, p2 : (T, B, 3, 3), (T, B, 3): R'' and p'' [1/s², m/s²]
@@ -115,7 +115,7 @@ def rigid_motion(link: Linkage, along: Path, t: Float[np.ndarray, " T"], drive: 
 
 
 def _about_origin(link: Linkage, t: Float[np.ndarray, " T"], q: np.ndarray, got: Moving) -> RigidMotion:
-    """Bodies turn about the linkage's centre c in their poses: a point drawn at X is at p + c + R (X − c)."""
+    """Motion of bodies in their poses about the linkage's centre c: reference position X goes to p + c + R (X − c)."""
     (R, p), (v, omega), (v2, alpha) = got.poses, got.first, got.second
     W, c = cross_matrix(omega), link.centre
     R2 = (cross_matrix(alpha) + W @ W) @ R

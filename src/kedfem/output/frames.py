@@ -181,10 +181,10 @@ def drawn_bodies(scene: Scene, linkage: Linkage, links: Mapping[str, Link]) -> l
         body = linkage.bodies.index(name)
         out.append(DrawnBody(name, body, points[used], numbers.reshape(cells.shape), kind))
     size = float(np.linalg.norm(np.ptp(np.concatenate([each.points for each in out]), axis=0)))
-    for name, carried in scene.bodies.items():
-        points = np.asarray(getattr(carried, "centre", carried.at)) + ball(carried.mass, size)
-        on, cell = linkage.bodies.index(carried.link), np.arange(27)[None]
-        out.append(DrawnBody(name, on, points, cell, "hexahedron27", ball_words(name, carried)))
+    for name, mass in scene.bodies.items():
+        points = np.asarray(getattr(mass, "centre", mass.at)) + ball(mass.mass, size)
+        on, cell = linkage.bodies.index(mass.link), np.arange(27)[None]
+        out.append(DrawnBody(name, on, points, cell, "hexahedron27", ball_words(name, mass)))
     return out
 
 

@@ -1,6 +1,6 @@
 """The drawing process of :func:`kedfem.output.mesh_picture.write_mesh_picture`.
 
-It is run by its path and imports nothing of kedfem.
+It is run by its path; of kedfem it imports only `kedfem.processes`, which imports no other module of it.
 """
 
 import math

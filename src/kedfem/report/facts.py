@@ -233,7 +233,7 @@ def notes_table(notes: Mapping[str, str | float]) -> Table:
     """All other notes of the run."""
     reported = (OF_SOURCE, TOGETHER, UNKNOWN, STEADY)
     plain = {key: x for key, x in notes.items() if not key.startswith(reported)}
-    return named_table("What the run reported of itself", plain.items())
+    return named_table("Notes of the run", plain.items())
 
 
 def named_table(title: str, items: Iterable[tuple[str, str | float]]) -> Table:

@@ -1,6 +1,6 @@
 """The mechanism in motion as one glTF file, which browsers, office programs and 3-D tools show.
 
-Links move as rigid, in the shape in which they are drawn, coloured by the highest stress of the whole run. glTF has y
+Links move as rigid bodies, in their reference shape, coloured by the highest stress of the whole run. glTF has y
 upwards and lengths in metres: a mechanism under gravity is turned so that this points down.
 """
 

@@ -59,11 +59,11 @@ def _range(values: Iterable[float], unit: str) -> str:
 
 
 def assembly_table(assembly: Assembly) -> Table:
-    """Misfits of joints that were drawn apart, and the motions of links that close them."""
+    """Misfits of joints that were given apart, and the motions of links that close them."""
     apart = sorted(assembly.misfits.items(), key=lambda each: -each[1])
     return facts("Assembly", [
-        *((f"joint {name}", f"drawn {with_prefix(misfit, 'm')} apart") for name, misfit in apart),
-        *((f"link {name}", f"moved {with_prefix(way, 'm')}, turned {np.degrees(turn):.3g}°")
+        *((f"joint {name}", f"given {with_prefix(misfit, 'm')} apart") for name, misfit in apart),
+        *((f"link {name}", f"moved {with_prefix(way, 'm')}, rotated {np.degrees(turn):.3g}°")
           for name, (way, turn) in assembly.moved.items() if apart),
     ])  # fmt: skip
 

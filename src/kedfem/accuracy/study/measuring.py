@@ -105,7 +105,7 @@ class _Bench:
     rows: dict[Variant, MeasuredVariant] = field(default_factory=dict)
     runs: dict[Variant, Histories] = field(default_factory=dict)
     estimates: dict[Variant, float] = field(default_factory=dict)
-    in_full: dict[Variant, float] = field(default_factory=dict)
+    unreduced: dict[Variant, float] = field(default_factory=dict)
 
     @property
     def left(self) -> float:
@@ -155,7 +155,7 @@ class _Bench:
         if variant.tolerance is not None:
             cost = estimated_cost(scene, ready.model)
             full = replace(variant, model_kind=replace(variant.model_kind, reduced=False), tolerance=None)
-            self.in_full[full] = perf_counter() - begun + cost.factor + cost.steps
+            self.unreduced[full] = perf_counter() - begun + cost.factor + cost.steps
             chosen = [name for name, link in scene.links.items() if link.reduced]
             found = reduced(ready, chosen, variant.tolerance, stage=self.stage)
             ready, self.estimates[variant] = found.ready, worst(found.estimate)
@@ -168,7 +168,7 @@ class _Bench:
         ran = (row for row in self.rows.values() if row.seconds)
         alike = [row for row in ran if row.variant.model_kind == variant.model_kind]
         if not alike:
-            return self.in_full.get(variant, float("inf"))
+            return self.unreduced.get(variant, float("inf"))
         row = max(alike, key=lambda row: (row.variant.fineness <= variant.fineness, row.variant.fineness))
         seconds, before = row.seconds or Seconds(0.0, 0.0, 0.0, 0), row.variant
         more = (variant.fineness / before.fineness) ** exponent(self.scene, variant.model_kind)

@@ -155,7 +155,7 @@ def _side(scene: Scene, name: str, on: str, links: dict[str, Link], layout: Link
 
 
 def slot_travels(scene: Scene, linkage: Linkage, along: Path | None = None) -> dict[str, tuple[float, float]]:
-    """Least and greatest place of each slot's pin along its line, from where it is drawn [m]; that alone without a drive.
+    """Least and greatest place of each slot's pin along its line, from its reference position [m]; 0 without a drive.
 
     Parameters
     ----------

@@ -64,7 +64,9 @@ class Bordered:
         try:
             self.factor = splu(self.matrix)
         except RuntimeError as error:
-            raise SolveError("joints: bodies must be held by joints or springs, got some that move freely") from error
+            raise SolveError(
+                "joints: bodies must be constrained by joints or springs, got some that move freely"
+            ) from error
 
     def solved(self, f: Flat, target: Flat, closes: bool = False) -> tuple[Flat, Flat]:
         """z and m, refined once.

@@ -38,13 +38,13 @@ class Basis:
     """
 
     needed: Float[np.ndarray, "n k"]
-    functions: Float[np.ndarray, "n f"]
+    modes: Float[np.ndarray, "n f"]
     weights: Float[np.ndarray, " f"]
 
     def first(self, count: int) -> Float[np.ndarray, "n s"]:
         """The needed modes and as many others as make up the count."""
         more = max(0, count - self.needed.shape[1])
-        return np.concatenate([self.needed, self.functions[:, :more]], axis=1)
+        return np.concatenate([self.needed, self.modes[:, :more]], axis=1)
 
     def count(self, tolerance: float) -> int:
         """How many modes leave out no more than a part of the strain-energy norm."""
@@ -163,9 +163,9 @@ def energy_sorted(link: Link, ports: Float[np.ndarray, "n p"], deflections: Sequ
     S, E = (x - rigid @ (rigid.T @ np.asarray(link.mass[0] @ x)) for x in (S, ports))
     E = orthonormal(E, H, 1e-10)[0]
     S = S - E @ (E.T @ np.asarray(H @ S))
-    functions, weights = orthonormal(S, H, INDEPENDENT)
+    modes, weights = orthonormal(S, H, INDEPENDENT)
     size = np.sqrt((weights**2).sum()) or 1.0
-    return Basis(np.concatenate([rigid, E], axis=1), functions, weights / size)
+    return Basis(np.concatenate([rigid, E], axis=1), modes, weights / size)
 
 
 def enriched(link: Link, deflections: Sequence[Float[np.ndarray, "n d"]], most: int) -> Float[np.ndarray, "n s"]:

@@ -133,7 +133,7 @@ def frozen_linkage(
     Raises
     ------
     SceneError
-        Stiffening of a link that a drive which lets go has carried, or beside links with co-rotational frames.
+        Stiffening of a link that a released drive has prescribed, or beside links with co-rotational frames.
     """
     released = linkage.mobility + (len(scene.driven_joints) if free else 0)
     if not scene.analysis.stiffening:

@@ -55,9 +55,9 @@ def transient(
     motion_at, state, length = motion_of(scene, linkage, along), mark.state, block_length(model)
     if state is None:
         state = started(scene, linkage, along, model, solver) if mark.start is None else mark.start
-        drawn = motion_at(np.zeros(1))
-        links, multipliers = solver.first(state, forcings(model, drawn), motion_at)
-        yield Block(0, drawn, links, multipliers=multipliers)
+        reference = motion_at(np.zeros(1))
+        links, multipliers = solver.first(state, forcings(model, reference), motion_at)
+        yield Block(0, reference, links, multipliers=multipliers)
     for first, motion in motions(scene, linkage, along, since):
         for k in range(0, len(motion.t), length):
             if first + k < since:
@@ -107,9 +107,9 @@ def _unbalanced(scene: Scene, moment: str, moves: str) -> str:
     """What to do about a position without a balance of forces."""
     kind = scene.analysis.kind
     advice = (
-        "a link that nothing holds, a load beyond buckling, or links that rotate too far under their loads for the "
-        "balance to be found: hold them by joints, springs or a drive, take positions nearer to each other, as each is "
-        "found from the one before, let loads grow in smaller steps over time, or take kind = 'transient' with damping"
+        "a link that nothing constrains, a load beyond buckling, or links that rotate too far under their loads for the "
+        "balance to be found: constrain them by joints, springs or a drive, take positions nearer to each other, as each "
+        "is found from the one before, let loads grow in smaller steps over time, or take kind = 'transient' with damping"
         if kind == "static"
         else "a drive near a natural frequency, or a linkage near a dead point, where small loads move it far: take a "
         "slower drive, stiffer links, another position or kind = 'steady'"

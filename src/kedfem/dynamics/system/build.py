@@ -56,7 +56,7 @@ def system_of(scene: Scene, linkage: Linkage, along: Path | None = None, model: 
 
 
 def without_stiffness(link: Link, turned: bool = False) -> Link:
-    """A rigid link whose bars hold it: it has no stiffness, and a frame of its own only if that turns its loads."""
+    """A rigid link, constrained to keep its shape: without stiffness, with a frame only if loads rotate with it."""
     out = replace(link, K0=np.zeros_like(np.asarray(link.K0)))
     return out if turned else replace(out, fit=None, frames=())
 

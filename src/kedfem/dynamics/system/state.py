@@ -29,7 +29,7 @@ class State(namedtuple("State", (
     z : (3, k) interface unknowns and their rates
     e : (3, r) coordinates and their rates; turned : (terms,) angles, counting turns
     bearing : (k,) force of all constraints and laws on z; multiplier : (r,) force along each
-    pairs, products, last, counts : Anderson acceleration's memory, see `mixing_kernel`
+    pairs, products, last, counts : Anderson acceleration's memory, see `anderson_kernel`
     passes : (3,) taken so far, steps whose tolerance was eased, largest in a step
     """
 
@@ -65,7 +65,7 @@ class Driving(namedtuple("Driving", (
 
 class Trial(namedtuple("Trial", (
     "u f damped seen Q angle base resisted strained r held reaction w force Rp RB SRB H K inverse x z e turned "
-    "C target compliance beside m right dz row change mixing fixed moving stress response foreseen"
+    "C target compliance beside m right dz row change memory fixed moving stress response foreseen"
 ))):  # fmt: skip
     """The end of a step while it is sought; arrays as in `State`.
 
@@ -73,7 +73,7 @@ class Trial(namedtuple("Trial", (
     reaction, w, force : (q,) at their interface points
     Rp : (bodies, 3, 3) frames of the step's factor; RB, SRB : flat, as B and its transpose; H : their common matrix, by
         its profile
-    mixing : room of `mixing_kernel`
+    memory : room of `anderson_kernel`
     C : gradients on what each constraint couples, in `columns`; target, compliance, beside, m : (r,); right, dz : (k,)
     K, inverse, x : H with constraints in it, factored, the inverse of its pivots, and what is solved for
     row : (k,) room for one gradient, zero between; change : what a pass asks for
@@ -121,7 +121,7 @@ def empty_trial(bodies: Bodies, ends: Ends, of: Constraints, like: State) -> Tri
         inverse=np.zeros(k + r), x=np.zeros(k + r), z=np.zeros(k), e=np.zeros(r), turned=like.turned.copy(),
         C=np.zeros(len(of.columns)), target=np.zeros(r), compliance=np.zeros(r), beside=np.zeros(r), m=np.zeros(r),
         right=np.zeros(k), dz=np.zeros(k), row=np.zeros(k),
-        change=np.zeros(like.last.shape[1]), mixing=np.zeros((DEPTH + 1, DEPTH)),
+        change=np.zeros(like.last.shape[1]), memory=np.zeros((DEPTH + 1, DEPTH)),
         fixed=place, moving=tuple(x.copy() for x in place), stress=np.zeros(int(bodies.stresses.at[-1])),
         response=np.zeros(len(like.u)), foreseen=np.zeros(len(like.u)),
     )  # fmt: skip

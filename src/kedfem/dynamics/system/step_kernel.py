@@ -124,7 +124,7 @@ def begin(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type:
 @inner
 def passes(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type: ignore[no-untyped-def]
     """Pass after pass, until none asks for a change; whether that came, and the body that moved most."""
-    memory = (state.pairs, state.products, state.last, trial.mixing)
+    memory = (state.pairs, state.products, state.last, trial.memory)
     R, worst, count, least, stalled = driving.R[t], -1, 0, np.inf, 0
     for iteration in range(PASSES):
         count = iteration + 1

@@ -43,7 +43,7 @@ from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import Scene, corotational
 
 if TYPE_CHECKING:
-    from kedfem.dynamics.system.oracle.monolithic import Now
+    from kedfem.dynamics.system.monolithic.monolithic import Now
 
 Rows = Float[np.ndarray, "T _ _"]
 
@@ -76,7 +76,7 @@ class Steps:
     system : of `scene_system`
     model : of the links whose states are handed on, without interface points for force elements
     tolerance : change of an iteration, of what a step moves; that of `ready` if not given
-    monolithic : whether the oracle takes the steps
+    monolithic : whether the monolithic solver takes the steps
     """
 
     def __init__(
@@ -92,11 +92,11 @@ class Steps:
         self.over: PeriodMap | None = None  # whose steady state that is
         self.watch: Watch = lambda marched: None
         self.search = Search()
-        self.oracle = None
+        self.monolithic = None
         if monolithic:
-            from kedfem.dynamics.system.oracle.monolithic import Monolithic
+            from kedfem.dynamics.system.monolithic.monolithic import Monolithic
 
-            self.oracle = Monolithic(system, scheme)
+            self.monolithic = Monolithic(system, scheme)
         self.elements = bool(scene.motors or scene.springs or scene.limits)
         bodies = body_names(scene)
         self.riders = {bodies.index(x.name): (x.carrier, x.weights) for x in system.model.sliders}
@@ -154,15 +154,15 @@ class Steps:
         ConvergenceError
             If the iterations of a step do not, in parts neither; `handed_on` shows what was done before.
         SolveError
-            If those of the oracle do not.
+            If those of the monolithic solver do not.
         """
         later: State | Now
-        if self.oracle is not None:
-            from kedfem.dynamics.system.oracle.monolithic_steps import monolithic_march
+        if self.monolithic is not None:
+            from kedfem.dynamics.system.monolithic.monolithic_steps import monolithic_march
 
-            later, found = monolithic_march(self.ready, self.oracle, state, motion, motion_at)
+            later, found = monolithic_march(self.ready, self.monolithic, state, motion, motion_at)
         elif not isinstance(state, State):
-            raise ValueError("a march must begin with a state of the system, got one of the oracle")
+            raise ValueError("state: must be a state of the condensed solver, got one of the monolithic solver")
         else:
             between = motion_at if self.corotational or self.ready.constraints.jumps.any() else None
             later, found = march(self.ready, state, motion, between, loads=[each.F for each in forcing])
@@ -218,7 +218,7 @@ class Steps:
     def _products(self, found: History, k: int, v: Rows) -> Products | None:
         """Products with the state of link k that its steps have at hand."""
         part, link = self.ready.parts[k], self.links[k]
-        if self.corotational or not part.unit or not found.Kg.size or self.oracle is not None:
+        if self.corotational or not part.unit or not found.Kg.size or self.monolithic is not None:
             return None
         Kg = displacements(self.ready, k, found.Kg)
         if link.unknowns == part.G.shape[0]:

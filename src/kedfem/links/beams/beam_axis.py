@@ -55,7 +55,7 @@ def straight_axis(points: Float[np.ndarray, "p 3"], elements: int, nodes: int, u
 
 
 def smooth_axis(points: Float[np.ndarray, "p 3"], elements: int, nodes: int, up: Float[np.ndarray, "3"] | None) -> Axis:
-    """A cubic spline through points; the section's directions are carried along it without turning about it.
+    """A cubic spline through points; the section's directions are transported along it without rotation about it.
 
     Parameters
     ----------

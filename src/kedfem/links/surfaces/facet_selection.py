@@ -72,14 +72,14 @@ def _selected_facets(
     if axis is None and link.d == 3 and not any(each.inward for found in about for each in found):
         about += [round_surfaces(link, seen, each) for each in _own_axes(link, seen)]
     if bores := _first([[each for each in found if each.inward] for found in about]):
-        return _told(link, where, seen, bores)
+        return _one_pin(link, where, seen, bores)
     journals = _first([[each for each in found if not each.inward] for found in about])
     if any(each.gap < -each.level or link.d == 2 for each in journals):
-        return _told(link, where, seen, journals)
+        return _one_pin(link, where, seen, journals)
     if len(face := flat_face(link, seen)):
         return face
     if journals:
-        return _told(link, where, seen, journals)
+        return _one_pin(link, where, seen, journals)
     raise MeshError(not_touching(link, where, point, axis))
 
 
@@ -88,7 +88,7 @@ def _first(several: Iterable[list[RoundSurface]]) -> list[RoundSurface]:
     return next((found for found in several if found), [])
 
 
-def _told(link: Link, where: str, point: Float[np.ndarray, "3"], found: list[RoundSurface]) -> Facets:
+def _one_pin(link: Link, where: str, point: Float[np.ndarray, "3"], found: list[RoundSurface]) -> Facets:
     """The facets of the one that a joint sits on, or of several that one pin fits; MeshError if they differ in radius."""
     chosen = nearest_round_surfaces(found, link.d == 2)
     size = [each.radius for each in chosen]

@@ -38,7 +38,7 @@ def not_touching(link: Link, where: str, point: Vector, axis: Vector | None = No
     level = 1e-6 * link.size  # what is as near: the narrowest first
     offered = sorted(candidates(link), key=lambda each: (round(each.distance(point) / level), each.radius))
     near = not link.meshed and gap < NEAR * link.size
-    apart = f"the parts do not meet: they are drawn {1e3 * gap:.3g} mm apart" if near else ""
+    apart = f"the parts do not meet: they are given {1e3 * gap:.3g} mm apart" if near else ""
     hints = [apart, _units(link, point, axis, gap, offered), _beside(point, axis, offered)]
     hints += [_listed(link, offered, point), _advice(link, offered)]
     return "; ".join([text, *(hint for hint in hints if hint)])

@@ -23,7 +23,7 @@ class Face:
         centre
     direction : (3,) unit vector: of a plane its outward normal, of a cylinder its axis [-]; else nan
     radius : of a cylinder or sphere [m]; else nan
-    inward : whether the material is outside of a cylinder or sphere: a bore or a coupling surface, not a journal or a
+    inward : whether the material is outside of a cylinder or sphere: a bore or a ball seat, not a journal or a
         ball
     sides : (f, 4), of tetrahedra (f, 3)
         Corner nodes of the sides of elements on the face, in any order.

@@ -74,7 +74,7 @@ def outline_quads(where: str, outline: Outline, sizing: Sizing) -> tuple[Quads, 
     Returns
     -------
     (n, 2) [m] and (e, 9): plane nodes; cells in VTK order, anticlockwise
-    What is to be reported of them: which share of the area cusps are that were cut off
+    For the report: which share of the area the cusps are that were cut off
 
     Raises
     ------

@@ -16,7 +16,7 @@ class QuadMesh:
     points : (n, 3) nodes in the global reference position [m]
     cells : (e, 9) node numbers in VTK order, anticlockwise (meshio: quad9)
     thickness : extent along z, half of it to either side [m]
-    method : what is to be reported of how it was made
+    method : how it was made, in the words of the report
     """
 
     points: Float[np.ndarray, "n 3"]
@@ -35,7 +35,7 @@ class Plate:
     quads : (n, 2) [m] and (e, 9): nodes and cells of the middle plane, all nodes used
     thickness : extent along z [m]
     origin, axes : (3,), (3, 3) where the frame's origin goes, and its x, y, z as rows [m]
-    method : what is to be reported of how its mesh was made
+    method : how its mesh was made, in the words of the report
     """
 
     quads: Quads

@@ -1,4 +1,4 @@
-"""The core of a solid of revolution about its own axis: a disc of quadrilaterals, carried along; no wedges."""
+"""The core of a solid of revolution about its own axis: a disc of quadrilaterals, extruded along it, without wedges."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""Bent bars, pipes, ring segments: their path of lines and arcs from end to end, one section meshed and carried along."""
+"""Meshes of bent bars, pipes and ring segments: one section is meshed and swept along a path of lines and arcs."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -88,7 +88,7 @@ def path_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
         mesh = in_layers(flat.points, np.arange(2 * layers + 1.0), flat.cells)
         placed = [frame.origin + solid.extent * flat.points @ frame.axes[:2] for frame in frames]
         points = np.concatenate(placed)
-        words = f"{flat.kind} carried along {_in_words(legs)} in {layers} elements"
+        words = f"{flat.kind} swept along {_in_words(legs)} in {layers} elements"
         return without_spare_nodes(SolidMesh(points, mesh.cells, method=words))
 
     return sized(solid, sizing, mesh_of)

@@ -41,8 +41,8 @@ def revolved_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
     """A solid of revolution, a `Method`: pulleys, bushings, shafts, balls.
 
     Its meridian section is meshed as the plan of a layer is, and swept about the axis through all angles: in elements of
-    the same size at the mean radius, or 12 to 24 to a turn where none is asked for. What is next to the axis is a core of
-    its own, discs of quadrilaterals carried along it, as sections swept about a line in them would have no angle there.
+    the same size at the mean radius, or 12 to 24 to a revolution where none is asked for. Next to the axis is a core of
+    discs of quadrilaterals, extruded along it, as sections swept about a line in them would have no angle there.
     """
     turn = revolution(gmsh, solid)
     return sized(solid, sizing, lambda share: _mesh_about(gmsh, solid, turn, sizing, share))

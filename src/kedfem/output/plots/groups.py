@@ -30,7 +30,7 @@ MOTIONS = {
 ALL = {"position": "position, velocity and acceleration", "rotation": "rotation and its rates"}
 """Title of such a picture, by its first channel."""
 
-COORDINATES = {"angle": "Turns of the joints", "travel": "Travels of the joints"}
+COORDINATES = {"angle": "Rotations of the joints", "travel": "Travels of the joints"}
 
 
 @dataclass(frozen=True, slots=True)

@@ -44,8 +44,8 @@ def drive_joint_wrench(
         if link.name in joint.links and elastic and name not in sliding:
             held.append((holder(model, elastic[0], name), name, np.asarray(joint.at)))
     others = [(port_wrench(model, *each, forces), each[2]) for each in held]
-    carried = [x for x in model.prescribed if partner(scene, x) == link.name]
-    riders = [(x, *drive_joint_wrench(scene, model, x, forces)) for x in carried]
+    driven = [x for x in model.prescribed if partner(scene, x) == link.name]
+    riders = [(x, *drive_joint_wrench(scene, model, x, forces)) for x in driven]
     held += [each for _, _, below in riders for each in below]
 
     def wrench(block: Block) -> tuple[Rows, Rows]:

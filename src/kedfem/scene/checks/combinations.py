@@ -12,9 +12,9 @@ from kedfem.scene.questions.enforced import enforced_by_equations
 from kedfem.scene.questions.modelling import default_frames
 from kedfem.scene.questions.planes import spatial_beams
 from kedfem.scene.records.joints import Bushing
-from kedfem.scene.records.wording import shown
+from kedfem.scene.records.wording import NOUNS, shown
 
-Told = tuple[str, Facts, Where, Mapping[str, str]]
+Reported = tuple[str, Facts, Where, Mapping[str, str]]
 """Section, factors, place and words of a part of a scene."""
 
 
@@ -48,7 +48,7 @@ def common_facts(parts: Parts) -> dict[str, str]:
     }
 
 
-def joints(parts: Parts) -> Iterator[Told]:
+def joints(parts: Parts) -> Iterator[Reported]:
     """Good joints: how each is enforced."""
     moving = {name for name in parts.good.joints if enforced_by_equations(parts.good, name)}
     slots = (joint for joint in parts.joints.values() if joint.word("kind") == "slot")
@@ -87,7 +87,7 @@ def on_joint(parts: Parts, name: str | None) -> tuple[dict[str, str], dict[str, 
     return {"joint": kind}, {"name": joint.name, "kind": kind}
 
 
-def drives(parts: Parts) -> Iterator[Told]:
+def drives(parts: Parts) -> Iterator[Reported]:
     """Drives, the coordinates that they prescribe and their shafts."""
     for drive in parts.all_drives:
         facts, words = on_joint(parts, drive.word("joint"))
@@ -105,7 +105,7 @@ def driven(parts: Parts) -> dict[str, str]:
     return {"driven": "" if joint is None else driven_coordinate(drive, str(joint.word("kind")))}
 
 
-def gears(parts: Parts) -> Iterator[Told]:
+def gears(parts: Parts) -> Iterator[Reported]:
     """Gears as a whole, and their joints."""
     for gear in parts.gears.values():
         yield "gears", {}, gear.where, {}
@@ -118,7 +118,7 @@ def gears(parts: Parts) -> Iterator[Told]:
             yield "gears", {**facts, "element": element, "stiffening": ""}, (*gear.where, "joints", i), words
 
 
-def elements(parts: Parts) -> Iterator[Told]:
+def elements(parts: Parts) -> Iterator[Reported]:
     """Motors, springs on joints, and limits of these."""
     for motor in parts.motors.values():
         facts, words = on_joint(parts, motor.word("joint"))
@@ -137,7 +137,7 @@ def elements(parts: Parts) -> Iterator[Told]:
         yield "limits", facts, limit.where, words
 
 
-def analysis(parts: Parts) -> Iterator[Told]:
+def analysis(parts: Parts) -> Iterator[Reported]:
     """The analysis with its start and times."""
     entry = parts.analysis
     at = entry.where
@@ -166,7 +166,7 @@ def analysis(parts: Parts) -> Iterator[Told]:
             yield "analysis", facts, at, {"given": shown(list(forces))}
 
 
-def kinds(parts: Parts) -> Iterator[Told]:
+def kinds(parts: Parts) -> Iterator[Reported]:
     """What a steady motion, and positions without vibration, are combined with."""
     entry = parts.analysis
     kind = entry.word("kind") or "transient"
@@ -183,7 +183,7 @@ def kinds(parts: Parts) -> Iterator[Told]:
             yield "analysis", {**facts, **more}, entry.where, {**words, "given": shown(list(given))}
 
 
-def fatigue(parts: Parts) -> Iterator[Told]:
+def fatigue(parts: Parts) -> Iterator[Reported]:
     """Damage over a period."""
     if parts.fatigue.where:
         period = "given" if parts.fatigue.has("period") else "none"
@@ -195,14 +195,14 @@ def only(**facts: str) -> dict[str, str]:
     return {"frames": "", "stiffening": "", "solver": "", **facts}
 
 
-def links(parts: Parts) -> Iterator[Told]:
+def links(parts: Parts) -> Iterator[Reported]:
     """Links with frames of their own."""
     for link in parts.links.values():
         if link.word("frames") and not slider(link):
             yield "links", {"frames": str(link.word("frames"))}, link.where, {}
 
 
-def loads(parts: Parts) -> Iterator[Told]:
+def loads(parts: Parts) -> Iterator[Reported]:
     """Loads on kinds of links, and their factors."""
     for load in parts.loads.values():
         link = parts.links.get(load.word("link") or "")
@@ -210,7 +210,7 @@ def loads(parts: Parts) -> Iterator[Told]:
             continue
         kind = "slider" if slider(link) else category(link)
         facts = {"element": str(load.word("kind")), "link": kind}
-        words = {"name": link.name, "noun": category(link)}
+        words = {"name": link.name, "noun": NOUNS.get(kind, kind)}
         facts |= {"factor": load.word("factor", "over") or "", **driven(parts)}
         yield "loads", facts, load.where, words
 

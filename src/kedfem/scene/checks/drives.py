@@ -193,7 +193,7 @@ def speed_faults(parts: Parts, joint: Entry, given: Any) -> Iterator[Fault]:
     """A speed of a joint that has none, that the drive moves, or in a unit of another kind."""
     kind = joint.word("kind")
     if joint.record is not None and kind not in STARTED:
-        got = f"got {joint.name!r}, which is {kind}"
+        got = f"got {joint.name!r}, a {kind} joint"
         message = f"must be of a revolute, prismatic, cylindrical, screw or slot joint, {got}; take initial_motions"
     elif joint.name in parts.driven_joints:
         message = f"must be of a joint that the drive does not move, got {joint.name!r}"

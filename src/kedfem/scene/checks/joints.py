@@ -40,7 +40,7 @@ def joint_faults(parts: Parts) -> Iterator[Fault]:
     reached = connected(GROUND, pairs)
     for link in parts.links.values() if pairs else ():
         if not any(link.name in pair for pair in pairs):
-            yield Fault(link.where, "must be held by a joint, got none")
+            yield Fault(link.where, "must be connected by a joint, got none")
         elif link.name not in reached:
             yield Fault(link.where, "must be connected with the ground through joints, got no way there")
 
@@ -80,7 +80,7 @@ def surface_faults(joint: Entry, parts: Parts) -> Iterator[Fault]:
                 yield joint.fault(key, unknown_name("a link of the joint", str(name), own))
             elif key == "faces" and link is not None and category(link) not in {"solid", "rigid"}:
                 noun = NOUNS.get(category(link), category(link))
-                yield joint.fault(key, f"must name faces of a solid, got {name!r}, which is a {noun}", name)
+                yield joint.fault(key, f"must name faces of a solid, got {name!r}, a {noun}", name)
 
 
 def coordinate_faults(parts: Parts) -> Iterator[Fault]:

@@ -24,7 +24,7 @@ def load_faults(parts: Parts) -> Iterator[Fault]:
     for probe in parts.probes.values():
         link, quantity = parts.links.get(probe.word("link") or ""), probe.word("quantity")
         if link is not None and category(link) == "rigid" and quantity in {"stress", "deflection"}:
-            got = f"got {link.name!r}, which is rigid"
+            got = f"got {link.name!r}, a rigid link"
             yield probe.fault("link", f"must name an elastic link for a {quantity}, {got}")
         if quantity in ELASTIC and not parts.driven:
             wanted = "position, travel or deflection" if quantity == "displacement" else f"total_{quantity}"

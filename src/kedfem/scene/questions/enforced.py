@@ -37,5 +37,5 @@ def _displaced(scene: Scene, name: str) -> bool:
     if link.category != "rigid":
         return True
     drives = ((scene.joints[x], drive) for x, drive in scene.driven_joints.items() if x in scene.joints)
-    carried = any(name in joint.links and not by_constraint_equations(joint, drive) for joint, drive in drives)
-    return not carried and (link.shape is not None or link.inertia is not None)
+    prescribed = any(name in joint.links and not by_constraint_equations(joint, drive) for joint, drive in drives)
+    return not prescribed and (link.shape is not None or link.inertia is not None)

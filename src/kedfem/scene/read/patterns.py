@@ -103,7 +103,7 @@ class _Copy:
         shape = spelt_out(raw).get("shape") if section == "links" else None
         kind = shape.get("kind") if isinstance(shape, Mapping) else None
         if not self.pattern.turn:
-            if kind in PLACED and "origin" not in (shape or {}):  # drawn in its place, which is shifted
+            if kind in PLACED and "origin" not in (shape or {}):  # in coordinates of the scene, which are shifted
                 whole = {key: x for key, x in spelt_out(made).items() if key != "file"}
                 made = {**whole, "shape": {**whole["shape"], "origin": self._vector([0.0, 0.0, 0.0], "m")}}
             return made

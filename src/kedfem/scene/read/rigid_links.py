@@ -55,7 +55,9 @@ def _carry(out: Tables, name: str, body: RigidBody) -> None:
     held, slots = [body.centre, *_held(out, name)], [*_slots(out, name)]
     radius = math.sqrt(max(sum(body.inertia[:3]) / (2 * body.mass), 0.0)) or 1.0
     reach = max(math.dist(P, Q) for P in held for Q in held) or radius
-    along = [_beyond(P, axis, reach) for P, axis in slots]  # a second point of each line, beside where its pin is drawn
+    along = [
+        _beyond(P, axis, reach) for P, axis in slots
+    ]  # a second point of each line, beside its pin's reference position
     points = [*_different([*held, *along])]
     if len(points) == 1:
         points.append((points[0][0] + radius, *points[0][1:]))

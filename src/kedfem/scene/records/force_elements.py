@@ -177,11 +177,11 @@ class LineSpring(_Elastic):
     @property
     def free(self) -> float:
         """l0: the length or travel at which it does not pull [m]."""
-        drawn = 0.0 if self.between is None else math.dist(*(end.at for end in self.between))
+        distance = 0.0 if self.between is None else math.dist(*(end.at for end in self.between))
         given = self.free_travel if self.between is None else self.free_length
         if self.preload is not None:
-            return drawn - self.preload / self.stiffness
-        return drawn if given is None else given
+            return distance - self.preload / self.stiffness
+        return distance if given is None else given
 
 
 class TorsionSpring(_Elastic):
@@ -229,11 +229,11 @@ class _Range(Record):
         elif lower is not None and upper is not None and lower >= upper:
             faults.append(Fault(("lower",), f"must be below upper {upper:.6g} [{unit}], got {lower:.6g}"))
         else:
-            drawn = f"0 [{unit}], the reference position, which must be within the limits"
+            reference = f"0 [{unit}], the reference position, which must be within the limits"
             if lower is not None and lower > 0.0:
-                faults.append(Fault(("lower",), f"must be at most {drawn}, got {lower:.6g}"))
+                faults.append(Fault(("lower",), f"must be at most {reference}, got {lower:.6g}"))
             if upper is not None and upper < 0.0:
-                faults.append(Fault(("upper",), f"must be at least {drawn}, got {upper:.6g}"))
+                faults.append(Fault(("upper",), f"must be at least {reference}, got {upper:.6g}"))
         refuse(faults)
         return self
 

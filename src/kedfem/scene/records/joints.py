@@ -163,7 +163,7 @@ class Joint(Record):
     links: tuple[EndName, EndName]
     """the two links that it joins; `"ground"` for the frame; of a slot first the link with the pin"""
     at: JointPoint
-    """its centre; where the two links are drawn a little apart that on each of them, by link (`ground` too):
+    """its centre; where the two links are given a little apart that on each of them, by link (`ground` too):
     `{ crank = [0.1, 0], rod = "P" }`. The links are then moved as little as can be so that all joints close"""
     axis: Axis | None = None
     """`"x"`, `"y"`, `"z"`, a vector or `{ from = point, to = point }`: a hinge's axis (`"z"` if not given), the direction
@@ -203,7 +203,7 @@ class Joint(Record):
 
     @property
     def open(self) -> bool:
-        """Whether its links are drawn apart."""
+        """Whether its links are given apart."""
         return len(set(self.points.values())) > 1
 
     def on(self, link: str) -> XYZ:

@@ -1,4 +1,4 @@
-"""Shapes of links, drawn in the reference position of the scene."""
+"""Shapes of links in the reference position of the scene."""
 
 from __future__ import annotations
 
@@ -194,7 +194,7 @@ class _FromFile(Record):
     kind: str
     file: FileName
     origin: Point = (0.0, 0.0, 0.0)
-    """where the file's origin goes; if neither this nor `towards` nor `z` is given, the file is drawn in its place"""
+    """where the file's origin goes; if neither this nor `towards` nor `z` is given, its coordinates are the scene's"""
     towards: Point | None = None
     """a point that the file's x axis goes to point at, from `origin`; along global x if not given"""
     z: Axis | None = None

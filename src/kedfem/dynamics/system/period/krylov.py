@@ -11,7 +11,7 @@ from kedfem.dynamics.system.starts.instant import Flat
 
 WHOLE = 1e-12  # what a new direction adds where a basis holds all that there is
 Watch = Callable[[int], None]
-"""Told of the periods that were marched so far."""
+"""Called with the number of periods that were marched so far."""
 Nearer = Callable[[Flat], Flat]
 """r → about (I − Φ)⁻¹ r."""
 

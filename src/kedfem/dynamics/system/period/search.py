@@ -2,8 +2,8 @@
 
 x = P(x) by Newton's method. Each of its linear systems, (I − Φ) d = P(x) − x with Φ the derivative of P, is solved by
 GMRES: a product with Φ is one more march over the period, so that it takes as many marches as there are vibrations that a
-period does not damp away. Of a linear system P is affine, and one such solution is all. Of others Anderson mixing of P
-comes first: it takes a march for each vibration where Newton's method takes one again in each of its solutions.
+period does not damp away. P of a linear system is affine and needs one such solution. For other systems Anderson
+acceleration of P comes first: it takes one march for each vibration, Newton's method one for each in every iteration.
 """
 
 from collections.abc import Sequence
@@ -155,7 +155,7 @@ def _fixed(steps: Watched, x: Flat, coarse: Coarse | None) -> tuple[Flat, Flat, 
 
 
 def _mixed(steps: Watched, x: Flat, y: Flat) -> tuple[Flat, Flat]:
-    """x and P(x) nearer to one another, by Anderson mixing.
+    """x and P(x) nearer to one another, by Anderson acceleration.
 
     Until a period leaves as little as it must, or no march of the last PATIENCE has led nearer.
     """

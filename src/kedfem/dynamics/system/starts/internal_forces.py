@@ -136,7 +136,7 @@ class StaticForces:
 
 
 def _rigid(link: Link, part: Any) -> Float[np.ndarray, "N m"]:
-    """Rigid motions of a body where it is drawn, on its coordinates, orthonormal."""
+    """Rigid motions of a body from its reference position, in its coordinates, orthonormal."""
     moved = rigid_modes(link).T.reshape(-1, link.n, link.d)
     return np.asarray(np.linalg.qr(np.array([coordinates(link, part, x).ravel() for x in moved]).T)[0])
 

@@ -34,9 +34,9 @@ class NoBalanceError(SolveError):
     def __init__(self, moves: str = "", cause: str = "") -> None:
         seen = f"; {moves}" * bool(moves)
         usual = (
-            "links that nothing holds but their weight, springs whose preload is far from what they bear there, or a "
-            f'drive at a natural frequency{seen}; give springs preload or free_length near that, take initial = "rest", '
-            "a slower drive, stiffer links"
+            "links that nothing constrains but their weight, springs whose preload is far from what they bear there, "
+            f"or a drive at a natural frequency{seen}; give springs preload or free_length near that, "
+            'take initial = "rest", a slower drive, stiffer links'
         )
         super().__init__(
             f"analysis.initial: the start must be a deflection that can be found, got none: {cause or usual}"
@@ -86,7 +86,7 @@ def iterated(
     z1 : rates of the interface unknowns
     rounding : of the deflection, below which changes that do not fall are taken for rounding
     """
-    of, mixing, bodies, settled, last = now.of, AndersonAcceleration(), TurningBodies(now, spins), False, np.inf
+    of, anderson, bodies, settled, last = now.of, AndersonAcceleration(), TurningBodies(now, spins), False, np.inf
     linear, slow, shaken, start, first = of.c.single, 0, 0, u, 0.0
     exact = now.slow or (linear and any(bodies.sparse))
     frames, balance = bodies.static.frames(), None
@@ -110,8 +110,8 @@ def iterated(
         if done or (settled and (sure or size <= ROUNDING * reached + of.c.floor)):
             return np.asarray(u + change)  # what was left of stiff rigid cross-section nodes would be large accelerations
         if settled:  # small changes were those of mass in the matrices
-            mixing, last, first, now.slow = AndersonAcceleration(), np.inf, size, True
-        u = u + (change if linear else mixing.step(change))
+            anderson, last, first, now.slow = AndersonAcceleration(), np.inf, size, True
+        u = u + (change if linear else anderson.step(change))
         reached = float(np.linalg.norm(u))
         first = first or size
         if size > DIVERGED * first and not linear:
@@ -119,7 +119,7 @@ def iterated(
         stalls = size > last / 2 and size <= (LINEAR if linear else rounding) * reached
         stalls = stalls and (n > DIRECT or not linear)
         if n >= DIRECT and size > last / 2 and rounding != FREE and not exact:
-            exact, mixing, last, first = True, AndersonAcceleration(), np.inf, 0.0
+            exact, anderson, last, first = True, AndersonAcceleration(), np.inf, 0.0
             now.slow = True  # it may be the mass in the matrices that slows it
             continue
         slow = slow + 1 if exact and size > last / 2 and size <= STALLED * reached else 0

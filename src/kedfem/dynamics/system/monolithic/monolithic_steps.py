@@ -8,7 +8,7 @@ from kedfem.arrays import Float
 from kedfem.dynamics.frames import frames_of, mean_orientation
 from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.system.layout import points_of
-from kedfem.dynamics.system.oracle.monolithic import Monolithic, Now, Seen
+from kedfem.dynamics.system.monolithic.monolithic import Monolithic, Now, Seen
 from kedfem.dynamics.system.ready import Motion, Ready, displacements
 from kedfem.dynamics.system.starts.instant import Instant, renumbered
 from kedfem.dynamics.system.starts.internal_forces import own

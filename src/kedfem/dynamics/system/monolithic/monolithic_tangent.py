@@ -11,12 +11,12 @@ from scipy.linalg import qr
 from scipy.sparse.linalg import splu
 
 from kedfem.arrays import Bool, Float
-from kedfem.dynamics.system.oracle.monolithic_places import force
+from kedfem.dynamics.system.monolithic.monolithic_places import force
 from kedfem.errors import SolveError
 from kedfem.motion.rigid import RigidMotion
 
 if TYPE_CHECKING:
-    from kedfem.dynamics.system.oracle.monolithic import Monolithic, Now
+    from kedfem.dynamics.system.monolithic.monolithic import Monolithic, Now
 
 DIFFERENCE = 1e-6  # of central differences for tangents: Newton's method needs no better ones
 ONE_SIDED = 1e-8  # of others: with 1e-6 a stiff body that turns freely by 0.02 rad a step had Newton's method diverge

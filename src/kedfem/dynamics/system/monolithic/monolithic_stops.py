@@ -20,12 +20,12 @@ from scipy.interpolate import CubicHermiteSpline
 
 from kedfem.arrays import Float
 from kedfem.dynamics.frames import mean_orientation
-from kedfem.dynamics.system.oracle.monolithic_tangent import assembled, inverse, rotated_stiffness
+from kedfem.dynamics.system.monolithic.monolithic_tangent import assembled, inverse, rotated_stiffness
 from kedfem.dynamics.system.record import Stop, System
 from kedfem.motion.rigid import RigidMotion
 
 if TYPE_CHECKING:
-    from kedfem.dynamics.system.oracle.monolithic import Monolithic, Now
+    from kedfem.dynamics.system.monolithic.monolithic import Monolithic, Now
 
 NEAR = 1e-2  # of a step: a stop that is met so near to its beginning or end is met there, as in `impacts`
 HALVINGS = 6  # parts of parts of a step, as in `march`

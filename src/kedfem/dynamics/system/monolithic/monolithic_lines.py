@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from kedfem.arrays import Float
 from kedfem.dynamics.system.ends import line_of
-from kedfem.dynamics.system.oracle.monolithic_places import of_rows, placed, point, valued
+from kedfem.dynamics.system.monolithic.monolithic_places import of_rows, placed, point, valued
 from kedfem.dynamics.system.record import ANGLE, ARC, GAP, ON_LINES, TURN, End, System, Term
 from kedfem.errors import SolveError
 

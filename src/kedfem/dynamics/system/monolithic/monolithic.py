@@ -25,10 +25,10 @@ from kedfem.dynamics.loads import applied
 from kedfem.dynamics.matrices.substructure import mass_matrix
 from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.stepping.scheme import Scheme
-from kedfem.dynamics.system.oracle.monolithic_lines import measured
-from kedfem.dynamics.system.oracle.monolithic_places import force, turned_load
-from kedfem.dynamics.system.oracle.monolithic_stops import HALVINGS, Motion, in_parts, sides
-from kedfem.dynamics.system.oracle.monolithic_tangent import Inverse, inverse, tangent
+from kedfem.dynamics.system.monolithic.monolithic_lines import measured
+from kedfem.dynamics.system.monolithic.monolithic_places import force, turned_load
+from kedfem.dynamics.system.monolithic.monolithic_stops import HALVINGS, Motion, in_parts, sides
+from kedfem.dynamics.system.monolithic.monolithic_tangent import Inverse, inverse, tangent
 from kedfem.dynamics.system.record import Driven, Held, System
 from kedfem.errors import SolveError
 from kedfem.links.record import Matrix
