@@ -83,7 +83,7 @@ def initial_rates(scene: Scene, linkage: Linkage, along: Path, model: Model) -> 
 def rigid_rates(
     link: Link, R: Float[np.ndarray, "3 3"], v: Float[np.ndarray, "3"], omega: Float[np.ndarray, "3"]
 ) -> Nodal:
-    """The rate of the state of a link rotated by R: v of the point drawn at the origin [m/s], turning by ω [rad/s]."""
+    """Rates of the state of a link rotated by R: velocity v of its reference origin [m/s], angular velocity ω [rad/s]."""
     rates = np.outer(link.one, v) + cross(omega[None], link.X @ R.T)
     if link.kind == "beam":
         rates[:, 2] = omega[2] * link.one
