@@ -55,7 +55,7 @@ def module_of(path: Path) -> str:
     return ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__")
 
 
-FOREIGN = {"_replace", "_fields", "_compiler", "_cache", "_cache_file", "_save_index", "_mesh", "_exit"}
+FOREIGN = {"_replace", "_fields", "_asdict", "_compiler", "_cache", "_cache_file", "_save_index", "_mesh", "_exit"}
 """Private by their spelling, of named tuples, numba, meshio and os; not kedfem's."""
 
 
