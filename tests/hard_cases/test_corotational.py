@@ -108,7 +108,7 @@ def test_a_drive_stops_suddenly() -> None:
     t = t[(t < 0.026) | (np.arange(len(t)) % 40 == 0)]
     x = np.clip((t - t1) / T, 0, 1)
     angle = 15 * np.minimum(t, t1) + 15 * T / 2 * (x + np.sin(np.pi * x) / np.pi)
-    motion = {"kind": "table", "time": list(t), "angle": list(angle)}
+    motion = {"kind": "curve", "time": list(t), "value": list(angle)}
     made = ran(driven(motion, bar([0, 0], [1, 0], (0.02, 0.01), 4), ALLOY, end_time=0.3, step=1e-4))
     assert history("sudden_stop").difference(made.t, made.position("arm", [1, 0])[:, :2]).max() < 2e-3
 

@@ -33,7 +33,7 @@ def pulled(links: Raw, joints: Raw, turn: np.ndarray, frames: str, load: float) 
     top = list(turn @ [L / 2, L, 0])
     wall = {"kind": "revolute", "links": ["frame", "ground"], "at": list(turn @ [L / 2, 0, 0])}
     wall["axis"] = list(turn @ [0, 0, 1])
-    rest = {"kind": "table", "time": [0, 1], "angle": [0, 0]}
+    rest = {"kind": "curve", "time": [0, 1], "value": [0, 0]}
     force = {"kind": "force", "link": next(reversed(links)), "at": top, "vector": list(load * (turn @ [0, 1, 0]))}
     return {
         "materials": {"m": {"youngs_modulus": E, "poisson_ratio": 0.3, "density": 7850.0}},

@@ -91,7 +91,7 @@ def test_a_half_sine_shock_moves_a_block_as_its_closed_form_says(tmp_path: Path)
     T, a, axis = 0.1, 50.0, AXES["oblique"]
     t = np.linspace(0, T, 801)
     y = a * T / np.pi * (t - T / np.pi * np.sin(np.pi * t / T))
-    motion = {"kind": "table", "time": t, "travel": y}
+    motion = {"kind": "curve", "time": t, "value": y}
     raw = sprung(axis, motion, end_time=T, step=2.5e-4)
     raw["springs"]["tyre"]["damping"] = 0.0
     found = run(raw, tmp_path, block=travel("block", 0.3 * axis), road=travel("road"))

@@ -55,7 +55,7 @@ def results(tally: Tally, count: int, seed: int, folder: Path) -> None:
 def tables(tally: Tally, count: int, seed: int, folder: Path) -> None:
     """Tables of motion: a scene with one is accepted or refused."""
     table, raw = folder / "motion.csv", example("four_bar_beams")
-    raw["drive"] = {"joint": raw["drive"]["joint"], "motion": {"kind": "table", "file": table.name}}
+    raw["drive"] = {"joint": raw["drive"]["joint"], "motion": {"kind": "curve", "file": table.name}}
     raw["analysis"] = {"end_time": 0.1, "step": 1e-3}
     lines = "t [s], angle [rad]\n" + "\n".join(f"{k / 50}, {(k / 50) ** 2}" for k in range(51))
 

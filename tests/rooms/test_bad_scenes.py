@@ -9,7 +9,7 @@ import pytest
 
 from kedfem.errors import SceneError
 from kedfem.motion.linkage import linkage
-from kedfem.scene import Bar, Scene, read_scene, scene_from
+from kedfem.scene import Bar, Scene, read_scene, scene_from, time_grid
 
 GOOD = """
 [points]
@@ -380,15 +380,15 @@ def test_a_part_that_fits_is_no_fault(tmp_path):
 )
 def test_a_motion_table_that_cannot_be_read(tmp_path, table, message):
     (tmp_path / "motion.csv").write_text(table)
-    change = {"drive/motion": {"kind": "table", "file": "motion.csv"}, "analysis": {"end_time": 1, "step": 0.1}}
+    change = {"drive/motion": {"kind": "curve", "file": "motion.csv"}, "analysis": {"end_time": 1, "step": 0.1}}
     assert faults_of(scene_from, changed(GOOD, change), tmp_path) == [f"drive.motion.file: {message}"]
 
 
 def test_a_motion_table_is_in_a_file_or_in_the_scene():
-    motion = {"kind": "table", "file": "motion.csv", "time": [0, 1], "angle": [0, 1]}
+    motion = {"kind": "curve", "file": "motion.csv", "time": [0, 1], "value": [0, 1]}
     change = {"drive/motion": motion, "analysis": {"end_time": 1, "step": 0.1}}
     assert faults_of(scene_from, changed(GOOD, change)) == [
-        "drive.motion.file: cannot be combined with time and angle, got both"
+        "drive.motion.file: cannot be combined with at and value, got both"
     ]
 
 
@@ -421,20 +421,33 @@ def test_no_odd_value_anywhere_gives_more_than_lines_of_faults(base):
 def test_a_table_rounded_to_whole_degrees_is_refused_with_its_place_and_remedy(tmp_path):
     rows = [f"{k / 100},{round(90 * k / 100 * k / 100)}" for k in range(101)]
     (tmp_path / "motion.csv").write_text("\n".join(["time [s],angle [deg]", *rows]))
-    motion = {"kind": "table", "file": "motion.csv"}
+    motion = {"kind": "curve", "file": "motion.csv"}
     change = {"drive/motion": motion, "analysis": {"end_time": 1, "step": 0.1}}
     (fault,) = faults_of(scene_from, changed(GOOD, change), tmp_path)
     assert fault.startswith(
-        "drive.motion.angle: must be smooth enough for its acceleration to shake nothing (more digits"
+        "drive.motion.value: must be smooth enough for its acceleration to shake nothing (more digits"
     )
-    assert "smooth = 0.01" in fault  # twice the 0.005 rad that rounding to 1 deg scatters by: 0.0175/√12
-    change["drive/motion"] = {**motion, "smooth": "0.5 deg"}
-    assert scene_from(changed(GOOD, change), tmp_path).motion.smooth == pytest.approx(0.00873, abs=1e-5)
+    assert "smoothing = 0.01" in fault  # twice the 0.005 rad that rounding to 1 deg scatters by: 0.0175/√12
+    change["drive/motion"] = {**motion, "smoothing": "0.5 deg"}
+    assert scene_from(changed(GOOD, change), tmp_path).motion.smoothing == pytest.approx(0.00873, abs=1e-5)
 
 
 def test_a_table_of_travel_is_read_in_its_unit(tmp_path):
     (tmp_path / "motion.csv").write_text("Time (ms),Travel (mm)\n0,0\n500,3\n1000,20\n")
-    change = {"drive": {"joint": "S", "motion": {"kind": "table", "file": "motion.csv"}}}
+    change = {"drive": {"joint": "S", "motion": {"kind": "curve", "file": "motion.csv"}}}
     motion = scene_from(changed(BEAMS, change), tmp_path).motion
     assert motion.time == (0.0, 0.5, 1.0)
-    assert motion.travel == pytest.approx((0.0, 0.003, 0.02))
+    assert motion.value == pytest.approx((0.0, 0.003, 0.02))
+
+
+def test_a_file_of_travel_is_refused_on_a_hinge(tmp_path):
+    (tmp_path / "motion.csv").write_text("time [s], travel [mm]\n0,0\n1,20\n")
+    change = {"drive/motion": {"kind": "curve", "file": "motion.csv"}, "analysis": {"end_time": 1, "step": 0.1}}
+    (fault,) = faults_of(scene_from, changed(GOOD, change), tmp_path)
+    assert fault.startswith("drive.motion.value[0]: must be an angle [rad], got '0.0 m'")
+
+
+def test_a_curve_of_motion_that_repeats_itself_needs_no_end():
+    motion = {"kind": "curve", "time": [0, 0.25, 0.5, 0.75], "value": [0, 1, 0, -1], "period": 1}
+    scene = scene_from(changed(GOOD, {"drive/motion": motion, "analysis": {"kind": "steady", "step": 0.1}}))
+    assert time_grid(scene).end == pytest.approx(1.0)

@@ -67,7 +67,7 @@ def test_drives_do_the_work_of_all_port_forces_on_the_rigid_body_motion(kind: st
 @pytest.mark.parametrize("moves", [0.0, 1e-5], ids=["at rest", "by 10 µm"])
 def test_a_drive_that_holds_what_rests_is_not_judged_by_rounding(moves: float) -> None:
     """A block hangs on a spring of a ground that rests; what moves by a 30,000th of the size is judged as all else."""
-    motion = {"kind": "table", "time": [0, 0.01, 0.02], "travel": [0.0, moves / 2, moves]}
+    motion = {"kind": "curve", "time": [0, 0.01, 0.02], "value": [0.0, moves / 2, moves]}
     raw = sprung(AXES["oblique"], motion, end_time=0.02, step=1e-3, initial="quasi-static")
     checks, _ = compared(*ran(raw | {"gravity": [0, 0, -9.81]}))
     assert checks.warnings() == ()

@@ -249,7 +249,7 @@ def test_a_force_on_a_slider_never_turns() -> None:
 
 def test_one_step_of_a_table_that_ends_with_it() -> None:
     raw = spinning_beam()
-    raw["drive"]["motion"] = {"kind": "table", "time": [0, 0.03, 0.06, 0.1], "angle": [0, 0.1, 0.4, 1]}
+    raw["drive"]["motion"] = {"kind": "curve", "time": [0, 0.03, 0.06, 0.1], "value": [0, 0.1, 0.4, 1]}
     for initial in ("rest", "quasi-static"):
         raw["analysis"] = {"end_time": 0.1, "step": 0.1, "initial": initial}
         assert len(run(raw)[2]) == 2

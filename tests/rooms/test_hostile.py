@@ -17,7 +17,7 @@ from kedfem.terminal import terminal
 
 from .test_bad_scenes import BEAMS, GOOD, changed
 
-CSV = {"drive/motion": {"kind": "table", "file": "motion.csv"}, "analysis": {"end_time": 1, "step": 0.1}}
+CSV = {"drive/motion": {"kind": "curve", "file": "motion.csv"}, "analysis": {"end_time": 1, "step": 0.1}}
 
 
 def refusal(change: dict[str, Any], base: str = GOOD, folder: Path | str = ".") -> list[str]:
@@ -40,7 +40,7 @@ HOSTILE = [
     ({"points/B/distance": 10**30 * 9}, "points.B.distance: must be at most 1e+30 in size [m]"),
     ({"output/folder": "a\0b"}, "output.folder: must be a path without control characters, got '\\x00'"),
     ({"output/folder": "b" * 300}, "output.folder: must be a path of names of at most 255 bytes, got one of 300"),
-    ({"drive/motion": {"kind": "table", "file": "a\0b"}}, "drive.motion.file: "),
+    ({"drive/motion": {"kind": "curve", "file": "a\0b"}}, "drive.motion.file: "),
     ({"title": "\x1b]0;x"}, "title: must be a line without control characters"),
     ({f"loads/{'p' * 300}": {"kind": "force", "link": "rocker", "at": "M"}}, "must be a name of at most 100"),
     ({"links/\x1b[31mx": {"material": "steel"}}, "must be a name of letters"),

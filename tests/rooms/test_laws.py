@@ -16,24 +16,25 @@ from kedfem.scene import (
     Damping,
     Drive,
     Factor,
+    MotionCurve,
     MotionLaw,
     Polynomial,
     Ramp,
-    Table,
     TimeGrid,
+    cycle,
     drive_angle,
     load_factor,
     rayleigh,
     time_grid,
 )
-from kedfem.scene.questions.laws import table_noise
+from kedfem.scene.questions.laws import curve_noise
 
 TIMES = tuple(np.linspace(0.0, 2.0, 9))
 LAWS = {
     "constant speed": ConstantSpeed(speed=7.0),
     "smooth ramp": Ramp(speed=-5.0, time=0.8),
     "linear ramp": Ramp(speed=5.0, time=0.8, shape="linear"),
-    "table": Table(time=TIMES, angle=tuple(math.sin(2.0 * t) for t in TIMES)),
+    "table": MotionCurve(time=TIMES, value=tuple(math.sin(2.0 * t) for t in TIMES)),
     "cycloidal": Cycloidal(angle=1.2, rise=0.3, dwell=0.2, return_time=0.4, dwell_after=0.1),
     "cycloidal, stays": Cycloidal(angle=-1.2, rise=0.7),
     "3-4-5": Polynomial(angle=1.2, rise=0.3, dwell=0.2, return_time=0.4),
@@ -123,16 +124,35 @@ def test_a_rise_without_a_return_stays_at_the_top():
 
 def test_a_table_passes_through_its_points_and_follows_a_cubic_exactly():
     t = np.linspace(0.0, 2.0, 50)
-    law = Table(time=TIMES, angle=tuple(s**3 - s for s in TIMES))  # not-a-knot reproduces cubics
+    law = MotionCurve(time=TIMES, value=tuple(s**3 - s for s in TIMES))  # not-a-knot reproduces cubics
     phi, dphi, ddphi = drive_angle(law, t)
     assert_allclose(phi, t**3 - t, atol=1e-13)
     assert_allclose(dphi, 3 * t**2 - 1, atol=1e-12)
     assert_allclose(ddphi, 6 * t, atol=1e-11)
 
 
+@pytest.mark.parametrize("closed", [True, False])
+@pytest.mark.parametrize("smoothing", [None, "1e-7 rad"])
+def test_a_periodic_curve_of_motion_repeats_itself_without_jumps(closed, smoothing):
+    """A sine over its period T; the error of a cubic spline's second derivative is h²/12 of the fourth one at the most,
+    for h = T/80: de Boor, A Practical Guide to Splines, 2001, chapter V."""
+    period, n = 1.6, 80
+    at = np.linspace(-0.4, 1.2, n + 1)[: None if closed else n]
+    law = MotionCurve(time=tuple(at), value=tuple(np.sin(2 * np.pi * at / period)), period=period, smoothing=smoothing)
+    w, t = 2 * np.pi / period, np.linspace(0.0, 3.7, 301)
+    phi, dphi, ddphi = drive_angle(law, t)
+    cap = 2.0 * (w * period / n) ** 2 / 12.0
+    assert_allclose(ddphi, -(w**2) * np.sin(w * t), atol=cap * w**2)
+    assert_allclose(dphi, w * np.cos(w * t), atol=cap * w)
+    assert_allclose(phi, np.sin(w * t), atol=cap)
+    seam = [x[:, 0] - x[:, 1] for x in np.array(drive_angle(law, np.array([1.2 - 1e-9, 1.2 + 1e-9])))[:, None, :]]
+    assert_allclose(np.ravel(seam), 0.0, atol=1e-7 * w**3)
+    assert cycle(law) == period
+
+
 @pytest.mark.parametrize("t", [-0.1, 2.1])
 def test_a_table_is_not_used_beyond_its_ends(t):
-    with pytest.raises(MotionError, match=rf"must reach t = {t} s, got a table from 0 to 2 s"):
+    with pytest.raises(MotionError, match=rf"must reach t = {t} s, got a curve from 0 to 2 s"):
         drive_angle(LAWS["table"], np.array([1.0, t]))
 
 
@@ -188,7 +208,7 @@ def noisy(digits):
 def test_the_noise_of_a_rounded_table_is_that_of_rounding():
     """Standard deviation of rounding: a unit of the last digit by √12; acceleration error √6 σ/h² of 30° ω²/√2."""
     t, angle = noisy(2)
-    sigma, share = table_noise(Table(time=tuple(t), angle=tuple(angle)))
+    sigma, share = curve_noise(MotionCurve(time=tuple(t), value=tuple(angle)))
     assert_allclose(sigma, np.radians(0.01) / np.sqrt(12), rtol=0.15)
     alone = np.sqrt(6) * sigma * 360**2 / (np.radians(30) * (2 * np.pi) ** 2 / np.sqrt(2))
     assert_allclose(share, alone / np.hypot(1, alone), rtol=0.15)  # of all second differences, the noise among them
@@ -198,7 +218,7 @@ def test_the_noise_of_a_rounded_table_is_that_of_rounding():
 @pytest.mark.parametrize("points", [13, 25, 400])
 def test_a_smooth_table_has_no_noise_however_coarse(points):
     t = np.sort(np.linspace(0, 1, points) + 0.1 / points * np.sin(np.arange(points)))
-    assert table_noise(Table(time=tuple(t), angle=tuple(np.sin(2 * np.pi * t))))[1] < 0.01
+    assert curve_noise(MotionCurve(time=tuple(t), value=tuple(np.sin(2 * np.pi * t))))[1] < 0.01
 
 
 def test_smoothing_mends_the_acceleration_of_a_rounded_table():
@@ -207,7 +227,7 @@ def test_smoothing_mends_the_acceleration_of_a_rounded_table():
     times = np.linspace(0.1, 0.9, 777)
     true = -math.radians(30) * (2 * np.pi) ** 2 * np.sin(2 * np.pi * times)
     rough, smooth = (
-        np.abs(drive_angle(Table(time=tuple(t), angle=tuple(angle), smooth=s), times)[2] - true).max()
+        np.abs(drive_angle(MotionCurve(time=tuple(t), value=tuple(angle), smoothing=s), times)[2] - true).max()
         for s in (None, "0.003 deg")
     )
     assert smooth < 0.01 * np.abs(true).max() < 0.1 * np.abs(true).max() < rough

@@ -364,7 +364,7 @@ def test_a_five_bar_is_driven_twice_and_its_dead_point_is_told_by_time() -> None
 
 def carried(frames: str) -> Scene:
     """A block on a spring of a ground that a drive lifts; its guide leaves it free."""
-    lift = {"kind": "table", "time": [0, 1], "travel": [-0.05, 0.05]}
+    lift = {"kind": "curve", "time": [0, 1], "value": [-0.05, 0.05]}
     return scene_from(
         sprung(np.array(Z), lift, end_time=1.0, step=0.01) | {"analysis": {"frames": frames, "end_time": 1.0}}
     )

@@ -27,6 +27,7 @@ PLACES: dict[str, tuple[str, ...]] = {
     "levels": ("analysis",),
     "exaggeration": ("output", "animation"),
     "ignore": ("links", "arm", "mesh"),
+    **dict.fromkeys(("angle", "travel", "smooth"), ("drive", "motion")),
 }
 WORDS: dict[str, tuple[str, ...]] = {
     "nominal": ("analysis", "frames"),
@@ -34,11 +35,14 @@ WORDS: dict[str, tuple[str, ...]] = {
     "literal": ("analysis", "solver"),
     "averaged": ("joints", "A", "coupling"),
     "stiff": ("joints", "A", "coupling"),
+    "table": ("drive", "motion", "kind"),
 }
 
 
 def changed(place: tuple[str, ...], value: Any) -> dict[str, Any]:
     raw = arm(bar(), constant_speed(1.0), analysis={"revolutions": 1})
+    if place[:2] == ("drive", "motion"):
+        raw["drive"]["motion"] = {"kind": "curve"}
     table = raw
     for key in place[:-1]:
         table = table.setdefault(key, {})

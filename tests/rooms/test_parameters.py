@@ -237,7 +237,7 @@ time = "0.1 s"
 
 
 def test_file_names_in_an_included_file_are_relative_to_it(tmp_path: Path) -> None:
-    motion = '[drive]\njoint = "A"\nmotion = { kind = "table", file = "motion.csv" }\n'
+    motion = '[drive]\njoint = "A"\nmotion = { kind = "curve", file = "motion.csv" }\n'
     plain = GOOD[: GOOD.index("[drive]")] + GOOD[GOOD.index("[damping]") :].replace(
         'revolutions = "=1/n"\nsteps_per_revolution = 400', "end_time = 0.01\nstep = 1e-3"
     )
@@ -250,7 +250,7 @@ def test_file_names_in_an_included_file_are_relative_to_it(tmp_path: Path) -> No
             "a/b/motion.csv": "0, 0\n0.005, 0.1\n0.01, 0.2",
         },
     )
-    assert read_scene(path, within=True).drive.motion.angle == (0.0, 0.1, 0.2)
+    assert read_scene(path, within=True).drive.motion.value == (0.0, 0.1, 0.2)
 
 
 @pytest.mark.parametrize(

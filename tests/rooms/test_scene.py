@@ -282,11 +282,11 @@ def test_a_byte_order_mark_is_no_fault(tmp_path):
 def test_a_motion_table_comes_from_a_file_with_units(tmp_path, heading):
     (tmp_path / "motion.csv").write_text(f"{heading}\n0, 0\n500, 90\n\n1000, 180\n")
     raw = read_raw()
-    raw["drive"]["motion"] = {"kind": "table", "file": "motion.csv"}
+    raw["drive"]["motion"] = {"kind": "curve", "file": "motion.csv"}
     raw["analysis"] = {"end_time": 1.0, "step": 0.01}
     motion = scene_from(raw, tmp_path).drive.motion
     assert_allclose(motion.time, (0.0, 0.5, 1.0))
-    assert_allclose(motion.angle, (0.0, math.pi / 2, math.pi))
+    assert_allclose(motion.value, (0.0, math.pi / 2, math.pi))
     assert motion.file is None
 
 
@@ -367,7 +367,7 @@ def test_a_fault_says_which_keys_lead_to_it(tmp_path):
     raw = read_raw()
     raw["links"]["arm"]["shape"]["width"] = -1
     raw["joints"]["A"]["links"][1] = "leg"
-    raw["drive"]["motion"] = {"kind": "table", "file": "no.csv"}
+    raw["drive"]["motion"] = {"kind": "curve", "file": "no.csv"}
     with pytest.raises(SceneError) as caught:
         scene_from(raw, tmp_path)
     places = {fault.where for fault in caught.value.faults}

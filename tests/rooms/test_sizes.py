@@ -111,7 +111,7 @@ def test_a_wrong_unit_is_told(raw: dict[str, Any], words: str, unit: str) -> Non
 def test_a_bare_number_with_its_unit_is_not_doubted() -> None:
     for speed in ("300 rpm", "300 rad/s", 62.83):
         assert seen(scene_from(four_bar(drive__motion__speed=speed)))[1] == ()
-    table = {"kind": "table", "time": [0, 1, 2, 3], "angle": [0, 10, 20, 30]}  # many revolutions
+    table = {"kind": "curve", "time": [0, 1, 2, 3], "value": [0, 10, 20, 30]}  # many revolutions
     assert seen(scene_from(four_bar(drive__motion=table, analysis={"end_time": 3, "step": 0.1})))[1] == ()
 
 

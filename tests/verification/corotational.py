@@ -165,7 +165,7 @@ def spun_up(h: float) -> Ran:
         "materials": {"m": {"density": 1.2, "youngs_modulus": 2.8e7, "shear_modulus": 1e7}},
         "links": {"arm": link},
         "joints": hinge("arm"),
-        "drive": {"joint": "A", "motion": {"kind": "table", "time": list(t), "angle": list(angle)}},
+        "drive": {"joint": "A", "motion": {"kind": "curve", "time": list(t), "value": list(angle)}},
         "analysis": {"end_time": 20, "step": h, "frames": "co-rotational", "rho_inf": 0.9},
     })  # fmt: skip
 

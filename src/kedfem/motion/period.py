@@ -11,10 +11,10 @@ from kedfem.motion.path import MOST_TURNS, Path, path
 from kedfem.scene import (
     ConstantSpeed,
     Drive,
+    MotionCurve,
     MotionLaw,
     Ramp,
     Scene,
-    Table,
     curves,
     cycle,
     drive_angle,
@@ -26,7 +26,7 @@ from kedfem.scene import (
 
 WHOLE = 1e-9  # of a period: how near whole multiples must be
 STEADY, FATIGUE = "analysis.kind = 'steady'", "[fatigue]"  # what asks for a period
-SAME = 1e-6  # of a table's range: how near its end must be to its beginning
+SAME = 1e-6  # of a curve's range: how near its end must be to its beginning
 
 
 def over_one_period(scene: Scene) -> Scene:
@@ -120,7 +120,7 @@ def _never(scene: Scene, asked: str) -> Iterator[str]:
     """What can have no period."""
     where = f"must have a period with {asked}"
     for name, drive in scene.driven_joints.items():
-        if not isinstance(drive.motion, Table) and cycle(drive.motion) is None:
+        if not isinstance(drive.motion, MotionCurve) and cycle(drive.motion) is None:
             yield f"the drive of joint {name!r}: {where}, got {drive.motion.kind!r} without return_time"
     for name, curve in curves(scene):
         if curve.over == "time" and curve.period is None and not is_constant(curve):
@@ -132,10 +132,10 @@ def _open(scene: Scene, along: Path, time: float, asked: str) -> Iterator[str]:
     gone = float(np.ptp(path_parameter(scene, np.array([0.0, time]))[0]))
     laws = {name: drive.motion for name, drive in scene.driven_joints.items()}
     for name, motion in laws.items():
-        if isinstance(motion, Table):
-            yield from _open_table(name, motion, time)
+        if isinstance(motion, MotionCurve):
+            yield from _open_curve(name, motion, time)
     returned = along.periodic and _whole(gone, along.period)
-    if not returned and any(_gone(motion, time) for motion in laws.values() if not isinstance(motion, Table)):
+    if not returned and any(_gone(motion, time) for motion in laws.values() if not isinstance(motion, MotionCurve)):
         yield (f"{asked}: must be of a linkage that returns, got one that is elsewhere after {time:.6g} s")
     for name, curve in curves(scene):
         if curve.over == "time" and not is_constant(curve) and curve.period and not _whole(time, curve.period):
@@ -157,8 +157,8 @@ def _gone(motion: MotionLaw, time: float) -> bool:
     return bool(abs(angle[-1] - angle[0]) > SAME * np.ptp(angle))
 
 
-def _open_table(name: str, motion: Table, time: float) -> Iterator[str]:
-    """A table of motion that does not end as it begins."""
+def _open_curve(name: str, motion: MotionCurve, time: float) -> Iterator[str]:
+    """A curve of motion that does not end as it begins."""
     angle, rate, _ = drive_angle(motion, np.linspace(0.0, time, 65))
     for what, over in (("angle or travel", angle), ("speed", rate)):
         if abs(over[-1] - over[0]) > SAME * np.ptp(over):

@@ -33,10 +33,10 @@ from kedfem.scene.records.drives import (
     Drive,
     Gear,
     Harmonic,
+    MotionCurve,
     MotionLaw,
     Polynomial,
     Ramp,
-    Table,
 )
 from kedfem.scene.records.fatigue import Fatigue, FatigueData, StrainLife
 from kedfem.scene.records.force_elements import (

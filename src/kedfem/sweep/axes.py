@@ -13,7 +13,7 @@ from kedfem.errors import SceneError, Where, place
 from kedfem.scene import Scene
 from kedfem.scene.checks.hints import below, known_keys, marks, models
 from kedfem.scene.records.curves import Curve
-from kedfem.scene.records.drives import EitherSpeed, prescribes_travel
+from kedfem.scene.records.drives import EITHER_SPEED, prescribes_travel
 from kedfem.scene.records.units import NUMBER, UNIT, UNREADABLE, Quantity, unit_registry
 from kedfem.scene.records.wording import nearest, shown
 
@@ -116,8 +116,9 @@ def _with_unit(axis: Axis, raw: Mapping[str, Any]) -> Axis:
         hint = below(hint, part, held)
         held = _item(held, part)
     quantities = marks(hint, Quantity) if hint else ()
-    units = {x.unit for x in quantities} | {x.what[1] for x in models(hint) if issubclass(x, Curve)}
-    if "initial_speeds" in axis.where[1:2] or any(isinstance(x, EitherSpeed) for x in quantities):
+    curves = [model for model in models(hint) if issubclass(model, Curve)]
+    units = {x.unit for x in quantities}.union(*(curve.what.values() for curve in curves))
+    if "initial_speeds" in axis.where[1:2] or EITHER_SPEED in quantities:
         units = {_speed_unit(axis.where, raw)}
     return replace(axis, unit=units.pop()) if len(units) == 1 and units != {"1"} else axis
 

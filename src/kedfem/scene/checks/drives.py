@@ -10,7 +10,7 @@ from pydantic_core import PydanticCustomError
 from kedfem.errors import Fault, place
 from kedfem.scene.checks.capabilities import DRIVEN
 from kedfem.scene.checks.parts import Entry, Parts
-from kedfem.scene.questions.laws import table_noise
+from kedfem.scene.questions.laws import curve_noise
 from kedfem.scene.questions.timing import cycle, turning_speed
 from kedfem.scene.records.analysis import WITHOUT_VIBRATION
 from kedfem.scene.records.drives import (
@@ -18,14 +18,14 @@ from kedfem.scene.records.drives import (
     TURNING,
     ConstantSpeed,
     Cycloidal,
+    MotionCurve,
     Polynomial,
     Ramp,
-    Table,
     prescribes_travel,
 )
 from kedfem.scene.records.units import Quantity, si_number
 
-ROUGH = 0.05  # share of a table's acceleration that may be noise
+ROUGH = 0.05  # share of a curve's acceleration that may be noise
 AXES = {"revolute": TURNING, "prismatic": SLIDING}  # joints with one motion, and its speed
 STARTED = {
     **AXES,
@@ -78,11 +78,15 @@ def law_faults(drive: Entry, kind: str) -> Iterator[Fault]:
         article = "an" if other == "angle" else "a"
         message = f"must be given as {wanted} of a {kind} joint, got {article} {other}"
         yield drive.fault("motion", message, other)
-    if (speed := motion.get("speed")) is not None:
+    values = motion.get("value")
+    given: Any = [(("value", i), x) for i, x in enumerate(values)] if isinstance(values, (list, tuple)) else []
+    for key, x in [(("speed",), motion.get("speed")), (("smoothing",), motion.get("smoothing")), *given]:
+        turning, sliding = (TURNING, SLIDING) if key == ("speed",) else (Quantity("rad"), Quantity("m"))
         try:
-            (TURNING if wanted == "angle" else SLIDING).number(speed)
+            (turning if wanted == "angle" else sliding).number(x or 0.0)
         except PydanticCustomError as reason:
-            yield drive.fault("motion", reason.message(), "speed")
+            yield drive.fault("motion", reason.message(), *key)
+            break
 
 
 def gear_faults(parts: Parts) -> Iterator[Fault]:
@@ -112,7 +116,7 @@ def analysis_faults(parts: Parts) -> Iterator[Fault]:
         yield link.fault("model", "needs an analysis.accuracy, e.g. 0.01, got 'quick' for 'auto'")
     drives = [drive for drive in parts.all_drives if drive.record is not None]
     for drive in drives:
-        yield from drive_table_faults(parts, drive)
+        yield from drive_curve_faults(parts, drive)
     if len(parts.all_drives) == 1:
         for drive in drives:
             yield from drive_and_analysis_faults(parts, drive)
@@ -157,28 +161,30 @@ def steps_faults(
         yield analysis.fault("step", f"is required with {doing} [s], got {got}")
 
 
-def drive_table_faults(parts: Parts, drive: Entry) -> Iterator[Fault]:
-    """A motion table that does not cover the analysis or is too rough for it; a dwell without a return."""
+def drive_curve_faults(parts: Parts, drive: Entry) -> Iterator[Fault]:
+    """A curve of motion that does not cover the analysis or is too rough for it; a dwell without a return."""
     motion = drive.record.motion
     stays = isinstance(motion, (Cycloidal, Polynomial)) and motion.return_time is None
     if stays and motion.dwell_after > 0.0:
         yield drive.fault("motion", "must be combined with return_time, got no return", "dwell_after")
-    if not isinstance(motion, Table) or not motion.time:
+    if not isinstance(motion, MotionCurve) or not motion.at:
         return
-    if motion.time[0] > 0.0:
-        wanted = f"must begin at 0 or before [s], got {motion.time[0]:.6g}"
-        yield drive.fault("motion", wanted, "time")
+    key = "time" if motion.time else "at"
+    if motion.period is None and motion.at[0] > 0.0:
+        wanted = f"must begin at 0 or before [s], got {motion.at[0]:.6g}"
+        yield drive.fault("motion", wanted, key)
     end = parts.analysis.record.end_time if parts.analysis.record is not None else None
-    if end is not None and end > motion.time[-1] * (1.0 + 1e-9):
+    if motion.period is None and end is not None and end > motion.at[-1] * (1.0 + 1e-9):
         wanted = f"must reach the end of the analysis {end:.6g} [s]"
-        remedy = "let it end there, or go on with rows of the last value where the joint is to stay"
-        yield drive.fault("motion", f"{wanted}, got {motion.time[-1]:.6g}: {remedy}", "time")
-    noise, share = table_noise(motion)
-    if motion.smooth is None and share > ROUGH:
-        key, unit = ("travel", "m") if motion.travel else ("angle", "rad")
-        wanted = "must be smooth enough for its acceleration to shake nothing (more digits, or smooth"
+        remedy = "let it end there, give it a period, or go on with rows of the last value where the joint is to stay"
+        yield drive.fault("motion", f"{wanted}, got {motion.at[-1]:.6g}: {remedy}", key)
+    noise, share = curve_noise(motion)
+    if motion.smoothing is None and share > ROUGH:
+        joint = parts.joints.get(drive.record.joint)
+        unit = "rad" if joint is None or driven_coordinate(drive, str(joint.word("kind"))) == "angle" else "m"
+        wanted = "must be smooth enough for its acceleration to shake nothing (more digits, or smoothing"
         got = f"got values that scatter by {noise:.2g} [{unit}], {100 * share:.0f} % of the acceleration"
-        yield drive.fault("motion", f"{wanted} = {2 * noise:.1g}), {got}", key)
+        yield drive.fault("motion", f"{wanted} = {2 * noise:.1g}), {got}", "value")
 
 
 def initial_faults(parts: Parts) -> Iterator[Fault]:

@@ -11,7 +11,7 @@ from kedfem.arrays import Float
 from kedfem.errors import MotionError
 from kedfem.scene.questions.curves import Pieces, pieces
 from kedfem.scene.records.curves import Curve, Factor
-from kedfem.scene.records.drives import ConstantSpeed, Cycloidal, Harmonic, MotionLaw, Polynomial, Ramp, Table
+from kedfem.scene.records.drives import ConstantSpeed, Cycloidal, Harmonic, MotionCurve, MotionLaw, Polynomial, Ramp
 from kedfem.scene.records.scene import Scene
 
 Times = Float[np.ndarray, " t"]
@@ -35,7 +35,7 @@ def drive_angle(motion: MotionLaw | None, t: Times) -> Law:
     Raises
     ------
     MotionError
-        A time outside the table of a table law.
+        A time outside a curve without a period.
     """
     t = np.asarray(t, dtype=float)
     match motion:
@@ -43,7 +43,7 @@ def drive_angle(motion: MotionLaw | None, t: Times) -> Law:
             return w * t, np.full_like(t, w), np.zeros_like(t)
         case Ramp():
             return ramp(motion, t)
-        case Table():
+        case MotionCurve():
             return spline(motion, t)
         case Cycloidal() | Polynomial():
             return rise_dwell(motion, t)
@@ -62,7 +62,7 @@ def path_parameter(scene: Scene, t: Times) -> Law:
     Raises
     ------
     MotionError
-        A time outside the table of a table law.
+        A time outside a curve without a period.
     """
     t = np.asarray(t, dtype=float)
     several = len(scene.driven_joints) > 1
@@ -85,27 +85,37 @@ def ramp(motion: Ramp, t: Times) -> Law:
     return phi + w * (t - up), dphi, np.where(t < T, ddphi, 0.0)
 
 
-def spline(motion: Table, t: Times) -> Law:
-    """The cubic spline through a table; with a tolerance the smoothest quintic one that passes so close."""
+def spline(motion: MotionCurve, t: Times) -> Law:
+    """The cubic spline through a curve of motion; with smoothing the smoothest quintic one that passes so close."""
     from scipy.interpolate import BSpline, CubicSpline, splrep
 
-    first, last = motion.time[0], motion.time[-1]
-    slack = 1e-9 * (last - first)
-    if t.size and (t.min() < first - slack or t.max() > last + slack):
-        wrong = t.min() if t.min() < first - slack else t.max()
-        got = f"got a table from {first:.6g} to {last:.6g} s"
-        raise MotionError(f"motion.time of a drive: must reach t = {wrong:.6g} s, {got}")
-    if motion.smooth is None:
-        curve = CubicSpline(motion.time, motion.values)
+    at, value, period = motion.at, motion.value, motion.period
+    if period is None:
+        _refuse_beyond(at, t)
+    else:
+        last = None if at[-1] < at[0] + period * (1.0 - 1e-12) else -1  # it may end where it begins anew
+        at, value = (*at[:last], at[0] + period), (*value[:last], value[0])
+        t = at[0] + np.mod(t - at[0], period)
+    if motion.smoothing is None:
+        curve = CubicSpline(at, value, bc_type="periodic" if period else "not-a-knot")
         return curve(t), curve(t, 1), curve(t, 2)
-    bound = len(motion.time) * motion.smooth**2
-    knots, coefficients, order = splrep(motion.time, motion.values, k=min(5, len(motion.time) - 1), s=bound)
-    smooth = BSpline(knots, coefficients, order)
+    bound = len(at) * motion.smoothing**2
+    smooth = BSpline(*splrep(at, value, k=min(5, len(at) - 1), s=bound, per=period is not None))
     return smooth(t), smooth(t, 1), smooth(t, 2)
 
 
-def table_noise(motion: Table) -> tuple[float, float]:
-    """How far the values of a table are out of a smooth curve, and what that makes of its acceleration.
+def _refuse_beyond(at: tuple[float, ...], t: Times) -> None:
+    """MotionError where a curve of motion does not reach a time."""
+    first, last = at[0], at[-1]
+    slack = 1e-9 * (last - first)
+    if t.size and (t.min() < first - slack or t.max() > last + slack):
+        wrong = t.min() if t.min() < first - slack else t.max()
+        got = f"got a curve from {first:.6g} to {last:.6g} s"
+        raise MotionError(f"motion of a drive: must reach t = {wrong:.6g} s, {got}")
+
+
+def curve_noise(motion: MotionCurve) -> tuple[float, float]:
+    """How far the values of a curve are out of a smooth curve, and what that makes of its acceleration.
 
     Divided differences of growing order take away what is smooth; of independent errors of standard deviation σ a
     difference whose weights have unit norm keeps σ. The least of those of orders 4 to 8 is the estimate (R. W. Hamming,
@@ -115,9 +125,9 @@ def table_noise(motion: Table) -> tuple[float, float]:
 
     Returns
     -------
-    σ [rad or m], and the share of the acceleration that is noise [-]; zeros of a table of fewer than 12 times
+    σ [rad or m], and the share of the acceleration that is noise [-]; zeros of a curve of fewer than 12 times
     """
-    t, y = np.array(motion.time), np.array(motion.values)
+    t, y = np.array(motion.at), np.array(motion.value)
     if len(t) < 12:
         return 0.0, 0.0
     noise = min(_left_by_differences(t, y, order) for order in range(4, 9))
@@ -199,7 +209,7 @@ def curves(scene: Scene) -> Iterator[tuple[str, Curve]]:
         if spring.curve is not None:
             yield f"springs.{name}.{spring.effort}", spring.curve
     for name, motor in scene.motors.items():
-        yield f"motors.{name}.{motor.curve.what[0]}", motor.curve
+        yield f"motors.{name}.{next(iter(motor.curve.what))}", motor.curve
 
 
 def is_constant(curve: Curve) -> bool:

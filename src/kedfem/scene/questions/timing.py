@@ -10,7 +10,7 @@ import numpy as np
 from kedfem.scene.questions.laws import drive_angle
 from kedfem.scene.questions.modelling import driven_travel
 from kedfem.scene.records.analysis import WITHOUT_VIBRATION
-from kedfem.scene.records.drives import ConstantSpeed, Cycloidal, Harmonic, MotionLaw, Polynomial, Ramp
+from kedfem.scene.records.drives import ConstantSpeed, Cycloidal, Harmonic, MotionCurve, MotionLaw, Polynomial, Ramp
 from kedfem.scene.records.scene import Scene
 
 STEPS_PER_REVOLUTION = 720
@@ -50,6 +50,9 @@ def cycle(motion: MotionLaw | None) -> float | None:
         return 2.0 * math.pi / abs(motion.speed) if motion.speed else None
     if isinstance(motion, (Cycloidal, Polynomial)) and motion.return_time is not None:
         return motion.rise + motion.dwell + motion.return_time + motion.dwell_after
+    if isinstance(motion, MotionCurve):
+        period: float | None = motion.period
+        return period
     return 1.0 / motion.frequency if isinstance(motion, Harmonic) else None
 
 

@@ -1,4 +1,4 @@
-"""Tables of numbers beside a scene: laws of motion and factors over time, in CSV files."""
+"""Curves in CSV files beside a scene."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from kedfem.errors import Fault, SceneError, Where
-from kedfem.scene.checks.hints import models, replaced
+from kedfem.scene.checks.hints import kind_of, models, replaced
 from kedfem.scene.read.files import file_text
 from kedfem.scene.records.curves import Curve
-from kedfem.scene.records.drives import Table
 from kedfem.scene.records.units import NUMBER, USUAL, si_number
 
 NO_UNIT = {"-", "–", "—", "−", "1", ""}  # how headings write that a column has no unit
@@ -32,14 +31,6 @@ def two_columns(path: Path, names: tuple[str, str], si: tuple[str, str]) -> tupl
             raise SceneError(f"{path.name}, line {i}: {wanted}, got {','.join(row)!r}")
         pairs.append((float(row[0]), float(row[1])))
     return [at * factors[0] for at, _ in pairs], [value * factors[1] for _, value in pairs]
-
-
-def motion_table(path: Path) -> tuple[list[float], str, list[float]]:
-    """Times [s], and `angle` [rad] or `travel` [m], as the heading says, of a CSV file."""
-    first = next((row for row in file_text(path).splitlines() if row.strip()), "")
-    key, unit = ("travel", "m") if "travel" in first.lower() else ("angle", "rad")
-    time, values = two_columns(path, ("time", key), ("s", unit))
-    return time, key, values
 
 
 def _is_number(cell: str) -> bool:
@@ -93,7 +84,7 @@ def _is_unit(word: str, of: str) -> bool:
 
 
 def with_tables(raw: Mapping[str, Any], folder: Path, hint: Any) -> tuple[dict[str, Any], list[Fault]]:
-    """A raw scene of a type with its motion tables and curves read from the files that they name; and faults."""
+    """A raw scene of a type with its curves read from the files that they name; and faults."""
     faults: list[Fault] = []
 
     def of(where: Where, value: Any, kind: Any) -> Any:
@@ -101,9 +92,7 @@ def with_tables(raw: Mapping[str, Any], folder: Path, hint: Any) -> tuple[dict[s
             return value
         try:
             for record in models(kind):
-                if record is Table and value.get("kind") == "table":
-                    return with_motion(value, folder)
-                if issubclass(record, Curve):
+                if kind_of(record) in {None, value.get("kind")} and issubclass(record, Curve):
                     return with_curve(value, record, folder)
         except SceneError as error:
             faults.extend(fault.under(*where, "file") for fault in error.faults)
@@ -113,23 +102,19 @@ def with_tables(raw: Mapping[str, Any], folder: Path, hint: Any) -> tuple[dict[s
     return read, faults
 
 
-def with_motion(given: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
-    """A raw motion table with the columns of its file, if it has none of its own."""
-    if given.keys() & {"time", "angle", "travel"}:
-        return given
-    time, key, values = motion_table(folder / given["file"])
-    return {**_without_file(given), "time": time, key: values}
-
-
 def with_curve(given: Mapping[str, Any], curve: type[Curve], folder: Path) -> Mapping[str, Any]:
-    """A raw curve with the columns of its file, if it is one that its record can read."""
+    """A raw curve with the columns of its file, if it is one that its record can read.
+
+    Of values that may be of either of two kinds the heading says the kind, and each value has its unit.
+    """
     over = given.get("over", "time")
     if over not in curve.units or given.keys() & {"time", "at", "value"}:
         return given
-    word, unit = curve.what
-    at, value = two_columns(folder / given["file"], (over, word), (curve.units[over], unit))
-    return {**_without_file(given), "over": over, "at": at, "value": value}
-
-
-def _without_file(given: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: x for key, x in given.items() if key != "file"}
+    path = folder / given["file"]
+    heading = next((row for row in file_text(path).splitlines() if row.strip()), "").lower()
+    said = [word for word in curve.what if word in heading]
+    word = said[0] if said else next(iter(curve.what))
+    at, value = two_columns(path, (over, word), (curve.units[over], curve.what[word]))
+    united = [f"{x!r} {curve.what[word]}" for x in value] if said and len(curve.what) > 1 else value
+    rest = {key: x for key, x in given.items() if key != "file"}
+    return {**rest, "over": over, "time" if over == "time" else "at": at, "value": united}

@@ -20,7 +20,7 @@ from pydantic_core import PydanticCustomError
 
 from kedfem.errors import Fault
 from kedfem.scene.records.base import FileName, JointName, LinkName, Name, Record, refuse
-from kedfem.scene.records.drives import EitherSpeed
+from kedfem.scene.records.drives import EITHER_SPEED
 from kedfem.scene.records.links import Count, Frames
 from kedfem.scene.records.loads import ForceVector
 from kedfem.scene.records.points import Point, as_vector
@@ -34,7 +34,7 @@ AngularVelocity = Annotated[tuple[Speed, Speed, Speed], BeforeValidator(as_vecto
 def joint_speed(value: object) -> float:
     """A rotational speed or a speed; which of them suits the joint is checked with the joint."""
     try:
-        return EitherSpeed("rad/s").number(value)
+        return EITHER_SPEED.number(value)
     except PydanticCustomError as reason:
         if not isinstance(value, str):
             raise

@@ -23,11 +23,12 @@ Torque = Annotated[float, Quantity("N*m")]
 class Curve(Record):
     """What all curves share: increasing places, a value at each; held outside, or repeated.
 
-    units : of what it may be over; what : of its values, a word and a unit
+    units : of what it may be over; what : of its values, words and their units; least : how many there must be
     """
 
     units: ClassVar[dict[str, str]]
-    what: ClassVar[tuple[str, str]]
+    what: ClassVar[dict[str, str]]
+    least: ClassVar[int] = 1
     over: str
     time: tuple[Time, ...] = ()
     """times, increasing: short for `over = "time"` and `at`"""
@@ -50,9 +51,10 @@ class Curve(Record):
             return self
         if self.time:
             refuse(self._time_faults())
-        key, quantity = "time" if self.time else "at", Quantity(self.units[self.over])
+        quantity = Quantity(self.units[self.over])
+        key = "time" if self.time or (self.over == "time" and not self.at) else "at"
         at = tuple(_number(quantity, (key, i), x) for i, x in enumerate(self.time or self.at))
-        refuse(curve_faults(at, self.value, quantity, key))
+        refuse(_faults(self, at, quantity, key))
         self.fill(at=at, period=None if self.period is None else _period(quantity, self.period, at))
         return self.fill(time=at) if self.time else self
 
@@ -83,24 +85,10 @@ def _number(quantity: Quantity, where: tuple[str | int, ...], given: Any) -> flo
         raise
 
 
-def curve_faults(
-    at: Sequence[float],
-    value: Sequence[float],
-    quantity: Quantity,
-    key: str = "at",
-    values: str = "value",
-    least: int = 1,
-) -> list[Fault]:
-    """What is wrong with values at places.
-
-    Parameters
-    ----------
-    quantity : of the places
-    key, values : the keys of places and values
-    least : how many there must be
-    """
-    if len(at) < least:
-        wanted = "one value" if least == 1 else f"{least} values"
+def _faults(curve: Curve, at: Sequence[float], quantity: Quantity, key: str) -> list[Fault]:
+    """What is wrong with the values of a curve at places of a quantity, which a key holds."""
+    if len(at) < curve.least:
+        wanted = "one value" if curve.least == 1 else f"{curve.least} values"
         return [Fault((key,), f"must hold at least {wanted}{quantity.bracket}, got {len(at) or 'none'}")]
     faults: list[Fault] = []
     for i, (before, after) in enumerate(pairwise(at), start=1):
@@ -108,8 +96,9 @@ def curve_faults(
             message = f"must be above the one before, {before:.6g}{quantity.bracket}, got {after:.6g}"
             faults.append(Fault((key, i), message))
             break
-    if len(value) != len(at):
-        faults.append(Fault((values,), f"must hold one value for each of the {len(at)} of {key}, got {len(value)}"))
+    if len(curve.value) != len(at):
+        wanted = f"must hold one value for each of the {len(at)} of {key}"
+        faults.append(Fault(("value",), f"{wanted}, got {len(curve.value)}"))
     return faults
 
 
@@ -117,7 +106,7 @@ class Factor(Curve):
     """What a load or a stiffness is multiplied by: over time, or over the angle or travel of the only drive."""
 
     units: ClassVar = {"time": "s", "angle": "rad", "travel": "m"}
-    what = ("factor", "1")
+    what: ClassVar = {"factor": "1"}
     over: Literal["time", "angle", "travel"] = "time"
     """what it depends on; angle and travel: those of the drive, from the reference position"""
     value: tuple[Number, ...] = ()
@@ -128,7 +117,7 @@ class TorqueCurve(Curve):
     """A torque over time, speed or angle."""
 
     units: ClassVar = {"time": "s", "speed": "rad/s", "angle": "rad"}
-    what = ("torque", "N*m")
+    what: ClassVar = {"torque": "N*m"}
     over: Literal["time", "speed", "angle"] = "time"
     """what it depends on; speed and angle are those of the joint, the angle from the reference position"""
     value: tuple[Torque, ...] = ()
@@ -139,7 +128,7 @@ class ForceCurve(Curve):
     """A force over time, speed or travel."""
 
     units: ClassVar = {"time": "s", "speed": "m/s", "travel": "m"}
-    what = ("force", "N")
+    what: ClassVar = {"force": "N"}
     over: Literal["time", "speed", "travel"] = "time"
     """what it depends on; speed and travel are those of the joint, the travel from the reference position"""
     value: tuple[Force, ...] = ()
@@ -150,7 +139,7 @@ class PullCurve(Curve):
     """A pull over time, or over the length, travel or speed of what pulls."""
 
     units: ClassVar = {"time": "s", "speed": "m/s", "length": "m", "travel": "m"}
-    what = ("force", "N")
+    what: ClassVar = {"force": "N"}
     over: Literal["time", "speed", "length", "travel"] = "time"
     """what it depends on; `"length"`: the distance of both ends; `"travel"`: along a slide, from the reference position;
     `"speed"`: at which either grows"""

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, StrictBool, StrictInt, model_validator
 from pydantic_core import PydanticCustomError
 
 from kedfem.errors import Fault
-from kedfem.scene.records.base import EndName, FileName, JointName, Record, refuse
-from kedfem.scene.records.curves import curve_faults
+from kedfem.scene.records.base import EndName, JointName, Record, refuse
+from kedfem.scene.records.curves import Curve
 from kedfem.scene.records.materials import Frequency
 from kedfem.scene.records.points import Axis
 from kedfem.scene.records.units import (
@@ -23,28 +23,34 @@ from kedfem.scene.records.units import (
     PositiveTime,
     Quantity,
     RotationalDamper,
-    Time,
 )
 
 TURNING, SLIDING = Quantity("rad/s"), Quantity("m/s")
 
 
 @dataclass(frozen=True, slots=True)
-class EitherSpeed(Quantity):
-    """A rotational speed or a speed; which of them suits the joint is checked with the joint."""
+class Either(Quantity):
+    """A quantity of an angle or of a travel; which of them suits the joint is checked with the joint."""
+
+    slides: str = "m"
+    """the unit of the travel's"""
 
     def number(self, value: object) -> float:
         """The SI number of a field that holds a number, or a string with a unit of either kind."""
         try:
-            return TURNING.number(value)
+            return Quantity.number(self, value)
         except PydanticCustomError:
             if isinstance(value, str):
                 with suppress(PydanticCustomError):
-                    return SLIDING.number(value)
+                    return Quantity(self.slides, above=self.above).number(value)
             raise
 
 
-DriveSpeed = Annotated[float, EitherSpeed("rad/s")]
+EITHER_SPEED = Either("rad/s", slides="m/s")
+DriveSpeed = Annotated[float, EITHER_SPEED]
+AngleOrTravel = Annotated[float, Either("rad")]
+PositiveAngleOrTravel = Annotated[float, Either("rad", above=0.0)]
+Period = Annotated[Any, "of times"]
 Teeth = Annotated[StrictInt, Field(ge=1)]
 
 
@@ -68,46 +74,33 @@ class Ramp(Record):
     """smooth: the speed rises as ½ (1 − cos πt/T), acceleration without jumps; linear: as t/T"""
 
 
-Smoothing = Annotated[Any, "of angles or travels"]
+class MotionCurve(Curve):
+    """An angle or a travel over time: a cubic spline, whose accelerations have no jumps."""
 
-
-class Table(Record):
-    """An angle or a travel given over time: a cubic spline (twice continuously differentiable, not-a-knot ends)."""
-
-    kind: Literal["table"] = "table"
-    time: tuple[Time, ...] = ()
-    """times, increasing, from 0 or before"""
-    angle: tuple[Angle, ...] = ()
-    """angle at these times, from the reference position"""
-    travel: tuple[Length, ...] = ()
-    """travel at these times, instead of angles"""
-    file: FileName | None = None
-    """CSV file with two columns, time and angle (or travel), instead of the two lists; a heading may give the units:
-    `time [s], angle [deg]`"""
-    smooth: Smoothing = None
+    units: ClassVar = {"time": "s"}
+    what: ClassVar = {"angle": "rad", "travel": "m"}
+    least: ClassVar = 2
+    kind: Literal["curve"] = "curve"
+    over: Literal["time"] = "time"
+    """what it depends on"""
+    value: tuple[AngleOrTravel, ...] = ()
+    """angle or travel there, from the reference position; of a file its heading says which"""
+    interpolation: Literal["spline"] = "spline"  # type: ignore[assignment]
+    """between the values: cubics, twice continuously differentiable, periodic or with not-a-knot ends"""
+    period: Period = None
+    """after which it repeats itself; if not given it must be from 0 or before to the end of the analysis"""
+    smoothing: PositiveAngleOrTravel | None = None
     """how far a smoother curve may pass from the values, in the mean square; for values that are rounded or measured"""
 
     @model_validator(mode="after")
-    def _one_row_per_time(self) -> Table:
-        key = "travel" if self.travel else "angle"
-        if self.file is None:
-            refuse(curve_faults(self.time, self.values, Quantity("s"), "time", key, least=2))
-        elif self.time or self.values:
-            refuse([Fault(("file",), f"cannot be combined with time and {key}, got both")])
-        if self.travel and self.angle:
-            refuse([Fault(("travel",), "cannot be combined with angle, got both")])
-        if self.smooth is None:
+    def _returns(self) -> MotionCurve:
+        if self.period is None or not self.at or self.at[-1] < self.at[0] + self.period * (1.0 - 1e-12):
             return self
-        try:
-            return self.fill(smooth=Quantity("m" if self.travel else "rad", above=0.0).number(self.smooth))
-        except PydanticCustomError as reason:
-            refuse([Fault(("smooth",), reason.message())])
+        first, last = self.value[0], self.value[-1]
+        if abs(last - first) > 1e-9 * (max(self.value) - min(self.value)):
+            wanted = f"must end as it begins, with {first:.6g}, where it repeats itself"
+            refuse([Fault(("value", len(self.value) - 1), f"{wanted}, got {last:.6g}")])
         return self
-
-    @property
-    def values(self) -> tuple[float, ...]:
-        """Angles or travels."""
-        return self.travel or self.angle
 
 
 class _Rise(Record):
@@ -163,7 +156,7 @@ class Harmonic(_Rise):
     """α: 0 begins at full speed, `"-90 deg"` at rest"""
 
 
-MotionLaw = Annotated[ConstantSpeed | Ramp | Table | Cycloidal | Polynomial | Harmonic, Field(discriminator="kind")]
+MotionLaw = Annotated[ConstantSpeed | Ramp | MotionCurve | Cycloidal | Polynomial | Harmonic, Field(discriminator="kind")]
 
 
 class Drive(Record):

@@ -12,11 +12,12 @@ KEYS = {  # of scenes by their former names: messages about unknown words name t
     "turning_stiffness": "rotational_stiffness", "turning_damping": "rotational_damping",
     "spin": "angular_velocity", "turns": "revolutions", "last_turns": "last_revolutions",
     "steps_per_turn": "steps_per_revolution", "frames_per_turn": "frames_per_revolution",
+    "angle": "value", "travel": "value", "smooth": "smoothing",
     "levels": "extrapolation_levels", "exaggeration": "deformation_scale", "ignore": "defeature_size",
 }  # fmt: skip
 VALUES = {
     "nominal": "rigid-body", "following": "co-rotational", "literal": "monolithic",
-    "averaged": "distributing", "stiff": "rigid",
+    "averaged": "distributing", "stiff": "rigid", "table": "curve",
 }  # fmt: skip
 NOUNS = {"solid": "solid", "plane": "plane link", "beam": "beam"}  # links by what they are modelled as
 
