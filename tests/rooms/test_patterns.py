@@ -1,7 +1,7 @@
 """Patterns of scenes: what they write out, beside scenes written by hand; what they refuse."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -9,8 +9,12 @@ from numpy.testing import assert_allclose
 
 from kedfem.analysis import analyse
 from kedfem.errors import SceneError
-from kedfem.scene import scene_from
+from kedfem.scene import Scene, scene_from
+from kedfem.scene.checks.hints import below, field_hint, marks, members, models
 from kedfem.scene.read.files import outside
+from kedfem.scene.records.analysis import Output
+from kedfem.scene.records.base import NameOf
+from kedfem.scene.records.patterns import SECTIONS
 
 Raw = dict[str, Any]
 SHAPE = {"kind": "bar", "width": 0.02, "thickness": 0.01}
@@ -180,3 +184,30 @@ def test_a_name_with_a_number_must_be_free() -> None:
     arm = {**BEAM, "shape": {**SHAPE, "between": [[0, 0], [1, 0]]}}
     with pytest.raises(SceneError, match=r"patterns\.p\.links\.arm: must have a name that is free .* 'arm_2' twice"):
         written_out({"count": 2, "turn": 1.0, "links": {"arm": arm}}, links={"arm_2": arm})
+
+
+def test_names_of_links_and_joints_are_known_as_such_in_all_tables_that_a_pattern_repeats() -> None:
+    """Else a copy would name the entry that is written, which there is no longer."""
+    words, checked = {"link", "links", "joint", "joints", "about"}, 0
+    for section in set(SECTIONS) - {"points"}:
+        kind = below(Output, "probes", {}) if section == "probes" else below(Scene, section, {})
+        for model in models(below(kind, "any", {})):
+            for key in words & set(model.model_fields):
+                hint = field_hint(model.model_fields[key])
+                inner = [hint, *(x for part in members(hint) for x in get_args(part))]
+                assert any(marks(x, NameOf) for x in inner), (section, model.__name__, key)
+                checked += 1
+    assert checked > 20
+
+
+def test_a_torque_on_a_joint_of_a_pattern_is_on_that_of_each_copy() -> None:
+    scene = scene_from({
+        "patterns": {"arms": {
+            "count": 2, "shift": [0, 0.2, 0],
+            "links": {"arm": {**BEAM, "shape": {**SHAPE, "between": [[0, 0, 0], [0.1, 0, 0]]}}},
+            "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0, 0]}},
+            "loads": {"t": {"kind": "torque", "link": "arm", "joint": "A", "vector": [0, 0, 1]}},
+        }},
+        "links": {}, "analysis": {"end_time": 0.1, "step": 0.01},
+    })  # fmt: skip
+    assert [load.joint for load in scene.loads.values()] == ["A_1", "A_2"]

@@ -10,8 +10,8 @@ from kedfem.arrays import Float
 from kedfem.errors import MotionError
 from kedfem.motion.closed import Shift, closed_scene
 from kedfem.motion.constraints import GAP, ConstraintEquation, Rows, stacked
-from kedfem.motion.joint_equations import GROUND, scene_centre
-from kedfem.motion.linkage import scene_size, undriven_rows
+from kedfem.motion.joint_equations import GROUND, scene_centre, undriven_rows
+from kedfem.motion.linkage import scene_size
 from kedfem.motion.newton import cross_matrix, rotation
 from kedfem.motion.period import over_one_period
 from kedfem.motion.released_motions import RANK_TOLERANCE

@@ -5,12 +5,28 @@ from dataclasses import replace
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.motion.constraints import ANGLE, GAP, ConstraintEquation, coupled, free_rows, joint_rows, travel_row, turn_row
+from kedfem.motion.constraints import (
+    ANGLE,
+    GAP,
+    TURN,
+    ConstraintEquation,
+    coupled,
+    cross,
+    free_rows,
+    joint_rows,
+    travel_row,
+    turn_row,
+)
 from kedfem.scene import Joint, Scene, driven_travel
 from kedfem.scene.records.points import XYZ
 
 GROUND = "ground"
 PLANE = "the plane"
+
+
+def body_names(scene: Scene) -> tuple[str, ...]:
+    """The ground and all links, in the order of their numbers in a linkage."""
+    return GROUND, *scene.links
 
 
 def joint_points(scene: Scene) -> Float[np.ndarray, "j 3"]:
@@ -102,6 +118,14 @@ def coordinate_row(
     return travel_row(name, i, j, np.asarray(joint.at) - scene_centre(scene), axis)
 
 
+def cross_row(joint: Joint, name: str, bodies: tuple[str, ...], about: str) -> ConstraintEquation:
+    """The sine of a universal joint's angle about the axis of its other link, whatever that about its own."""
+    other = next(link for link in joint.links if link != about)
+    axis = coordinate_axis(joint, about)
+    normal = cross(axis, coordinate_axis(joint, other))
+    return ConstraintEquation(TURN, bodies.index(other), bodies.index(about), normal, axis, name)
+
+
 def driven_row(scene: Scene, name: str, bodies: tuple[str, ...]) -> ConstraintEquation:
     """Turn or travel that the drive of a joint prescribes."""
     drive = scene.driven_joints[name]
@@ -118,6 +142,13 @@ def gear_row(scene: Scene, name: str, bodies: tuple[str, ...]) -> ConstraintEqua
     if second.kind == ANGLE and abs(gear.transmission) > 1:
         return coupled(first, (-1 / gear.transmission, second))
     return coupled(second, (-gear.transmission, first))
+
+
+def undriven_rows(scene: Scene) -> list[ConstraintEquation]:
+    """Rows of joints and couplings, without the drives'."""
+    bodies, centre = body_names(scene), scene_centre(scene)
+    rows = [row for name in scene.joints for row in rows_of(scene, name, bodies, centre)]
+    return rows + [gear_row(scene, name, bodies) for name in scene.gears]
 
 
 def joint_free_rows(scene: Scene, name: str, bodies: tuple[str, ...]) -> list[ConstraintEquation]:

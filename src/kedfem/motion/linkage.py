@@ -17,14 +17,16 @@ from kedfem.motion.constraints import GAP, ConstraintEquation, Rows, stacked, tr
 from kedfem.motion.drives import Drives, drives
 from kedfem.motion.joint_equations import (
     GROUND,
+    body_names,
     coordinate_row,
+    cross_row,
     driven_row,
-    gear_row,
     joint_free_rows,
     joint_points,
     plane_rows,
     rows_of,
     scene_centre,
+    undriven_rows,
 )
 from kedfem.motion.parts import parts
 from kedfem.motion.redundancy import LOOSER, Looser, would_move
@@ -75,11 +77,6 @@ class Linkage:
         _, r, pivot = scipy.linalg.qr(J.T, pivoting=True, mode="economic")
         rank = int((np.abs(np.diag(r)) > RANK_TOLERANCE * abs(r[0, 0])).sum())
         return tuple(sorted({self.joints[k] for k in pivot[rank:]}))
-
-
-def body_names(scene: Scene) -> tuple[str, ...]:
-    """The ground and all links, in the order of their numbers in a linkage."""
-    return GROUND, *scene.links
 
 
 def linkage(scene: Scene) -> Linkage:
@@ -148,13 +145,6 @@ def reference_linkage(scene: Scene, rows: list[ConstraintEquation] | None = None
     J, names = reference_jacobian(rows, len(bodies), size), tuple(row.joint for row in rows)
     moves = np.array([row.drive is not None for row in rows], bool)
     return Reference(J, names, moves, bodies[1:], scene.joints, scene_centre(scene), size)
-
-
-def undriven_rows(scene: Scene) -> list[ConstraintEquation]:
-    """Rows of joints and couplings, without the drives'."""
-    bodies, centre = body_names(scene), scene_centre(scene)
-    rows = [row for name in scene.joints for row in rows_of(scene, name, bodies, centre)]
-    return rows + [gear_row(scene, name, bodies) for name in scene.gears]
 
 
 def looser_rows(scene: Scene, reference: Reference) -> Looser:
@@ -261,12 +251,18 @@ def _across(reference: Reference, bodies: tuple[str, ...]) -> list[ConstraintEqu
 
 
 def _holding(scene: Scene, reference: Reference, free: int) -> list[ConstraintEquation]:
-    """Rows that hold as many joint motions as are free in the reference position."""
+    """Rows that hold as many joint motions as are free in the reference position, of driven joints the last.
+
+    Of a driven joint they are those of its motions that the drive leaves.
+    """
     if not free:
         return []
     bodies, motions = (GROUND, *reference.links), scipy.linalg.svd(reference.J)[2][-free:].T
-    undriven = (name for name in scene.joints if name not in scene.driven_joints)
-    rows = [row for name in undriven for row in _free_rows(scene, name, bodies, reference.size, motions)]
+    rows = []
+    for name in sorted(scene.joints, key=lambda name: name in scene.driven_joints):
+        about = scene.driven_joints[name].about if name in scene.driven_joints else None
+        every = _free_rows(scene, name, bodies, reference.size, motions)
+        rows += every if about is None else [cross_row(scene.joints[name], name, bodies, about)]
     return _most_changed(rows, motions, len(bodies), reference.size)
 
 

@@ -38,7 +38,8 @@ from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.dynamics.system.starts.instant import Instant, renumbered
 from kedfem.dynamics.system.starts.internal_forces import own
 from kedfem.dynamics.system.state import History, State, empty_history
-from kedfem.motion.linkage import body_names, linkage
+from kedfem.motion.joint_equations import body_names
+from kedfem.motion.linkage import linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import Scene, corotational
 

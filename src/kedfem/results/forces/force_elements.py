@@ -19,8 +19,7 @@ from kedfem.dynamics.system.forces.supports import supports
 from kedfem.dynamics.system.record import Term
 from kedfem.motion.constraints import cross
 from kedfem.motion.coordinates import counted_on
-from kedfem.motion.joint_equations import moving_pair
-from kedfem.motion.linkage import body_names
+from kedfem.motion.joint_equations import body_names, moving_pair
 from kedfem.results.channels import Channel
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.scene import LineSpring, Scene

@@ -19,7 +19,7 @@ def load_faults(parts: Parts) -> Iterator[Fault]:
         known, at = load.word("link") in parts.links and parts.joints, load.word("joint")
         if known and load.word("kind") == "torque" and at is not None:
             here = [x.name for x in parts.joints.values() if load.word("link") in link_names(x)]
-            if at not in here:
+            if at in parts.joints and at not in here:
                 yield load.fault("joint", unknown_name("a joint of the link", at, here))
     for probe in parts.probes.values():
         link, quantity = parts.links.get(probe.word("link") or ""), probe.word("quantity")

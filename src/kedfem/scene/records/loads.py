@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from kedfem.arrays import Float
 from kedfem.errors import Fault
-from kedfem.scene.records.base import LinkName, Record, refuse
+from kedfem.scene.records.base import JointName, LinkName, Record, refuse
 from kedfem.scene.records.curves import ONE, FactorOver, Force, Torque
 from kedfem.scene.records.points import Point, as_vector
 from kedfem.scene.records.units import Mass, Pressure, Quantity
@@ -113,7 +113,7 @@ class TorqueLoad(_Directed):
     at: Point | None = None
     """a point on the axis of a bore or journal, or of a face; of a beam a point of its axis, of one in space one where it
     has a node; in the reference position"""
-    joint: str | None = None
+    joint: JointName | None = None
     """a joint of the link, on whose bore or face it acts, instead of `at`"""
     vector: TorqueVector
     """the torque"""
