@@ -165,6 +165,7 @@ NAMED = {
     drives.Period: ("number > 0", "s"),
     drives.PositiveAngleOrTravel: ("number > 0", "rad or m"),
     curves.Span: ("number", "s, rad/s, rad, m/s or m"),
+    loads.Moments: ("3 or 6 × number", "kg·m²"),
     materials.Ratios: ("number or 2 × number ≥ 0, < 1", ""),
     joints.Rates: ("number or 3 × number > 0", "N/m"),
     joints.Dampers: ("number or 3 × number ≥ 0", "N·s/m"),

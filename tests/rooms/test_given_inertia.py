@@ -233,8 +233,14 @@ def test_rigid_motion_knows_their_masses() -> None:
     assert list(rigid_links(scene_from(four_bar(numbers, numbers)))) == ["crank", "coupler", "rocker"]
 
 
-def test_a_pattern_turns_their_inertia() -> None:
-    raw = pendulum(np.eye(3))
+def test_three_values_are_principal_moments_along_x_y_z() -> None:
+    three, six = (scene_from(pendulum(np.eye(3), inertia=x)) for x in ([1, 2, 2.5], [1, 2, 2.5, 0, 0, 0]))
+    assert three.bodies == six.bodies
+
+
+@pytest.mark.parametrize("inertia", [{}, {"inertia": [1, 2, 2.5]}], ids=["six", "three"])
+def test_a_pattern_turns_their_inertia(inertia: dict[str, Any]) -> None:
+    raw = pendulum(np.eye(3), **inertia)
     link, hinge = raw["links"].pop("p"), raw["joints"].pop("H")
     raw["patterns"] = {"four": {"count": 4, "about": "x", "turn": "90 deg", "links": {"p": link}, "joints": {"H": hinge}}}
     scene = scene_from(raw)
@@ -254,13 +260,15 @@ def test_a_pattern_turns_their_inertia() -> None:
         ({"centre": None}, r"^links\.p\.centre: is required for .* \[m\], got nothing$"),
         ({"inertia": None}, r"^links\.p\.inertia: is required for .* \[kg\*m\^2\], got nothing$"),
         ({"inertia": [1, 1, 5, 0, 0, 0]}, r"^links\.p\.inertia: must have principal moments .* got 1, 1 and 5$"),
-        ({"inertia": [1, 1]}, r"^links\.p\.inertia: must hold 6 values, got 2$"),
+        ({"inertia": [1, 1]}, r"^links\.p\.inertia: must be three values .*, Ixx, Iyy, Izz, or six, .* got 2$"),
         ({"inertia": [1, 1, "4 kg", 0, 0, 0]}, r"^links\.p\.inertia\[2\]: must be a moment of inertia"),
         ({"centre": [0.1]}, r"^links\.p\.centre: must be a point"),
         ({"material": "steel"}, r"^links\.p\.material: cannot be combined with centre and inertia, got material$"),
         ({"shape": {"kind": "bar", "between": [[0, 0], [1, 0]], "width": 0.1, "thickness": 0.1}},
          r"^links\.p\.shape: cannot be combined with centre and inertia, got shape$"),
         ({"model": "solid"}, r"^links\.p\.centre: must be given for a rigid link only, got model 'solid'"),
+        ({"model": None}, r"^links\.p\.model: must be 'rigid' for a link given by its mass, .* got nothing$"),
+        ({"model": None, "centre": None, "inertia": None}, r"^links\.p\.model: must be 'rigid' .* got nothing$"),
     ],
 )  # fmt: skip
 def test_what_is_lacking_or_impossible_is_told(given: dict[str, Any], told: str) -> None:

@@ -76,7 +76,9 @@ def rigid_faults(link: Entry, parts: Parts) -> Iterator[Fault]:
 def elastic_faults(link: Entry, sketch: bool) -> Iterator[Fault]:
     """Missing or unsuitable keys of an elastic link."""
     kind, shape, element = category(link), link.word("shape", "kind"), link.word("element")
-    noun = NOUNS[kind]
+    noun, by_numbers = NOUNS[kind], any(map(link.has, ("mass", "centre", "inertia")))
+    if by_numbers and not any(map(link.has, ("model", "shape", "material"))):  # a rigid link, as its record says
+        return
     for key in () if sketch else ("shape", "material"):
         if not link.has(key):
             yield link.fault(key, f"is required for a {noun}, got nothing")
@@ -88,7 +90,7 @@ def elastic_faults(link: Entry, sketch: bool) -> Iterator[Fault]:
         yield link.fault("element", f"must be {either(ELEMENTS[kind])} for a {noun}, got {element!r}")
     if link.record is not None and link.record.mass:
         got = f"got {link.record.mass:.6g} for a {noun}"
-        yield link.fault("mass", f"must be given for a rigid link only [kg], {got}")
+        yield link.fault("mass", f"must be given for a rigid link only (model = 'rigid') [kg], {got}")
 
 
 def meshing_faults(link: Entry) -> Iterator[Fault]:

@@ -16,6 +16,10 @@ SIGN = "="
 MOST_CHAINED = 30  # parameters that are defined by each other
 
 
+class FollowsError(ValueError):
+    """A fault that follows from another one, which is reported where it is."""
+
+
 class Parameters(Mapping[str, Any]):
     """Quantities of parameters by name, worked out when they are asked for; each fault is reported once, where it is.
 
@@ -41,7 +45,7 @@ class Parameters(Mapping[str, Any]):
 
     def __getitem__(self, name: str) -> Any:
         if name in self._failed:
-            raise ValueError(f"parameters.{name} has a fault")
+            raise FollowsError
         if name in self._pending:
             circle = " → ".join([*self._pending[self._pending.index(name) :], name])
             raise ValueError(f"it must not be defined by itself: {circle}")
@@ -53,8 +57,9 @@ class Parameters(Mapping[str, Any]):
             try:
                 self._found[name] = self._quantity(self._raw[name])
             except ValueError as reason:
-                self._failed[name] = f"must be {WANTED}, got {shown(self._raw[name])}: {reason}"
-                raise ValueError(f"parameters.{name} has a fault") from None
+                echo, got = isinstance(reason, FollowsError), shown(self._raw[name])
+                self._failed[name] = "" if echo else f"must be {WANTED}, got {got}: {reason}"
+                raise FollowsError from None
             finally:
                 self._pending.pop()
         return self._found[name]
@@ -66,7 +71,7 @@ class Parameters(Mapping[str, Any]):
                 self[name]
             except ValueError:
                 continue
-        return [Fault(("parameters", str(name)), message) for name, message in self._failed.items()]
+        return [Fault(("parameters", str(name)), message) for name, message in self._failed.items() if message]
 
     def _quantity(self, value: object) -> Any:
         if isinstance(value, str):
@@ -82,13 +87,15 @@ class Parameters(Mapping[str, Any]):
 WANTED = "a number, a text of a number and a unit, or an expression"
 
 
-def with_expressions(raw: Mapping[str, Any], hint: Any) -> tuple[dict[str, Any], list[Fault]]:
+def with_expressions(raw: Mapping[str, Any], hint: Any) -> tuple[dict[str, Any], list[Fault], set[Where]]:
     """A raw scene with its expressions worked out by the types of its keys, and faults.
+
     Returns
     -------
     A changed copy: plain numbers where an expression has no unit, else texts that carry their quantity; what has a fault
-    is left as it was.
+    is left as it was. The faults, and where others follow from those of parameters.
     """
+    echoes: set[Where] = set()
     known = Parameters(raw.get("parameters"))
     faults = known.faults()
 
@@ -99,6 +106,9 @@ def with_expressions(raw: Mapping[str, Any], hint: Any) -> tuple[dict[str, Any],
             return value
         try:
             quantity = evaluated(value.removeprefix(SIGN), known)
+        except FollowsError:
+            echoes.add(where)
+            return value
         except ValueError as reason:
             faults.append(Fault(where, f"must be an expression, got {shown(value)}: {reason}"))
             return value
@@ -109,4 +119,4 @@ def with_expressions(raw: Mapping[str, Any], hint: Any) -> tuple[dict[str, Any],
         text.quantity = quantity
         return text
 
-    return replaced(raw, hint, of), faults
+    return replaced(raw, hint, of), faults, echoes

@@ -116,8 +116,8 @@ class _Copy:
             if raw.get("kind") == "revolute" and "axis" not in raw and tilted:
                 made = {**made, "axis": self.R[:, 2].tolist()}
         inertia = raw.get("inertia") if section in {"bodies", "links"} else None
-        if isinstance(inertia, list) and len(inertia) == 6:
-            J = inertia_tensor([INERTIA.number(x) for x in inertia])
+        if isinstance(inertia, list) and len(inertia) in {3, 6}:
+            J = inertia_tensor([*map(INERTIA.number, inertia), 0.0, 0.0, 0.0][:6])
             made = {**made, "inertia": list(moments_of_inertia(self.R @ J @ self.R.T))}
         about = "in a pattern turned about another axis than z"
         if kind in PLACED:

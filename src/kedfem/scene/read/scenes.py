@@ -108,7 +108,7 @@ def validated(given: Any, folder: Path, *, sketch: bool = False) -> Scene:
     written = plain(given)
     if not isinstance(written, Mapping):
         raise SceneError(f"must be a table of keys, got {written!r}")
-    raw, wrong = with_expressions(written, Scene)
+    raw, wrong, echoes = with_expressions(written, Scene)
     repeated, (raw, more, origins) = raw.get("patterns"), with_patterns(raw, Scene)
     wrong, bare = wrong + more, raw
     placement = Placement(raw.get("points"), raw.get("joints"))
@@ -128,7 +128,7 @@ def validated(given: Any, folder: Path, *, sketch: bool = False) -> Scene:
     if scene is not None and not wrong + faults:
         faults = steep_faults(scene.links, repeated)
     if scene is None or wrong + faults:
-        places = {each.where for each in wrong}
+        places = echoes.union(each.where for each in wrong)
         rest = [each for each in faults if each.where not in places]
         raise SceneError(in_pattern(each, origins) for each in [*wrong, *rest])
     if (steps := time_grid(scene).steps) > MOST_STEPS:

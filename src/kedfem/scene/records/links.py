@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
 from kedfem.errors import Fault, SceneError
 from kedfem.scene.records.base import FileName, MaterialName, Record, refuse
-from kedfem.scene.records.loads import Inertia, inertia_faults
+from kedfem.scene.records.loads import Moments, inertia_faults
 from kedfem.scene.records.points import Point
 from kedfem.scene.records.shapes import MESH_ENDINGS, Bar, Cad, MeshFile, Polyline, Shape
 from kedfem.scene.records.units import Mass, PositiveLength, Quantity, fault
@@ -95,9 +95,9 @@ class LinkScene(Record):
     that drives alone move (it has no other joint), which these bear"""
     centre: Point | None = None
     """of a rigid link given by mass, centre and inertia instead of a shape: its centre in the reference position"""
-    inertia: tuple[Inertia, Inertia, Inertia, Inertia, Inertia, Inertia] | None = None
-    """of the same: tensor about its centre in the reference position: Ixx, Iyy, Izz, Ixy, Iyz, Izx, with Ixy = −∫xy dm
-    and so on"""
+    inertia: Moments | None = None
+    """of the same: tensor about its centre in the reference position, along x, y, z of the scene: Ixx, Iyy, Izz, Ixy,
+    Iyz, Izx, with Ixy = −∫xy dm and so on; three values: Ixx, Iyy, Izz where x, y, z are principal axes"""
     mesh: Meshing = Meshing()
     """how it is meshed"""
     element: Element | None = None
@@ -127,18 +127,21 @@ class LinkScene(Record):
         own = isinstance(self.shape, (Cad, MeshFile)) and self.shape.file == self.file
         if self.file is not None and not own:
             refuse([Fault(("file",), "cannot be combined with shape, got both")])
-        self.fill(model=self.model or self.family)
         refuse(self._body_faults())
+        self.fill(model=self.model or self.family)
         element = self.element or self._usual_element()
         return self.fill(element=element, mesh=self.mesh.model_copy(update=self._mesh_defaults()))
 
     def _body_faults(self) -> list[Fault]:
-        """What is wrong with a link given by mass, centre and inertia."""
+        """What is wrong with a link given by mass, centre and inertia, or by its mass alone."""
+        if self.model is None and not (self.shape or self.material) and (self.mass or self.centre or self.inertia):
+            return [Fault(("model",), "must be 'rigid' for a link given by its mass, without a shape, got nothing")]
         if self.centre is None and self.inertia is None:
             return []
         if self.model != "rigid":
             keys = [key for key in ("centre", "inertia") if getattr(self, key) is not None]
-            return [Fault((key,), f"must be given for a rigid link only, got model {self.model!r}") for key in keys]
+            wanted = f"must be given for a rigid link only, got model {self.model or self.family!r}"
+            return [Fault((key,), wanted) for key in keys]
         present = [key for key in ("shape", "material") if getattr(self, key) is not None]
         if present:
             together = " and ".join(present)

@@ -13,9 +13,22 @@ from kedfem.errors import Fault
 from kedfem.scene.records.base import JointName, LinkName, Record, refuse
 from kedfem.scene.records.curves import ONE, FactorOver, Force, Torque
 from kedfem.scene.records.points import Point, as_vector
-from kedfem.scene.records.units import Mass, Pressure, Quantity
+from kedfem.scene.records.units import Mass, Pressure, Quantity, fault
 
 Inertia = Annotated[float, Quantity("kg*m^2")]
+
+
+def six_moments(value: object) -> object:
+    """Ixx, Iyy, Izz, Ixy, Iyz, Izx of these, or of the first three alone, about principal axes."""
+    if not isinstance(value, (list, tuple)) or len(value) == 6:
+        return value
+    if len(value) != 3:
+        wanted = "must be three values [kg*m^2], Ixx, Iyy, Izz, or six, with Ixy, Iyz, Izx"
+        raise fault(f"{wanted}, got {len(value) or 'none'}")
+    return (*value, 0.0, 0.0, 0.0)
+
+
+Moments = Annotated[tuple[Inertia, Inertia, Inertia, Inertia, Inertia, Inertia], BeforeValidator(six_moments)]
 
 
 def inertia_tensor(inertia: Sequence[float]) -> np.ndarray:
@@ -158,8 +171,9 @@ class RigidBody(Record):
     """where: anywhere on a beam's axis or on a rigid link; on an elastic solid a bore, as of a joint"""
     mass: Annotated[float, Quantity("kg", above=0.0)]
     """its mass"""
-    inertia: tuple[Inertia, Inertia, Inertia, Inertia, Inertia, Inertia]
-    """tensor about its centre in the reference position: Ixx, Iyy, Izz, Ixy, Iyz, Izx, with Ixy = −∫xy dm and so on"""
+    inertia: Moments
+    """tensor about its centre in the reference position, along x, y, z of the scene: Ixx, Iyy, Izz, Ixy, Iyz, Izx, with
+    Ixy = −∫xy dm and so on; three values: Ixx, Iyy, Izz where x, y, z are principal axes"""
     centre: Point
     """its centre of mass in the reference position"""
 
