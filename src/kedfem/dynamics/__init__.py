@@ -1,1 +1,1 @@
-"""Dynamics: joints as shared points, loads, generalised-α steps (condensed and monolithic), initial states."""
+"""Dynamics: joints, loads, generalised-α steps (condensed and monolithic), initial states."""

@@ -1,9 +1,9 @@
 """Anderson acceleration of iterations and the small dense solves of a step, compiled by numba.
 
-pairs (2, m, N) : where steps taken led, and how the change asked for changed in them
-products (m, m) : of the latter with each other
-last (2, N) : step taken and change asked for, of the iteration before
-room (m + 1, m) : for the small system; nothing is allocated in a step
+pairs (2, m, N) : differences of iterates, and of the changes that the iteration requests there
+products (m, m) : scalar products of the latter
+last (2, N) : step taken and change requested in the last iteration
+room (m + 1, m) : work array of the small system, so that a step allocates nothing
 """
 
 import numpy as np

@@ -1,12 +1,12 @@
 """Planar beams whose frames follow the tangent at each Gauss point, compiled by numba: their strains and internal force.
 
-At a point, with x' the derivative of the position by arc length in the reference position, where |x'| = 1, and θ the
-angle it has turned,
+At a point, with x' the derivative of the position by arc length in the reference position, where |x'| = 1, and θ its
+rotation,
 
     ε = |x'| − 1,   γ = θ − ψ,   κ = ψ'
 
-exactly what `dynamics.frames` finds with a frame at each point, see `links.segments.beam_segments`. World components:
-ψ and θ count from the rigid-body motion, so that x' = R t + u' with t the tangent in the reference position.
+These equal the strains of `dynamics.frames` with a frame at each point (`links.segments.beam_segments`). Components are
+in world axes; ψ and θ count from the rigid-body motion, so x' = R t + u' with t the tangent in the reference position.
 
     segment, body : (b,) number of each, and of its rotation
     at, stride : (b,) where its coordinates begin, and the number of one component
@@ -15,8 +15,8 @@ exactly what `dynamics.frames` finds with a frame at each point, see `links.segm
     rigidity (b, 3, E) : EA, κGA, EI times the length that belongs to a point; 0 where a segment has fewer points
     strain (3, b, 3, E) and rates, direction (b, 2, E) of the tangents in the rigid-body frame, turn (b, E) : state
 
-One call does all segments: a call costs as much as a short beam. Without any, `beams` may be None: nothing of this is
-compiled then.
+One call evaluates all segments, as a call costs as much as a short beam. Without such beams `beams` may be None; this
+module is then not compiled.
 """
 
 import numpy as np

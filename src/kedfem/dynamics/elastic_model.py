@@ -1,4 +1,4 @@
-"""The elastic model of a scene: its links meshed and assembled, with loads, bodies and sliders, tied together."""
+"""The elastic model of a scene: meshed links, with loads, bodies and sliders, connected by the joints."""
 
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,12 +1,12 @@
-"""Co-rotational frames of a segment: its mean rotation, its deformation seen from there, and the force that belongs to
-it.
+"""Co-rotational frame of a segment: its mean rotation, the deformation in that frame, and the internal force.
 
 With y the segment's position in the link's rigid-body frame, c the weights of the frame and K0 its stiffness,
 
     Σ y_a ⊗ c_a = Q U,  Q a rotation, U symmetric          g = Qᵀ y − X          strain energy ½ gᵀ K0 g
 
-The force is the gradient of that energy: with f = K0 g and τ = Σ g_a × f_a, the moment that f has about the deformed
-segment, turning Q costs τ, and so F_a = f_a − (G⁻¹ τ) × c_a with G = tr(U) 1 − U; F has neither resultant nor moment.
+The force is the gradient of that energy: with f = K0 g and τ = Σ g_a × f_a, the moment of f about the deformed
+segment, a rotation of Q does the work of τ, so F_a = f_a − (G⁻¹ τ) × c_a with G = tr(U) 1 − U; F has neither resultant
+nor moment.
 """
 
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
-"""Links as rigid bodies: masses, their moments, and loads, in the reference position; what acts on each over time.
+"""Links as rigid bodies: their masses, moments of mass and loads in the reference position, and the forces over time.
 
-All that a rigid body does to the balance of forces is in ∫ρ dV, ∫ρ X dV and ∫ρ X ⊗ X dV; all that a load does in Σ f and
-Σ X ⊗ f, whatever the link is made of.
+The inertia of a rigid body depends on ∫ρ dV, ∫ρ X dV and ∫ρ X ⊗ X dV alone, the effect of a load on Σ f and Σ X ⊗ f,
+for any kind of link.
 """
 
 from collections.abc import Callable, Iterable, Mapping

@@ -1,4 +1,4 @@
-"""Where a load acts on a link, as weights of its nodes."""
+"""Nodal weights of the point or surface of a link on which a load acts."""
 
 from collections.abc import Mapping
 

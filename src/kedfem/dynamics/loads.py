@@ -1,6 +1,6 @@
-"""Loads P of the general equation: every one is constant patterns of the link times factors over time.
+"""Loads P of the general equation: constant patterns on the link, times factors over time.
 
-[KED, eqs. (15)(16)]: body, surface and concentrated forces, all through Nᵀ; couples on the turn of a coupling surface.
+[KED, eqs. (15)(16)]: body, surface and concentrated forces by Nᵀ; couples by the rotation of a coupling surface.
 """
 
 from collections.abc import Callable, Mapping, Sequence

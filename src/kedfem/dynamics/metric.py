@@ -1,4 +1,4 @@
-"""Tables of the elements of beams in space as compiled loops take them, see `dynamics.metric_kernel`."""
+"""Arrays of the elements of beams in space for the compiled loops of `dynamics.metric_kernel`."""
 
 from collections import namedtuple
 from collections.abc import Sequence

@@ -1,6 +1,6 @@
-"""Strains and forces of elements of beams in space, compiled by numba: as in `links.beams.metric`.
+"""Strains and forces of elements of beams in space by the formulas of `links.beams.metric`, compiled by numba.
 
-Tables are those of `dynamics.metric.Elements`, room is that of `dynamics.metric.room_for`.
+`dynamics.metric.Elements` describes the arrays, `dynamics.metric.room_for` the work arrays.
 """
 
 import numpy as np

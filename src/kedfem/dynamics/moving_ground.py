@@ -1,4 +1,4 @@
-"""Moving parts of the ground: rigid links without a shape that drives alone move, as links of no mass for the model."""
+"""Moving parts of the ground: rigid links without a shape that only drives move, as massless links of the model."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A model whose links are reduced, and one as it is kept in a file."""
+"""Models with reduced links, and their form in a file."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace

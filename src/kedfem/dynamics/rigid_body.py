@@ -1,4 +1,4 @@
-"""The rigid-body motion of a model over time: blocks of it, loads along it, what starts and estimates ask of instants."""
+"""The rigid-body motion of a model in blocks of time points and at single instants, with the loads along it."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

@@ -1,7 +1,7 @@
-"""Forces of motors, springs and limits were all links rigid, at any times of the motion; and their ends on links.
+"""Forces of motors, springs and limits with all links rigid, at any times of the motion, and their ends on links.
 
-Their coordinates depend on the times before in one thing only: rotations of hinges are counted on beyond ±π. How often a
-hinge has turned is known along the path of the linkage, so that any part of the motion can be asked for by itself.
+Their coordinates depend on earlier times only by the count of revolutions: angles of hinges continue beyond ±π. The path
+of the linkage has that count, so that any part of the motion can be evaluated by itself.
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""Rigid links of a model: reduced to {1, x, y, z}, and so stiff that they do not deform beside elastic parts."""
+"""Rigid links of a model: reduced to {1, x, y, z}, and so stiff that their deformation is negligible."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

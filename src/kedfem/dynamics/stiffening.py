@@ -1,10 +1,11 @@
 """Geometric stiffening: M δ'' + C δ' + (K + K_σ) δ = P − M R0'', K_σ from the stresses of the rigid-body motion.
 
-The stresses are quasi-static: those of P − M R0'' and the joint forces that go with it, in balance on each link. In the
-link frame such loads are combinations of a few constant ones: six of turning, three in a plane (what deforms of −M R0''
-= −(m·1) ⊗ p'' − (m·X) R''ᵀ), the link's loads, those of motors and springs, and its port forces. Their static states g_i
-are made orthonormal in strain energy; then K0 g = F has g = Σ s_i g_i with s_i = g_i · F, and K_σ = T (k ⊗ P) Tᵀ, k(t) =
-Σ s_i(t) k_i, k_i constant.
+The stresses are quasi-static: those of P − M R0'' and the joint forces in balance with it, on each link. In the
+link frame such loads are combinations of a few constant ones: six of rotation, three in a plane (the deforming part of
+−M R0'' = −(m·1) ⊗ p'' − (m·X) R''ᵀ), the link's loads, those of motors and springs, and its port forces. Their static
+states g_i
+are made orthonormal in strain energy; then K0 g = F has the solution g = Σ s_i g_i with s_i = g_i · F, and
+K_σ = T (k ⊗ P) Tᵀ, k(t) = Σ s_i(t) k_i, k_i constant.
 """
 
 from collections.abc import Callable, Sequence

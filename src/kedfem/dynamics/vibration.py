@@ -1,4 +1,4 @@
-"""The least damped vibration about a steady motion, as it goes on over a period: which link, how fast, what shape."""
+"""The least damped vibration about a steady motion over a period: its link, frequency and shape."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

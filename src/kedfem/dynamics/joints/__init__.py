@@ -1,1 +1,1 @@
-"""Joints in the dynamics: shared port points, constraint equations whose directions vary in time, rigid couplings."""
+"""Joints in the dynamics: shared interface points, constraint equations that vary in time, rigid couplings."""

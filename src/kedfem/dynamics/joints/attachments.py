@@ -1,4 +1,4 @@
-"""Joints as the interface sees them: port weights on one link, and joints that cut a shared point."""
+"""Attachments of links to the interface: the port weights of one link, and joints that share an interface point."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,9 +1,7 @@
-"""Joints enforced by constraint equations whose directions vary in time: C(t) z = 0, where others share port points for
-good.
+"""Joints enforced by constraint equations C(t) z = 0 with directions that vary in time, not by shared interface points.
 
-What slides or turns relative to both its links cannot be said of fixed points by constant weights. Such a joint's links
-have port points of their own, fixed in them, whose displacements are interface unknowns; the terms of a system say over
-them what the joint constrains.
+Constant weights of fixed points cannot express a constraint that slides or rotates relative to both links. Each link
+of such a joint has interface points of its own, whose displacements are interface unknowns; the joint constrains them.
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,5 +1,4 @@
-"""What joints enforced by constraint equations have on their links: coupling surfaces, or stations along the line of a
-slot."""
+"""Attachments of joints enforced by constraint equations: coupling surfaces, or stations along the line of a slot."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

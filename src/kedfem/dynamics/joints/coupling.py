@@ -1,7 +1,7 @@
-"""Joints as shared port points: W u = B z with constant scalar weights W and a constant selection B.
+"""Joints enforced by elimination, as shared interface points: W u = B z with constant scalar weights W and constant B.
 
-Weights commute with rotation, so joints hold for displacement, velocity and acceleration at once. Joints whose directions
-vary in time have port points of each link's own, and is enforced by constraint equations over these (`row_joints`).
+Weights commute with rotation, so joints are closed in displacement, velocity and acceleration at once. For joints whose
+directions vary in time each link has interface points of its own, with constraint equations (`constraint_joints`).
 """
 
 from collections.abc import Mapping, Sequence

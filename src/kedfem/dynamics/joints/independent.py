@@ -1,4 +1,4 @@
-"""Joints that share port points: which of their conditions are independent, and the port forces that follow."""
+"""Independent conditions of joints that share interface points, and the port forces that follow from these."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Where joints are on links: their coupling surfaces, on links and on segments of links."""
+"""Coupling surfaces of joints on links and on segments of links."""
 
 from collections.abc import Callable, Mapping
 from typing import TypeVar

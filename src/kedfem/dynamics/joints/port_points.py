@@ -1,4 +1,4 @@
-"""Port points of a joint on a link: where they lie about its place, and what is reported where they cannot."""
+"""Interface points of a joint on a link: their positions about the joint, and the refusal where there can be none."""
 
 import numpy as np
 

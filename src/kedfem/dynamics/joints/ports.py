@@ -1,4 +1,4 @@
-"""Ports of one link: the displacements there, W u, and forces on them, Wᵀ λ, in the link frame or turned."""
+"""Ports of one link: displacements W u and forces Wᵀ λ, in the link frame or rotated."""
 
 import numpy as np
 

@@ -1,5 +1,4 @@
-"""Coupling surfaces of joints with rigid couplings: added stiffness of their links, before anything else is made of
-these."""
+"""Stiffness that the rigid couplings of joints add to their links, before the links are reduced or divided."""
 
 from collections.abc import Mapping
 

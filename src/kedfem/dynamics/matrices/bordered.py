@@ -1,4 +1,4 @@
-"""Unknowns under constraints and laws, by one sparse factor of both: H z = f + Cᵀ m, C z + m / κ = target."""
+"""One sparse factor of unknowns, constraints and force laws: H z = f + Cᵀ m, C z + m / κ = target."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -1,4 +1,4 @@
-"""The linkage with its joints closed: all links together, through the common system of their interface unknowns."""
+"""Solutions for the linkage with closed joints, by the common system of the interface unknowns of all links."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Order and profile of the matrix of interface unknowns and constraints: each row is kept from its first column on."""
+"""Order and profile of the matrix of interface unknowns and constraints: each row is stored from its first entry on."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

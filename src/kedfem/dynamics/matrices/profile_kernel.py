@@ -1,7 +1,7 @@
 """L D Lᵀ factor of a matrix of unknowns and multipliers, stored by its profile, and solutions; compiled by numba.
 
-Rows stand one after the other, each from its first column to its diagonal. Pivots of unknowns are positive, those of
-multipliers negative in any order in which a constraint follows all unknowns that it couples.
+Rows are stored one after the other, each from its first column to its diagonal. The pivots of unknowns are positive, and
+those of multipliers negative, in any order in which a constraint follows all unknowns that it couples.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
-"""Links condensed onto their ports, and all of them solved together: joints on a dozen unknowns.
+"""Static condensation of links onto their ports, and the solution of all links by the common interface.
 
-Exact block elimination of the coupled system, because T M Tᵀ = M and K = T K0 Tᵀ [KED, eqs. (12)(14)].
+It is an exact block elimination of the coupled system, because T M Tᵀ = M and K = T K0 Tᵀ [KED, eqs. (12)(14)].
 """
 
 from collections.abc import Callable

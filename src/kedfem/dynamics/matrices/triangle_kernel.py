@@ -1,7 +1,7 @@
 """A pair of triangular solves with a sparse Cholesky factor L, compiled by numba.
 
-Columns that follow each other with the same rows below them are a block. Its part of a right-hand side is solved in a
-room of its own, four columns at a time, so that a number of that room is read and written once for four of the factor.
+Consecutive columns with the same rows below them are a block (a supernode). Its part of a right-hand side is solved in
+a separate work array, four columns at a time, so that each number there is read and written once for four of the factor.
 """
 
 from kedfem.compiled import inner

@@ -1,1 +1,1 @@
-"""Modes: bases of reduced links and segments, what they leave out, natural frequencies of links and linkages."""
+"""Modes: bases of reduced links and segments, their truncation errors, natural frequencies of links and linkages."""

@@ -1,4 +1,4 @@
-"""A basis for every link of a model, or segment of one, from what its loads do at some instants of the motion."""
+"""A basis of modes for every link or segment of a model, from its static deflections at some instants of the motion."""
 
 from collections.abc import Callable, Collection, Sequence
 

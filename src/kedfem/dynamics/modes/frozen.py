@@ -2,11 +2,10 @@
 
     (K + κ c cᵀ) x = ω² M x,   joints closed: W x = Rᵀ B z,  C z = 0
 
-K = T K0 Tᵀ of links, κ the tangents of force laws there. All links are factored once, with
+K = T K0 Tᵀ is the stiffness of links, κ are the tangents of force laws at the position. All links are factored once, with
 K0 + s M; at each position joints and laws add an interface of some dozen unknowns (`system.starts.linear_equations`), and
-a block Lanczos run on (K + s M)⁻¹ M finds the lowest ω². s > 0, so that motions without strain, ω = 0, are found like the
-others.
-Forces that stretch a link or a spring do not change its stiffness here, unless `preloads` are asked for; `stiffened` has
+a block Lanczos run on (K + s M)⁻¹ M finds the lowest ω². With s > 0 it also finds rigid-body motions, ω = 0.
+Forces that stretch a link or a spring do not change its stiffness here, unless `preloads` are requested; `stiffened` has
 those of links.
 """
 

@@ -1,4 +1,4 @@
-"""Lowest modes by a block Lanczos run on an inverse: all vectors are kept, so that equal frequencies are all found."""
+"""Lowest modes by a block Lanczos run on an inverse; all vectors are kept, so that no repeated frequency is missed."""
 
 from collections.abc import Callable
 

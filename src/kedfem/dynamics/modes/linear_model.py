@@ -1,8 +1,8 @@
 """A linkage frozen at a position as a small linear system: its lowest modes under forces, q'' + Γ q' + Ω² q = Φᵀ F.
 
-What the modes that are left out answer to a constant force, G F, is kept, so that a constant force bends the linkage as
-in full, x = K⁻¹ F. With s the shift of `Frozen` and A = K + s M, which is factored there, conjugate gradients in the
-product of M find x in a few steps, motions without strain left out,
+The static response of the truncated modes, G F, is kept, so that a constant force deflects the linkage as in the
+unreduced model, x = K⁻¹ F. With s the shift of `Frozen` and A = K + s M, which is factored there, conjugate gradients in
+the scalar product of M find x, less rigid-body motions, in a few steps,
 
     (1 − s A⁻¹ M) x = A⁻¹ F,   G F = x − Φ Ω⁻² Φᵀ F
 """

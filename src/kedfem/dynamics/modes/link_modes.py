@@ -1,8 +1,8 @@
-"""Natural frequencies and mode shapes of a single link, free or held.
+"""Natural frequencies and mode shapes of a single link, free or constrained.
 
     K0 x = ω² M x,   G x = 0
 
-G are the mean displacements and rotations of coupling surfaces that joints hold; points of faces that are clamped have no
+G are the mean displacements and rotations of coupling surfaces that joints constrain; points of clamped faces have no
 unknowns. K0 + s M is factored once (again where s is far from the first ω²), as for frozen linkages.
 """
 

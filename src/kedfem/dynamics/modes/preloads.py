@@ -1,6 +1,6 @@
-"""What forces of springs and motors add to the stiffness as their directions change: −Q ∂²q/∂z² of a coordinate q.
+"""Stiffness by the change in direction of forces of springs and motors: −Q ∂²q/∂z² for a coordinate q.
 
-Second derivatives are exact: where z moves along x at a steady rate and all else rests, q'' = xᵀ (∂²q/∂z²) x.
+Second derivatives are exact: if z moves along x at a constant rate and nothing else moves, q'' = xᵀ (∂²q/∂z²) x.
 """
 
 from itertools import combinations

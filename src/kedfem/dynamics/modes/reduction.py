@@ -1,8 +1,8 @@
-"""Modes for reduced links: what the loads of this scene excite, and no more.
+"""Modes for reduced links: those that the loads of the scene excite.
 
-At some instants of the motion the linkage is frozen. Its static deflection under P − M R0'' there, and the
-vibration modes that this deflection excites (Lanczos steps K⁻¹ M on the whole linkage, drive held), are what its links do
-later. Taken apart into scalar components and sorted by strain energy, the first few of them make the basis.
+The linkage is frozen at some instants of the motion. Its static deflection under P − M R0'' and the vibration modes that
+this deflection excites (Lanczos steps K⁻¹ M on the whole linkage, drive fixed) represent the motion of its links. Their
+scalar components are sorted by strain energy, and the first few make the basis.
 """
 
 from collections.abc import Sequence

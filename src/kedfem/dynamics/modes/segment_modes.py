@@ -1,16 +1,17 @@
-"""Modes for reduced segments of links with co-rotational frames: as few as bend like the segment itself.
+"""Modes for reduced segments of links with co-rotational frames: as few as keep the segment's flexibility.
 
-A segment bends under the forces of its cuts and joints: a handful of deflections, whose strain energy is small beside
-what each of their components alone would take (a bar bends by s² across and s y along it, and its section changes by y z:
-without any one of these it is stiff). So modes are not sorted by size. From all of them the one goes first whose
-loss costs the deflections least strain energy, the others free to answer. With K the stiffness on the modes and C a
-deflection's coefficients, the loss of qᵀ C costs
+A segment bends under the forces of its cuts and joints. These few deflections have a small strain energy compared with
+that of each of their components alone (a bar bends by s² across and s y along it, and its section changes by y z:
+without any one of these it is stiff). So modes are not sorted by size. Modes are removed one by one, first the one whose
+loss adds least strain energy to the deflections while the others adjust. With K the stiffness on the modes and C a
+deflection's coefficients, the loss of qᵀ C adds
 
     J(q) = tr[(qᵀ C)ᵀ (qᵀ C) F(q)⁻¹],   F(q) = (q ⊗ I)ᵀ K⁻¹ (q ⊗ I),
 
 and q is the direction in which Σ |qᵀ C|² over tr F(q) is least.
 
-Besides the deflections of the linear equation a segment needs what a large turn adds at its ends, `_turned_ports`.
+Beside the deflections of the linear equation a segment needs those that a large rotation adds at its ends,
+`_rotated_ports`.
 """
 
 from collections.abc import Sequence
@@ -49,7 +50,7 @@ def segment_basis(
         Weights are what the loss of each function costs the deflections, of their strain-energy norm.
     """
     g = _relative(link, np.stack([x.ravel() for x in deflections], axis=1))
-    S = _shapes(link, np.concatenate([_answers(link, joint, part, g), _turned_ports(link, joint, part, g), g], axis=1))
+    S = _shapes(link, np.concatenate([_answers(link, joint, part, g), _rotated_ports(link, joint, part, g), g], axis=1))
     rigid = mass_orthonormal(link, rigid_functions(link))
     H = energy_product(link)
     S = S - rigid @ (rigid.T @ np.asarray(link.mass[0] @ S))
@@ -93,7 +94,7 @@ def _free(
     return np.asarray(y - part.Y[:, q:] @ np.linalg.lstsq(F, y[part.anchors], rcond=1e-9)[0])
 
 
-def _turned_ports(
+def _rotated_ports(
     link: Link, joint: Attachment, part: Substructure, deflections: Float[np.ndarray, "k c"]
 ) -> Float[np.ndarray, "k a"]:
     """How cuts and joints strain a segment that sees their turns w as small: by ½ w × (w × r) at their points r.

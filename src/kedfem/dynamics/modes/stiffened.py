@@ -1,8 +1,8 @@
 """Natural frequencies of a linkage frozen at a position, with geometric stiffening and the inertia of rotation.
 
-A link that turns at Ω sees δ = R y with M (y'' + 2 Ω̃ y' + Ω̃² y) + (K0 + k ⊗ P) y = 0 (`dynamics.stiffening`). What is
-symmetric of it stays, K0 + k ⊗ P + M Ω̃² with the link's own Ω; the gyroscopic 2 M Ω̃ y' is left out. A bar on a hinge
-that nothing holds has no frequency then, as it should: what turns the tension with it and M Ω̃² cancel.
+For a link that rotates at Ω, δ = R y with M (y'' + 2 Ω̃ y' + Ω̃² y) + (K0 + k ⊗ P) y = 0 (`dynamics.stiffening`). The
+symmetric part K0 + k ⊗ P + M Ω̃², with the link's Ω, is kept; the gyroscopic term 2 M Ω̃ y' is left out. A bar that rotates
+freely about its hinge then has the frequency zero, as it should: the rotation of the tension and M Ω̃² cancel.
 """
 
 from dataclasses import replace

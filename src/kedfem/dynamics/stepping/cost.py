@@ -1,4 +1,4 @@
-"""Forecast of the time of a run: from a few real steps of its own solver, for large models from their sizes alone."""
+"""Forecast of the time of a run: from a few steps of its solver, for large models from their sizes alone."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

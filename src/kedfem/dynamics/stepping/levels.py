@@ -1,15 +1,15 @@
 """Extrapolation levels: the same motion in steps of h, h/2 (and h/4), combined state by state at common times.
 
 The error of a step of generalised-α has an expansion in powers of h, c₂ h² + c₃ h³ + c₄ h⁴ …
-(docs/theory/time-integration.md), where numerical damping alone makes c₃,
-which goes with ((1 − ρ∞)/(1 + ρ∞))³ and is 2e-5 at the default ρ∞ = 0.95. So
+(docs/theory/time-integration.md). Only numerical damping contributes to c₃,
+which is proportional to ((1 − ρ∞)/(1 + ρ∞))³ and 2e-5 at the default ρ∞ = 0.95. So
 
     two levels    (4 x_{h/2} − x_h)/3                                    order 4, with little numerical damping
     three levels  (r E_{h/2} − E_h)/(r − 1), E_h = (4 x_{h/2} − x_h)/3   r = 16: order 6; r = 8: order 4, without h³
 
-Everything that is smooth in the state keeps the order, and what is linear in it stays exact: positions, rates, loads,
-internal forces, joint forces. δ'' of the method itself belongs to an instant (α_f − α_m) h before the end of the step;
-what the balance M a = P − M R0'' − f + Wᵀ λ asks for is found from it by the method's own recursion,
+Smooth functions of the state keep the order, and linear relations stay exact: positions, rates, loads, internal forces,
+joint forces. δ'' of the method belongs to an instant (α_f − α_m) h before the end of the step;
+the acceleration of the balance M a = P − M R0'' − f + Wᵀ λ follows from it by the method's own recursion,
 
     (1 − α_f) a₁ + α_f a₀ = (1 − α_m) δ₁'' + α_m δ₀''
 

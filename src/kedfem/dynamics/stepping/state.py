@@ -1,4 +1,4 @@
-"""Rayleigh damping of links, which acts on their co-rotated deformation."""
+"""Rayleigh damping of links, on their deformation in co-rotational frames."""
 
 from dataclasses import dataclass
 

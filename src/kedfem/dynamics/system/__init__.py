@@ -1,1 +1,1 @@
-"""One system, one step: bodies, constraints and force laws of a mechanism, marched by one method whatever they are."""
+"""One system and one time step for all mechanisms: bodies, constraints and force laws, integrated by one method."""

@@ -1,6 +1,6 @@
 """One body in a step, compiled by numba: its right-hand side, its internal force, and its state at the end.
 
-Of body i: coordinates `at[i]:at[i + 1]`, component first; mass one. Rotations act on components.
+Body i has the coordinates `at[i]:at[i + 1]`, component first, in which its mass is one. Rotations act on components.
 """
 
 import numpy as np

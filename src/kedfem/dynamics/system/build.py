@@ -1,7 +1,7 @@
 """The system of a scene and its elastic model: constraints of joints, and force elements with their coordinates.
 
-What a kind of joint constrains stands with the joint (`joints.constraint_joints.constrained`); gears, springs, motors and
-limits are laws on the same coordinates.
+`joints.constraint_joints.constrained` says what each kind of joint constrains; gears, springs, motors and limits are laws
+on the same coordinates.
 """
 
 from collections.abc import Sequence

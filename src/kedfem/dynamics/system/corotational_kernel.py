@@ -1,6 +1,6 @@
 """Bodies with one co-rotational frame in a step, compiled by numba: internal force, and state at the end.
 
-Without any, K may be None: nothing of this is compiled then.
+Without such bodies K may be None; this module is then not compiled.
 """
 
 from kedfem.compiled import inner

@@ -1,4 +1,4 @@
-"""Ends of constraints from what joints have on links: coupling surfaces, points of rigid links, prescribed bodies."""
+"""Ends of constraints: coupling surfaces, points of rigid links, prescribed bodies."""
 
 import numpy as np
 

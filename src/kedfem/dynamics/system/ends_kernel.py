@@ -1,12 +1,12 @@
-"""Ends of constraints, compiled by numba: place and orientation from the interface unknowns, and forces back onto them.
+"""Ends of constraints, compiled by numba: position and orientation from the interface unknowns, and forces on these.
 
-The orientation of a coupling surface is the rotation Q of A = Σ D_k ⊗ e_k = Q U, D_k the directions as they are now, e_k
-in the reference position. Of a surface of which two directions are known the third is its normal. With G = tr(U) 1 − U a
+The orientation of a coupling surface is the rotation Q of A = Σ D_k ⊗ e_k = Q U, with its directions D_k now and e_k
+in the reference position. If two directions of a surface are known, the third is its normal. With G = tr(U) 1 − U a
 moment τ on Q is
 
     τ · ω = Σ q_k · δD_k,   q_k = Q (t × e_k),   t = G⁻¹ Qᵀ τ
 
-Without any line, `ends.knots` may be None: nothing of lines is compiled then.
+Without lines of slots `ends.knots` may be None; the functions of lines are then not compiled.
 
     place : x (E, 3), Q (E, 3, 3), D (E, 3, 3), U (E, 3, 3) of all ends; X (n, 3) of the stations of all lines
 """

@@ -2,8 +2,8 @@
 
     (Σ Bᵀ R S Rᵀ B) Δz = Σ Bᵀ R (Yᵀ Rᵀ r − S w₀) + known + Cᵀ m,   C Δz + m / κ = target
 
-κ is infinite of a constraint; of a force law it is its tangent, so that it is exact however stiff. A part σ < κ of each
-is put into the matrix, as in `dynamics.matrices.bordered`. Both are solved for at once, from one matrix by its profile:
+κ is infinite for a constraint and the tangent of a force law, so that the equation is exact for any stiffness. A part
+σ < κ of each is added to the matrix, as in `dynamics.matrices.bordered`. One matrix, stored by its profile, gives both:
 
     [H + Σ σ cᵀ c, Cᵀ; C, −1/κ] (Δz, −m) = (right, target)
 

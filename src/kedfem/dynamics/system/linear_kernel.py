@@ -1,6 +1,6 @@
-"""Steps of a linear system, compiled by numba: all bodies have rigid-body frames, one solution of the interface a step.
+"""Steps of a linear system with rigid-body frames, compiled by numba: one solution of the interface a step.
 
-Apart from `step_kernel`, whose passes a linear scene has no use for and need not wait to be compiled.
+It is separate from `step_kernel`, so that a linear scene need not wait until unused passes are compiled.
 """
 
 from kedfem.compiled import compiled, inner

@@ -1,4 +1,4 @@
-"""The public march of a system: from any state, over any stretch of its rigid-body motion, to the state at its end."""
+"""Time integration of a system from any state over any part of its rigid-body motion, to the state at its end."""
 
 from collections.abc import Callable
 from dataclasses import replace

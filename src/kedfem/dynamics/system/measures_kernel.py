@@ -1,25 +1,25 @@
 """Rotation vectors, tilts and distances from lines between two ends, compiled by numba.
 
-Rotation vectors and how they change: with R = Q_jᵀ Q_i = exp [θ]× and w the rate of rotation of i against j, seen from j,
+Rates of rotation vectors: with R = Q_jᵀ Q_i = exp [θ]× and w the angular velocity of i against j, in components of j,
 
     θ' = w − ½ θ × w + c θ × (θ × w),   c = (1 − θ/2 cot θ/2) / θ²
 
-The tilt of an axis is the shortest rotation that takes n, its direction in j, to a, that in i: θ = f(a · n) n × a with
+The tilt of an axis is the shortest rotation from n, its direction in j, to a, that in i: θ = f(a · n) n × a with
 f(cos t) = t / sin t.
 
-How far a point x is off a line c(s) = Σ N_k(s) x_k through stations: n · d with d = x − c where x stands square to the
-line, t · d = 0, t = c'. The direction across is that of the reference position, turned with the line's body and then from
+The distance of a point x from a line c(s) = Σ N_k(s) x_k through stations, in one direction, is n · d with d = x − c and
+t · d = 0, t = c'. The direction n is that of the reference position, rotated with the line's body and then from
 its axis a to the tangent: n = b − 2 h (h · b) / h · h, h = a + t/|t|. With g = ∂(n · d)/∂h
 
     q = (1 − t tᵀ/t·t) g / |t|,   κ = q · c'' / (t · t − c'' · d),   F = n + κ t
 
     δ(n · d) = F · δx + Σ (N'_k (q + κ d) − N_k F) · δx_k
 
-On the line d, q and κ are zero: as the pin slides, and as n turns, no force does work. The place s itself changes by
+On the line d, q and κ are zero: no force does work as the pin slides and as n rotates. The change of the place s is
 
     δs = (t · δx + Σ (N'_k d − N_k t) · δx_k) / (t · t − c'' · d)
 
-so that a force along it acts on the pin along the tangent, and on the line's link against that where the pin is.
+so a force along the line acts on the pin along the tangent, and on the line's link in the opposite direction at the pin.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """Products of bodies' mass and stiffness with vectors, and solutions of sparse bodies; compiled by numba.
 
-Arrays of sparse bodies are found by their addresses: each body has its own, as factors are too large for copies in one.
-Without any sparse body, their addresses and mass may be None: nothing of this is compiled then.
+Arrays of sparse bodies are passed by their addresses, as factors are too large to be copied into one array.
+Without sparse bodies their addresses and mass may be None; this module is then not compiled.
 """
 
 from kedfem.compiled import compiled, inner

@@ -1,4 +1,4 @@
-"""A system made ready for steps of one length, with its rigid-body motion and loads over time as flat arrays."""
+"""A system prepared for steps of one length, with its rigid-body motion and loads over time as flat arrays."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace

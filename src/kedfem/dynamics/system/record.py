@@ -1,4 +1,4 @@
-"""The record of a system: ends of constraints on bodies, coordinates, and the laws that these obey."""
+"""The record of a system: bodies, ends of constraints on them, coordinates, and the laws that these obey."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

@@ -1,10 +1,10 @@
-"""Records handed to compiled functions by address: one pointer instead of all arrays. Arrays, too.
+"""Records and arrays passed to compiled functions by address, with one pointer instead of all their arrays.
 
-numba takes a named tuple apart into its arrays, and each array into seven numbers, at every call: with all records of
-a system 1,100 arguments, which cost more to compile and to call than what is done with them. `by_address(record)` lays
-these numbers out once, as numba keeps a named tuple in memory; in compiled code `x.name` of it is the array.
+numba divides a named tuple into its arrays, and each array into seven numbers, at every call. All records of a system
+are 1,100 such arguments, which cost more to compile and to pass than the work on them. `by_address(record)` stores
+these numbers once, in numba's memory layout of a named tuple; in compiled code its `x.name` is the array.
 
-What is handed on must be kept as long as the function runs.
+The caller must keep the record as long as the function runs.
 """
 # mypy: disable-error-code="misc, no-untyped-call, untyped-decorator, attr-defined, override"
 # numba's interface for new types has no types itself

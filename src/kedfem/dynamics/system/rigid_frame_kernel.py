@@ -1,4 +1,4 @@
-"""Begin and end of a step for a body with a rigid-body frame, and for the interface; compiled by numba."""
+"""Beginning and end of a step for a body with a rigid-body frame and for the interface, compiled by numba."""
 
 from kedfem.compiled import inner
 from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, ports_turned, product

@@ -1,8 +1,8 @@
 """Large bodies of a system, with sparse factors that are solved between the compiled parts of a step.
 
-Their coordinates are nodal rows, component first, so that their mass is not one. What a compiled step asks of them, once
-a step or a pass of those with frames of their own, is Ã⁻¹ r of its right-hand side: by compiled triangular solves,
-or by a call out of compiled code where the factor is too large to be taken out of CHOLMOD.
+Their coordinates are nodal rows, component first, so that their mass is not one. A compiled step needs Ã⁻¹ r of its
+right-hand side, once a step, or once a pass of bodies with co-rotational frames: by compiled triangular solves, or by a
+call out of compiled code where the factor is too large to be copied from CHOLMOD.
 """
 
 import ctypes

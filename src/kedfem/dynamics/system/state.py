@@ -1,4 +1,4 @@
-"""Variables of a system: its state, histories and the work arrays of a step, and functions that make them empty."""
+"""Variables of a system: its state, histories and the work arrays of a step, and functions that allocate them."""
 
 from collections import namedtuple
 

@@ -2,8 +2,8 @@
 
     r = history + c_f (F − f),   g = G Rᵀ r + Y w,   λ = S w − Yᵀ Rᵀ r,   w = Rᵀ B z − W Rᵀ b
 
-Frames, constraints and laws are evaluated where a pass has led, Anderson acceleration chooses the step to take, and
-again. A linear system is done after one: `linear_kernel`.
+Each pass evaluates frames, constraints and laws at the last iterate, and Anderson acceleration gives the next one. A
+linear system needs one pass: `linear_kernel`.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
-"""Steps of a scene's links, taken by its system, as histories of links.
+"""Steps of a scene's links by its system, returned as histories of links.
 
-What a force element exerts on its links is part of their forces F there, and forces at ports are those of joints alone.
+The forces F on links include those of force elements; forces at ports are those of joints alone.
 """
 
 from __future__ import annotations

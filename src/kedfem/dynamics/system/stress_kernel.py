@@ -1,6 +1,6 @@
 """Geometric stiffening of bodies with rigid-body frames, compiled by numba: k g P is part of the right-hand side.
 
-Without any, `of` may be None: nothing of this is compiled then.
+Without such bodies `of` may be None; this module is then not compiled.
 """
 
 from kedfem.compiled import inner

@@ -1,1 +1,1 @@
-"""Forces of a system: what constraints and laws exert, efforts of supports and drives, stiffening and turning loads."""
+"""Forces of a system: those of constraints and laws, efforts of supports and drives, stiffening, loads that rotate."""

@@ -1,6 +1,6 @@
-"""Pins of slots on lines of links that bend and turn: where they are, and what a unit multiplier exerts there.
+"""Pins of slots on lines of bent and rotated links: their positions, and the forces of a unit multiplier there.
 
-As `measures_kernel` has it, over time.
+The formulas are those of `measures_kernel`, for many times at once.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Where bodies and their ends are, displaced: poses, directions and points of forces."""
+"""Displaced positions of bodies and their ends: poses, directions and points of forces."""
 
 import numpy as np
 

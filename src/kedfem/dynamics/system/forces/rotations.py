@@ -1,7 +1,7 @@
-"""Rotation vectors of one end against another, and of the tilt of an axis: moments by their components, of many times.
+"""Rotation vectors of one end against another and of the tilt of an axis, and moments by their components, at many times.
 
-As `measures_kernel` has them. arccos(c) / √(1 − c²), which is t / sin t at c = cos t, is a power series of (1 − c)/2
-near c = 1.
+The formulas are those of `measures_kernel`. arccos(c) / √(1 − c²), which is t / sin t at c = cos t, is a power series of
+(1 − c)/2 near c = 1.
 """
 
 import numpy as np

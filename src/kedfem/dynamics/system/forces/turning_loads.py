@@ -1,9 +1,10 @@
-"""Loads that turn with bodies whose frames are their own: where a load acts, two directions of the body show how.
+"""Loads that rotate with bodies with co-rotational frames, by directions of the body where the load acts.
 
-They are y_m = R e_m + Σ_a w_ma u_a, e_m in the reference position: of a beam in space the section's two directions where
-the load is, of other bodies two or three of the mean deformation, linear in u. Nodal forces are p Qᵀ, with the rotation
-Q of Σ y_m ⊗ e_m = Q U, U symmetric, which no choice of axes changes; of a planar beam they turn by ψ where the load is. A
-torque fixed in the world is three loads, the couples about the body's axes e_k, times m · Q e_k.
+The directions are y_m = R e_m + Σ_a w_ma u_a, e_m in the reference position: for a beam in space the two directions of
+the section at the load, for other bodies two or three of the mean deformation, linear in u. Nodal forces are p Qᵀ, with
+the rotation Q of Σ y_m ⊗ e_m = Q U, U symmetric, which does not depend on the choice of axes; for a planar beam the
+rotation is ψ at the load. A torque fixed in the world is three loads, the couples about the body's axes e_k, times
+m · Q e_k.
 """
 
 from collections.abc import Sequence

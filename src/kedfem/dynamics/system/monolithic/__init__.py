@@ -1,1 +1,1 @@
-"""The reference solver: a system with all its unknowns, to check the compiled steps; it shares none of their code."""
+"""The monolithic solver: all unknowns of a system in one matrix; it checks the condensed steps with code of its own."""

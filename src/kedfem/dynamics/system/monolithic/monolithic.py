@@ -1,12 +1,12 @@
-"""The reference solver: a system with all its unknowns, iterated to rounding with tangents assembled anew each time.
+"""The monolithic solver: all unknowns of a system in one matrix, iterated to rounding, with newly assembled tangents.
 
-Unknown are the displacements u of all bodies (full rows, world components), the interface unknowns z, the forces λ at
-interface points and the multipliers m of constraints:
+The unknowns are the displacements u of all bodies (full rows, world components), the interface unknowns z, the forces λ
+at interface points and the multipliers m of constraints:
 
     M [(1 − α_m) u1'' + α_m u0''] + (1 − α_f) (f1 − F1) + α_f (f0 − F0) = Wᵀ λ,   W u = B z,
     Bᵀ λ = Cᵀ m + α_f C₀ᵀ μ₀,   e(z) = 0 of constraints,   m = −(1 − α_f) φ(e, e') of force laws
 
-Nothing of `step_kernel` or what it calls is used here: internal forces are those of `dynamics.frames`,
+It uses neither `step_kernel` nor the functions that this calls: internal forces are those of `dynamics.frames`,
 coordinates those of `motion.values`.
 """
 

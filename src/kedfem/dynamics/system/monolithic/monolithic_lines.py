@@ -1,4 +1,4 @@
-"""Lines of slots in the reference solver: places of pins by bisection, directions across by rotations."""
+"""Lines of slots in the monolithic solver: places of pins by bisection, directions across by rotations."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

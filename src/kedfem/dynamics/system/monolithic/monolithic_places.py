@@ -1,4 +1,4 @@
-"""Ends, coordinates and laws in the reference solver: one at a time, by singular values and the rows of rigid motion."""
+"""Ends, coordinates and laws in the monolithic solver, by singular values and the equations of rigid motion."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

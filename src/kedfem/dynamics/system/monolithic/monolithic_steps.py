@@ -1,4 +1,4 @@
-"""Steps by the reference solver, returned as those of a march: what `solver = "monolithic"` takes."""
+"""Steps by the monolithic solver, returned as those of a march: what `solver = "monolithic"` takes."""
 
 from collections.abc import Sequence
 

@@ -1,11 +1,11 @@
-"""Stops in the reference solver: which may push in a step, and steps that are divided where a damped one is met.
+"""Stops in the monolithic solver: those active in a step, and the division of steps at impacts on damped ones.
 
-A step is solved as if such a stop were out of reach. Where the cubic through its coordinate and rate at both ends passes
-the limit, −c e' changes accelerations as the matrix of the step after that time lets them:
+A step is first solved without such a stop. At the time at which the cubic through its coordinate and rate at both ends
+passes the limit, the accelerations change by −c e', with the matrix of the second part of the step:
 
     A x = c_M Wᵀ λ,   W x = B z,   Bᵀ λ = Cᵀ m,   C z = 0 of constraints,   m = −c e' of stops that are met
 
-with A = c_M M + c_K K0, turned as links are.
+with A = c_M M + c_K K0, rotated with the links.
 """
 
 from __future__ import annotations

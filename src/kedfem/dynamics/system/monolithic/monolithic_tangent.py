@@ -1,4 +1,4 @@
-"""Tangents of the reference solver: of bodies and force laws by differences, in one matrix with all constraints."""
+"""Tangents of the monolithic solver: of bodies and force laws by differences, in one matrix with all constraints."""
 
 from __future__ import annotations
 

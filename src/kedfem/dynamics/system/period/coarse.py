@@ -1,10 +1,10 @@
-"""The search of a steady motion of full links, preconditioned by the map of reduced ones (two levels).
+"""Two-level preconditioner for the steady motion of unreduced links: the period map of reduced ones.
 
     (I − Φ)⁻¹ ≈ 1 + L [(I − Φ_r)⁻¹ − 1] R
 
-R takes from a state its part in the modes of reduced links, Qᵀ M of displacements and rates; L puts it back. Φ_r is the
-derivative of the period map of the system with reduced links, whose marches cost next to nothing; its own equations are
-solved by GMRES. What is left for the full map are vibrations that the modes do not hold, and what these are off by.
+R projects a state onto the modes of the reduced links, by Qᵀ M of displacements and rates; L maps back. Φ_r
+is the derivative of the period map of the system with reduced links, whose marches are cheap; its equations are solved
+by GMRES. The unreduced map then needs iterations only for vibrations outside the modes, and for the modes' errors.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Krylov spaces of the derivative of a period map: a march over the period a product."""
+"""Krylov spaces of the derivative of a period map; each product is a march over the period."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass

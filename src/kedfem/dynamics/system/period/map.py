@@ -1,12 +1,11 @@
 """The period map: from the state at the start of a period, as a vector, to the state at its end.
 
-All that a step remembers is one vector, but for Anderson acceleration's memory, which only saves iterations, and the
-time. The size of a vector is √(u K u + ω² u M u + v M v), ω = 2π/T: everything else of a state follows from displacements
-and rates, but for what numerical damping makes vanish, which counts a little (`weighed`).
+The vector has all variables of a step but the time and the memory of Anderson acceleration, which only saves iterations.
+Its norm is √(u K u + ω² u M u + v M v), ω = 2π/T: the rest of a state follows from displacements and rates, but for the
+part that numerical damping removes, which has a small weight (`weighed`).
 
-Sums of states of a linear system are states of it. With co-rotational frames what follows from displacements by other
-than linear functions is found anew (`possible`): strains, how far points have turned, coordinates. A march would
-keep what these are off by for ever.
+Sums of states of a linear system are states. With co-rotational frames the nonlinear functions of displacements are
+computed anew (`possible`): strains, rotations of points, coordinates. A march would keep their errors for ever.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

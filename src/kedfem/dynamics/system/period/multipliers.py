@@ -1,7 +1,7 @@
 """Floquet multipliers of small vibrations about a steady motion: the eigenvalues of Φ.
 
-They are found by Arnoldi's method from a state that a random blow has left, so that vibrations show which the loads do
-not excite: by the largest magnitude a vibration grows, or falls, in a period.
+Arnoldi's method finds them from the state after a random impulse, so that vibrations which the loads do not excite are
+included. The largest magnitude is the factor by which a vibration grows, or decays, in a period.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""The search of the steady state: the state that a march over one period leads back to, and its Floquet multipliers.
+"""The steady state: the state to which a march over one period returns, and its Floquet multipliers.
 
 x = P(x) by Newton's method. Each of its linear systems, (I − Φ) d = P(x) − x with Φ the derivative of P, is solved by
 GMRES: a product with Φ is one more march over the period, so that it takes as many marches as there are vibrations that a

@@ -1,6 +1,7 @@
-"""Where marches of a system begin: rates and accelerations that fit, deflections without vibration, divided steps.
+"""Initial states of a system: consistent rates and accelerations, deflections without vibration, divided steps.
 
-States: `initial_states` (rest, given links), `deflected` (static, quasi-static, plucked), `impacts` (divided steps). They
-ask an `instant` of the motion for `internal_forces` and `coordinate_rates`; `modified_newton`, and `newton_krylov` where
-it diverges, find deflections, `accelerations` what fits them, all by `linear_equations` of `turning_bodies` and others.
+`initial_states` makes states without deflection, `deflected` static, quasi-static and plucked ones, `impacts` those
+within divided steps. An `instant` of the motion gives `internal_forces` and `coordinate_rates`; `modified_newton`, and
+`newton_krylov` where it diverges, find deflections, `accelerations` the accelerations that fit, all by
+`linear_equations`.
 """

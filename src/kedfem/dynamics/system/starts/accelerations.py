@@ -1,10 +1,10 @@
-"""Accelerations that balance all forces and keep all constraints; if asked, those of bodies that do not strain.
+"""Accelerations that balance all forces and satisfy all constraints; on request those of bodies without strain.
 
-With P the motions of a body without strain, its acceleration is then a_c + b, a_c centripetal and b = P Pᵀ b:
+With P the motions of a body without strain, its acceleration is then a_c + b, a_c centripetal, and b = P Pᵀ b:
 
     P Pᵀ b + s (1 − P Pᵀ) b = r − a_c − μ + Wᵀ λ,   μ + s (1 − P Pᵀ) b → μ
 
-which closes in on b without strain by a factor s each time.
+each iteration reduces the strain of b by a factor s.
 """
 
 from collections.abc import Sequence

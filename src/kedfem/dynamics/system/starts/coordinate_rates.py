@@ -1,11 +1,11 @@
-"""Coordinates of constraints with their rates, exact: the rigid-body motion and the interface as series in time.
+"""Exact rates of coordinates of constraints, by series in time of the rigid-body motion and the interface.
 
-A series is an array (3, …): a value, its rate, and the rate of that. Of a coupling surface, A = Σ D_k ⊗ e_k = Q U:
+A series is an array (3, …): a value and its first and second rates. For a coupling surface, A = Σ D_k ⊗ e_k = Q U:
 with B = Q₀ᵀ A and Q = Q₀ exp [w t + b t²/2]×, the skew parts of exp(−[…]×) B vanish at each order,
 
     G w = axial(B'),   G b = axial(B'' − 2 [w]× B' + [w]×² B),   G = tr(U) 1 − U
 
-Constraints that are linear in z are derivatives by z: taken by a complex step, exact to rounding.
+Derivatives by z are taken by a complex step, exact to rounding.
 """
 
 from collections.abc import Sequence

@@ -1,10 +1,9 @@
-"""Deflections without vibration: quasi-static, in static balance, or plucked. Marches begin there, and they are the
-positions of static and quasi-static analyses.
+"""Deflections without vibration for starts, and for static and quasi-static analyses: quasi-static, static or plucked.
 
-With a drive the deflection turns with its links, K δ = P − M R0'' − M ([α]× + [ω]×²) δ, each with its own rigid-body
-motion: the matrix has that inertia in it, so that no frequency is too near. Its rate is a difference of fourth order over
-one step, and over more where dampers feel it: each time that rates are found anew adds the rounding of a difference.
-Without a drive links accelerate as rigid bodies where they are, and K δ = P − M a carries that.
+With a drive the deflection rotates with its links, K δ = P − M R0'' − M ([α]× + [ω]×²) δ, each with its own rigid-body
+motion: the matrix includes that inertia, so that a natural frequency near the speed does no harm. The rate is a
+difference of fourth order over one step, over more steps with dampers, as each new difference adds rounding. Without a
+drive links accelerate as rigid bodies in their positions, and K δ = P − M a.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,8 +1,8 @@
-"""Stops with damping that a step meets: when, and the state in which their push begins, with c e'.
+"""Impacts on stops with damping within a step: their times, and the states in which the force c e' begins.
 
-`march` divides the step there. Before that time the stop is left out, so that both parts of the step are smooth; between
-them the push changes accelerations as the matrix of the step after it lets them. Where a push ends, and where it begins
-without damping, it is continuous: steps keep their order there undivided.
+`march` divides the step there. Before that time the stop is left out, so that both parts of the step are smooth;
+between them the force changes the accelerations, with the matrix of the second part. At the end of a contact, and at
+its beginning without damping, the force is continuous: such steps keep their order undivided.
 """
 
 import numpy as np

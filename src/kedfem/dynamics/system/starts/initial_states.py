@@ -1,6 +1,6 @@
-"""Where a march begins at rest: rates as given, and accelerations that balance forces and keep all constraints.
+"""Initial states without deflection: given rates, and accelerations that balance forces and satisfy all constraints.
 
-Rates of constraints are exact (`rates`), the bars of rigid links among them.
+Rates of constraints are exact (`coordinate_rates`), those of the bars of rigid links too.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""A system at one instant of its rigid-body motion: bodies, coordinates and laws as starts need them."""
+"""A system at one instant of its rigid-body motion: bodies, coordinates and laws for the computation of starts."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,9 +1,10 @@
-"""Linear equations of all bodies with joints and constraints at one instant, condensed to the interface, for any matrix
-of each body: what starts of a march are found by.
+"""Linear equations of all bodies with joints and constraints at one instant, condensed to the interface.
+
+Starts solve them with any matrix A of each body:
 
     A_i x_i = r_i + W_iᵀ λ_i,   W_i (x_i + moved_i) = Rᵀ B z,   Σ Bᵀ R λ = Cᵀ m + known,   C z + m / κ = target
 
-A need not be symmetric: the inertia of a deflection that turns with its link is not. With Z the null space of W and
+A need not be symmetric: the inertia of a deflection that rotates with its link is not. With Z the null space of W and
 W M = 1,
 
     G = Z (Zᵀ A Z)⁻¹ Zᵀ,   Y = (1 − G A) M,   Ȳ = (1 − Gᵀ Aᵀ) M,   S = Ȳᵀ A Y,   x = G r + Y w,   λ = S w − Ȳᵀ r

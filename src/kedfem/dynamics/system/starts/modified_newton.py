@@ -1,5 +1,7 @@
-"""The deflection at which all forces balance at one instant, by a modified Newton method: the tangent is the stiffness
-of bodies in their mean frames, without what turns with them. Where it diverges `newton_krylov` takes over."""
+"""The deflection in static balance at one instant, by a modified Newton method.
+
+Its tangent is the stiffness of bodies in their mean frames, without terms of the rotation of forces. Where it diverges
+`newton_krylov` takes over."""
 
 from collections.abc import Callable
 

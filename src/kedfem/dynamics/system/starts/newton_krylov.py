@@ -1,14 +1,13 @@
-"""Newton–Krylov method for a deflection at which all forces balance, however far bodies move to it.
+"""Newton–Krylov method for a deflection in static balance, for displacements of any size.
 
 With A the stiffness of bodies in their mean frames, and all forces on bodies and interface at u as right-hand sides,
 
     A Δ = r − (J − A) Δ + Wᵀ λ,   C Δz + Δm / κ = target,   Σ Bᵀ R λ = Cᵀ (m + Δm) + (∂C/∂z Δz)ᵀ m
 
-J Δ is a difference of forces along Δ, ∂C/∂z Δz one of gradients, so that what rotates with bodies counts: forces of
-springs and joints, axial forces of beams, preloads. GMRES solves for it, A its preconditioner. Rigid bodies then rotate
-by a whole rotation, not by its linear part, which would strain them: what opens their joints by that closes with the next
-Δ. A step is as long as what is left falls, seen through the factor that it was found with (Deuflhard's monotonicity
-test).
+J Δ is a difference of forces along Δ, ∂C/∂z Δz one of gradients, so that both include forces that rotate with bodies:
+those of springs and joints, axial forces of beams, preloads. GMRES solves for Δ, preconditioned by A. Rigid bodies then
+take a finite rotation, as its linear part would strain them; the next Δ closes the joints that this opens. The step is
+shortened until the residual, preconditioned by the same factor, decreases (Deuflhard's monotonicity test).
 """
 
 from collections.abc import Callable

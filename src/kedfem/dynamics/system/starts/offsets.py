@@ -1,4 +1,4 @@
-"""Where pins are on the lines of their slots, and how far off these, as series in time; see `coordinate_rates`.
+"""Positions of pins along the lines of their slots and distances from these, as series in time; see `coordinate_rates`.
 
 The place s of the pin as a series makes t · (x − c(s)) zero at each order; n is as in `measures_kernel`.
 """

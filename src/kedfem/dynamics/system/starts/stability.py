@@ -1,13 +1,13 @@
-"""Stability of a balance of forces: whether the stiffness is positive definite with the change of the forces.
+"""Stability of a static balance: whether the tangent stiffness, with the change of the forces, is positive definite.
 
-With A the stiffness of bodies in their mean frames and of laws, and J the tangent of all forces at a balance, both of
+With A the stiffness of bodies in their mean frames and of laws, and J the tangent of all forces at a balance, both for
 motions that joints allow,
 
     A⁻¹ J x = σ x
 
-has σ = 1 where forces do not change the stiffness, less where they press, and below zero where a small push takes links
-away from the balance for good: what buckles, or stands on its tip. Inertia of the deflection is not in J: beyond a
-critical speed links may be in balance by it that are stable as they turn.
+has σ = 1 where forces do not change the stiffness, σ < 1 under compression, and σ < 0 where the balance is unstable: a
+buckled column, or an inverted pendulum. Inertia of the deflection is not in J: beyond a critical speed rotating links may
+be stable by it.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,7 @@
 """Static balance of links that only stops constrain, such as an arm pressed against one, by temporary springs.
 
-A search that begins away from the stops finds no stiffness. Temporary springs on the limited coordinates first hold the
-links near the start of the search, and are weakened until the stops take over their forces; the final balance is without
-springs.
+Iterations that begin away from the stops find no stiffness. Temporary springs on the limited coordinates first keep the
+links near the start, and are weakened until the stops take over their forces; the final balance is without springs.
 """
 
 from collections.abc import Callable

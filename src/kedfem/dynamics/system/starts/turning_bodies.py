@@ -1,4 +1,4 @@
-"""Stiffness of bodies with the inertia of their rotation, held at their interface points."""
+"""Stiffness of bodies with the inertia of their rotation, condensed onto their interface points."""
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
