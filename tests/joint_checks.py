@@ -12,7 +12,7 @@ from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.attachments import Attachment, interface_matrix
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
 from kedfem.dynamics.joints.constraint_matrices import constraint_matrices
-from kedfem.dynamics.joints.ports import port_values, turned_ports, turned_vectors
+from kedfem.dynamics.joints.ports import port_values, rotated_ports, rotated_vectors
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.system.record import TURN
 from kedfem.links.record import Link, in_space
@@ -106,7 +106,7 @@ def port_wrench(ready: Prepared, blocks: list[Block], name: str, on: str) -> np.
     """Force of a joint on a link at its ports, and moment about the joint's point over LENGTH (T, 6)."""
     at, (k, here) = bodies(ready, blocks), ports(ready, name, on)
     joint = ready.model.joints[k]
-    f = turned_vectors(joint, state(blocks, k, "R"), state(blocks, k, "port_forces"))[:, here]
+    f = rotated_vectors(joint, state(blocks, k, "R"), state(blocks, k, "port_forces"))[:, here]
     arms = at.place(on, joint.points[here]) - point_of(ready, at, name)[:, None]
     return np.hstack([f.sum(axis=1), np.cross(arms, f).sum(axis=1) / LENGTH])
 
@@ -209,7 +209,7 @@ def row_values(ready: Prepared, block: Block) -> tuple[np.ndarray, np.ndarray, n
     C = np.stack([rows.at(k).toarray() for k in range(T)])
     every = list(zip(model.joints, block.links, strict=True))
     w = [(x.weights @ own.u[:, x.nodes]).reshape(T, -1)[:, x.keep] for x, own in every]
-    p = [turned_ports(x, own.R, own.port_forces) for x, own in every]
+    p = [rotated_ports(x, own.R, own.port_forces) for x, own in every]
     B = interface_matrix(model.joints).toarray()
     pushed = np.concatenate(p, axis=1) @ B
     mu = np.linalg.pinv(C.transpose(0, 2, 1), rcond=1e-9) @ pushed[..., None]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kedfem.dynamics.history import Block, LinkHistory
-from kedfem.dynamics.joints.ports import turned_vectors
+from kedfem.dynamics.joints.ports import rotated_vectors
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.links.record import Link
@@ -121,7 +121,7 @@ def _of_link(model: Model, k: int, block: Block, last: _Before | None) -> tuple[
     velocity = fields.affine(motion.v[:, body], turning, omega) + of.v
     inertia = fields.mass_times(fields.affine(motion.p2[:, body], motion.R2[:, body], motion.alpha[:, body]))
     loads, ports = of.F + inertia, np.zeros_like(of.F)
-    ports[:, joint.nodes] = np.einsum("pn,tpd->tnd", joint.weights, turned_vectors(joint, of.R, of.port_forces))
+    ports[:, joint.nodes] = np.einsum("pn,tpd->tnd", joint.weights, rotated_vectors(joint, of.R, of.port_forces))
     turned = np.zeros((len(p), 6))
     if link.fit is None:
         turned[:, 3:] = np.einsum("tij,tj->ti", R, fields.moment(of.g, fields.stiffness_times(of.g)))

@@ -31,7 +31,7 @@ from kedfem.dynamics.system.steps import Steps
 from kedfem.dynamics.vibration import Vibration, vibration
 from kedfem.links.recovery import stress_recovery
 from kedfem.motion.assembly import assembled, assembly_warning
-from kedfem.motion.counted_turns import require_counted
+from kedfem.motion.counted_revolutions import require_counted
 from kedfem.output.derived import (
     MESH,
     WORST,

@@ -16,7 +16,7 @@ from kedfem.errors import MeshError
 from kedfem.links.build import bare_link, part_meshes
 from kedfem.links.record import Link
 from kedfem.motion.assembly import assembled, assembly_warning
-from kedfem.motion.counted_turns import require_counted
+from kedfem.motion.counted_revolutions import require_counted
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.transmission import LEAST

@@ -14,7 +14,15 @@ from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.output.load_files import write_drive_load, write_joint_load, write_polar, write_summary
 from kedfem.results import Results, read_results, ready_folder, results_file
-from kedfem.results.forces.loads import DriveLoad, JointLoad, drive_loads, drive_summary, joint_loads, last_turns, summary
+from kedfem.results.forces.loads import (
+    DriveLoad,
+    JointLoad,
+    drive_loads,
+    drive_summary,
+    joint_loads,
+    last_revolutions,
+    summary,
+)
 from kedfem.scene import Scene, path_parameter, scene_from
 
 JOINTS, DRIVES = "joints.csv", "drives.csv"
@@ -53,7 +61,7 @@ def loads(file: FilePath, last: float | None = None, folder: FilePath | None = N
     results = read_results(path)
     _refuse(path, results, last)
     scene = scene_from(json.loads(results.scene_json), path.parent.parent)
-    rows = last_turns(results, last)
+    rows = last_revolutions(results, last)
     joints, drives, why = loads_of(scene, results)
     if not joints and not drives:
         raise OutputError(f"{path}: must have forces of joints or of a drive, got none")

@@ -36,7 +36,7 @@ from kedfem.results.recording import rows
 from kedfem.results.stresses.envelope import Envelope
 from kedfem.results.table import drive_heading
 from kedfem.resume import Keeper, remove_state
-from kedfem.scene import Scene, time_grid, turn_steps
+from kedfem.scene import Scene, revolution_steps, time_grid
 
 ROWS, SECONDS = 4096, 0.5  # steps, or time, after which they go to the results file
 AHEAD, HELD = 16, 100e6  # instants, and bytes of them, that wait to be drawn as frames while steps go on
@@ -51,7 +51,7 @@ def frame_steps(scene: Scene) -> Int[np.ndarray, " f"]:
     animation, grid = scene.output.animation, time_grid(scene)
     if animation is None:
         return np.zeros(0, int)
-    turn = turn_steps(scene) or float(grid.steps)
+    turn = revolution_steps(scene) or float(grid.steps)
     last = animation.last_revolutions
     first = 0.0 if last is None else max(0.0, grid.steps - last * turn)
     count = int((grid.steps - first) * animation.frames_per_revolution / turn + 1e-9)

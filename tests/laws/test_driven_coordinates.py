@@ -13,7 +13,7 @@ from kedfem.dynamics.joints.constraint_matrices import constraint_matrices
 from kedfem.dynamics.rigid_body import drive_range
 from kedfem.dynamics.system.monolithic.monolithic import Monolithic
 from kedfem.motion.coordinates import coordinates, driven_name
-from kedfem.motion.counted_turns import turn_of
+from kedfem.motion.counted_revolutions import turn_of
 from kedfem.motion.joint_equations import ordered
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path

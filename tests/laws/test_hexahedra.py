@@ -16,9 +16,9 @@ from kedfem.links.recovery import (
     COMPONENTS,
     nodal_stress,
     principal_stresses,
+    rotated_stress,
     stress_of_gradient,
     stress_recovery,
-    turned_stress,
 )
 from kedfem.links.solid import elastic_stiffness, gradient_products, pattern, solid_basis
 from kedfem.links.surfaces.surface import surface_quadrature
@@ -320,7 +320,7 @@ def test_principal_stresses_are_eigenvalues_in_all_axes() -> None:
     size = np.abs(S).max(axis=1, keepdims=True) + 1e-300
     turned = T @ full @ T.T
     components = np.stack([turned[:, i, j] for i, j in COMPONENTS], axis=1)
-    assert_allclose(turned_stress(S, T) / size, components / size, atol=1e-14)
+    assert_allclose(rotated_stress(S, T) / size, components / size, atol=1e-14)
     expected = np.linalg.eigvalsh(full)[:, [0, 2]]
     for stress in (S, components):  # the angle of Lode loses half of the digits where two are equal
         assert_allclose(principal_stresses(stress) / size, expected / size, atol=1e-7)

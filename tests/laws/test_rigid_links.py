@@ -158,7 +158,7 @@ def test_what_rigid_links_give_is_part_of_the_error_of_the_step(case: str) -> No
     """Against steps an eighth as long; 1e-11 to 0.14 of it when marches in steps twice as long had links as stiff."""
     made, steps = CASES[case]
     ready = meshed(scene_from(made(steps)))
-    assert [x.turns_little for x in ready.model.step_limits if x] == [False]
+    assert [x.rotates_little for x in ready.model.step_limits if x] == [False]
     found = histories(ready)
     true = relative_errors(found, histories(meshed(scene_from(made(8 * steps)))))
     estimate = step_errors(ready, found)
@@ -171,8 +171,8 @@ def test_a_link_that_would_turn_too_far_in_longer_steps_is_judged_by_shorter_one
     """It is a ten-thousandth as stiff in steps twice as long: these would tell 20 times the true error, 1.6 %."""
     ready = meshed(scene_from(connected(60, rho_inf=0.9)))
     (limit,) = (x for x in ready.model.step_limits if x)
-    assert limit.turns_little
-    assert not limit.in_steps(2 * limit.step).turns_little
+    assert limit.rotates_little
+    assert not limit.in_steps(2 * limit.step).rotates_little
     found = histories(ready)
     true = relative_errors(found, histories(meshed(scene_from(connected(480, rho_inf=0.9)))))
     estimate = step_errors(ready, found)

@@ -11,7 +11,7 @@ from kedfem.links.beams.spatial_beam import space_strains
 from kedfem.links.beams.spatial_stress import metric
 from kedfem.links.record import Link
 from kedfem.links.reduced import reduced, rigid, rigid_functions
-from kedfem.links.stress_stiffness import stress_stiffness, turned_directions
+from kedfem.links.stress_stiffness import rotated_directions, stress_stiffness
 from kedfem.motion.newton import cross_matrix
 from kedfem.scene import Material
 from tests.verification.meshes import mapped_link, mapped_plane
@@ -55,7 +55,7 @@ def test_forces_turn_with_a_link_that_turns(name: str) -> None:
     assert_allclose(k @ link.X[:, : link.d], force, rtol=0, atol=rounding)
     assert_allclose(k @ link.one, 0, rtol=0, atol=1e-12 * np.abs(k).max())
     assert_allclose(k, k.T, rtol=0, atol=1e-13 * np.abs(k).max())
-    assert_allclose(turned_directions(link), np.eye(link.d), rtol=0, atol=0)
+    assert_allclose(rotated_directions(link), np.eye(link.d), rtol=0, atol=0)
 
 
 @pytest.mark.parametrize("kind", ["solid", "plane"])
@@ -88,10 +88,10 @@ def test_stress_stiffness_is_what_green_lagrange_strain_adds_to_the_energy(kind:
 def test_a_straight_planar_beam_is_stiffened_across_its_axis_only() -> None:
     link = beam_link("beam", np.array([[0.0, 0, 0], [0.6, 0.8, 0]]), rectangle(0.02, 0.01), SOFT, 4)
     t = np.array([0.6, 0.8, 0.0])
-    P = turned_directions(link)
+    P = rotated_directions(link)
     assert_allclose(P, np.diag([1.0, 1.0, 0.0]) - np.outer(t, t), rtol=0, atol=1e-14)
     bent = beam_link("beam", BENT, rectangle(0.02, 0.01), SOFT, 4)
-    assert_allclose(turned_directions(bent), np.diag([1.0, 1.0, 0.0]), rtol=0, atol=0)
+    assert_allclose(rotated_directions(bent), np.diag([1.0, 1.0, 0.0]), rtol=0, atol=0)
 
 
 @pytest.mark.parametrize("made", ["full", "rigid"])
@@ -109,7 +109,7 @@ def test_a_tie_pulls_back_across_its_axis_with_its_force_over_its_length(made: s
         g = np.linalg.lstsq(link.K0, force.ravel(), rcond=1e-12)[0].reshape(-1, 3)
         across = np.linalg.lstsq(link.Q, across, rcond=None)[0]
     k = stress_stiffness(link)(g)
-    P = turned_directions(link)
+    P = rotated_directions(link)
     assert_allclose(np.vdot(across, k @ across @ P), N * 1.0, rtol=1e-6)  # N L θ², L = θ = 1
 
 

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from kedfem.dynamics.system.forces.turning_loads import turned
+from kedfem.dynamics.system.forces.follower_loads import rotated_forces
 from kedfem.dynamics.system.ready import displacements
 from kedfem.frequencies import Wanted, frequencies
 from kedfem.scene import scene_from
@@ -220,7 +220,7 @@ def test_a_load_turns_with_a_rigid_link(plane: bool, drawn: str, tmp_path: Path)
     Q = Rotation.from_rotvec([0, 0, 0.8] if plane else [0.4, -0.9, 0.7]).as_matrix()[: link.d, : link.d]
     X = link.X[:, : link.d]
     u = (X @ Q.T - X)[None]
-    found = turned(link, load, np.eye(3)[None], u, np.array([2.0]))[0]
+    found = rotated_forces(link, load, np.eye(3)[None], u, np.array([2.0]))[0]
     assert_allclose(found, 2 * load.forces @ Q.T, atol=1e-9 * np.abs(load.forces).max())
     wanted = displacements(of.ready, system.names.index("arm"), marched(of, 20)[1].u)
     run = state(ran(raw)[1], 0, "u")[1:]

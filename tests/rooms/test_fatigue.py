@@ -74,7 +74,7 @@ def test_turning_under_a_fixed_force_is_the_guidelines_life_by_hand(along: Any, 
     assert a + M * m < STRENGTH
     assert_allclose(spot.damage, damage, rtol=1e-9)
     assert_allclose(found(done).hours(spot), 60 / 3600 / damage, rtol=1e-9)
-    assert_allclose(found(done).turns(spot), 1 / damage, rtol=1e-9)
+    assert_allclose(found(done).cycles(spot), 1 / damage, rtol=1e-9)
     assert_allclose(spot.utilisation, 1.5 * (spot.amplitude + M * spot.mean) / STRENGTH, rtol=1e-9)
     assert (spot.criterion, spot.cycles, found(done).unreliable) == ("signed von Mises", 1, "")
 

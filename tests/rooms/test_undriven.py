@@ -19,7 +19,15 @@ from kedfem.dynamics.stepping.start import initial_rates
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import as_rows, mass_times
 from kedfem.motion.rigid import resting
-from kedfem.scene import corotational, corotational_links, link_frames, read_scene, scene_from, time_grid, turn_steps
+from kedfem.scene import (
+    corotational,
+    corotational_links,
+    link_frames,
+    read_scene,
+    revolution_steps,
+    scene_from,
+    time_grid,
+)
 from kedfem.stepping import frame_steps
 from kedfem.tables import check_tables, moment
 from tests.scenes import arm, bar
@@ -111,7 +119,7 @@ def test_time_and_frames_are_counted_over_the_whole_analysis() -> None:
     scene = scene_from(tomllib.loads(ARM))
     grid = time_grid(scene)
     assert (grid.steps, grid.end) == (455, pytest.approx(0.5))
-    assert turn_steps(scene) is None
+    assert revolution_steps(scene) is None
     steps = frame_steps(scene)
     assert (len(steps), steps[0], steps[-1]) == (21, 0, 455)
     assert drive_range(scene) == (0.0, 0.0)

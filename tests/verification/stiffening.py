@@ -18,7 +18,7 @@ from kedfem.links.beams.spatial_beam import spatial_beam_link
 from kedfem.links.bodies import flywheel_tensor, with_body
 from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
-from kedfem.links.stress_stiffness import stress_stiffness, turned_directions
+from kedfem.links.stress_stiffness import rotated_directions, stress_stiffness
 from kedfem.links.surfaces.coupling_surfaces import joint_surface
 from kedfem.scene import Material, Scene, scene_from, time_grid
 
@@ -82,7 +82,7 @@ def solid(elements: int = 16) -> Supported:
 
 def stressed(link: Link, g: np.ndarray) -> sp.csr_array:
     """k ⊗ P, (dn, dn), of the stresses in a state g."""
-    return sp.kron(stress_stiffness(link)(g), turned_directions(link), format="csr")
+    return sp.kron(stress_stiffness(link)(g), rotated_directions(link), format="csr")
 
 
 # -- columns ------------------------------------------------------------------------------------------------

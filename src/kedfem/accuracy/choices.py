@@ -14,7 +14,7 @@ from kedfem.accuracy.trials import Trials
 from kedfem.accuracy.variants import TRIAL_STEPS, shortened, with_analysis, with_links, with_steps
 from kedfem.dynamics.stepping.levels import most_levels
 from kedfem.errors import KedfemError
-from kedfem.scene import LinkScene, Scene, scene_from, states_step, time_grid, turn_steps, without_vibration
+from kedfem.scene import LinkScene, Scene, revolution_steps, scene_from, states_step, time_grid, without_vibration
 
 FOLLOWED = 0.5  # of the accuracy: above this error of rigid-body frames, scenes of beams have co-rotational frames
 DEARER = 1.5  # the same for solid or plane links: these frames cost them more, and the estimate is cautious
@@ -231,7 +231,7 @@ def _resolving(
 
 def _fewest_rows(trial: Scene) -> int:
     """Least number of time points of a trial, for smooth curves and animations."""
-    turn = turn_steps(trial)
+    turn = revolution_steps(trial)
     return FEWEST if turn is None else max(FEWEST, math.ceil(ROWS * time_grid(trial).steps / turn))
 
 

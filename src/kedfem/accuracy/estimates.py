@@ -193,8 +193,8 @@ def step_errors(ready: Prepared, base: Histories) -> dict[str, float]:
     stay as stiff beside a step, half as long.
     """
     grid = time_grid(ready.scene)
-    firm = [x for x in ready.model.step_limits if x is not None and x.in_steps(grid.step).turns_little]
-    alike = all(x.in_steps(2 * grid.step).turns_little for x in firm)
+    firm = [x for x in ready.model.step_limits if x is not None and x.in_steps(grid.step).rotates_little]
+    alike = all(x.in_steps(2 * grid.step).rotates_little for x in firm)
     longer = alike and grid.steps // 2 >= max(fewest_steps(ready.scene), 4)
     h, steps = (2.0 * grid.step, grid.steps // 2) if longer else (0.5 * grid.step, 2 * grid.steps)
     scene = with_analysis(in_steps(ready.scene, h, steps), extrapolation_levels=1)

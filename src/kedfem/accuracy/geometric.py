@@ -34,7 +34,7 @@ import numpy as np
 from kedfem.arrays import Float, Int
 from kedfem.dynamics.history import Block, LinkHistory
 from kedfem.dynamics.joints.attachments import Attachment
-from kedfem.dynamics.joints.ports import turned_vectors
+from kedfem.dynamics.joints.ports import rotated_vectors
 from kedfem.dynamics.model import Model
 from kedfem.links.record import Link, in_space
 from kedfem.motion.rigid import RigidMotion
@@ -206,7 +206,7 @@ def axial_forces(
     """N at each cut, tension positive: what P − M R0'' − M δ'' and the port forces beyond it pull along the axis [N]."""
     affine = np.concatenate([motion.p2[:, body, None], motion.R2[:, body].transpose(0, 2, 1)], axis=1)
     force = in_space(link, of.beyond @ history.F - of.mass @ history.a) + of.mended @ affine
-    force += of.ports @ in_space(link, turned_vectors(joint, history.R, history.port_forces))
+    force += of.ports @ in_space(link, rotated_vectors(joint, history.R, history.port_forces))
     return np.asarray((force @ (motion.R[:, body] @ of.axis)[:, :, None])[:, :, 0])
 
 

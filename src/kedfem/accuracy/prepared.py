@@ -34,8 +34,8 @@ from kedfem.scene import (
     drive_angle,
     path_parameter,
     rayleigh,
+    revolution_steps,
     time_grid,
-    turn_steps,
 )
 from kedfem.store import contents
 
@@ -144,7 +144,7 @@ def damped_as(scene: Scene, model: Model) -> Model:
 def training_motion(full: Prepared) -> RigidMotion:
     """Rigid motion at the instants where the linkage is examined: over the whole time, the last turn more closely."""
     scene, grid = full.scene, time_grid(full.scene)
-    per_turn = turn_steps(scene)
+    per_turn = revolution_steps(scene)
     half = INSTANTS // 2
     t = grid.end * (np.arange(half) + 0.5) / half
     if per_turn is not None:

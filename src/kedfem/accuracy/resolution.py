@@ -25,8 +25,8 @@ from kedfem.scene import (
     enforced_by_equations,
     path_parameter,
     rayleigh,
+    revolution_steps,
     time_grid,
-    turn_steps,
 )
 
 POSES = 8  # of the last revolution at which the linkage is frozen
@@ -72,7 +72,7 @@ def resolution(ready: Prepared) -> Resolution | None:
     if ready.model.unknowns > LARGE or ready.linkage.mobility:
         return None
     scene, grid = ready.scene, time_grid(ready.scene)
-    turn = turn_steps(scene)
+    turn = revolution_steps(scene)
     span = min((turn or grid.steps) * grid.step, grid.end)
     t = grid.end - span * np.arange(POSES)[::-1] / POSES
     phi = path_parameter(scene, t)

@@ -9,7 +9,7 @@ import numpy as np
 from kedfem.dynamics.stepping.combined import level_weights
 from kedfem.dynamics.system.period.search import Periodic
 from kedfem.dynamics.system.steps import Steps
-from kedfem.scene import Scene, time_grid, turn_steps
+from kedfem.scene import Scene, revolution_steps, time_grid
 
 # oscillations in a step, five steps each: of faster ones a step does not determine whether they grow
 RESOLVED = 0.2
@@ -90,7 +90,7 @@ def steady_of(scene: Scene, solvers: Sequence[Steps]) -> Steady | None:
     found = [x for x in (getattr(each, "steady", None) for each in solvers) if isinstance(x, Periodic)]
     if not found:
         return None
-    turn, grid, growth, levels = turn_steps(scene), time_grid(scene), None, tuple[float, ...]()
+    turn, grid, growth, levels = revolution_steps(scene), time_grid(scene), None, tuple[float, ...]()
     if all(len(each.multipliers) for each in found):
         weights = level_weights(len(found), scene.analysis.rho_inf)
         levels = tuple(max(each.growth, 1e-300) for each in found)

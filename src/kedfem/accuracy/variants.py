@@ -5,7 +5,19 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 from kedfem.errors import MotionError
-from kedfem.scene import Bar, Cad, Extrusion, LinkScene, MeshFile, Part, PlateLink, Ramp, Scene, time_grid, turn_steps
+from kedfem.scene import (
+    Bar,
+    Cad,
+    Extrusion,
+    LinkScene,
+    MeshFile,
+    Part,
+    PlateLink,
+    Ramp,
+    Scene,
+    revolution_steps,
+    time_grid,
+)
 
 TRIAL_STEPS = 20_000  # of a trial run: of longer analyses only the beginning is run
 TURNS = 2  # of a trial run
@@ -50,7 +62,7 @@ def with_steps(scene: Scene, steps: int) -> Scene:
 
 def shortened(scene: Scene) -> Scene:
     """The beginning of an analysis that is too long for trials: TURNS of a rotating drive, after its run-up."""
-    grid, turn = time_grid(scene), turn_steps(scene)
+    grid, turn = time_grid(scene), revolution_steps(scene)
     span = grid.end
     if turn is not None:
         rises = scene.motion.time if isinstance(scene.motion, Ramp) else 0.0

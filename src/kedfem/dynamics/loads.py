@@ -46,7 +46,7 @@ class Pattern:
     factor : times (t,) and angles of the drive (t,) → factors (t,)
     share : unit vectors of the link in the reference position and of the world: the factor times their cosine, once the
         link has turned
-    own : turns as the link itself does, which no rigid-body orientation shows: `system.forces.turning_loads`
+    own : turns as the link itself does, which no rigid-body orientation shows: `system.forces.follower_loads`
     load : its name in the scene; of gravity none
     """
 
@@ -77,11 +77,11 @@ def patterns(scene: Scene, links: Mapping[str, Link], prescribed: bool = False) 
     for name, load in scene.loads.items():
         for key, found in _load_patterns(scene, f"loads.{name}", load, links).items():
             own = links[key].fit is not None and not prescribed
-            out[key] += [replace(x, own=own and _turns(links[key], x), load=name) for x in found]
+            out[key] += [replace(x, own=own and _follows(links[key], x), load=name) for x in found]
     return {key: tuple(found) for key, found in out.items()}
 
 
-def _turns(link: Link, pattern: Pattern) -> bool:
+def _follows(link: Link, pattern: Pattern) -> bool:
     """Whether a load depends on how its link has turned: ψ of a planar beam takes a torque however it has."""
     return pattern.follows and bool(pattern.forces[:, : 2 if link.kind == "beam" else 3].any())
 

@@ -12,7 +12,7 @@ from kedfem.dynamics.model import Model
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, joined, rigid_motion
-from kedfem.scene import ConstantSpeed, Scene, path_parameter, time_grid, turn_steps
+from kedfem.scene import ConstantSpeed, Scene, path_parameter, revolution_steps, time_grid
 
 POINTS = 1024  # time points of rigid motion found together
 KEPT = 20_000  # time points of a revolution whose rigid motion is kept
@@ -34,7 +34,7 @@ def motions(scene: Scene, linkage: Linkage, along: Path, since: int = 0) -> Iter
     no block goes on beyond its end.
     """
     grid, law = time_grid(scene), scene.motion
-    turn = (turn_steps(scene) or 0.0) * (along.period / (2 * np.pi) if along.periodic else 1.0)
+    turn = (revolution_steps(scene) or 0.0) * (along.period / (2 * np.pi) if along.periodic else 1.0)
     returns = isinstance(law, ConstantSpeed) and along.periodic and abs(turn - round(turn)) < 1e-9 * turn
     returns = returns and turn <= KEPT
     kept: list[RigidMotion] = []

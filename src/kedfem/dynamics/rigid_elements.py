@@ -22,7 +22,7 @@ from kedfem.dynamics.system.record import ANGLE, Curve, End, Law, Spring, Stop, 
 from kedfem.links.record import Link
 from kedfem.links.stations import Stations
 from kedfem.motion.constraints import cross
-from kedfem.motion.counted_turns import turn_of
+from kedfem.motion.counted_revolutions import angle_along
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, resting
@@ -139,7 +139,7 @@ class RigidElements:
         unit, q = exerted(each.term, each.ends, motion, None), value(each.term, each.ends, motion, None)
         if each.turns:
             tau = motion.t if motion.drives.shape[1] > 1 else motion.phi
-            near = turn_of(self.scene, self.linkage, self.along, each.turns, tau)
+            near = angle_along(self.scene, self.linkage, self.along, each.turns, tau)
             q = q + 2 * np.pi * np.round((near - q) / (2 * np.pi))
         rate = np.zeros(len(q))
         for end, x, f, t in unit:

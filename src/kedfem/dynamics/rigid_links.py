@@ -54,7 +54,7 @@ def made_rigid(
     elastic = [link for key, link in links.items() if key not in made]
     out, limits, soft = dict(links), {}, _mounts(scene)
     in_steps = not without_vibration(scene) and any(links[key].fit is not None for key in made)
-    turning = _turning(scene, linkage, along) if in_steps else {}
+    turning = _angular_speeds(scene, linkage, along) if in_steps else {}
     for key in made:
         link = _spread(_thickened(links[key]) if thicken else links[key])
         _with_extent(link)
@@ -85,7 +85,7 @@ def for_steps(model: Model, h: float, longest: float | None = None) -> Model:
     return replace(model, links=tuple(links), step_limits=tuple(limits))
 
 
-def _turning(scene: Scene, linkage: Linkage, along: Path | None) -> dict[str, float]:
+def _angular_speeds(scene: Scene, linkage: Linkage, along: Path | None) -> dict[str, float]:
     """How fast links turn that drives move [rad/s], at most."""
     if along is None or linkage.drive is None:
         return {}

@@ -28,13 +28,13 @@ from kedfem.dynamics.rigid_elements import RigidElements
 from kedfem.dynamics.stepping.state import Nodal
 from kedfem.links.record import Link, Matrix
 from kedfem.links.reduced import rigid_modes
-from kedfem.links.stress_stiffness import stress_stiffness, turned_directions
+from kedfem.links.stress_stiffness import rotated_directions, stress_stiffness
 from kedfem.motion.rigid import RigidMotion
 
 BALANCED = 1e-9  # of a load: what is left of one that only accelerates the link is rounding
 INDEPENDENT = 1e-10  # of the largest energy: loads below repeat others
 NEGLIGIBLE = 1e-12  # of the largest stress: rounding, as of what leaves the plane of a planar linkage
-Turning = Callable[[Nodal], Nodal]
+StressForce = Callable[[Nodal], Nodal]
 """k g P of a link at one time, from g."""
 
 
@@ -45,7 +45,7 @@ class StressModes:
     states : (m, n, d) g_i, without rigid motion, orthonormal in strain energy [1/√J times a state's unit]
     k : (m, z) their stress stiffness, entries of one sparsity pattern or all n² of dense matrices [N/m, times 1/√J]
     indices, indptr : of that pattern; None if dense
-    P : (d, d) `turned_directions`
+    P : (d, d) `rotated_directions`
     """
 
     states: Float[np.ndarray, "m n d"]
@@ -61,7 +61,7 @@ class StressModes:
             return data.reshape(n, n)
         return sp.csr_array((data, self.indices, self.indptr), shape=(n, n))
 
-    def turning(self, s: Float[np.ndarray, " m"]) -> Turning:
+    def force(self, s: Float[np.ndarray, " m"]) -> StressForce:
         """g → k g P."""
         k = self.stiffness(s)
         return lambda g: np.asarray(k @ (g @ self.P))
@@ -102,10 +102,10 @@ class Stiffening:
             F[k] = F[k] + more
         return F
 
-    def turnings(self, forcing: Sequence[Forcing], motion: RigidMotion) -> list[Turning]:
+    def stress_forces(self, forcing: Sequence[Forcing], motion: RigidMotion) -> list[StressForce]:
         """g → k g P of all links at the first time of a motion."""
         every = zip(self.modes, self.over(forcing, motion), strict=True)
-        return [modes.turning(now.factors[0]) for modes, now in every]
+        return [modes.force(now.factors[0]) for modes, now in every]
 
     def stiffness(self, forcing: Sequence[Forcing], motion: RigidMotion) -> list[Matrix]:
         """k ⊗ R P Rᵀ of all links at the first time of a motion, world frame, (dn, dn)."""
@@ -165,12 +165,12 @@ def stress_modes(link: Link, part: Substructure, loads: Sequence[Pattern], eleme
     kept = values > INDEPENDENT * values.max(initial=0.0)
     states = (g @ (vectors[:, kept] / size[:, None] / np.sqrt(values[kept]))).T.reshape(-1, link.n, link.d)
     of = stress_stiffness(link)
-    return StressModes(states, *_stacked([of(each) for each in states], link.n), turned_directions(link))
+    return StressModes(states, *_stacked([of(each) for each in states], link.n), rotated_directions(link))
 
 
 def _no_modes(link: Link) -> StressModes:
     none, pattern = np.zeros((0, link.n, link.d)), np.zeros(link.n + 1, np.int32)
-    return StressModes(none, np.zeros((0, 0)), pattern[:0], pattern, turned_directions(link))
+    return StressModes(none, np.zeros((0, 0)), pattern[:0], pattern, rotated_directions(link))
 
 
 def unit_loads(

@@ -7,7 +7,7 @@ from kedfem.accuracy.variants import moved
 from kedfem.dynamics.rigid_body import all_motions
 from kedfem.export.files import require_ending
 from kedfem.motion.assembly import assembled, assembly_warning
-from kedfem.motion.counted_turns import require_counted
+from kedfem.motion.counted_revolutions import require_counted
 from kedfem.output.motion_file import write_motion
 from kedfem.scene import Scene
 

@@ -20,7 +20,7 @@ from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.output.fields import LinkField
 from kedfem.output.frames import link_fields
-from kedfem.output.plots.frequencies import write_campbell, write_over_turn
+from kedfem.output.plots.frequencies import write_campbell, write_over_drive
 from kedfem.output.shapes import Shape, write_shapes
 from kedfem.output.words import clock, moment
 from kedfem.results import claimed
@@ -28,7 +28,7 @@ from kedfem.results.files import beside
 from kedfem.results.frequencies import CAMPBELL, FREQUENCIES, OVER_TURN, Summary, write_frequencies, write_summary
 from kedfem.results.recorded import drive_channel
 from kedfem.results.table import drive_heading
-from kedfem.scene import Scene, path_parameter, time_grid, turn_steps
+from kedfem.scene import Scene, path_parameter, revolution_steps, time_grid
 from kedfem.scene.records.units import RPM
 
 Watch = Callable[[str, int, int], None]
@@ -106,7 +106,7 @@ def frequencies(
     t = _positions(scene, wanted.positions)
     made, errors, meshes = frozen(scene, wanted.modes, t[0], _without_drives if wanted.free else None)
     scene, system, solver = made.scene, made.system, made.solver
-    turn = turn_steps(scene)
+    turn = revolution_steps(scene)
     speed = 2 * np.pi / (turn * time_grid(scene).step) if turn else 0.0
     phi, rate, change = path_parameter(scene, t)
     shares = SPEEDS if speed and scene.analysis.stiffening else (1.0,)
@@ -153,7 +153,7 @@ def _write_files(
     for name in (OVER_TURN, CAMPBELL):
         (target / name).unlink(missing_ok=True)
     if len(t) > 1:
-        write_over_turn(target / OVER_TURN, t, angle, values, bool(speed))
+        write_over_drive(target / OVER_TURN, t, angle, values, bool(speed))
     if speed:
         x = np.linspace(0.0, fastest if over.varies else SPEEDS[-1] * speed, POINTS)
         write_campbell(target / CAMPBELL, x, *over.bands(x), speed, wanted.harmonics)
@@ -232,6 +232,6 @@ def _positions(scene: Scene, count: int) -> Float[np.ndarray, " P"]:
     """Times at which the linkage is frozen."""
     if scene.driven is None:
         return np.zeros(1)
-    grid, turn = time_grid(scene), turn_steps(scene)
+    grid, turn = time_grid(scene), revolution_steps(scene)
     span = min(turn * grid.step, grid.end) if turn else grid.end
     return np.asarray(grid.end - span + span * np.arange(count) / count)

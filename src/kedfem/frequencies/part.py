@@ -132,7 +132,7 @@ def link_of_scene(scene: Scene, name: str, joints: Sequence[str] = ()) -> Part:
         _check(scene, name, joint)
     scene = unsimplified(scene)
     given, link = scene.links[name], single_link(scene, name)
-    support = together(link, [held_at(scene, joint, link, _turns(scene, joint)) for joint in joints])
+    support = together(link, [held_at(scene, joint, link, _constrained_rotations(scene, joint)) for joint in joints])
     folder = frequencies_folder(scene)
 
     def remade(given: LinkScene) -> Part:
@@ -159,7 +159,7 @@ def _check(scene: Scene, name: str, joint: str) -> None:
         raise SceneError(f"--hold: must be a joint without a bushing, got '{joint}', which has a bushing")
 
 
-def _turns(scene: Scene, joint: str) -> Float[np.ndarray, "r 3"]:
+def _constrained_rotations(scene: Scene, joint: str) -> Float[np.ndarray, "r 3"]:
     """Directions about which a joint constrains a link."""
     of = scene.joints[joint]
     if of.kind == "weld" or joint in scene.driven_joints:

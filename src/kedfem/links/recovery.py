@@ -209,7 +209,7 @@ def von_mises(stress: Float[np.ndarray, "p 6"]) -> Float[np.ndarray, " p"]:
     return np.asarray(np.sqrt(normal + 3 * (xy**2 + yz**2 + zx**2)))
 
 
-def turned_stress(stress: Float[np.ndarray, "p 6"], T: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "p 6"]:
+def rotated_stress(stress: Float[np.ndarray, "p 6"], T: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "p 6"]:
     """Stresses xx, yy, zz, xy, yz, zx in the axes that T takes components to: T S Tᵀ [same unit]."""
     units = np.zeros((6, 3, 3))
     for k, (i, j) in enumerate(COMPONENTS):

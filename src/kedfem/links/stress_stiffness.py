@@ -22,7 +22,7 @@ StressStiffness = Callable[[Float[np.ndarray, "n d"]], Matrix]
 ELEMENTS = 256  # taken together
 
 
-def turned_directions(link: Link) -> Float[np.ndarray, "d d"]:
+def rotated_directions(link: Link) -> Float[np.ndarray, "d d"]:
     """P, link frame, with which k acts on the rows of a state, k g P: the unit matrix, but for planar beams.
 
     Of these ψ does not take part, and of straight ones only what is across them: the strain of a beam's axis is that of

@@ -14,7 +14,7 @@ from kedfem.mesh.elements.hexahedra import SolidMesh, frame_along, placed, recta
 from kedfem.mesh.elements.quality import checked_mesh
 from kedfem.mesh.elements.tetrahedra import FORMS
 from kedfem.mesh.files.read import mesh_from_file
-from kedfem.mesh.layered.outlines import outline_quads, profile_outline, turned_outline
+from kedfem.mesh.layered.outlines import outline_quads, profile_outline, rotated_outline
 from kedfem.mesh.memory_forecast import NODES_EACH, check_count, check_room, check_size, size_key
 from kedfem.mesh.methods import NOTHING, KeptWhole, cad_mesh, file_axes, sizing
 from kedfem.mesh.planar.flat import Plate, QuadMesh, middle_mesh, swept_mesh
@@ -193,7 +193,7 @@ def part_plate(where: str, shape: Part, mesh: Meshing, folder: Path, kept_whole:
     """A plate that a file describes, between two points."""
     part = _part(where, shape, folder)
     origin, x_point = np.array(part.origin[:2]), np.array(part.x_point[:2])
-    outline = turned_outline(profile_outline(part), origin, x_point - origin)
+    outline = rotated_outline(profile_outline(part), origin, x_point - origin)
     P, Q = np.array(shape.between)
     axes = frame_along(Q - P)
     quads, note = outline_quads(where, outline, _sizing(mesh, kept_whole, P, axes))

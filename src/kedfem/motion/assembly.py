@@ -134,7 +134,7 @@ def _linearised(
     poses = _poses(x, centres, size)
     f = features(rows, poses)
     J = jacobian(rows, f, len(x) + 1, size)[0].reshape(rows.count, len(x), 6)
-    turning = _turning(x[:, 3:])  # ω = T θ', and v = d' − ω × R c
+    turning = _rotation_rates(x[:, 3:])  # ω = T θ', and v = d' − ω × R c
     arms = cross_matrix((poses[0][0, 1:] @ centres[..., None])[..., 0] / size)
     by_theta = np.einsum("mbi,bij->mbj", J[..., :3], arms @ turning)
     by_theta += np.einsum("mbi,bij->mbj", J[..., 3:], turning)
@@ -150,7 +150,7 @@ def _poses(x: Change, centres: Float[np.ndarray, "n 3"], size: float) -> Poses:
     return R[None], p[None]
 
 
-def _turning(theta: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3 3"]:
+def _rotation_rates(theta: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3 3"]:
     """T of ω = T θ', for exp([θ]×): I + (1 − cos θ)/θ² [θ]× + (θ − sin θ)/θ³ [θ]×²."""
     angle, W = np.linalg.norm(theta, axis=1)[:, None, None], cross_matrix(theta)
     safe = np.maximum(angle, 1e-3)

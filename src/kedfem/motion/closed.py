@@ -63,7 +63,7 @@ class Shift:
         moved = np.asarray(x) + self.d + (self.R - np.eye(3)) @ (np.asarray(x) - self.centre)
         return _three(moved)
 
-    def turned(self, a: XYZ) -> XYZ:
+    def rotated(self, a: XYZ) -> XYZ:
         """A direction, or a vector."""
         return _three(np.asarray(a) + (self.R - np.eye(3)) @ np.asarray(a))
 
@@ -113,7 +113,7 @@ def _moved(record: AnyRecord, shift: Shift) -> AnyRecord:
     given = [key for key in ("at", "centre") if getattr(record, key, None) is not None]
     change: dict[str, Any] = {key: shift.point(getattr(record, key)) for key in given}
     if getattr(record, "frame", None) == "link" and hasattr(record, "vector"):
-        change["vector"] = shift.turned(record.vector)
+        change["vector"] = shift.rotated(record.vector)
     if isinstance(record, Probe) and record.chord is not None:
         change["chord"] = tuple(shift.point(x) for x in record.chord)
     if isinstance(record, RigidBody):
@@ -138,9 +138,9 @@ def _joint(joint: Joint, shifts: Mapping[str, Shift]) -> Joint:
     along = {"slot": joint.links[1], "spherical": moving}.get(joint.kind, still)
     change: dict[str, Any] = {"at": shifts[of].point(joint.on(of))}
     if joint.axis is not None:
-        change["axis"] = shifts[along].turned(joint.axis)
+        change["axis"] = shifts[along].rotated(joint.axis)
     if joint.axes is not None:
-        change["axes"] = tuple(shifts[x].turned(a) for x, a in zip(joint.links, joint.axes, strict=True))
+        change["axes"] = tuple(shifts[x].rotated(a) for x, a in zip(joint.links, joint.axes, strict=True))
     if joint.faces:
         every = joint.faces.items()
         change["faces"] = {name: tuple(_face(x, shifts[name]) for x in named) for name, named in every}
@@ -152,7 +152,7 @@ def _face(face: FaceName, shift: Shift) -> FaceName:
     if isinstance(face, str):
         return face
     turned = {key: getattr(face, key) for key in ("plane", "axis") if getattr(face, key) is not None}
-    change: dict[str, Any] = {key: shift.turned(value) for key, value in turned.items()}
+    change: dict[str, Any] = {key: shift.rotated(value) for key, value in turned.items()}
     if face.near is not None:
         change["near"] = shift.point(face.near)
     return face.model_copy(update=change)
@@ -169,7 +169,7 @@ def _link(name: str, link: LinkScene, shift: Shift) -> LinkScene:
             points = tuple(shift.point(x) for x in line.points)
             change = {"points": points, "up": _up(where, line.up, _directions(line), shift)}
         case Bar() as bar:
-            up = bar.up if _tilt(shift, bar.upward) == 0.0 else shift.turned(bar.upward)
+            up = bar.up if _tilt(shift, bar.upward) == 0.0 else shift.rotated(bar.upward)
             change = {"between": tuple(shift.point(x) for x in bar.between), "up": up}
         case PlateLink() | Part() as shape:
             _check_level(where, shape.kind, shift)
@@ -197,8 +197,8 @@ def _placing(shape: Cad | MeshFile, shift: Shift) -> dict[str, Any]:
     along = (1.0, 0.0, 0.0) if shape.towards is None else _three(np.subtract(shape.towards, shape.origin))
     flat = math.hypot(*along[:2]) / math.hypot(*along)
     z = shape.z or ((0.0, 0.0, 1.0) if flat > 1e-9 else (1.0, 0.0, 0.0))
-    origin, turned = shift.point(shape.origin), shift.turned(z)
-    towards = _three(np.add(origin, shift.turned(along)))
+    origin, turned = shift.point(shape.origin), shift.rotated(z)
+    towards = _three(np.add(origin, shift.rotated(along)))
     return {"origin": origin, "towards": towards, "z": shape.z if turned == z else turned}
 
 
@@ -215,7 +215,7 @@ def _defaults(segments: list[tuple[XYZ, XYZ]]) -> list[XYZ]:
 
 def _tilt(shift: Shift, *ups: XYZ) -> float:
     """How far a motion turns directions [rad]."""
-    return max(math.dist(shift.turned(up), up) for up in ups)
+    return max(math.dist(shift.rotated(up), up) for up in ups)
 
 
 def _up(where: str, up: XYZ | None, segments: list[tuple[XYZ, XYZ]], shift: Shift) -> XYZ | None:
@@ -226,7 +226,7 @@ def _up(where: str, up: XYZ | None, segments: list[tuple[XYZ, XYZ]], shift: Shif
     if len(ups) > 1:
         wanted = "is required where closing the joints turns a line with steep parts"
         raise MotionError(f"{where}.up: {wanted}, got nothing")
-    return shift.turned(ups[0])
+    return shift.rotated(ups[0])
 
 
 def _check_level(where: str, kind: str, shift: Shift) -> None:

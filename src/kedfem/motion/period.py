@@ -21,7 +21,7 @@ from kedfem.scene import (
     factors,
     is_constant,
     path_parameter,
-    turn_steps,
+    revolution_steps,
 )
 
 WHOLE = 1e-9  # of a period: how near whole multiples must be
@@ -47,7 +47,7 @@ def over_one_period(scene: Scene) -> Scene:
     if base is None:
         raise SceneError("analysis.end_time: is required [s], the period of the steady motion, got nothing")
     count, time = _periods(scene, linkage(scene), base, STEADY)
-    stated, turns = scene.analysis.revolutions, turn_steps(scene) is not None
+    stated, turns = scene.analysis.revolutions, revolution_steps(scene) is not None
     if stated is not None and abs(stated - count) > WHOLE * count:
         message = f"must be left out, or the {count:g} of the period of the steady motion, got {stated:g}"
         raise SceneError(f"analysis.revolutions: {message}")

@@ -138,7 +138,7 @@ def _angle_convective(f: Features, wi: np.ndarray, wj: np.ndarray) -> np.ndarray
     return np.asarray((z2 / f.product - _dot(apart, f.rate) ** 2).imag)
 
 
-def turning(rows: Rows, f: Features, twists: Twists) -> Float[np.ndarray, "T A"]:
+def angle_rates(rows: Rows, f: Features, twists: Twists) -> Float[np.ndarray, "T A"]:
     """Rates of the angle rows."""
     omega, k = twists[1].T, rows.angles
     return np.asarray(_dot(f.about, omega[:, rows.i[k]] - omega[:, rows.j[k]]).T)

@@ -82,7 +82,7 @@ def draw_abscissa(top: Any, bottom: Any, along: Abscissa) -> None:
     if span > 361.0:
         revolutions = top.secondary_xaxis("top", functions=(lambda x: x / 360.0, lambda x: x * 360.0))
         revolutions.set_xlabel("revolutions")
-        revolutions.xaxis.set_major_locator(_turn_ticks(span / 360.0))
+        revolutions.xaxis.set_major_locator(_angle_ticks(span / 360.0))
 
 
 def _ticks(span: float) -> Any:
@@ -96,7 +96,7 @@ def _ticks(span: float) -> Any:
     return MultipleLocator(360.0 * revolutions)
 
 
-def _turn_ticks(revolutions: float) -> Any:
+def _angle_ticks(revolutions: float) -> Any:
     """Ticks at half revolutions if there are few, else at whole ones."""
     from matplotlib.ticker import MaxNLocator, MultipleLocator
 

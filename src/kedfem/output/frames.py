@@ -12,7 +12,7 @@ from kedfem.dynamics.history import LinkMoment, Snapshot
 from kedfem.dynamics.model import Model
 from kedfem.links.beams.spatial_recovery import drawn
 from kedfem.links.record import Link, in_space
-from kedfem.links.recovery import StressRecovery, extreme_stresses, nodal_state, nodal_stress, turned_stress
+from kedfem.links.recovery import StressRecovery, extreme_stresses, nodal_state, nodal_stress, rotated_stress
 from kedfem.mesh.cad.sides import boundary_sides, side_corners
 from kedfem.mesh.elements.shape_functions import HEX8
 from kedfem.motion.constraints import perpendiculars
@@ -117,7 +117,7 @@ def _in_world(link: Link, moment: LinkMoment, stress: Float[np.ndarray, "p 6"]) 
         return np.full_like(stress, np.nan)
     R = np.eye(3)
     R[: link.d, : link.d] = moment.R
-    return turned_stress(stress, R @ link.axes)
+    return rotated_stress(stress, R @ link.axes)
 
 
 def _section(link: Link) -> tuple[float, float, bool] | None:

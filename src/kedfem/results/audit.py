@@ -30,7 +30,7 @@ from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.stepping.state import Rayleigh
-from kedfem.dynamics.stiffening import Stiffening, StressModes, Turning
+from kedfem.dynamics.stiffening import Stiffening, StressForce, StressModes
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.balance import Balance, Flow, Stress, fields_of, flow, prescribed_fields, stress
 from kedfem.results.channels import Channel
@@ -169,7 +169,7 @@ class Account:
         at = rates_of_bodies(block.motion)
         for group in self._groups:
             of, links = [self.of[i] for i in group], [block.links[i] for i in group]
-            made = [partial(_turning, stresses.modes[i], forcing[i]) for i in group]
+            made = [partial(_stress_force, stresses.modes[i], forcing[i]) for i in group]
             more = stress(of, links, made, at.of(_bodies(of), of[0].k))
             found = Stress(found.power + more.power, found.stored + more.stored)
         return found
@@ -229,11 +229,11 @@ def balance_warning(found: Balance) -> tuple[str, ...]:
     )
 
 
-def _turning(modes: StressModes, forcing: Forcing, t: int) -> Turning:
+def _stress_force(modes: StressModes, forcing: Forcing, t: int) -> StressForce:
     """g → k g P of a link at a time point."""
     if forcing.stress is None:
         raise ValueError("stress factors must be there, got none")
-    return modes.turning(forcing.stress[t])
+    return modes.force(forcing.stress[t])
 
 
 def _grouped(of: Sequence[Constants], k: int) -> list[list[int]]:

@@ -10,8 +10,8 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.history import LinkHistory, Products
-from kedfem.dynamics.joints.ports import turned_vectors
-from kedfem.dynamics.stiffening import Turning
+from kedfem.dynamics.joints.ports import rotated_vectors
+from kedfem.dynamics.stiffening import StressForce
 from kedfem.results.forces.moments import Constants, Field, RigidRates, crossed, dot, rotated
 
 Scalars = Float[np.ndarray, " T"]
@@ -55,7 +55,10 @@ class Stress:
 
 
 def stress(
-    of: Sequence[Constants], histories: Sequence[LinkHistory], made: Sequence[Callable[[int], Turning]], at: RigidRates
+    of: Sequence[Constants],
+    histories: Sequence[LinkHistory],
+    made: Sequence[Callable[[int], StressForce]],
+    at: RigidRates,
 ) -> Stress:
     """Geometric stiffening of links that are all planar or all in space.
 
@@ -66,8 +69,8 @@ def stress(
     """
     S, T = len(of), len(histories[0].u)
     rows, power, stored = np.empty((of[0].fit.m, S, T)), np.zeros((S, T)), np.zeros(T)
-    for i, (x, history, turning) in enumerate(zip(of, histories, made, strict=True)):
-        f = np.stack([turning(t)(g) for t, g in enumerate(history.g)])
+    for i, (x, history, force_at) in enumerate(zip(of, histories, made, strict=True)):
+        f = np.stack([force_at(t)(g) for t, g in enumerate(history.g)])
         stored += 0.5 * dot(history.g, f)
         f = f @ history.R.transpose(0, 2, 1)
         x.fit.of(f, rows[:, i])
@@ -107,7 +110,7 @@ def fields_of(
     elastic = np.zeros((2 * k - 3, S, T)) if any(turns) else None
     for i, (x, history, product) in enumerate(zip(of, histories, made, strict=True)):
         v, F = history.v, history.F
-        f = turned_vectors(x.joint, history.R, history.port_forces)
+        f = rotated_vectors(x.joint, history.R, history.port_forces)
         for slot, (A, y) in enumerate(((x.weighted, v), (x.fit, F), (x.ports, f))):
             A.of(y, rows[slot, :, i])
         if elastic is not None and turns[i]:

@@ -59,7 +59,7 @@ def kinematics_of(scene: Scene, linkage: Linkage, along: Path, inertias: Inertia
         at = np.asarray(first if centre is None else centre)
         what = "joint" if centre is None else "centre of mass"
         every += _point(f"links/{name}", body, at, f"of the {what} of link {name}")
-        every += _turn(name, body, normal)
+        every += _orientation(name, body, normal)
     for name, joint in scene.joints.items():
         if GROUND not in joint.links:
             link = stated_link(scene, joint)
@@ -112,7 +112,7 @@ def _point(
     ]
 
 
-def _turn(
+def _orientation(
     name: str, body: int, normal: Float[np.ndarray, "3"] | None
 ) -> list[tuple[Channel, Callable[[RigidMotion], Rows]]]:
     """Orientation of a link and its rates: about the normal of the plane of motion, or in space."""

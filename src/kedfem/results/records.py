@@ -105,7 +105,7 @@ class Fatigue:
         """Life at a place [h]; infinite without damage."""
         return self.period / spot.damage / 3600 if spot.damage else math.inf
 
-    def turns(self, spot: FatigueSpot) -> float:
+    def cycles(self, spot: FatigueSpot) -> float:
         """Life at a place in revolutions of the drive, or in periods if the drive does not rotate continuously."""
         return (self.revolutions or 1.0) / spot.damage if spot.damage else math.inf
 

@@ -14,7 +14,7 @@ from kedfem.scene.questions.laws import (
 )
 from kedfem.scene.questions.modelling import corotational, corotational_links, driven_travel, link_frames, moving_grounds
 from kedfem.scene.questions.planes import plane_scene, spatial_beams
-from kedfem.scene.questions.timing import TimeGrid, cycle, states_step, time_grid, turn_steps, without_vibration
+from kedfem.scene.questions.timing import TimeGrid, cycle, revolution_steps, states_step, time_grid, without_vibration
 from kedfem.scene.read.files import part_geometry
 from kedfem.scene.read.scenes import (
     face_from,

@@ -23,7 +23,7 @@ from kedfem.errors import KedfemError, SceneError, Where, place
 from kedfem.motion.assembly import assembled
 from kedfem.results import Results
 from kedfem.resume import origin
-from kedfem.scene import Scene, scene_from, time_grid, turn_steps
+from kedfem.scene import Scene, revolution_steps, scene_from, time_grid
 from kedfem.sweep.axes import Value, with_values
 
 SETTLED = 0.01  # largest relative difference of the last two revolutions
@@ -182,7 +182,7 @@ def _ran(job: Job) -> Row:
     found = extremes(results, since)
     for name, peak in run.peaks.items():
         found[STRESS.format(name)] = ("Pa", (peak.stress, math.nan, math.nan, peak.time))
-    turn, unknown = turn_steps(scene), (math.nan,) * 3
+    turn, unknown = revolution_steps(scene), (math.nan,) * 3
     if run.steady is not None:
         if run.steady.growth is not None:
             found[GROWTH] = ("1", (run.steady.growth, *unknown))
@@ -211,7 +211,7 @@ def _ends(job: Job) -> tuple[Scene, ...]:
 def _since(scene: Scene, last: float) -> float:
     """The time [s] after which extremes count, between two steps; before the start where the drive makes no turns
     and where one period, or each position by itself, is found."""
-    turn, grid = turn_steps(scene), time_grid(scene)
+    turn, grid = revolution_steps(scene), time_grid(scene)
     if turn is None or scene.analysis.kind != "transient":
         return -0.5 * grid.step
     if last * turn > grid.steps + 0.5:

@@ -36,7 +36,7 @@ from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.forces.force_elements import element_forces
 from kedfem.results.recording import recording
 from kedfem.scene import Curve, Limit, LineSpring, Scene, Spring, is_constant, time_grid
-from kedfem.scene.questions.timing import turn_steps
+from kedfem.scene.questions.timing import revolution_steps
 from kedfem.stepping import Watched, frame_steps, stepped
 from kedfem.tables.layout import facts
 from kedfem.tables.model import link_tables, mobility_table
@@ -114,7 +114,7 @@ def seconds_of_frame(ready: Prepared, recoveries: list[StressRecovery], now: Sna
 
 def resolution_table(found: Resolution, scene: Scene) -> Table:
     """First frequency of the linkage against step and drive."""
-    span = "over the last revolution" if turn_steps(scene) else "over the analysis"
+    span = "over the last revolution" if revolution_steps(scene) else "over the analysis"
     low, high = found.first.min(), found.first.max()
     return facts("First frequency (drive held, of what the loads excite)", [
         (span, f"{low:.4g} Hz" if high < 1.001 * low else f"{low:.4g} to {high:.4g} Hz"),

@@ -153,7 +153,7 @@ def fatigue_table(found: Fatigue) -> Table:
     caption = Text("\n".join(fatigue_notes(found)))
     table = listed("Fatigue, by the last period", columns, caption=caption)
     for name, (worst, *_) in ((name, spots) for name, spots in found.spots.items() if spots):
-        lives = [f"{x:.3g}" if x < ENDLESS else "endless" for x in (found.hours(worst), found.turns(worst))]
+        lives = [f"{x:.3g}" if x < ENDLESS else "endless" for x in (found.hours(worst), found.cycles(worst))]
         cycle = f"{worst.mean / 1e6:.3g} ± {worst.amplitude / 1e6:.3g} MPa"
         table.add_row(name, *lives, percent(worst.utilisation), cycle, place_of(worst.place))
     return table

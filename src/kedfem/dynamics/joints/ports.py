@@ -45,18 +45,18 @@ def add_port_forces(out: Nodal, attachment: Attachment, force: Float[np.ndarray,
     out[attachment.nodes] += attachment.weights.T @ port_vectors(attachment, force)
 
 
-def turned_vectors(
+def rotated_vectors(
     attachment: Attachment, R: Float[np.ndarray, "T d d"], force: Float[np.ndarray, "T q"]
 ) -> Float[np.ndarray, "T p d"]:
     """R λ over time, a row per port in world components, zero where a component is not held."""
     return np.asarray(port_vectors(attachment, force) @ R.transpose(0, 2, 1))
 
 
-def turned_ports(
+def rotated_ports(
     attachment: Attachment, R: Float[np.ndarray, "T d d"], force: Float[np.ndarray, "T q"]
 ) -> Float[np.ndarray, "T q"]:
     """R λ over time: port forces of the link frame in world components."""
-    return turned_vectors(attachment, R, force).reshape(len(force), -1)[:, attachment.keep]
+    return rotated_vectors(attachment, R, force).reshape(len(force), -1)[:, attachment.keep]
 
 
 def in_balance(link: Link, joint: Attachment, S: Float[np.ndarray, "c c"]) -> Float[np.ndarray, "c c"]:

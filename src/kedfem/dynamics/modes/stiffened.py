@@ -90,13 +90,13 @@ class Stiffened:
         ):
             s = np.zeros(len(modes.k)) if force.stress is None else force.stress[0]
             R = motion.R[0, body]
-            added = sp.kron(modes.stiffness(s), modes.P) + _turning(link, R.T @ motion.omega[0, body])
+            added = sp.kron(modes.stiffness(s), modes.P) + _rotation_inertia(link, R.T @ motion.omega[0, body])
             links.append(replace(link, K0=_plus(link.K0, added)))
             shift = max(shift, AMPLE * _unstable(rigid, added))
         return replace(self.system, model=replace(model, links=tuple(links))), shift
 
 
-def _turning(link: Link, omega: Float[np.ndarray, "3"]) -> sp.csr_array:
+def _rotation_inertia(link: Link, omega: Float[np.ndarray, "3"]) -> sp.csr_array:
     """M Ω̃², (dn, dn)."""
     space = 2 if link.planar else 3
     W = np.zeros((link.d, link.d))

@@ -9,7 +9,7 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.dynamics.frames import mean_rotations, position
 from kedfem.dynamics.history import Block, LinkHistory, multipliers_together
-from kedfem.dynamics.joints.ports import turned_vectors
+from kedfem.dynamics.joints.ports import rotated_vectors
 from kedfem.dynamics.model import Model
 from kedfem.motion.rigid import RigidMotion
 
@@ -95,5 +95,5 @@ def _fields(model: Model, k: int, block: Block) -> Fields:
     link, history = model.links[k], block.links[k]
     out = {name: getattr(history, name) for name in LINEAR}
     if link.fit is not None:
-        out["port_forces"] = turned_vectors(model.joints[k], history.R, history.port_forces)
+        out["port_forces"] = rotated_vectors(model.joints[k], history.R, history.port_forces)
     return out

@@ -26,14 +26,14 @@ class StepLimit:
     longest: float
 
     @property
-    def turns_little(self) -> bool:
+    def rotates_little(self) -> bool:
         """Whether it may be FIRM."""
         return self.turning * self.longest <= self.stable_rotation
 
     @property
     def frequency(self) -> float:
         """ω [rad/s]."""
-        return min(self.highest, (FIRM if self.turns_little else RESOLVED) / self.step)
+        return min(self.highest, (FIRM if self.rotates_little else RESOLVED) / self.step)
 
     def in_steps(self, h: float, longest: float | None = None) -> "StepLimit":
         """The same in other steps."""

@@ -62,10 +62,10 @@ class Beams(namedtuple("Beams", "segment body at stride rows tangent rigidity"))
     """Planar beams with strains at points, as `beams_kernel` takes them."""
 
 
-class TurningLoads(namedtuple("TurningLoads", (
+class FollowerLoads(namedtuple("FollowerLoads", (
     "body force_at shown_at planar_beam drawn shown force axis fixed"
 ))):  # fmt: skip
-    """Loads that turn with bodies, as directions shown by the body turn; see `turning_loads`.
+    """Loads that turn with bodies, as directions shown by the body turn; see `follower_loads`.
 
     body, at : (w,) number, and where its coordinates' share of `force` and its functions' of `shown` begin, thrice those
     planar_beam : (w,) whether an angle shows how it turns

@@ -10,9 +10,9 @@ from kedfem.dynamics.beams_kernel import bent
 from kedfem.dynamics.frames_kernel import entry
 from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, turned, turned_back
 from kedfem.dynamics.system.corotational_kernel import corotational_end, corotational_force, unforeseen
+from kedfem.dynamics.system.follower_loads_kernel import add_follower_loads
 from kedfem.dynamics.system.products_kernel import mass_times
 from kedfem.dynamics.system.record import COROTATIONAL, RIGID_BODY, TANGENTIAL
-from kedfem.dynamics.system.turning_kernel import turned_loads
 
 
 @inner
@@ -122,7 +122,7 @@ def internal_forces(c, bodies, R, amounts, state, trial, work, first):  # type: 
             corotational_force(bodies.K, c, bodies, i, R, state, trial, work, first)
         if bodies.frame[i] > RIGID_BODY and c.alpha != 0.0:
             mass_damped(c, bodies, i, R[bodies.motion[i]], trial.u, state, trial, work)
-    turned_loads(bodies.turning, bodies, R, amounts, trial.u, f, work.frame)
+    add_follower_loads(bodies.turning, bodies, R, amounts, trial.u, f, work.frame)
 
 
 @inner

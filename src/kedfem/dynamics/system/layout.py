@@ -15,8 +15,8 @@ from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.dynamics.system import record
 from kedfem.dynamics.system.arrays import Beams, Bodies, Coefficients, Constraints, Ends, ends_of, flat, groups
+from kedfem.dynamics.system.forces.follower_loads import follower_loads
 from kedfem.dynamics.system.forces.stresses import stress_tables
-from kedfem.dynamics.system.forces.turning_loads import turning_loads
 from kedfem.dynamics.system.record import Constraint, Curve, Driven, Held, Law, Spring, Stop, System, curve_of
 from kedfem.dynamics.system.sparse import (
     Part,
@@ -103,7 +103,7 @@ def body_arrays(system: System, parts: Sequence[Part], profile: Profile) -> Bodi
             *_beam_tables([links[k] for k in beams], [parts[k] for k in beams]),
         ),
         elements=element_tables(links, parts), mass=mass_tables(links, parts),
-        turning=turning_loads(links, parts, model.loads),
+        turning=follower_loads(links, parts, model.loads),
         stiffness=stiffness_tables(links, parts, [frame == record.COROTATIONAL for frame in frames]),
         size=np.array([1.0 if whole else mass_of(link) for link, whole in zip(links, dense, strict=True)]),
         rigid=np.array([x.rigid and frame == record.COROTATIONAL for x, frame in zip(links, frames, strict=True)], bool),

@@ -11,8 +11,8 @@ from kedfem.dynamics.rigid_body import forcing_of, forcings
 from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.dynamics.system.arrays import Bodies, Coefficients, Constraints, Ends
 from kedfem.dynamics.system.ends import line_weights
+from kedfem.dynamics.system.forces.follower_loads import own_patterns
 from kedfem.dynamics.system.forces.stresses import NO_TERMS, Stressed, stressed
-from kedfem.dynamics.system.forces.turning_loads import turning
 from kedfem.dynamics.system.layout import TOLERANCE, as_arrays, coefficients, factored
 from kedfem.dynamics.system.record import System, is_affine, stiffness_factors, without_unknowns
 from kedfem.dynamics.system.sparse import Part
@@ -80,7 +80,7 @@ def driving(of: Ready, motion: RigidMotion, loads: Loads | None = None) -> Drivi
 
 def amounts(of: Ready, motion: RigidMotion) -> Float[np.ndarray, "T w"]:
     """Amounts of the loads that turn with bodies over time."""
-    every = [load.factor(motion.t, motion.phi) for _, load in turning(of.system.model.loads)]
+    every = [load.factor(motion.t, motion.phi) for _, load in own_patterns(of.system.model.loads)]
     return np.stack(every, axis=1) if every else np.zeros((len(motion.t), 0))
 
 

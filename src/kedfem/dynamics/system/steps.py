@@ -14,7 +14,7 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Forcing, LinkHistory, Multipliers, Products
 from kedfem.dynamics.joints.coupling import joined
-from kedfem.dynamics.joints.ports import port_columns, turned_ports
+from kedfem.dynamics.joints.ports import port_columns, rotated_ports
 from kedfem.dynamics.loads import initial_forces
 from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.model import Model
@@ -23,8 +23,8 @@ from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.dynamics.stiffening import Stiffening
 from kedfem.dynamics.system.build import system_of
 from kedfem.dynamics.system.forces.exerted import on_links
+from kedfem.dynamics.system.forces.follower_loads import own_patterns, rotated_forces
 from kedfem.dynamics.system.forces.supports import Supports
-from kedfem.dynamics.system.forces.turning_loads import turned, turning
 from kedfem.dynamics.system.layout import points_of
 from kedfem.dynamics.system.march import march
 from kedfem.dynamics.system.period.krylov import Watch
@@ -180,13 +180,13 @@ class Steps:
         multipliers = multipliers_of(self.ready, found)
         acting = on_links(Supports(multipliers, motion), self.riders) if self.elements else {}
         every = [self._link(k, found, each, acting.get(k)) for k, each in enumerate(forcing)]
-        return self._with_turning_loads(every, motion) if self.corotational else every, multipliers
+        return self._with_follower_loads(every, motion) if self.corotational else every, multipliers
 
-    def _with_turning_loads(self, every: list[LinkHistory], motion: RigidMotion) -> list[LinkHistory]:
+    def _with_follower_loads(self, every: list[LinkHistory], motion: RigidMotion) -> list[LinkHistory]:
         """Forces F with those of loads that turn with links."""
-        for k, load in turning(self.model.loads):
+        for k, load in own_patterns(self.model.loads):
             R, factor = motion.R[:, self.model.bodies[k]], load.factor(motion.t, motion.phi)
-            every[k] = replace(every[k], F=every[k].F + turned(self.links[k], load, R, every[k].u, factor))
+            every[k] = replace(every[k], F=every[k].F + rotated_forces(self.links[k], load, R, every[k].u, factor))
         return every
 
     def _link(self, k: int, found: History, forcing: Forcing, acting: Rows | None = None) -> LinkHistory:
@@ -196,7 +196,7 @@ class Steps:
         R = found.R[:, k, : link.d, : link.d].copy() if self.corotational else forcing.R
         F = forcing.F if acting is None else forcing.F + acting
         at = slice(of.bodies.port_at[k], of.bodies.port_at[k + 1])
-        force = turned_ports(of.system.model.joints[k], R.transpose(0, 2, 1), found.port_force[:, at])
+        force = rotated_ports(of.system.model.joints[k], R.transpose(0, 2, 1), found.port_force[:, at])
         to_ports, inverse = self._to_ports[k], self._inverse[k]
         if to_ports is not None and inverse is not None:
             force = force @ to_ports.T

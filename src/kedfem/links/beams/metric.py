@@ -108,14 +108,14 @@ def pulled_back(
     on_d = (v1 * x + a11 * d1 + a12 * d2 - t / 2 * s2, v2 * x + a22 * d2 + a12 * d1 + t / 2 * s1)
     on_s = (m1 * x + t / 2 * d2, m2 * x - t / 2 * d1)
     torque = sum(np.cross(d[..., i, :], element.N.T @ on_d[i] + element.D.T @ on_s[i]) for i in range(2))
-    on_g = _turning(element, g, Q, np.asarray(torque))
+    on_g = _torque_forces(element, g, Q, np.asarray(torque))
     first, second = (np.eye(len(element.node))[:, each] for each in element.pairs.T)
     c = (_pair_factors(element) * stress[..., 6 * E :])[..., None]
     on_g += first @ (c * (second.T @ g)) + second @ (c * (first.T @ g))
     return np.asarray(element.tangents.T @ on_x + element.gradients.T @ on_g)
 
 
-def _turning(
+def _torque_forces(
     element: BeamElement, g: Float[np.ndarray, "*#b k 3"], Q: Float[np.ndarray, "*#b m 3 3"],
     torque: Float[np.ndarray, "*#b m 3"],
 ) -> Float[np.ndarray, "*#b k 3"]:  # fmt: skip

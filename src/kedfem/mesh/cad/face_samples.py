@@ -33,7 +33,7 @@ class FaceSamples:
     places: Float[np.ndarray, "q 3"]
     normals: Float[np.ndarray, "q 3"]
 
-    def turns_about(self, axis: Axis) -> bool:
+    def revolves_about(self, axis: Axis) -> bool:
         """Whether all normals meet the axis or are along it."""
         return bool(abs(np.cross(self.places - axis[0], self.normals) @ axis[1]).max(initial=0) < OFF)
 

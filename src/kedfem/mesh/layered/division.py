@@ -61,14 +61,14 @@ def divided(plan: Plan, size: float, sizing: Sizing) -> tuple[Division, tuple[Ma
     size : by the solid's extent [-]
     sizing : its `turn`, `hollow` and `kept` places
     """
-    sizes = _sizes(plan, size, _turns(plan, sizing))
+    sizes = _sizes(plan, size, _rotations(plan, sizing))
     measures = [_measure(curve, local) for curve, local in zip(plan.curves, sizes, strict=True)]
     counts = [2 * max(1, int(np.ceil(measure[-1] / 2 - 0.25))) for measure in measures]
     fitting = mappings(plan, counts)
     return _nodes(plan, counts, measures, fitting), fitting
 
 
-def _turns(plan: Plan, sizing: Sizing) -> list[Float[np.ndarray, " m"]]:
+def _rotations(plan: Plan, sizing: Sizing) -> list[Float[np.ndarray, " m"]]:
     """Most that an element turns at the samples of each curve [rad]: less along walls that are hollow."""
     out = [np.full(len(curve.samples), sizing.turn) for curve in plan.curves]
     if sizing.hollow >= sizing.turn:

@@ -55,7 +55,7 @@ def profile_outline(profile: Profile) -> Outline:
     return Outline(corners, edges, centres, np.array([hole.diameter / 2 for hole in profile.holes]))
 
 
-def turned_outline(outline: Outline, origin: Float[np.ndarray, "2"], axis: Float[np.ndarray, "2"]) -> Outline:
+def rotated_outline(outline: Outline, origin: Float[np.ndarray, "2"], axis: Float[np.ndarray, "2"]) -> Outline:
     """The outline in a frame at `origin` [m] whose x runs along `axis`."""
     x = axis / np.linalg.norm(axis)
     to_frame = np.array([[x[0], -x[1]], [x[1], x[0]]])

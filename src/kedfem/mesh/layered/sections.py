@@ -32,7 +32,7 @@ class _Piece:
     bends: Float[np.ndarray, " m"]
     tangents: Float[np.ndarray, "2 2"]
 
-    def turned(self) -> "_Piece":
+    def reversed(self) -> "_Piece":
         """The curve run through from its end."""
         return _Piece(
             self.tag, self.ends[::-1], self.parameters[::-1], self.lengths[-1] - self.lengths[::-1],
@@ -192,11 +192,11 @@ def _chains(pieces: dict[int, _Piece]) -> list[list[_Piece]]:
     left, chains = dict(pieces), []
     while left:
         chain = [left.pop(next(iter(left)))]
-        for _ in (0, 1):  # forward from its end, then, turned, from its start
+        for _ in (0, 1):  # forward from its end, then, reversed, from its start
             while (follower := _follower(chain, at, left)) is not None:
                 chain.append(follower)
                 del left[follower.tag]
-            chain = [piece.turned() for piece in reversed(chain)]
+            chain = [piece.reversed() for piece in reversed(chain)]
         chains.append(chain)
     return chains
 
@@ -208,7 +208,7 @@ def _follower(chain: list[_Piece], at: dict[int, list[int]], left: dict[int, _Pi
     if len(at[end]) != 2 or len(others) != 1:
         return None
     piece = left[others[0]]
-    piece = piece if piece.ends[0] == end else piece.turned()
+    piece = piece if piece.ends[0] == end else piece.reversed()
     tangent = last.tangents[1] @ piece.tangents[0] > 1 - 1e-8
     same_bend = abs(last.bends[-1] - piece.bends[0]) < 1e-4 * (1 + last.bends[-1])
     return piece if tangent and same_bend else None

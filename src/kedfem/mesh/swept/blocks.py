@@ -68,7 +68,7 @@ def _boundary(gmsh: ModuleType, dim: int, tag: int) -> list[int]:
 def _counts(gmsh: ModuleType, solid: Solid, groups: list[set[int]], sizing: Sizing) -> list[int]:
     """Elements along each set of edges."""
     lengths = [[float(gmsh.model.occ.getMass(1, edge)) for edge in group] for group in groups]
-    turns = [max(_turn(gmsh, edge) for edge in group) for group in groups]
+    turns = [max(_rotation(gmsh, edge) for edge in group) for group in groups]
     if sizing.size is not None:
         size = sizing.size / solid.extent
     else:
@@ -81,8 +81,8 @@ def _counts(gmsh: ModuleType, solid: Solid, groups: list[set[int]], sizing: Sizi
     ]
 
 
-def _turn(gmsh: ModuleType, edge: int) -> float:
-    """Angle by which an edge turns from end to end."""
+def _rotation(gmsh: ModuleType, edge: int) -> float:
+    """Angle between the tangents at both ends of an edge."""
     low, high = (float(bound[0]) for bound in gmsh.model.getParametrizationBounds(1, edge))
     slopes = np.reshape(gmsh.model.getDerivative(1, edge, np.linspace(low, high, 33)), (-1, 3))
     along = slopes / np.linalg.norm(slopes, axis=1, keepdims=True)

@@ -202,7 +202,7 @@ def _motions(solid: Solid, walls: list[FaceSamples], frame: Frame) -> Iterator[L
         return
     for point, axis in common_axes(solid, walls):
         arm = own - point - ((own - point) @ axis) * axis
-        if max(abs(axis @ ahead), abs(arm @ ahead)) < OFF and all(wall.turns_about((point, axis)) for wall in walls):
+        if max(abs(axis @ ahead), abs(arm @ ahead)) < OFF and all(wall.revolves_about((point, axis)) for wall in walls):
             yield Leg(frame, solid.extent * arm)
 
 

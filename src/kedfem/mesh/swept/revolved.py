@@ -56,7 +56,7 @@ def revolution(gmsh: ModuleType, solid: Solid) -> Frame:
     every = list(face_samples(gmsh, solid).values())
     obstacles: list[tuple[float, str]] = []
     for axis in common_axes(solid, every):
-        others = [look.face for look in every if not look.turns_about(axis)]
+        others = [look.face for look in every if not look.revolves_about(axis)]
         if not others:
             return _framed(gmsh, solid, every, axis)
         words = face_in_words(max(others, key=lambda face: face.area))
@@ -83,7 +83,7 @@ def _mesh_about(gmsh: ModuleType, solid: Solid, turn: Frame, sizing: Sizing, sha
     with _meridian(gmsh, solid, turn, sizing, share) as meridian:
         flat = plan_mesh(solid.name, meridian.outside, meridian.size, sizing)
         around = _elements_around(meridian, sizing)
-        mesh = _turned(flat, around)
+        mesh = _revolved(flat, around)
         for region in meridian.inside:
             mesh = _with_core(mesh, flat, meridian, region, around)
     about = direction_in_words(turn.axes[0])
@@ -160,7 +160,7 @@ def _elements_around(meridian: _Meridian, sizing: Sizing) -> int:
     return 4 * max(2, round(float(wanted) / 4))
 
 
-def _turned(flat: PlanMesh, around: int) -> SolidMesh:
+def _revolved(flat: PlanMesh, around: int) -> SolidMesh:
     """The section's cells swept through a turn: x along the axis, y and z across it, by the solid's extent."""
     count = len(flat.points)
     mesh = in_layers(flat.points, np.arange(2 * around + 1.0), flat.cells)

@@ -15,7 +15,7 @@ from kedfem.motion.batch import Choice, Moving, settled
 from kedfem.motion.linkage import Linkage, resting_poses
 from kedfem.motion.messages import stopped
 from kedfem.motion.newton import OPEN, SETTLED, TINY, agree, cross_matrix, orthonormal, target
-from kedfem.motion.values import Poses, features, turning
+from kedfem.motion.values import Poses, angle_rates, features
 
 JUMP = 0.02  # of the size [-, rad]: a prediction that far off may lead to another branch
 CONTRACTION = 0.1  # Newton's second step against its first: well within the branch's own basin
@@ -113,7 +113,7 @@ def _settled(
     if len(steps) > 1:
         good &= steps[1] <= CONTRACTION * steps[0] + SETTLED
     shape, near = shapes(got), factor.f.value[link.rows.angles].T
-    turns = turning(link.rows, factor.f, got.first)
+    turns = angle_rates(link.rows, factor.f, got.first)
     return [
         GridPoint(float(tau[k]), shape[:, k], near[k], turns[k], fastest[k], steps[0][k], factor.J[k])
         for k in range(len(tau) if good.all() else int(good.argmin()))

@@ -83,7 +83,7 @@ def _grid(link: Linkage, low: float, high: float, period: float, step: float) ->
     ahead, behind = [start], [start]
     if high > period or low < -period:
         forwards = high > period
-        once = _turns(link, start, step, period, high if forwards else low)
+        once = _revolutions(link, start, step, period, high if forwards else low)
         turns = round(abs(once[-1].tau) / period)
         if _returned(link, start, once[-1]) and abs(abs(once[-1].tau) - turns * period) < ROUNDING * period:
             return once if forwards else once[::-1], turns * period
@@ -93,7 +93,7 @@ def _grid(link: Linkage, low: float, high: float, period: float, step: float) ->
     return behind[:0:-1] + ahead, np.inf
 
 
-def _turns(link: Linkage, start: GridPoint, step: float, period: float, end: float) -> list[GridPoint]:
+def _revolutions(link: Linkage, start: GridPoint, step: float, period: float, end: float) -> list[GridPoint]:
     """Turn by turn, until the linkage is back or the end reached; at most so many revolutions."""
     out = [start]
     for turn in range(1, MOST_TURNS + 1):

@@ -9,7 +9,7 @@ from kedfem.output.plots.drawing import draw_legend, figure_saved
 from kedfem.scene.records.units import RPM
 
 
-def write_over_turn(
+def write_over_drive(
     path: Path, t: Float[np.ndarray, " P"], angle: Float[np.ndarray, " P"], values: Float[np.ndarray, "P f"],
     revolutions: bool,
 ) -> None:  # fmt: skip

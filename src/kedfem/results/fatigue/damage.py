@@ -17,7 +17,7 @@ from kedfem.results.records import Fatigue, FatigueSpot
 from kedfem.results.stresses.envelope import Envelope
 from kedfem.results.stresses.peaks import drawn_points, places_apart, within
 from kedfem.scene import Fatigue as FatigueSettings
-from kedfem.scene import Scene, time_grid, turn_steps, without_vibration
+from kedfem.scene import Scene, revolution_steps, time_grid, without_vibration
 
 MOST = 5  # hot spots of a link
 REPEATS = 0.01  # of a link's highest stress: by how much two periods may differ
@@ -59,7 +59,7 @@ def fatigue_of(
     of = {name: {k: x for k, x in surfaces.items() if x.name == name} for name in strengths}
     spots = {name: _spots(each, fields, asked, period) for name, each in of.items()}
     repeats = max((surface.repeats for surface in surfaces.values()), default=0.0)
-    turn = turn_steps(scene)
+    turn = revolution_steps(scene)
     elastic = dict.fromkeys(link.name for link in model.links if not link.rigid)
     return Fatigue(
         length, length / (turn * time_grid(scene).step) if turn else 0.0,

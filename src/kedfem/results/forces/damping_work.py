@@ -77,10 +77,10 @@ def damping_work(
     taken /= np.where(h > 0, h, 1.0)
     if not len(which):
         return DampingWork(taken, np.zeros(len(t)))
-    return DampingWork(taken, _turning(rows, arms, _mean(at.of(bodies, k), before.at.of(bodies, k))))
+    return DampingWork(taken, _drag(rows, arms, _mean(at.of(bodies, k), before.at.of(bodies, k))))
 
 
-def _turning(rows: Float[np.ndarray, "m S T"], arms: Float[np.ndarray, "c S T"], at: RigidRates) -> Scalars:
+def _drag(rows: Float[np.ndarray, "m S T"], arms: Float[np.ndarray, "c S T"], at: RigidRates) -> Scalars:
     """Drag of damping forces that turn with the rigid-body motion."""
     y = rows[:-1].reshape(at.rates.shape[1:])
     moment = turned(y[1:]) + arms

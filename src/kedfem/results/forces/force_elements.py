@@ -68,7 +68,7 @@ class ElementForces:
             out += (f * (v - cross(omega, motion.p[:, body])) + m * omega).sum(axis=1)
         return out
 
-    def turns(self, block: Block) -> Float[np.ndarray, "T A"]:
+    def rotations(self, block: Block) -> Float[np.ndarray, "T A"]:
         """Rotations of all hinges; blocks in the order of time."""
         if block is not self.block:
             first = block.step == 0 or not len(self.angles)
@@ -101,7 +101,7 @@ def acting(scene: Scene, measured: ElementForces) -> list[Recorded]:
     every = ((name, *each) for name, element in measured.every.items() for each in _channels(name, element))
     elements = [Recorded(channel, partial(_column, name, which, sign)) for name, channel, which, sign in every]
     return elements + [
-        Recorded(_turn(scene, name), partial(lambda i, block: measured.turns(block)[:, i, None], i))
+        Recorded(_angle_channel(scene, name), partial(lambda i, block: measured.rotations(block)[:, i, None], i))
         for i, name in enumerate(measured.hinges)
     ]
 
@@ -110,7 +110,7 @@ def _column(name: str, which: str, sign: float, block: Block) -> Rows:
     return np.asarray(sign * getattr(block.multipliers, which)[:, supports(block).number(name), None])
 
 
-def _turn(scene: Scene, name: str) -> Channel:
+def _angle_channel(scene: Scene, name: str) -> Channel:
     one, other = moving_pair(scene.joints[name])
     text = f"rotation of joint {name}: link {one} against {other}, from the reference position"
     return Channel(f"joints/{name}/angle", ("angle",), "rad", "", text)

@@ -23,7 +23,7 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.errors import SolveError
 from kedfem.links.record import Link, mass_times
-from kedfem.links.recovery import nodal_state, nodal_stress, stress_recovery, turned_stress, von_mises
+from kedfem.links.recovery import nodal_state, nodal_stress, rotated_stress, stress_recovery, von_mises
 from kedfem.motion.constraints import cross
 
 Forces = Float[np.ndarray, "n 3"]
@@ -116,7 +116,7 @@ def load_case(at: Snapshot, k: int, model: Model, full: Model, statics: Statics)
     largest = max(float(np.abs(x).max(initial=0.0)) for x in parts.values())
     parts = {name: x for name, x in parts.items() if np.abs(x).max(initial=0.0) > NOTHING * largest}
     g = nodal_state(model.links[k], now.g)
-    stress = turned_stress(nodal_stress(statics.recovery, g), link.axes)
+    stress = rotated_stress(nodal_stress(statics.recovery, g), link.axes)
     acceleration = (at.motion.p2[at.k, body] + link.X @ at.motion.R2[at.k, body].T + a) @ R
     total = np.asarray(sum(parts.values(), np.zeros((link.n, 3))))
     again = von_mises(statics.stress(total))

@@ -199,7 +199,7 @@ def drive_rate(scene: Scene, name: str, linked: Linkage, motion: RigidMotion) ->
     return np.asarray((v * axis).sum(axis=1))
 
 
-def last_turns(results: Results, turns: float | None) -> Bool[np.ndarray, " T"]:
+def last_revolutions(results: Results, turns: float | None) -> Bool[np.ndarray, " T"]:
     """The rows of the last revolutions of the drive; all if their number is not given."""
     if turns is None:
         return np.ones(len(results.time), bool)

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from kedfem.arrays import Float, Int
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.attachments import Attachment
-from kedfem.dynamics.joints.ports import turned_ports
+from kedfem.dynamics.joints.ports import rotated_ports
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.system.forces.exerted import on_ports
 from kedfem.dynamics.system.forces.supports import supports
@@ -46,7 +46,7 @@ def port_wrench(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"], fo
         f = np.zeros((len(block), len(rows)))
         for j, share in shares:
             history = block.links[j]
-            f += turned_ports(model.joints[j], history.R, history.port_forces) @ share.T
+            f += rotated_ports(model.joints[j], history.R, history.port_forces) @ share.T
         if from_rows.nnz:
             f += forces.on_ports(block) @ from_rows.T
         return resultant(link, placed(block), f.reshape(len(f), len(arms), link.d))
@@ -77,18 +77,18 @@ def _arms_over_time(
     beside = at - among @ drawn
 
     def undeformed(block: Block) -> Float[np.ndarray, "T p 3"]:
-        return np.asarray((drawn - at) @ _turned(block, k, link).transpose(0, 2, 1))
+        return np.asarray((drawn - at) @ _orientation(block, k, link).transpose(0, 2, 1))
 
     def displaced(block: Block) -> Float[np.ndarray, "T p 3"]:
         u = np.asarray(weights @ block.links[k].u[:, attachment.nodes])
         x = drawn @ block.motion.R[:, body].transpose(0, 2, 1) + in_space(link, u)
-        centre = among @ x + _turned(block, k, link) @ beside
+        centre = among @ x + _orientation(block, k, link) @ beside
         return np.asarray(x - centre[:, None])
 
     return undeformed if link.fit is None else displaced
 
 
-def _turned(block: Block, k: int, link: Link) -> Float[np.ndarray, "T 3 3"]:
+def _orientation(block: Block, k: int, link: Link) -> Float[np.ndarray, "T 3 3"]:
     """Orientation of a link's frame, in space."""
     R = np.tile(np.eye(3), (len(block), 1, 1))
     R[:, : link.d, : link.d] = block.links[k].R

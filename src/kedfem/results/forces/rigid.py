@@ -19,7 +19,7 @@ from kedfem.motion.released_motions import components
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.channels import XYZ, Channel
 from kedfem.results.recorded import Rows, drive_effort
-from kedfem.scene import GROUND, ConstantSpeed, Joint, Scene, turn_steps
+from kedfem.scene import GROUND, ConstantSpeed, Joint, Scene, revolution_steps
 
 Responses = Float[np.ndarray, "T c k"]
 OPEN = 1e-9  # of squares: a smaller share of a joint's force is rounding
@@ -152,7 +152,7 @@ def returning(scene: Scene, along: Path | None) -> int:
     """Time steps of a turn, or a few, after which all poses return; 0 if they do not, or are too many to be kept."""
     if along is None or not along.periodic or not isinstance(scene.motion, ConstantSpeed):
         return 0
-    turn = (turn_steps(scene) or 0.0) * along.period / (2 * np.pi)
+    turn = (revolution_steps(scene) or 0.0) * along.period / (2 * np.pi)
     return round(turn) if abs(turn - round(turn)) < 1e-9 * turn and turn <= KEPT else 0
 
 

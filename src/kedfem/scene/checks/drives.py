@@ -11,7 +11,7 @@ from kedfem.errors import Fault, place
 from kedfem.scene.checks.capabilities import DRIVEN
 from kedfem.scene.checks.parts import Entry, Parts
 from kedfem.scene.questions.laws import curve_noise
-from kedfem.scene.questions.timing import cycle, turning_speed
+from kedfem.scene.questions.timing import continuous_speed, cycle
 from kedfem.scene.records.analysis import WITHOUT_VIBRATION
 from kedfem.scene.records.drives import (
     SLIDING,
@@ -142,7 +142,7 @@ def drive_and_analysis_faults(parts: Parts, drive: Entry) -> Iterator[Fault]:
     kind = "" if joint is None else str(joint.word("kind"))
     if driven_coordinate(drive, kind) == "travel":
         yield from steps_faults(parts, f"one of the travel of a {kind} joint")
-    elif turning_speed(motion) == 0.0:
+    elif continuous_speed(motion) == 0.0:
         still = isinstance(motion, (ConstantSpeed, Ramp))
         yield from steps_faults(parts, "speed 0" if still else f"{motion.kind!r}")
 

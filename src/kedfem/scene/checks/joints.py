@@ -16,7 +16,7 @@ from kedfem.scene.questions.planes import (
     spatial_beams,
     spring_ends,
     tilted,
-    turned_up,
+    upward_faults,
     welded,
 )
 from kedfem.scene.records.joints import DIRECTED, SQUARE
@@ -130,7 +130,7 @@ def planar_faults(parts: Parts) -> Iterator[Fault]:
     yield from leaving(scene, f"in {here}")
     for name, link in scene.links.items():
         if link.category == "plane":
-            yield from turned_up(name, link.shape, f"in {here}")
+            yield from upward_faults(name, link.shape, f"in {here}")
     yield from off_plane(_beside_plane(scene), f"the other points of {here}")
 
 

@@ -90,7 +90,7 @@ def _own_obstacles(scene: Scene, name: str, around: Iterable[Placed]) -> Iterato
         for key in ("smooth", "up"):
             if getattr(shape, key):
                 yield Fault((*place, key), "must be left out for a planar beam, got one")
-    yield from turned_up(name, shape, whose)
+    yield from upward_faults(name, shape, whose)
     for where, record in around:
         others = [x for x in getattr(record, "links", ()) if x in scene.links and x != name]
         if getattr(record, "kind", None) == "weld" and others:
@@ -137,7 +137,7 @@ def tilted(where: Where, joint: Joint, whose: str, upright: Collection[str]) -> 
         yield Fault((*where, "axis"), f"must lie in the xy plane {whose}, got {vector(axis)}")
 
 
-def turned_up(name: str, shape: Any, whose: str) -> Iterator[Fault]:
+def upward_faults(name: str, shape: Any, whose: str) -> Iterator[Fault]:
     """A bar whose thickness is not along z."""
     if isinstance(shape, Bar) and math.hypot(*shape.upward[:2]) > FLAT:
         where = "links", name, "shape", "up"

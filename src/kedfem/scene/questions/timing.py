@@ -30,7 +30,7 @@ class TimeGrid:
         return self.step * self.steps
 
 
-def turning_speed(motion: MotionLaw | None) -> float:
+def continuous_speed(motion: MotionLaw | None) -> float:
     """The speed [rad/s] (its size) at which a drive goes on turning; 0 for one that does not, or where there is none."""
     return abs(motion.speed) if isinstance(motion, (ConstantSpeed, Ramp)) else 0.0
 
@@ -38,7 +38,7 @@ def turning_speed(motion: MotionLaw | None) -> float:
 def scene_speed(scene: Scene) -> float:
     """The speed [rad/s] at which the only drive of a scene goes on turning; 0 for a slide, for several and for none."""
     slides = any(driven_travel(scene, name) for name in scene.driven_joints)
-    return 0.0 if slides else turning_speed(scene.motion)
+    return 0.0 if slides else continuous_speed(scene.motion)
 
 
 def cycle(motion: MotionLaw | None) -> float | None:
@@ -63,7 +63,7 @@ def without_vibration(scene: Scene) -> bool:
 
 def time_of_revolutions(motion: MotionLaw, revolutions: float) -> float:
     """Time [s] at which a drive that goes on turning has made so many revolutions."""
-    angle, speed = 2.0 * math.pi * revolutions, turning_speed(motion)
+    angle, speed = 2.0 * math.pi * revolutions, continuous_speed(motion)
     if isinstance(motion, ConstantSpeed):
         return angle / speed
     if not isinstance(motion, Ramp):
@@ -119,7 +119,7 @@ def states_step(scene: Scene) -> bool:
     return scene.analysis.step is not None or scene.analysis.steps_per_revolution is not None
 
 
-def turn_steps(scene: Scene) -> float | None:
+def revolution_steps(scene: Scene) -> float | None:
     """Time steps in one turn of the drive at its final speed; None if it does not go on turning."""
     speed = scene_speed(scene)
     return 2.0 * math.pi / (speed * time_grid(scene).step) if speed else None

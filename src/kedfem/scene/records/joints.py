@@ -11,7 +11,7 @@ from kedfem.errors import Fault
 from kedfem.scene.records.base import EndName, Record, refuse
 from kedfem.scene.records.points import XYZ, Apart, Axis, JointPoint, Point, apart
 from kedfem.scene.records.units import Damper, PositiveLength, Quantity, RotationalDamper, fault
-from kedfem.scene.records.units import PositiveRotationalStiffness as TurningRate
+from kedfem.scene.records.units import PositiveRotationalStiffness as RotationalSpring
 from kedfem.scene.records.units import PositiveStiffness as Rate
 from kedfem.scene.records.wording import one_of, shown, unknown_name
 
@@ -106,8 +106,8 @@ def three(value: object) -> Any:
 
 Rates = Annotated[tuple[Rate, Rate, Rate], BeforeValidator(three)]
 Dampers = Annotated[tuple[Damper, Damper, Damper], BeforeValidator(three)]
-TurningRates = Annotated[tuple[TurningRate, TurningRate, TurningRate], BeforeValidator(three)]
-TurningDampers = Annotated[tuple[RotationalDamper, RotationalDamper, RotationalDamper], BeforeValidator(three)]
+RotationalSprings = Annotated[tuple[RotationalSpring, RotationalSpring, RotationalSpring], BeforeValidator(three)]
+RotationalDampers = Annotated[tuple[RotationalDamper, RotationalDamper, RotationalDamper], BeforeValidator(three)]
 
 
 class Bushing(Record):
@@ -124,10 +124,10 @@ class Bushing(Record):
     """against displacements; rigid if not given"""
     damping: Dampers = (0.0, 0.0, 0.0)
     """of displacements"""
-    rotational_stiffness: TurningRates | None = None
+    rotational_stiffness: RotationalSprings | None = None
     """against rotations; rigid if not given. A universal joint constrains one rotation, about the normal of its cross:
     the third"""
-    rotational_damping: TurningDampers = (0.0, 0.0, 0.0)
+    rotational_damping: RotationalDampers = (0.0, 0.0, 0.0)
     """of rotations"""
 
 

@@ -5,8 +5,8 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.dynamics.system import record
 from kedfem.dynamics.system.ends import line_weights
+from kedfem.dynamics.system.forces.follower_loads import rotations
 from kedfem.dynamics.system.forces.rotations import rotation_moment, tilt_moment
-from kedfem.dynamics.system.forces.turning_loads import rotations
 from kedfem.dynamics.system.record import End, Term
 from kedfem.motion.constraints import cross
 from kedfem.motion.rigid import RigidMotion
@@ -14,7 +14,7 @@ from kedfem.motion.rigid import RigidMotion
 Vectors = Float[np.ndarray, "T 3"]
 
 
-def turning(term: Term, Q_i: Float[np.ndarray, "T 3 3"], Q_j: Float[np.ndarray, "T 3 3"]) -> Vectors:
+def unit_moment(term: Term, Q_i: Float[np.ndarray, "T 3 3"], Q_j: Float[np.ndarray, "T 3 3"]) -> Vectors:
     """Moment on end i of a unit multiplier on a turn, an angle or a rotation; on j it is the opposite."""
     a, b = Q_i @ term.a, Q_j @ term.b
     if term.kind == record.TURN:

@@ -13,7 +13,7 @@ from kedfem.dynamics.history import Block, Multipliers
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
 from kedfem.dynamics.system.ends import corners, end_of, same_end
 from kedfem.dynamics.system.forces.lines import on_line
-from kedfem.dynamics.system.forces.poses import Vectors, point_forces, poses, turning
+from kedfem.dynamics.system.forces.poses import Vectors, point_forces, poses, unit_moment
 from kedfem.dynamics.system.record import DISTANCE, GAP, ON_LINES, Constraint, End, Term
 from kedfem.motion.constraints import cross
 from kedfem.motion.rigid import RigidMotion
@@ -110,7 +110,7 @@ def exerted(term: Term, ends: tuple[End, End], motion: RigidMotion, z: Float[np.
     """
     (x_i, Q_i), (x_j, Q_j) = (poses(end, motion, z) for end in ends)
     if term.kind not in (GAP, DISTANCE, *ON_LINES):
-        turn = turning(term, Q_i, Q_j)
+        turn = unit_moment(term, Q_i, Q_j)
         return [(ends[0], x_i, 0 * x_i, turn), (ends[1], x_j, 0 * x_j, -turn)]
     a_i = Q_i @ (term.a - ends[0].origin)
     if term.kind in ON_LINES and z is not None:

@@ -26,7 +26,7 @@ from kedfem.dynamics.matrices.substructure import mass_matrix
 from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.dynamics.system.monolithic.monolithic_lines import measured
-from kedfem.dynamics.system.monolithic.monolithic_places import force, turned_load
+from kedfem.dynamics.system.monolithic.monolithic_places import force, rotated_load
 from kedfem.dynamics.system.monolithic.monolithic_stops import HALVINGS, Motion, in_parts, sides
 from kedfem.dynamics.system.monolithic.monolithic_tangent import Inverse, inverse, tangent
 from kedfem.dynamics.system.record import Driven, Held, System
@@ -236,7 +236,7 @@ class Monolithic:
             seen.append((turn, np.stack([g, *rates])))
         own = [load for load in self.system.model.loads[k] if load.own]
         x = u.reshape(link.n, link.d)
-        pushed = [load.factor(at.t, at.phi)[0] * turned_load(link, load, whole, x) for load in own]
+        pushed = [load.factor(at.t, at.phi)[0] * rotated_load(link, load, whole, x) for load in own]
         return (f @ R.T - sum(pushed, np.zeros_like(f))).ravel(), seen, C
 
     def _unbalanced(self, now: Now, old: Now) -> Column:

@@ -95,7 +95,7 @@ def _foot(
 def off_line(term: Term, on: _Foot, end: End, R: Float[np.ndarray, "3 3"]) -> tuple[float, Column]:
     """How far a pin is off a line along a direction across it, and the gradient by z; R of the line's body."""
     axis, tangent = R @ line_of(end).axis, on.tangent
-    n = _turned(axis, tangent) @ R @ term.b
+    n = _tangent_rotation(axis, tangent) @ R @ term.b
     spin = np.cross(axis, tangent) / (1 + axis @ tangent) @ on.turns  # about the tangent, of the smallest rotation
     return float(n @ on.away), n @ on.moves - (on.away @ np.cross(tangent, n)) * spin
 
@@ -113,7 +113,7 @@ def _place(curve: CubicSpline, x: Float[np.ndarray, "3"]) -> float:
     return float(min(found, key=lambda s: np.linalg.norm(x - curve(s))))
 
 
-def _turned(a: Float[np.ndarray, "3"], t: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+def _tangent_rotation(a: Float[np.ndarray, "3"], t: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
     """The smallest rotation of a to t."""
     normal = np.cross(a, t)
     size = float(np.linalg.norm(normal))

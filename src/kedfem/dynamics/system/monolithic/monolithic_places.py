@@ -11,7 +11,7 @@ from scipy.linalg import expm
 from kedfem.arrays import Float
 from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.system import record
-from kedfem.dynamics.system.forces.turning_loads import shown_by
+from kedfem.dynamics.system.forces.follower_loads import shown_by
 from kedfem.dynamics.system.record import Constraint, Curve, End, Spring, Stop, System, Term, law_at
 from kedfem.links.record import Link
 from kedfem.motion.constraints import ConstraintEquation, stacked
@@ -46,7 +46,7 @@ def _on_curve(curve: Curve | None, at: RigidMotion, e: float, rate: float) -> fl
     return float(PPoly(np.array(of.coefficients).T[::-1], [*of.at, max(x, of.at[-1]) + 1.0])(x))
 
 
-def turned_load(
+def rotated_load(
     link: Link, load: Pattern, R: Float[np.ndarray, "3 3"], u: Float[np.ndarray, "n d"]
 ) -> Float[np.ndarray, "n d"]:
     """Nodal forces of a load that turns with a link of orientation R, displaced by u: rotations that align best."""

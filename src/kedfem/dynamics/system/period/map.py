@@ -18,7 +18,7 @@ from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.system.arrays import ends_of
 from kedfem.dynamics.system.march import march
 from kedfem.dynamics.system.ready import Ready
-from kedfem.dynamics.system.starts.instant import TURN, Flat, Instant, Motion, turned
+from kedfem.dynamics.system.starts.instant import TURN, Flat, Instant, Motion, term_angles
 from kedfem.dynamics.system.starts.internal_forces import own, put_momenta, store_internal_state
 from kedfem.dynamics.system.state import History, State, copied
 from kedfem.motion.rigid import RigidMotion
@@ -148,7 +148,7 @@ class PeriodMap:
         z = now.interface(state.u)
         state.z[0, now.always.number] = z
         state.e[0] = now.coordinates(np.stack([z, 0 * z, 0 * z]))[0]
-        state.turned[:] = turned(now, z)
+        state.turned[:] = term_angles(now, z)
         return self.vector(state)
 
     def complete(self, state: State) -> None:

@@ -17,7 +17,7 @@ from kedfem.dynamics.matrices.bordered import ConstraintTerms
 from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.system.sparse import SparsePart
 from kedfem.dynamics.system.starts.instant import Flat, Instant
-from kedfem.dynamics.system.starts.internal_forces import drawn, own, rows, turned_rate
+from kedfem.dynamics.system.starts.internal_forces import drawn, own, rotated_rate, rows
 from kedfem.dynamics.system.starts.linear_equations import LinearEquations, Solved, held_body, stepped_body
 from kedfem.links.record import Link
 from kedfem.motion.newton import cross_matrix
@@ -50,8 +50,8 @@ def accelerations(now: Instant, r: Flat, u: Flat, v: Flat, asked: ConstraintTerm
         found = balance.solved(r - turning - stress, turning)
         for k, P in enumerate(pure):
             if P is not None:
-                x = balance.turned(k, found.x[own(of, k)], back=True)
-                stress[own(of, k)] += STIFFER * balance.turned(k, x - P @ (P.T @ x))
+                x = balance.rotated(k, found.x[own(of, k)], back=True)
+                stress[own(of, k)] += STIFFER * balance.rotated(k, x - P @ (P.T @ x))
     return replace(found, x=found.x + turning)
 
 
@@ -81,8 +81,8 @@ def in_a_step(now: Instant, pushed: Flat, asked: ConstraintTerms, R: Float[np.nd
     ]  # fmt: skip
     balance = LinearEquations(of, held, R, asked)
     more = balance.solved(pushed)
-    x = [balance.turned(k, more.x[own(of, k)], back=True) for k in range(len(held))]
-    f = np.concatenate([balance.turned(k, share * still.times(k, each)) for k, each in enumerate(x)])
+    x = [balance.rotated(k, more.x[own(of, k)], back=True) for k in range(len(held))]
+    f = np.concatenate([balance.rotated(k, share * still.times(k, each)) for k, each in enumerate(x)])
     return replace(more, f=f)
 
 
@@ -93,7 +93,7 @@ def rigid_motions(now: Instant, k: int, u: Flat) -> Float[np.ndarray, "N m"]:
     axes = np.eye(3)[2 if link.planar else 0 :]
     moved = [np.outer(link.one, e)[:, : link.d] for e in np.eye(3)[: 2 if link.planar else 3]]
     for e in axes:
-        turning = turned_rate(cross_matrix(e), x)
+        turning = rotated_rate(cross_matrix(e), x)
         if link.kind == "beam":
             turning[:, 2] = link.one
         moved.append(turning)
@@ -122,9 +122,9 @@ def centripetal(now: Instant, u: Flat, v: Flat, which: Sequence[bool]) -> Flat:
         here = own(now.of, k)
         moved, x = rows(now.of, k, u[here]), _position(now, k, u)
         omega = cross_matrix(now.omega[k])
-        spin = omega + own_spin(link, rows(now.of, k, v[here]) - turned_rate(omega, moved), x)
-        rate = turned_rate(spin @ spin - omega @ omega, x)
-        rate += turned_rate(cross_matrix(alpha[k]) + omega @ omega, moved)
+        spin = omega + own_spin(link, rows(now.of, k, v[here]) - rotated_rate(omega, moved), x)
+        rate = rotated_rate(spin @ spin - omega @ omega, x)
+        rate += rotated_rate(cross_matrix(alpha[k]) + omega @ omega, moved)
         out[here] = coordinates(link, now.of.parts[k], rate).ravel()
     return out
 

@@ -215,17 +215,17 @@ def _rotation(A: Series) -> Series:
     left, _, right = np.linalg.svd(A[0].real)
     Q = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
     for _ in range(2):
-        Q = Q @ rotation(_turn(Q.T @ A[0].real))
+        Q = Q @ rotation(_small_rotation(Q.T @ A[0].real))
     if np.iscomplexobj(A):  # one step more is exact to first order
-        Q = Q @ (np.eye(3) + cross_matrix(_turn(Q.T @ A[0])))
+        Q = Q @ (np.eye(3) + cross_matrix(_small_rotation(Q.T @ A[0])))
     B = Q.T @ A
-    w = _turn(B[0], B[1])
+    w = _small_rotation(B[0], B[1])
     W = cross_matrix(w)
-    b = _turn(B[0], B[2] - 2 * W @ B[1] + W @ W @ B[0])
+    b = _small_rotation(B[0], B[2] - 2 * W @ B[1] + W @ W @ B[0])
     return np.stack([Q, Q @ W, Q @ (W @ W + cross_matrix(b))])
 
 
-def _turn(U: np.ndarray, B: np.ndarray | None = None) -> np.ndarray:
+def _small_rotation(U: np.ndarray, B: np.ndarray | None = None) -> np.ndarray:
     """θ of G θ = axial(B), B = U if not given."""
     B = U if B is None else B
     axial = np.array([B[2, 1] - B[1, 2], B[0, 2] - B[2, 0], B[1, 0] - B[0, 1]])

@@ -18,11 +18,11 @@ from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.system.ready import Ready
 from kedfem.dynamics.system.starts.accelerations import accelerations, own_spin
 from kedfem.dynamics.system.starts.initial_states import as_coordinates, begun
-from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
-from kedfem.dynamics.system.starts.internal_forces import drawn, own, rows, turned_rate
+from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, term_angles
+from kedfem.dynamics.system.starts.internal_forces import drawn, own, rotated_rate, rows
 from kedfem.dynamics.system.starts.laws import feels_rates
 from kedfem.dynamics.system.starts.modified_newton import FREE, ROUNDING, NoBalanceError, direct_balance, equilibrium
-from kedfem.dynamics.system.starts.turning_bodies import CONVERGED, Spins, spins_of
+from kedfem.dynamics.system.starts.rotating_bodies import CONVERGED, Spins, spins_of
 from kedfem.dynamics.system.state import State
 from kedfem.errors import MotionError, SolveError
 from kedfem.motion.newton import cross_matrix
@@ -215,7 +215,7 @@ def differenced_rates(first: Instant, motion_at: Motion, h: float, pull: Flat) -
                 guess = u[k]
                 if again == 0 and k:  # joints are closed in all before, and so in what these go on to
                     guess = AHEAD[k] @ u[:k]
-                    now.near = turned(instants[k - 1], instants[k - 1].interface(u[k - 1]))
+                    now.near = term_angles(instants[k - 1], instants[k - 1].interface(u[k - 1]))
                 now.slow = now.slow or instants[k - 1].slow
                 z1 = now.interface(v[k]) if again else None
                 if again or k:
@@ -280,7 +280,7 @@ def _relieved(now: Instant, v: Flat) -> tuple[Flat, Flat]:
     ]
 
     def rate(u: Flat) -> Flat:
-        turning = [turned_rate(S, rows(of, k, u[own(of, k)])) for k, S in enumerate(spins)]
+        turning = [rotated_rate(S, rows(of, k, u[own(of, k)])) for k, S in enumerate(spins)]
         return np.asarray(v + as_coordinates(of, turning))
 
     def inertia(u: Flat, f: Flat) -> Flat:

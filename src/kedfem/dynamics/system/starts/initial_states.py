@@ -12,7 +12,7 @@ from kedfem.dynamics.matrices.bordered import ConstraintTerms
 from kedfem.dynamics.matrices.dense import coordinates
 from kedfem.dynamics.system.ready import Ready
 from kedfem.dynamics.system.starts.accelerations import accelerations
-from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, turned
+from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, term_angles
 from kedfem.dynamics.system.starts.internal_forces import own, put_momenta, store_internal_state
 from kedfem.dynamics.system.starts.linear_equations import LinearEquations, Solved
 from kedfem.dynamics.system.state import State, empty_state
@@ -79,7 +79,7 @@ def begun(
     state.z[:, now.always.number] = np.stack([z, z1, found.z])
     state.a[:], state.port_force[:] = found.x, found.forces
     state.e[:], state.multiplier[:], state.bearing[now.always.number] = e, m, C.T @ m
-    state.turned[:] = turned(now, z)
+    state.turned[:] = term_angles(now, z)
     put_momenta(of, state)
     return state
 

@@ -15,8 +15,7 @@ from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.matrices.substructure import factored
 from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.system.ends import left_line, line_of
-from kedfem.dynamics.system.forces.turning_loads import turned as turned_load
-from kedfem.dynamics.system.forces.turning_loads import turning
+from kedfem.dynamics.system.forces.follower_loads import own_patterns, rotated_forces
 from kedfem.dynamics.system.ready import Ready, driving
 from kedfem.dynamics.system.record import ANGLE, Driven, Held, law_at
 from kedfem.dynamics.system.sparse import SparsePart, softening
@@ -84,12 +83,12 @@ class Instant:
         self.R, self.omega = motion.R[0][of.bodies.motion], motion.omega[0][of.bodies.motion]
         self.travels = travels(of.system, self.at)
         self.always: Always = always(of) if like is None else like.always
-        self._turnings = of.stressed and of.stressed.stiffening.turnings(forcings(of.system.model, motion), motion)
+        self._stress = of.stressed and of.stressed.stiffening.stress_forces(forcings(of.system.model, motion), motion)
 
     def stress(self, u: Flat) -> Flat:
         """Forces by the stresses of the rigid-body motion, R (k g P), at a displacement; none without stiffening."""
         out = np.zeros_like(u)
-        for k, stressed in enumerate(self._turnings or ()):
+        for k, stressed in enumerate(self._stress or ()):
             R = self.R[k][: (d := self.of.system.model.links[k].d), :d]
             force = stressed(rows(self.of, k, u[own(self.of, k)]) @ R) @ R.T
             out[own(self.of, k)] = work_on(self.of.parts[k], force).ravel()
@@ -106,9 +105,9 @@ class Instant:
     def pushed(self, u: Flat) -> Flat:
         """Loads that turn with bodies (N,) on the coordinates at a displacement, world components."""
         of, out = self.of, np.zeros_like(u)
-        for (k, load), amount in zip(turning(of.system.model.loads), self.amounts, strict=True):
+        for (k, load), amount in zip(own_patterns(of.system.model.loads), self.amounts, strict=True):
             link, here = of.system.model.links[k], own(of, k)
-            force = turned_load(link, load, self.R[k][None], rows(of, k, u[here])[None], amount[None])[0]
+            force = rotated_forces(link, load, self.R[k][None], rows(of, k, u[here])[None], amount[None])[0]
             out[here] += work_on(of.parts[k], force).ravel()
         return out
 
@@ -121,7 +120,7 @@ class Instant:
         """Coordinates of all constraints less what drives ask, with their rates."""
         e = coordinates(self.of.system, self.at, z)
         if self.near is not None:
-            e[0] += self._whole_turns(z[0])
+            e[0] += self._whole_revolutions(z[0])
         return self._less_drives(e)
 
     def _less_drives(self, e: Float[np.ndarray, "n r"]) -> Float[np.ndarray, "n r"]:
@@ -134,7 +133,7 @@ class Instant:
                     e[0, n] -= TURN * np.round(e[0, n] / TURN)
         return e
 
-    def _whole_turns(self, z: Flat) -> Float[np.ndarray, " r"]:
+    def _whole_revolutions(self, z: Flat) -> Float[np.ndarray, " r"]:
         """What coordinates gain by the whole revolutions that their terms have made; none where they are linear in z."""
         system, out, place = self.of.system, np.zeros(len(self.of.system.constraints)), 0
         found = angles(system, self.at, z)
@@ -241,7 +240,7 @@ def renumbered(of: Ready) -> Int[np.ndarray, " k"]:
     return number
 
 
-def turned(now: Instant, z: Flat) -> Flat:
+def term_angles(now: Instant, z: Flat) -> Flat:
     """Angles of all terms, within half a revolution of what they are near; of drives of what these ask."""
     return _counted(now, angles(now.of.system, now.at, z))
 

@@ -178,7 +178,7 @@ def drawn(link: Link) -> Nodal:
     return position(link, np.zeros((link.n, link.d)))
 
 
-def turned_rate(spin: Float[np.ndarray, "3 3"], x: Nodal) -> Nodal:
+def rotated_rate(spin: Float[np.ndarray, "3 3"], x: Nodal) -> Nodal:
     """[ω]× x of rows; of a planar beam ψ stays out of it."""
     d = x.shape[1]
     return np.asarray(x @ spin[:d, :d].T)
@@ -197,7 +197,7 @@ def internal_state(
     link, damping = of.system.model.links[k], of.system.model.damping
     d = link.d
     x, x1 = rows(of, k, u), rows(of, k, v)
-    g, g1 = x @ R[:d, :d], (x1 - turned_rate(spin, x)) @ R[:d, :d]
+    g, g1 = x @ R[:d, :d], (x1 - rotated_rate(spin, x)) @ R[:d, :d]
     y = position(link, g)
     damped = np.zeros((3, *g.shape))
     for m, each in enumerate((g, g1)):

@@ -141,18 +141,18 @@ class LinearEquations:
         f = more + (0.0 * self.asked.known if alone else self.asked.known)
         for i, (each, RB) in enumerate(zip(self.held, self.RB, strict=True)):
             here = slice(int(at[i]), int(at[i + 1]))
-            local.append(self.turned(i, r[here], back=True))
-            offset.append(np.zeros(len(each.W)) if moved is None else each.W @ self.turned(i, moved[here], back=True))
+            local.append(self.rotated(i, r[here], back=True))
+            offset.append(np.zeros(len(each.W)) if moved is None else each.W @ self.rotated(i, moved[here], back=True))
             f[self.columns[i]] += RB.T @ (each.left.T @ local[i] + each.S @ offset[i])
         z, m = self.bordered.solved(f, (0.0 if alone else 1.0) * self.asked.target)
         x, forces = np.zeros(len(r)), np.zeros(int(ports[-1]))
         for i, (each, RB) in enumerate(zip(self.held, self.RB, strict=True)):
             w = RB @ z[self.columns[i]] - offset[i]
-            x[at[i] : at[i + 1]] = self.turned(i, each.G @ local[i] + each.Y @ w)
+            x[at[i] : at[i + 1]] = self.rotated(i, each.G @ local[i] + each.Y @ w)
             forces[ports[i] : ports[i + 1]] = self.RT[i].T @ (each.S @ w - each.left.T @ local[i])
         return Solved(x, z, m, forces)
 
-    def turned(self, i: int, x: Flat, back: bool = False) -> Flat:
+    def rotated(self, i: int, x: Flat, back: bool = False) -> Flat:
         """R x, or Rᵀ x, of a body's coordinates."""
         d = int(self.of.bodies.components[i])
         R = self.R[i, :d, :d]

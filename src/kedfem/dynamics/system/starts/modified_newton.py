@@ -12,8 +12,8 @@ from kedfem.dynamics.matrices.bordered import ConstraintTerms
 from kedfem.dynamics.system.starts.instant import Flat, Instant
 from kedfem.dynamics.system.starts.linear_equations import LinearEquations
 from kedfem.dynamics.system.starts.newton_krylov import Equilibrium, solution, stands_off
+from kedfem.dynamics.system.starts.rotating_bodies import CONVERGED, RotatingBodies, Spins
 from kedfem.dynamics.system.starts.temporary_springs import has_stops, with_temporary_springs
-from kedfem.dynamics.system.starts.turning_bodies import CONVERGED, Spins, TurningBodies
 from kedfem.errors import SolveError
 
 ITERATIONS = 60
@@ -88,7 +88,7 @@ def iterated(
     z1 : rates of the interface unknowns
     rounding : of the deflection, below which changes that do not fall are taken for rounding
     """
-    of, anderson, bodies, settled, last = now.of, AndersonAcceleration(), TurningBodies(now, spins), False, np.inf
+    of, anderson, bodies, settled, last = now.of, AndersonAcceleration(), RotatingBodies(now, spins), False, np.inf
     linear, slow, shaken, start, first = of.c.single, 0, 0, u, 0.0
     exact = now.slow or (linear and any(bodies.sparse))
     frames, balance = bodies.static.frames(), None

@@ -28,7 +28,7 @@ from kedfem.dynamics.system.starts.instant import Flat, Instant
 from kedfem.dynamics.system.starts.internal_forces import Frames as Sought
 from kedfem.dynamics.system.starts.internal_forces import drawn, moved, own, rows
 from kedfem.dynamics.system.starts.linear_equations import LinearEquations
-from kedfem.dynamics.system.starts.turning_bodies import CONVERGED, Spins, TurningBodies
+from kedfem.dynamics.system.starts.rotating_bodies import CONVERGED, RotatingBodies, Spins
 from kedfem.errors import SolveError
 from kedfem.links.reduced import reach
 
@@ -84,8 +84,8 @@ class Equilibrium:
 
     def __init__(self, now: Instant, more: Callable[[Flat, Flat], Flat], spins: Spins | None, z1: Flat | None) -> None:
         self.now, self.more, self.z1 = now, more, z1
-        self.inertia = TurningBodies(now, spins)
-        self.bodies = TurningBodies(now, None)
+        self.inertia = RotatingBodies(now, spins)
+        self.bodies = RotatingBodies(now, None)
         self.right = [np.linalg.pinv(part.W) for part in now.of.parts]
         links = now.of.system.model.links
         mass = sum(float(link.one @ link.m1[:, 0]) for link in links)

@@ -19,7 +19,7 @@ from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion
 from kedfem.dynamics.system.starts.internal_forces import moved
 from kedfem.dynamics.system.starts.linear_equations import LinearEquations
 from kedfem.dynamics.system.starts.newton_krylov import Equilibrium, Point
-from kedfem.dynamics.system.starts.turning_bodies import spins_of
+from kedfem.dynamics.system.starts.rotating_bodies import spins_of
 from kedfem.dynamics.system.state import State
 from kedfem.errors import SolveError
 from kedfem.links.reduced import reach

@@ -11,7 +11,7 @@ import numpy as np
 
 from kedfem.arrays import Bool
 from kedfem.dynamics.system.record import Stop
-from kedfem.dynamics.system.starts.instant import Flat, Instant, turned
+from kedfem.dynamics.system.starts.instant import Flat, Instant, term_angles
 from kedfem.dynamics.system.starts.laws import TemporarySprings
 from kedfem.errors import SolveError
 
@@ -68,7 +68,7 @@ def with_temporary_springs(now: Instant, u: Flat, z1: Flat | None, sought: Sough
         at, frames, first = nearer, static.frames(), False
         counted = copy(now)
         counted.near = near
-        near = turned(counted, counted.interface(at))
+        near = term_angles(counted, counted.interface(at))
         before, borne = e, bearing
         e, bearing = limited(counted, at, z1)
         if (bearing & ~borne).any() or np.abs(e - before).max() < STILL * np.abs(e - about).max():

@@ -24,7 +24,7 @@ def spins_of(now: Instant) -> Spins:
     return np.asarray(alpha + omega @ omega)
 
 
-class TurningBodies:
+class RotatingBodies:
     """Bodies with K0 and the inertia of turning, held at their interface points."""
 
     def __init__(self, now: Instant, spins: Spins | None) -> None:

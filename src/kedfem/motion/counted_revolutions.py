@@ -30,7 +30,7 @@ def require_counted(scene: Scene, link: Linkage, along: Path) -> None:
     tau = path_parameter(scene, grid.step * np.arange(grid.steps + 1 if counting else 1))[0]
     faults = []
     for where, joint, about in counting:
-        most = float(np.abs(np.diff(turn_of(scene, link, along, joint, tau, about))).max(initial=0.0))
+        most = float(np.abs(np.diff(angle_along(scene, link, along, joint, tau, about))).max(initial=0.0))
         if most > MOST:
             faults.append(
                 f"{where}: joint {joint!r} must rotate by less than {np.degrees(MOST):.0f} deg between time points, so "
@@ -61,7 +61,7 @@ def _counting(scene: Scene) -> Iterator[tuple[str, str, str | None]]:
         yield from ((f"joints.{name}", name, None) for name, joint in scene.joints.items() if joint.kind == "screw")
 
 
-def turn_of(
+def angle_along(
     scene: Scene, link: Linkage, along: Path, name: str, tau: Float[np.ndarray, " T"], about: str | None = None
 ) -> Float[np.ndarray, " T"]:
     """Turn of a joint about its axis at places of the path, counted from the reference position [rad].

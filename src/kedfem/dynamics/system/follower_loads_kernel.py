@@ -1,4 +1,4 @@
-"""Loads that rotate with bodies in a step, compiled by numba; `forces.turning_loads` has the formulas."""
+"""Loads that rotate with bodies in a step, compiled by numba; `forces.follower_loads` has the formulas."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ TURNS = 30
 
 
 @inner
-def turned_loads(loads, bodies, R, amounts, u, f, frame):  # type: ignore[no-untyped-def]
+def add_follower_loads(loads, bodies, R, amounts, u, f, frame):  # type: ignore[no-untyped-def]
     """Subtract loads from internal forces f (N,), world components, of bodies displaced by u (N,).
 
     Parameters

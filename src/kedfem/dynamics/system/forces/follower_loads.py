@@ -14,21 +14,21 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.matrices.dense import Coordinates, work_on
-from kedfem.dynamics.system.arrays import TurningLoads, flat
+from kedfem.dynamics.system.arrays import FollowerLoads, flat
 from kedfem.links.record import Link
 
 Loads = Sequence[Sequence[Pattern]]
 Shown = tuple[Float[np.ndarray, "m 3"], Float[np.ndarray, "m n"]]
 
 
-def turning(loads: Loads) -> list[tuple[int, Pattern]]:
+def own_patterns(loads: Loads) -> list[tuple[int, Pattern]]:
     """All loads that turn with their bodies, with the bodies' numbers."""
     return [(k, load) for k, own in enumerate(loads) for load in own if load.own]
 
 
-def turning_loads(links: Sequence[Link], parts: Sequence[Coordinates], loads: Loads) -> TurningLoads:
+def follower_loads(links: Sequence[Link], parts: Sequence[Coordinates], loads: Loads) -> FollowerLoads:
     """As flat arrays, on the coordinates of all bodies."""
-    every, force_at, shown_at = turning(loads), [0], [0]
+    every, force_at, shown_at = own_patterns(loads), [0], [0]
     drawn, shown, force, axis, fixed = [], [], [], [], []
     for k, load in every:
         link, part = links[k], parts[k]
@@ -43,7 +43,7 @@ def turning_loads(links: Sequence[Link], parts: Sequence[Coordinates], loads: Lo
         fixed.append(world)
         force_at.append(force_at[-1] + force[-1].size)
         shown_at.append(shown_at[-1] + shown[-1].size)
-    return TurningLoads(
+    return FollowerLoads(
         body=np.array([k for k, _ in every], int), force_at=np.array(force_at), shown_at=np.array(shown_at),
         planar_beam=np.array([links[k].kind == "beam" for k, _ in every], bool),
         drawn=np.array(drawn).reshape(-1, 3, 3), shown=flat(shown),
@@ -52,7 +52,7 @@ def turning_loads(links: Sequence[Link], parts: Sequence[Coordinates], loads: Lo
     )  # fmt: skip
 
 
-def turned(
+def rotated_forces(
     link: Link, load: Pattern, R: Float[np.ndarray, "T 3 3"], u: Float[np.ndarray, "T n d"],
     factor: Float[np.ndarray, " T"],
 ) -> Float[np.ndarray, "T n d"]:  # fmt: skip
