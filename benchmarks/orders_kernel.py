@@ -135,9 +135,8 @@ def inside(c, c_inside, bodies, driving, t, size, state, trial, work):  # type: 
                 state.seen[:] = 0.0
                 state.strain[:] = 0.0
             for i in range(len(bodies.motion)):
-                first, own = bodies.at[i], bodies.at[i + 1] - bodies.at[i]
-                for x in range(own):
-                    state.seen[3 * first + own + x] += scale * trial.seen[3 * first + x]
+                for x in range(bodies.at[i], bodies.at[i + 1]):
+                    state.seen[1, x] += scale * trial.seen[0, x]
             for beam in range(len(bodies.beams.segment)):
                 for m in range(3):
                     for e in range(state.strain.shape[3]):
@@ -146,7 +145,7 @@ def inside(c, c_inside, bodies, driving, t, size, state, trial, work):  # type: 
             first, own = bodies.at[i], bodies.at[i + 1] - bodies.at[i]
             turned_back(R[bodies.motion[i]], bodies.components[i], trial.r[first : first + own], work.room[:own])
             for x in range(own):
-                state.damped[3 * first + own + x] = c.alpha * work.room[x]
+                state.damped[1, first + x] = c.alpha * work.room[x]
     seen(c_inside, bodies, driving, t, state, trial, work)
 
 

@@ -9,42 +9,51 @@ TURNS = 50
 
 
 @inner
-def strained(rates, i, kind, shapes, fit, R, u, before, now, Q, angle, out, work):  # type: ignore[no-untyped-def]
-    """Deformation of segment i in its frame at the displacement u, with its rates; out becomes g + β g'.
+def strained(rates, kind, shapes, R, u, seen, frame, work):  # type: ignore[no-untyped-def]
+    """Deformation of a segment in its frame at the displacement u (D, n), with its rates.
 
     Parameters
     ----------
     rates : (6,) Newmark's acceleration (3), h γ, h (1 − γ), damping β
-    before, now : g (3, L, N) seen from the frame, and its rates, at the beginning and at the end of the step
-    Q, angle : (L, 3, 3) and (L,) of the frame in the rigid-body one; at the beginning an earlier one
-    work : y (D, n) becomes its shape in the rigid-body frame
+    shapes : X, one and fit (D, n)
+    seen : g (N,) and its two rates in the frame, at the beginning and at the end of the step
+    frame : Q (3, 3) and angle (1,) of the frame in the rigid-body one; at the beginning an earlier one
+    work : y (D, n) becomes its shape in the rigid-body frame, the third (N,) g + β g'
     """
     n0, n1, n2, h1, h0, beta = rates
-    X, one = shapes
-    y, _, _, A, U, change = work
-    D, n = u.shape[1:]
+    X, one, fit = shapes
+    y, _, out, A, U, change = work
+    (g0, v0, a0), (g, v, a) = seen
+    Q, angle = frame
+    D, n = u.shape
     d = 2 if kind == PLANE else D
-    for b in range(d):
-        for j in range(n):
-            x = X[i, b, j]
-            for m in range(d):
-                x += R[i, m, b] * u[i, m, j]
-            y[b, j] = x
-    rotation(i, kind, fit, y, Q, angle, A, U, change)
-    deformation(i, kind, y, X, one, Q[i], angle[i], now[0, i])
+    shaped(X, R, u, d, y)
+    rotation(kind, fit, y, frame, A, U, change)
+    deformation(kind, y, X, one, Q, angle[0], g)
     for r in range(D * n):
-        x = now[0, i, r]
+        x = g[r]
         out[r] = x
         if beta != 0.0:
-            x2 = n0 * (x - before[0, i, r]) - n1 * before[1, i, r] - n2 * before[2, i, r]
-            x1 = before[1, i, r] + h1 * x2 + h0 * before[2, i, r]
-            now[1, i, r], now[2, i, r] = x1, x2
+            x2 = n0 * (x - g0[r]) - n1 * v0[r] - n2 * a0[r]
+            x1 = v0[r] + h1 * x2 + h0 * a0[r]
+            v[r], a[r] = x1, x2
             out[r] += beta * x1
 
 
 @inner
-def balanced(i, kind, fit, R, now, Q, f, work):  # type: ignore[no-untyped-def]
-    """Add to f (L, D, n), world components, the internal force of segment i, in balance.
+def shaped(X, R, u, d, y):  # type: ignore[no-untyped-def]
+    """y becomes the shape X + Rᵀ u (d, n) of a segment in the rigid-body frame."""
+    for b in range(d):
+        for j in range(u.shape[1]):
+            x = X[b, j]
+            for m in range(d):
+                x += R[m, b] * u[m, j]
+            y[b, j] = x
+
+
+@inner
+def balanced(kind, fit, R, g, Q, f, work):  # type: ignore[no-untyped-def]
+    """Add to f (D, n), world components, the internal force of a segment, in balance.
 
     Parameters
     ----------
@@ -53,16 +62,16 @@ def balanced(i, kind, fit, R, now, Q, f, work):  # type: ignore[no-untyped-def]
     y, turned, _, _, U, change = work
     d, n = (2 if kind == PLANE else len(turned)), turned.shape[1]
     if kind == SPACE:
-        balanced_space(fit[i], y, Q[i], now[0, i], turned, U, change)
+        balanced_space(fit, y, Q, g, turned, U, change)
     else:
-        balanced_plane(fit[i], y, Q[i], now[0, i], turned)
+        balanced_plane(fit, y, Q, g, turned)
     for b in range(d):  # R Q: from the frame to the world
         for m in range(d):
             x = 0.0
             for k in range(d):
-                x += R[i, b, k] * entry(kind, Q[i], k, m)
+                x += R[b, k] * entry(kind, Q, k, m)
             for j in range(n):
-                f[i, b, j] += x * turned[m, j]
+                f[b, j] += x * turned[m, j]
 
 
 @inner
@@ -74,28 +83,28 @@ def entry(kind, Q, b, m):  # type: ignore[no-untyped-def]
 
 
 @inner
-def rotation(i, kind, fit, y, Q, angle, A, U, change):  # type: ignore[no-untyped-def]
+def rotation(kind, fit, y, frame, A, U, change):  # type: ignore[no-untyped-def]
     """Q of Σ y_a ⊗ fit_a in place, from an earlier one; of a planar segment its angle, which counts turns."""
-    n = y.shape[1]
+    n, (Q, angle) = y.shape[1], frame
     if kind != SPACE:
         c, s = 0.0, 0.0
         for j in range(n):
-            c += y[0, j] * fit[i, 0, j] + y[1, j] * fit[i, 1, j]
-            s += y[1, j] * fit[i, 0, j] - y[0, j] * fit[i, 1, j]
+            c += y[0, j] * fit[0, j] + y[1, j] * fit[1, j]
+            s += y[1, j] * fit[0, j] - y[0, j] * fit[1, j]
         turn = np.arctan2(s, c)
-        turn += 2 * np.pi * np.round((angle[i] - turn) / (2 * np.pi))
-        angle[i] = turn
+        turn += 2 * np.pi * np.round((angle[0] - turn) / (2 * np.pi))
+        angle[0] = turn
         size = np.sqrt(c * c + s * s)
         c, s = c / size, s / size
-        Q[i, 0, 0], Q[i, 0, 1], Q[i, 1, 0], Q[i, 1, 1] = c, -s, s, c
+        Q[0, 0], Q[0, 1], Q[1, 0], Q[1, 1] = c, -s, s, c
         return
     for b in range(3):
         for m in range(3):
             x = 0.0
             for j in range(n):
-                x += y[b, j] * fit[i, m, j]
+                x += y[b, j] * fit[m, j]
             A[b, m] = x
-    nearest(A, Q[i], U, change)
+    nearest(A, Q, U, change)
 
 
 @inner
@@ -149,25 +158,25 @@ def rodrigues(w, Q, W):  # type: ignore[no-untyped-def]
 
 
 @inner
-def deformation(i, kind, y, X, one, Q, angle, g):  # type: ignore[no-untyped-def]
+def deformation(kind, y, X, one, Q, angle, g):  # type: ignore[no-untyped-def]
     """g = Qᵀ y − X without its mean, flat; ψ less the frame's angle."""
     n = y.shape[1]
     k = 3 if kind == SPACE else 2
     for b in range(k):
         mean, total = 0.0, 0.0
         for j in range(n):
-            x = -X[i, b, j]
+            x = -X[b, j]
             for m in range(k):
                 x += Q[m, b] * y[m, j]
             g[b * n + j] = x
-            mean += x * one[i, b, j]
-            total += one[i, b, j] * one[i, b, j]
+            mean += x * one[b, j]
+            total += one[b, j] * one[b, j]
         mean /= total
         for j in range(n):
-            g[b * n + j] -= mean * one[i, b, j]
+            g[b * n + j] -= mean * one[b, j]
     if kind == BEAM:
         for j in range(n):
-            g[2 * n + j] = y[2, j] - angle * one[i, 2, j]
+            g[2 * n + j] = y[2, j] - angle * one[2, j]
 
 
 @inner

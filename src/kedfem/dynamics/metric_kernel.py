@@ -6,48 +6,44 @@
 import numpy as np
 
 from kedfem.compiled import inner
-from kedfem.dynamics.frames_kernel import SPACE, nearest, rotation, turn_of
+from kedfem.dynamics.frames_kernel import SPACE, nearest, rotation, shaped, turn_of
 
 
 @inner
-def metric_force(rates, i, e, elements, X, fit, R, u, before, now, Q, angle, f, work, room):  # type: ignore[no-untyped-def]
-    """Internal force of segment i, element e, at the displacement u, added to f, world components.
+def metric_force(rates, e, elements, shapes, R, u, seen, frame, f, work, room):  # type: ignore[no-untyped-def]
+    """Internal force of a segment, element e, at the displacement u (3, n), added to f (3, n), world components.
 
     Parameters
     ----------
-    X, fit, before, now, Q : as in `frames_kernel.strained`; g is a displacement that has the strains
-    work : of `frames_kernel.strained`
+    shapes, seen, frame, work : as in `frames_kernel.strained`; g is a displacement that has the strains
     """
     if elements is None:
         return
     n0, n1, n2, h1, h0, beta = rates
+    X, _, fit = shapes
     y, forces, strained, A, U, change = work
+    (g0, v0, a0), (g, v, a) = seen
     rows, share, tangents, gradients = elements.rows, elements.share, elements.tangents, elements.gradients
     E, M, K, P = elements.sizes[e]
     turned, s, stress, on_g, on_x = room[0], room[7], room[8], room[5], room[6]
-    n, width, S = u.shape[2], tangents.shape[2], 6 * E + P
-    for b in range(3):
-        for j in range(n):
-            x = X[i, b, j]
-            for m in range(3):
-                x += R[i, m, b] * u[i, m, j]
-            y[b, j] = x
-    rotation(i, SPACE, fit, y, Q, angle, A, U, change)
-    for a in range(M):
+    n, width, S = u.shape[1], tangents.shape[2], 6 * E + P
+    shaped(X, R, u, 3, y)
+    rotation(SPACE, fit, y, frame, A, U, change)
+    for node in range(M):
         for b in range(3):
             for m in range(3):
-                turned[a, b, m] = Q[i, b, m]
+                turned[node, b, m] = frame[0][b, m]
     strains(e, elements, y, room, A, U, change)
     for b in range(3):
         for j in range(n):
             r, x = b * n + j, 0.0
             for m in range(S):
                 x += share[e, b * width + j, m] * s[m]
-            now[0, i, r] = x
+            g[r] = x
             if beta != 0.0:
-                x2 = n0 * (x - before[0, i, r]) - n1 * before[1, i, r] - n2 * before[2, i, r]
-                x1 = before[1, i, r] + h1 * x2 + h0 * before[2, i, r]
-                now[1, i, r], now[2, i, r] = x1, x2
+                x2 = n0 * (x - g0[r]) - n1 * v0[r] - n2 * a0[r]
+                x1 = v0[r] + h1 * x2 + h0 * a0[r]
+                v[r], a[r] = x1, x2
                 strained[r] = beta * x1
     for m in range(S):
         x = s[m]
@@ -68,7 +64,7 @@ def metric_force(rates, i, e, elements, X, fit, R, u, before, now, Q, angle, f, 
     for b in range(3):
         for m in range(3):
             for j in range(n):
-                f[i, b, j] += R[i, b, m] * forces[m, j]
+                f[b, j] += R[b, m] * forces[m, j]
 
 
 @inner

@@ -11,6 +11,12 @@ def copied(x, out):  # type: ignore[no-untyped-def]
 
 
 @inner
+def state_of(x, first, last):  # type: ignore[no-untyped-def]
+    """A quantity of a body, its rate and the rate of that, of an array (3, N) of all bodies."""
+    return x[0, first:last], x[1, first:last], x[2, first:last]
+
+
+@inner
 def frame_copied(R, out):  # type: ignore[no-untyped-def]
     """out becomes the rotation R."""
     for b in range(3):

@@ -8,7 +8,7 @@ import numpy as np
 from kedfem.compiled import inner
 from kedfem.dynamics.beams_kernel import bent
 from kedfem.dynamics.frames_kernel import entry
-from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, turned, turned_back
+from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, state_of, turned, turned_back
 from kedfem.dynamics.system.corotational_kernel import corotational_end, corotational_force, unforeseen
 from kedfem.dynamics.system.follower_loads_kernel import add_follower_loads
 from kedfem.dynamics.system.products_kernel import mass_times
@@ -24,17 +24,15 @@ def right_hand_side(c, bodies, i, R, F, state, out, room):  # type: ignore[no-un
     N = last - first
     u, v, a = state.u[first:last], state.v[first:last], state.a[first:last]
     if not bodies.dense[i]:
-        momentum = state.momentum[3 * first : 3 * last]
-        u, v, a = momentum[:N], momentum[N : 2 * N], momentum[2 * N :]
+        u, v, a = state_of(state.momentum, first, last)
     F0, F1, f0, alpha_f = state.F[first:last], F[first:last], state.f[first:last], c.alpha_f
     for x in range(N):
         room[x] = n0 * u[x] + n1 * v[x] + n2 * a[x] + c_f * F1[x] + alpha_f * (F0[x] - f0[x])
     turned_back(R, d, room[:N], out[first:last])
     if c.alpha != 0.0 or c.beta != 0.0:
         for m in range(3):
-            of = 3 * first + m * N
-            for x in range(N):
-                out[first + x] += c_f * c.rate[m] * state.damped[of + x]
+            for x in range(first, last):
+                out[x] += c_f * c.rate[m] * state.damped[m, x]
 
 
 @inner
@@ -50,9 +48,8 @@ def rigid_frame_end(c, bodies, i, R, F, g, Ag, state, history, t, work):  # type
         copied(g, Mg)
     else:
         mass_times(bodies.mass, bodies, i, u, Mg)
-        momentum = state.momentum[3 * first : 3 * last]
-        newmark_advanced(c, Mg, momentum)
-        copied(momentum[N : 2 * N], history.Mv[t, first:last])
+        newmark_advanced(c, Mg, state_of(state.momentum, first, last))
+        copied(state.momentum[1, first:last], history.Mv[t, first:last])
         turned_back(R, d, Mg, u)
         copied(u, Mg)
     energy, Kg = 0.0, history.Kg[t, first:last]
@@ -62,25 +59,24 @@ def rigid_frame_end(c, bodies, i, R, F, g, Ag, state, history, t, work):  # type
         Ag[x] = Kg[x] = y
     history.energy[t, i] = 0.5 * energy
     if c.alpha != 0.0 or c.beta != 0.0:
-        damped = state.damped[3 * first : 3 * last]
         for x in range(N):
             u[x] = c.alpha * Mg[x] + c.beta * Ag[x]
-        newmark_advanced(c, u, damped)
+        newmark_advanced(c, u, state_of(state.damped, first, last))
         if not bodies.dense[i]:
             copied(u, history.Cg[t, first:last])
         for x in range(N):
-            Ag[x] += damped[N + x]
+            Ag[x] += state.damped[1, first + x]
     turned(R, d, Ag, state.f[first:last])
     frame_copied(R, history.R[t, i])
 
 
 @inner
 def newmark_advanced(c, x, state):  # type: ignore[no-untyped-def]
-    """Newmark's formulas for any quantity from x at the end of the step; state (3N,) has it and its rates."""
+    """Newmark's formulas for any quantity from x at the end of the step; state is it and its rates, each (N,)."""
     n0, n1, n2 = c.acceleration
-    N, late, early = len(x), c.late, c.early
-    own, rates, seconds = state[:N], state[N : 2 * N], state[2 * N :]
-    for m in range(N):
+    late, early = c.late, c.early
+    own, rates, seconds = state
+    for m in range(len(x)):
         second = n0 * (x[m] - own[m]) - n1 * rates[m] - n2 * seconds[m]
         rates[m] += late * second + early * seconds[m]
         own[m], seconds[m] = x[m], second
@@ -137,10 +133,10 @@ def mass_damped(c, bodies, i, R, u, state, trial, work):  # type: ignore[no-unty
         turned_back(R, d, work.turned[:N], work.y[:N])
     for x in range(N):
         work.y[x] *= c.alpha
-    damped = trial.damped[3 * first : 3 * last]
-    copied(state.damped[3 * first : 3 * last], damped)
-    newmark_advanced(c, work.y[:N], damped)
-    turned(R, d, damped[N : 2 * N], work.turned[:N])
+    for m in range(3):
+        copied(state.damped[m, first:last], trial.damped[m, first:last])
+    newmark_advanced(c, work.y[:N], state_of(trial.damped, first, last))
+    turned(R, d, trial.damped[1, first:last], work.turned[:N])
     for x in range(N):
         trial.f[first + x] += work.turned[x]
 
@@ -188,12 +184,12 @@ def residual(c, bodies, i, R, F, u, state, trial, out, work):  # type: ignore[no
             r = c_f * (F[x] - f1[x]) - c_m * a
             room[x - first] = r + alpha_f * (F0[x] - f0[x]) - alpha_m * a0[x]
     else:
-        N, momentum = last - first, state.momentum[3 * first : 3 * last]
         mass_times(bodies.mass, bodies, i, u[first:last], out[first:last])
-        for x in range(N):
-            later = n0 * (out[first + x] - momentum[x]) - n1 * momentum[x + N] - n2 * momentum[x + 2 * N]
-            r = c_f * (F[first + x] - f1[first + x]) - c_m * later
-            room[x] = r + alpha_f * (F0[first + x] - f0[first + x]) - alpha_m * momentum[x + 2 * N]
+        momentum, rate, second = state.momentum
+        for x in range(first, last):
+            later = n0 * (out[x] - momentum[x]) - n1 * rate[x] - n2 * second[x]
+            r = c_f * (F[x] - f1[x]) - c_m * later
+            room[x - first] = r + alpha_f * (F0[x] - f0[x]) - alpha_m * second[x]
     turned_back(R, d, room[: last - first], out[first:last])
 
 
@@ -205,14 +201,15 @@ def own_end(c, bodies, i, R, F, u, state, trial, history, t, work):  # type: ign
     moved_to(c, first, last, u[first:last], F, state, history, t)
     if not bodies.dense[i]:
         mass_times(bodies.mass, bodies, i, u[first:last], work.y)
-        newmark_advanced(c, work.y[:N], state.momentum[3 * first : 3 * last])
+        newmark_advanced(c, work.y[:N], state_of(state.momentum, first, last))
     copied(trial.f[first:last], state.f[first:last])
     if bodies.rigid[i]:
         unforeseen(bodies, i, trial, work)
         for x in range(N):
             state.f[first + x] -= work.room[x]  # rounding, times K
     if c.alpha != 0.0:
-        copied(trial.damped[3 * first : 3 * last], state.damped[3 * first : 3 * last])
+        for m in range(3):
+            copied(trial.damped[m, first:last], state.damped[m, first:last])
     if bodies.frame[i] == COROTATIONAL:
         corotational_end(bodies.K, bodies, i, trial, state, history, t, work)
     orientation(bodies, i, R, u, trial, history.R[t, i])

@@ -6,7 +6,7 @@ Without such bodies K may be None; this module is then not compiled.
 from kedfem.compiled import inner
 from kedfem.dynamics.frames_kernel import balanced, strained
 from kedfem.dynamics.metric_kernel import metric_force
-from kedfem.dynamics.system.algebra_kernel import copied, turned
+from kedfem.dynamics.system.algebra_kernel import copied, state_of, turned
 from kedfem.dynamics.system.products_kernel import stiffness_times
 
 
@@ -23,22 +23,23 @@ def corotational_force(K, c, bodies, i, R, state, trial, work, first_pass):  # t
     if K is None:
         return
     first, last, d, n = bodies.at[i], bodies.at[i + 1], bodies.components[i], bodies.functions[i]
-    N, body = last - first, bodies.motion[i]
-    moved, f = trial.u[first:last].reshape(1, d, n), trial.f[first:last].reshape(1, d, n)
-    X, one = bodies.X[first:last].reshape(1, d, n), bodies.one[first:last].reshape(1, d, n)
-    fit = bodies.fit[first:last].reshape(1, d, n)
-    before = state.seen[3 * first : 3 * last].reshape(3, 1, N)
-    now = trial.seen[3 * first : 3 * last].reshape(3, 1, N)
+    N, body = last - first, R[bodies.motion[i]]
+    moved, f = trial.u[first:last].reshape(d, n), trial.f[first:last].reshape(d, n)
+    shapes = (
+        bodies.X[first:last].reshape(d, n), bodies.one[first:last].reshape(d, n), bodies.fit[first:last].reshape(d, n),
+    )  # fmt: skip
+    seen, frame = (
+        (state_of(state.seen, first, last), state_of(trial.seen, first, last)),
+        (trial.Q[i], trial.angle[i : i + 1]),
+    )
     rooms = (
         work.y[:N].reshape(d, n), work.turned[:N].reshape(d, n), work.strained[:N], work.A, work.U, work.change,
     )  # fmt: skip
     element = number_of(bodies.elements, i)
     if element >= 0:
-        metric_force(newmark(c), 0, element, bodies.elements, X, fit, R[body : body + 1], moved, before,
-                     now, trial.Q[i : i + 1], trial.angle[i : i + 1], f, rooms, work.element)  # fmt: skip
+        metric_force(newmark(c), element, bodies.elements, shapes, body, moved, seen, frame, f, rooms, work.element)
         return
-    strained(newmark(c), 0, bodies.kind[i], (X, one), fit, R[body : body + 1], moved, before, now, trial.Q[i : i + 1],
-             trial.angle[i : i + 1], work.strained, rooms)  # fmt: skip
+    strained(newmark(c), bodies.kind[i], shapes, body, moved, seen, frame, rooms)
     stiffness_times(bodies, i, work.strained, work.turned)
     if bodies.rigid[i]:
         copied(work.turned[:N], trial.response[first:last])
@@ -48,7 +49,7 @@ def corotational_force(K, c, bodies, i, R, state, trial, work, first_pass):  # t
         unforeseen(bodies, i, trial, work)
         for x in range(N):
             trial.f[first + x] += work.room[x]
-    balanced(0, bodies.kind[i], fit, R[body : body + 1], now, trial.Q[i : i + 1], f, rooms)
+    balanced(bodies.kind[i], shapes[2], body, seen[1][0], frame[0], f, rooms)
 
 
 @inner
@@ -92,8 +93,9 @@ def corotational_end(K, bodies, i, trial, state, history, t, work):  # type: ign
     if K is None:
         return
     first, last = bodies.at[i], bodies.at[i + 1]
-    g = trial.seen[3 * first : 2 * first + last]
-    copied(trial.seen[3 * first : 3 * last], state.seen[3 * first : 3 * last])
+    g = trial.seen[0, first:last]
+    for m in range(3):
+        copied(trial.seen[m, first:last], state.seen[m, first:last])
     copied(g, history.g[t, first:last])
     stiffness_times(bodies, i, g, work.y)
     energy = 0.0

@@ -20,9 +20,9 @@ class State(namedtuple("State", (
     time : (1,) [s]
     u, v, a : (N,) δ, δ', δ'' in coordinates, world components
     F, f : (N,) applied and internal force, world components
-    damped : (3N,) per body (3, N): damping force without its rate, and its rates, in the rigid-body frame
-    momentum : (3N,) per sparse body (3, N): M δ, M δ', M δ'' in world components
-    seen : (3N,) per co-rotational body (3, N): deformation g and its rates
+    damped : (3, N) damping force without its rate, and its rates, in the rigid-body frame
+    momentum : (3, N) of sparse bodies M δ, M δ', M δ'' in world components
+    seen : (3, N) of co-rotational bodies the deformation g and its rates
     Q, angle : (bodies, 3, 3), (bodies,) frames' rotation in the rigid-body one; of planar bodies its angle, with turns
     strain, direction, turn : of planar beams at their points, see `beams_kernel`
     port_force : (q,) force on each body at its interface points, world components
@@ -97,7 +97,7 @@ def empty_state(bodies: Bodies, of: Constraints) -> State:
     direction[:] = bodies.beams.tangent
     return State(
         time=np.zeros(1), u=np.zeros(N), v=np.zeros(N), a=np.zeros(N), F=np.zeros(N), f=np.zeros(N),
-        damped=np.zeros(3 * N), momentum=np.zeros(3 * N), seen=np.zeros(3 * N),
+        damped=np.zeros((3, N)), momentum=np.zeros((3, N)), seen=np.zeros((3, N)),
         Q=np.tile(np.eye(3), (L, 1, 1)), angle=np.zeros(L),
         strain=np.zeros((3, b, 3, E)), direction=direction, turn=np.zeros((b, E)),
         port_force=np.zeros(int(bodies.port_at[-1])), z=np.zeros((3, k)), e=np.zeros((3, r)),

@@ -74,7 +74,7 @@ def begun(of: Ready, state: State, motion_at: Motion | None) -> Now:
     number, damped = renumbered(of), []
     for k in range(len(links)):
         here = own(of, k)
-        rates = np.split(state.damped[3 * here.start : 3 * here.stop], 3)
+        rates = state.damped[:, here]
         damped.append(np.stack([nodal_forces(of, k, x) for x in rates]))
     seen: list[list[Seen]] = [[] for _ in links]
     if motion_at is not None and any(link.fit is not None for link in links):

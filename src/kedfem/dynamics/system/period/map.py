@@ -142,9 +142,7 @@ class PeriodMap:
         for k, each in enumerate(now.internal_states(state.u, state.v)):
             store_internal_state(self.of, k, each, state)
         state.f[:], state.damped[:], state.strain[1:] = was.f, was.damped, was.strain[1:]
-        for first, last in zip(self.of.bodies.at, self.of.bodies.at[1:], strict=False):
-            rates = slice(2 * first + last, 3 * last)  # of (3, N) per body: all but the first N
-            state.seen[rates] = was.seen[rates]
+        state.seen[1:] = was.seen[1:]
         z = now.interface(state.u)
         state.z[0, now.always.number] = z
         state.e[0] = now.coordinates(np.stack([z, 0 * z, 0 * z]))[0]
@@ -202,10 +200,10 @@ class PeriodMap:
 
     def _moving(self, x: Flat) -> tuple[Flat, Flat, Flat, Flat]:
         """u, v, M u, M v; coordinates of dense bodies have unit mass."""
-        u, v, m = (x[self._at[name]] for name in ("u", "v", "momentum"))
+        u, v = x[self._at["u"]], x[self._at["v"]]
+        momentum = x[self._at["momentum"]].reshape(3, -1)
         Mu, Mv, bodies = u.copy(), v.copy(), self.of.bodies
         for k in np.flatnonzero(bodies.dense == 0):
-            first, last = int(bodies.at[k]), int(bodies.at[k + 1])
-            N = last - first
-            Mu[first:last], Mv[first:last] = (m[3 * first : 3 * first + N], m[3 * first + N : 3 * first + 2 * N])
+            here = slice(int(bodies.at[k]), int(bodies.at[k + 1]))
+            Mu[here], Mv[here] = momentum[:2, here]
         return u, v, Mu, Mv

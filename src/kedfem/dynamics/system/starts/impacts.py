@@ -70,7 +70,6 @@ def pushed(of: Ready, state: State, between: Motion, met: Bool[np.ndarray, " r"]
     state.bearing[now.always.number] += C.T @ m
     for k, part in enumerate(of.parts):
         if isinstance(part, SparsePart):
-            here, N = own(of, k), own(of, k).stop - own(of, k).start
-            at = 3 * here.start + 2 * N
-            state.momentum[at : at + N] += momentum(of.system.model.links[k], found.x[here])
+            here = own(of, k)
+            state.momentum[2, here] += momentum(of.system.model.links[k], found.x[here])
     return state

@@ -222,10 +222,8 @@ def store_internal_state(of: Ready, k: int, found: InternalState, state: State) 
     """What a step remembers of body k, put into the state."""
     link, part, here = of.system.model.links[k], of.parts[k], own(of, k)
     state.f[here] = found.f
-    N = here.stop - here.start
     for m in range(3):
-        at = 3 * here.start + m * N
-        state.damped[at : at + N] = work_on(part, found.damped[m]).ravel()
+        state.damped[m, here] = work_on(part, found.damped[m]).ravel()
     points, b = points_of(link), np.searchsorted(of.bodies.beams.segment, k)
     for e, (point, seen) in enumerate(zip(points, found.frames, strict=False)):
         state.strain[0, b, :, e] = point.strains @ seen.g.ravel()
@@ -234,8 +232,7 @@ def store_internal_state(of: Ready, k: int, found: InternalState, state: State) 
     for seen in found.frames if not points else ():
         state.Q[k, : link.d, : link.d], state.angle[k] = seen.Q, seen.angle
         for m, x in enumerate((seen.g, seen.g1)):
-            at = 3 * here.start + m * N
-            state.seen[at : at + N] = coordinates(link, part, x).ravel()
+            state.seen[m, here] = coordinates(link, part, x).ravel()
 
 
 def put_momenta(of: Ready, state: State) -> None:
@@ -243,5 +240,4 @@ def put_momenta(of: Ready, state: State) -> None:
     for k, part in enumerate(of.parts):
         if isinstance(part, SparsePart):
             here, link = own(of, k), of.system.model.links[k]
-            moving = [momentum(link, x[here]) for x in (state.u, state.v, state.a)]
-            state.momentum[3 * here.start : 3 * here.stop] = np.concatenate(moving)
+            state.momentum[:, here] = [momentum(link, x[here]) for x in (state.u, state.v, state.a)]
