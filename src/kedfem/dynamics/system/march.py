@@ -8,7 +8,6 @@ import numpy as np
 
 from kedfem.dynamics.system.ends import left_line
 from kedfem.dynamics.system.ready import Loads, Motion, Ready, driving, shortened
-from kedfem.dynamics.system.reference import by_address
 from kedfem.dynamics.system.sparse import solver
 from kedfem.dynamics.system.starts.impacts import apart_from, met_at, pushed, without
 from kedfem.dynamics.system.state import Driving, History, State, copied, empty_history, empty_trial, room
@@ -65,6 +64,8 @@ def march(
     LeftLineError
         If a pin slides beyond the line of its slot.
     """
+    from kedfem.dynamics.system.reference import by_address
+
     constraints = of.constraints
     if between is None or not halvings:
         constraints = constraints._replace(jumps=np.zeros_like(constraints.jumps))
