@@ -7,6 +7,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from kedfem.errors import MeshError
 from kedfem.mesh import SolidMesh, checked_mesh, link_mesh, session
@@ -15,6 +16,7 @@ from kedfem.mesh.files.raw import RawMesh
 from kedfem.mesh.layered import outlines
 from kedfem.mesh.session import gmsh_model
 from kedfem.scene import LinkScene
+from kedfem.scene.records.outlines import crossing_at
 
 BAR = {"kind": "bar", "between": [[0, 0], [1, 0]], "width": 0.1, "thickness": 0.1}
 PLATE = {"kind": "plate_link", "between": [[0, 0], [0.2, 0]], "width": 0.04, "thickness": 0.01, "bore_diameter": 0.02}
@@ -216,6 +218,28 @@ class TestPart:
         assert part(tmp_path, OUTLINE, ((0, 0), (1.001, 0))) == (
             "links.arm.shape.between: must be as far apart as origin and x_point of plate.toml, 1 [m], got 1.001"
         )
+
+
+@pytest.mark.parametrize("scale", [1e-4, 1.0, 1e3])
+@pytest.mark.parametrize("turn", [0.0, 0.4, 2.1, 4.0])
+@pytest.mark.parametrize(
+    ("corners", "place"),
+    [
+        ([(0, 0), (2, 0), (2, 1), (0.6, 0), (0, 1)], (0.6, 0)),
+        ([(0, 0), (2, 0), (1, 1), (2, 2), (0, 2), (1, 1)], (1, 1)),
+        ([(0, 0), (2, 0), (2, 0), (0, 1)], (2, 0)),
+        ([(0, 0), (2, 2), (2, 0), (0, 2)], (1, 1)),
+        ([(0, 0), (2, 0), (2, 1), (0.6, 1e-6), (0, 1)], None),
+    ],
+    ids=["a corner on a side", "two corners", "a corner twice", "crossing", "a narrow neck"],
+)
+def test_where_an_outline_touches_itself_is_found_in_any_direction_and_size(corners, place, turn, scale):
+    """Rounding leaves a corner that is put on a side some 1e-16 of the size beside it, on either side."""
+    R = scale * np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    found = crossing_at(np.array(corners) @ R.T + scale)
+    assert (found is None) == (place is None)
+    if place is not None:
+        assert_allclose(found, R @ place + scale, atol=1e-9 * scale)
 
 
 class TestShape:

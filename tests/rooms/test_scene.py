@@ -321,7 +321,7 @@ def test_a_fault_of_a_lone_record_is_a_value_error():
 def test_importing_the_scene_leaves_heavy_libraries_alone():
     code = (
         "import sys, kedfem.scene;"
-        "print([name for name in ('pint', 'gmsh', 'pyvista', 'matplotlib', 'scipy', 'meshio', 'skfem')"
+        "print([name for name in ('pint', 'gmsh', 'pyvista', 'matplotlib', 'scipy', 'meshio', 'skfem', 'shapely')"
         " if name in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -170,46 +170,32 @@ def arc_points(
     return np.asarray(centre + radius * np.column_stack([np.cos(angles), np.sin(angles)]))
 
 
-def segment_distances(point: Float[np.ndarray, "*m 1 2"], polygon: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "*m n"]:
-    """Distances of points from each side of a polygon."""
-    P, side = polygon, np.roll(polygon, -1, axis=0) - polygon
-    along = ((point - P) * side).sum(-1) / np.maximum((side**2).sum(-1), 1e-300)
-    foot = P + np.clip(along, 0.0, 1.0)[..., None] * side
-    return np.asarray(np.linalg.norm(point - foot, axis=-1))
-
-
 def crossing_at(polygon: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "2"] | None:
     """A point near which a polygon crosses or touches itself, or None."""
-    n = len(polygon)
-    P, Q = polygon, np.roll(polygon, -1, axis=0)
-    touching = segment_distances(P[:, None, :], polygon) <= NEAR * np.ptp(polygon)
-    touching[np.arange(n), np.arange(n)] = touching[np.arange(n), np.arange(n) - 1] = False
-    if touching.any():
-        return np.asarray(P[np.nonzero(touching)[0][0]])
-    side = Q - P
+    from shapely import Polygon, get_coordinates, is_valid_reason, minimum_clearance, minimum_clearance_line
 
-    def beside(X: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n n"]:
-        d = X[None, :, :] - P[:, None, :]
-        return np.asarray(side[:, None, 0] * d[..., 1] - side[:, None, 1] * d[..., 0])
-
-    apart = beside(P) * beside(Q) < 0.0
-    crossing = np.argwhere(apart & apart.T)
-    return None if len(crossing) == 0 else 0.5 * (P + Q)[crossing[0][0]]
+    near, area = NEAR * np.ptp(polygon), Polygon(polygon)
+    sides = np.linalg.norm(np.roll(polygon, -1, axis=0) - polygon, axis=1)
+    if sides.min() <= near:  # a corner that is given twice, which shapely passes over
+        return np.asarray(polygon[sides.argmin()])
+    if not area.is_valid:
+        return np.array(is_valid_reason(area).partition("[")[2].rstrip("]").split(), dtype=float)
+    return np.asarray(get_coordinates(minimum_clearance_line(area))[0]) if minimum_clearance(area) <= near else None
 
 
 def edge_distance(
     point: Float[np.ndarray, "2"], polygon: Float[np.ndarray, "n 2"], straight: Bool[np.ndarray, " n"]
 ) -> float:
     """Distance of a point from an outline: from its straight sides and the ends of the chords of its arcs."""
-    corners = np.linalg.norm(polygon - point, axis=1)
-    sides = np.where(straight, segment_distances(point[None, :], polygon), np.inf)
-    return float(min(corners.min(), sides.min()))
+    from shapely import MultiLineString, MultiPoint, Point
+
+    sides = np.stack([polygon, np.roll(polygon, -1, axis=0)], axis=1)[straight]
+    drawn = [MultiPoint(polygon), MultiLineString([*sides])]
+    return float(min(each.distance(Point(point)) for each in drawn if each))
 
 
 def inside(point: Float[np.ndarray, "2"], polygon: Float[np.ndarray, "n 2"]) -> bool:
-    """Whether a point is inside a polygon: a ray from it crosses the sides an odd number of times."""
-    P, Q = polygon, np.roll(polygon, -1, axis=0)
-    spans = (P[:, 1] > point[1]) != (Q[:, 1] > point[1])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        x = P[:, 0] + (point[1] - P[:, 1]) / (Q[:, 1] - P[:, 1]) * (Q[:, 0] - P[:, 0])
-    return bool(np.count_nonzero(spans & (x > point[0])) % 2)
+    """Whether a point is inside a polygon."""
+    from shapely import Point, Polygon
+
+    return bool(Polygon(polygon).contains(Point(point)))
