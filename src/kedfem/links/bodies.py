@@ -1,4 +1,4 @@
-"""Rigid bodies attached to links: flywheels, point masses, any inertia. Still a scalar, constant mass."""
+"""Rigid bodies attached to links (flywheels, point masses, any inertia); the mass stays scalar and constant."""
 
 from dataclasses import replace
 

@@ -1,6 +1,6 @@
-"""Scene links made into records: shape → mesh → functions → constant matrices, attached bodies included.
+"""Records of links from a scene: shape → mesh → functions → constant matrices, with attached bodies.
 
-A MeshError says that a link cannot be meshed well enough.
+A MeshError reports a link that cannot be meshed with the required quality.
 """
 
 from collections.abc import Iterable, Mapping

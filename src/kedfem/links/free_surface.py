@@ -1,4 +1,4 @@
-"""Points at the surface of a link with the surface's axes there: where cracks begin."""
+"""Points on the free surface of a link, where cracks begin, with axes of the surface."""
 
 from dataclasses import dataclass
 

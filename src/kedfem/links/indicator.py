@@ -1,12 +1,12 @@
 """The error of stresses in each element: the indicator of Zienkiewicz and Zhu (1987).
 
-The stress that is recovered at the nodes, averaged there and interpolated by the shape functions, is nearer to the exact
-one than the element's own. Their difference in the energy norm, of the whole, is the mesh's error in that norm:
+The recovered stress, averaged at the nodes and interpolated by the shape functions, is nearer to the exact stress than
+that of the element. Their difference, relative to the whole in the energy norm, is the mesh's error in that norm:
 
     η² = ∫ (σ* − σ_h) : C⁻¹ : (σ* − σ_h) / (∫ σ_h : C⁻¹ : σ_h + the same)
 
-A displacement under the loads, that is a compliance, errs by η². At an edge that points inwards without a fillet, and
-under a force at a point, the exact stress has no bound: nothing converges there, which `re_entrant` shows.
+The error of a displacement under the loads, that is of a compliance, is η². At a re-entrant edge without a fillet, and
+under a point force, the exact stress is singular and no stress converges; `re_entrant` finds such edges.
 """
 
 from dataclasses import dataclass

@@ -1,6 +1,6 @@
 """Plane links: quadrilaterals in plane stress, with a thickness; the forms of `solid` in two dimensions.
 
-Mass is ρ t ∫ N_a N_b dA, the stiffness made of four scalar matrices: there is no third dimension.
+The mass is ρ t ∫ N_a N_b dA; four scalar matrices make the stiffness.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Rows that give displacement and stress of a link at a point: of a probe, or where a load acts."""
+"""Rows that give displacement and stress of a link at a point, such as that of a probe or a load."""
 
 from dataclasses import dataclass
 

@@ -1,8 +1,7 @@
 """The record of a link, the same for all models; the solver uses nothing else of a link.
 
 A link is a scalar function space {N_a} with a vector at each function. Its state is an array (n, d), its mass scalar
-matrices, its stiffness K0 constant in the link frame: [KED, eqs. (9)(11)-(14)]. d is 3, but for plane links, which know
-no third dimension.
+matrices, its stiffness K0 constant in the link frame: [KED, eqs. (9)(11)-(14)]. d is 3, for plane links 2.
 """
 
 from dataclasses import dataclass, field

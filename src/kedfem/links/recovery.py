@@ -1,6 +1,6 @@
 """Displacements and stresses of a link from its state, at points and at nodes, in link axes.
 
-Stress = elasticity : sym(gradient), and the gradient is again scalar: d (n, n) matrices serve all of it.
+Stress = elasticity : sym(gradient). The operator of the gradient is scalar, too: d matrices (n, n) suffice.
 Gradients are taken at the superconvergent (reduced) Gauss points, extended linearly to the nodes and averaged there.
 """
 

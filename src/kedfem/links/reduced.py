@@ -1,7 +1,7 @@
 """Links reduced to the span of a few scalar modes, with the same equations.
 
 Q (n, s) holds modes of a link, column by column. Q ⊗ Rᵈ is closed under rotation, so the reduced link is again a
-link: mass Qᵀ m Q, stiffness (Q ⊗ I)ᵀ K0 (Q ⊗ I) [KED, eqs. (12)(14)]. The same idea: Pechstein, Reischl, Gerstmayr
+link: mass Qᵀ m Q, stiffness (Q ⊗ I)ᵀ K0 (Q ⊗ I) [KED, eqs. (12)(14)]. Sources: Pechstein, Reischl, Gerstmayr
 (2013), "A generalized component mode synthesis approach for flexible multibody systems"; Gerstmayr, Schöberl (2006).
 """
 

@@ -1,8 +1,8 @@
-"""Links cut into segments, each a link again, with co-rotational frames: large deflection.
+"""Links divided into segments with co-rotational frames, for large deflections; each segment is a link, too.
 
 The segments of a beam are its elements, those of a solid or plane link slices of its mesh. Neighbours share the ports of
-the cut between them: of beams its node, of meshed links the affine field that fits the cut best, so that the two sides of
-a cut need not warp alike.
+the cut between them: for beams its node, for meshed links the affine field that fits the cut best, so that both sides of
+a cut may warp differently.
 """
 
 from collections.abc import Sequence

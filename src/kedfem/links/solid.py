@@ -1,7 +1,7 @@
 """Solid links of hexahedra or tetrahedra: mass and stiffness from six scalar forms.
 
-The only wall to scikit-fem, with `surface`.
 [KED, eqs. (4), (9), (11), (13)]; the same functions interpolate geometry and displacement (isoparametric).
+Only this module and `surface` import scikit-fem.
 """
 
 from dataclasses import dataclass

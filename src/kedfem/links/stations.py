@@ -1,9 +1,9 @@
-"""Stations along a line of a link on which something slides: displacements there, and between them by cubic splines.
+"""Stations along a line of a link on which a joint slides, with cubic splines of the displacements between them.
 
-A slider that feels the elements' own functions gets a kick whenever it passes a border between two of them, where slopes
-jump. A spline through stations is twice continuously differentiable, so that it passes without noticing. In a solid the
-displacement of a point under a point force grows without bounds as the mesh is refined; a station is therefore the affine
-mean of the material in a ball about it, as wide as the stations are apart.
+Slopes of the shape functions jump between elements, which would accelerate a slider like an impact. A spline through
+stations is twice continuously differentiable. In a solid the displacement under a point force grows without bounds as the
+mesh is refined; the displacement of a station is therefore the affine mean over the material in a ball about it, with
+the distance between stations as its width.
 """
 
 from collections.abc import Mapping

@@ -1,8 +1,8 @@
 """Stress stiffness: the stiffness that a stress σ adds for small rotations of a link's parts.
 
-k_ab = ∫ ∇N_a · σ ∇N_b dV is a scalar matrix, the same for all components of a state, as the mass is. It is linear in the
-state that σ comes from. Σ_b k_ab X_b is that state's internal force K0 g: a link that turns by θ has
-k (θ × X) = θ × K0 g, its forces turned.
+k_ab = ∫ ∇N_a · σ ∇N_b dV is a scalar matrix, the same for all components of a state, like the mass. It is linear in the
+state with the stress σ. Σ_b k_ab X_b is that state's internal force K0 g: for a link that rotates by θ,
+k (θ × X) = θ × K0 g, the rotation of its forces.
 """
 
 from collections.abc import Callable

@@ -1,1 +1,1 @@
-"""Rigid motion of the linkage: joints as rows, continuation along the drive, accelerations at any times."""
+"""Rigid motion of the linkage: constraint equations of joints, continuation along the drive, accelerations."""

@@ -1,7 +1,7 @@
-"""All time points at once: one or two small linear systems each, from a close prediction.
+"""Positions at all time points at once: from a close prediction, by one or two small linear systems each.
 
-A constant set of as many rows as motions, independent all along the path, takes the place of least squares over all
-rows; the others are only checked to be closed.
+A constant set of independent constraint equations, as many as unknowns, replaces least squares over all of them; the
+others are only checked.
 """
 
 from collections.abc import Sequence

@@ -1,8 +1,8 @@
-"""Constraint rows of large linkages by their entries: least squares and singular values, each row joining few bodies.
+"""Sparse constraint equations of large linkages, each between few bodies: least squares and singular values.
 
-The matrix of a small linkage is dealt with as a whole (`newton.Factor`). Of a large one only those entries are kept that
-join a row to one of its two to four bodies. JᵀJ is factored in blocks of six, bodies in order of least degree, so that a
-hundred four-bars, or loops in a row, cost a hundred times what one does.
+The matrix of a small linkage is dense (`newton.Factor`). That of a large one is stored by its entries, for the two to
+four bodies of each equation. JᵀJ is factored in blocks of six, in an order of minimum degree, so that the cost grows in
+proportion to the number of loops.
 """
 
 from dataclasses import dataclass

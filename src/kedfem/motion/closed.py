@@ -1,4 +1,4 @@
-"""The scene after small rigid motions of its links have closed the joints: everything on a link moves with it."""
+"""The scene with its joints closed by small rigid motions of links, which take everything on a link with them."""
 
 import math
 from collections.abc import Mapping

@@ -1,8 +1,8 @@
 """Constraint rows of joints, couplings and drives.
 
-A body's point is at p + R X (X: reference position, R = I there). Three kinds of elementary rows make them all:
+A body's point is at p + R X (X: reference position, R = I there). All are made of three kinds of elementary rows:
 
-* gap:   b_j · (x_i − x_j)    how far two points of bodies i and j are apart along a direction b fixed in body j
+* gap:   b_j · (x_i − x_j)    distance of two points of bodies i and j along a direction b fixed in body j
 * turn:  a_i · b_j            cosine between directions of body i and body j: zero where they are perpendicular
 * angle: twist of body i against body j about an axis b of both, counted on beyond a revolution: the arctangent of
          a_i · e_j − e_i · a_j over a_i · a_j + e_i · e_j, e = b × a: the same for all a across b, however the axes tilt

@@ -1,7 +1,8 @@
-"""Coordinates of joints: how far a hinge has turned and a slide has travelled, from the reference position.
+"""Coordinates of joints: rotations of hinges and travels of slides, from the reference position.
 
-They are of the joint's first link that is not the ground, against the other, about or along the joint's axis; of a slot,
-of the link with the pin along the line of the other; of a cross, about each axis, against the link that has this axis.
+They are those of the joint's first link that is not the ground against the other, about or along the joint's axis; in a
+slot those of the link with the pin along the line of the other; in a universal joint, about each axis, against the link
+with this axis.
 """
 
 from dataclasses import dataclass

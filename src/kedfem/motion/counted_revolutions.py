@@ -1,4 +1,4 @@
-"""Angles counted from one time point to the next, which laws over an angle need beyond half a revolution."""
+"""Angles counted on from one time point to the next, as laws over an angle need beyond half a revolution."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""How close a linkage comes to a dead point over the drive's range, estimated."""
+"""Estimated distance of a linkage from a dead point over the drive's range."""
 
 from dataclasses import dataclass
 

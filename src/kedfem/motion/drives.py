@@ -1,4 +1,4 @@
-"""Drives along the path of a linkage: the parameter τ is the turn or travel of one drive, of several the time."""
+"""Drives along the path of a linkage: the parameter τ is the angle or travel of one drive, of several drives the time."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Velocities of all bodies where a linkage starts to move by itself, from speeds that the scene asks for."""
+"""Initial velocities of all bodies of a linkage without a drive, from the speeds that the scene gives."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

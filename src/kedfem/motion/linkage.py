@@ -1,7 +1,7 @@
 """The linkage as rigid bodies and constraint equations; its mobility and redundancy in the reference position.
 
-With co-rotational frames motions may be left free. In the rigid-body motion the joints that bear them stay in the
-reference position while the drive moves the rest; without a drive it rests.
+With co-rotational frames motions may be free. In the rigid-body motion the joints with free motions stay in the
+reference position while the drive moves the rest; without a drive the linkage is at rest.
 """
 
 from dataclasses import dataclass, replace

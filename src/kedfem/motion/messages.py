@@ -1,4 +1,4 @@
-"""Why a linkage cannot follow its drive: the joint and the drive angle, in words."""
+"""Messages for linkages that cannot follow their drive, with the joint and the drive angle."""
 
 import numpy as np
 

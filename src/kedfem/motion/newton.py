@@ -1,4 +1,4 @@
-"""Poses that close all joints, and their derivatives by the path's parameter, at many of its values at once."""
+"""Poses that close all joints, and their derivatives by the path's parameter, at many values of it at once."""
 
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,7 +1,7 @@
 """Independent parts of a linkage: closed loops that share a joint, and single joints.
 
-Relative motions at the joints of a tree are free of each other, so constraints lose rank only within parts whose bodies
-are joined by closed loops: the biconnected components of the graph of bodies and constraints. The rank of all
+Relative motions at the joints of a tree are independent, so constraints lose rank only within parts whose bodies
+are connected by closed loops: the biconnected components of the graph of bodies and constraints. The rank of all
 constraints is the sum of the parts' ranks.
 """
 

@@ -1,4 +1,4 @@
-"""The period of a motion: the time after which linkage, drives and loads are where they were."""
+"""The period of a motion: the time after which linkage, drives and loads return."""
 
 import math
 from collections.abc import Iterator

@@ -1,7 +1,8 @@
-"""Forces of all joints and drives of rigid links: Jᵀ λ balances what acts on the bodies, at many times at once.
+"""Forces of all joints and drives of rigid links: Jᵀ λ balances the forces on the bodies, at many times at once.
 
-Rows that repeat others leave some of λ open: the least λ in scaled rows is taken, and `open_directions` shows what of a
-joint's force depends on that choice. All is linear in what acts, with factors that only depend on the pose.
+Redundant equations leave part of λ undetermined: the least λ in scaled equations is taken, and `open_directions` shows
+which components of a joint's force depend on that choice. λ is linear in the forces, with factors that depend on the
+pose.
 """
 
 from dataclasses import dataclass

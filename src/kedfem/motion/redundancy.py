@@ -1,8 +1,8 @@
-"""Redundant joint equations: which they are, in which directions, and which kinds of joints would avoid them.
+"""Redundant joint equations: their joints and directions, and the kinds of joints that would avoid them.
 
-A dependent set of rows bears forces in balance with one another without any load: self-stress, the vectors λ with
-Jᵀ λ = 0. What these do at a joint is what the joint holds redundantly, whichever rows are struck out; statics of rigid
-links cannot determine it.
+A dependent set of equations can have forces in balance without any load: self-stress, the vectors λ with Jᵀ λ = 0. The
+components of these at a joint are its redundant constraints, whichever equations are removed; statics of rigid links
+cannot determine them.
 """
 
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,7 @@
-"""Transmission angles: how well couplers drive the links that they end on.
+"""Transmission angles of couplers to the links that they drive.
 
-A coupler bears force along the line between its two joints. What it drives turns or slides on the ground, so that the
-joint's point there moves in one direction only; the angle between both is the pressure angle α. The transmission angle
+A coupler transmits force along the line between its two joints. The driven link rotates or slides on the ground, so that
+its joint moves in one direction only; the angle between both is the pressure angle α. The transmission angle
 is 90° − α, and 90° + α where the coupler leans away from the driven link's hinge: the angle between coupler and rocker of
 a four-bar.
 """

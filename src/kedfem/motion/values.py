@@ -1,6 +1,6 @@
 """Values of constraint rows and their first and second derivatives, for many time points at once.
 
-Inside, time runs along the last axis: of a few hundred points all that one operation touches then lies in the cache.
+Internally, time runs along the last axis: of a few hundred points all that one operation touches then lies in the cache.
 """
 
 from collections.abc import Iterator

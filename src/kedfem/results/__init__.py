@@ -1,6 +1,6 @@
 """Results: time series of probes, joint forces and the drive, in HDF5 and CSV.
 
-Nothing half-done is ever taken for whole, and nothing old is lost for a run that does not start:
+An incomplete file is never taken for a complete one, and a run that does not start loses no older results:
 
 * A run claims its folder; a second run there is refused before it touches anything.
 * A run writes to a part file with a name of its own; the first rows that reach the disk put it in place of an
@@ -9,7 +9,7 @@ Nothing half-done is ever taken for whole, and nothing old is lost for a run tha
 * The file says ``status = "running"`` from then on, ``"complete"`` only after a clean end, and
   ``"interrupted"`` (with the reason) after an error, Ctrl-C or SIGTERM. A killed process leaves ``"running"``, and no
   lock: whoever reads the file gets ``"abandoned"``.
-* Changed bytes are noticed: such a file is refused.
+* A file whose bytes have changed is refused.
 * Whatever the status, all rows up to the last :meth:`ResultsWriter.append` can be read.
 """
 

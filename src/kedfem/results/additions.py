@@ -1,6 +1,6 @@
 """Entries of a results file that are written after its rows: status, peaks, damage, notes, warnings, timing.
 
-All files are whole; an OutputError says that a file cannot be written.
+An OutputError reports a file that cannot be written.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,20 +1,20 @@
 """The energy account of a run, kept step by step.
 
-With the absolute rate R0' + δ' the general equation, [KED, eq. (20)], says exactly
+With the absolute rate R0' + δ' the general equation, [KED, eq. (20)], gives exactly
 
     d/dt (T + V) = loads + supports − g'ᵀ C0 g' − Σ ω · Σ δ × K δ − (damping on the rigid-body motion)
 
-because T K0 Tᵀ turns with the rigid-body motion, not with the bent link: its forces have the moment Σ δ × K δ, which a
-real link's inner forces do not have. That is the equation's geometric error, and is kept apart. The residual is the
-integration's: of second order in the step, and what numerical damping takes (ρ∞ < 1).
+because T K0 Tᵀ rotates with the rigid-body motion, not with the bent link: its forces have the moment Σ δ × K δ, which a
+real link's internal forces do not have. This geometric error of the equation is a separate term. The residual is that of
+the integration: of second order in the step, and the dissipation of numerical damping (ρ∞ < 1).
 
-Geometric stiffening stores ½ Σ g · k g P, in the strain energy here, and its forces R (k g P) do work on the rigid-body
-motion; with what the stresses do as they change, which comes from loads that shorten bent links, that is apart too.
+Geometric stiffening stores ½ Σ g · k g P, part of the strain energy here, and its forces R (k g P) do work on the
+rigid-body motion; that, and the work of the stresses as they change, by loads that shorten bent links, is separate, too.
 
-Supports do work on the elastic motion too where joints are enforced by constraint equations whose directions vary in
-time. Springs in joints, bushings and shafts, store energy and dampers take it: that is no work of supports.
+Supports also do work on the elastic motion where joints are enforced by constraint equations with directions that vary
+in time. Springs in joints, bushings and shafts store energy and dampers dissipate it, which is no work of supports.
 
-Work is the trapezoidal sum of powers; damping's is that of the means over a step, h ġᵀ C0 ġ with ġ = (g1 − g0)/h.
+Work is the trapezoidal sum of powers; that of damping is taken with means over a step, h ġᵀ C0 ġ with ġ = (g1 − g0)/h.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,10 +1,9 @@
-"""Two independent computations of one effort, compared over a run: elastic against rigid links, drives against energy.
+"""Comparison of two independent computations of an effort over a run: elastic and rigid links, drives and energy.
 
-They cost a few sums a step; where motions are free, which rigid links hold in the reference position, there is nothing
-to compare.
-Elastic effort e and rigid effort r of one joint or drive agree but for vibration, which over a run has no mean and
-nothing in common with r. So both e ≈ c r with c = ⟨e r⟩/⟨r r⟩ and the mean of e − r reveal an effort that is missing,
-or counted twice, not of one that swings.
+It costs a few sums a step. With free motions, in which rigid links stay in the reference position, there is no
+comparison. Elastic effort e and rigid effort r of one joint or drive agree but for vibration, which over a run has no
+mean and is not correlated with r. So c = ⟨e r⟩/⟨r r⟩ of e ≈ c r and the mean of e − r reveal an effort that is missing
+or counted twice, but are insensitive to vibration.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Differences between runs in their common channels, over time or the drive's position, from the first run."""
+"""Differences of runs from the first one in their common channels, over time or the drive's position."""
 
 import json
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,7 @@
 """Dimensions and CF texts of a results file, by which xarray, Panoply and other readers of netCDF 4 know its channels.
 
 Dimensions are HDF5's dimension scales in the root group: `time`, and one for the columns of vectors and of tensors, with
-their names. kedfem itself reads neither scales nor the references to them: HDF5 keeps these where it checks nothing.
+their names. kedfem itself reads neither scales nor the references to them, as HDF5 has no checksums for these.
 
 Source: netCDF-4 file format; CF Metadata Conventions 1.11, sections 2.7 (groups), 3.1 (units), 3.2 (long_name),
 5 (coordinates).

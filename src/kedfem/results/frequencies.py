@@ -1,4 +1,4 @@
-"""Natural frequencies over positions, and of single links, as tables for spreadsheets; what a report shows of them."""
+"""Natural frequencies over positions, and of single links, as tables for spreadsheets and for reports."""
 
 import json
 from dataclasses import asdict, dataclass

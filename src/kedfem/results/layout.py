@@ -1,7 +1,7 @@
 """Layout of a results file in HDF5, and detection of damage to it.
 
-Numbers carry HDF5's own checksum (Fletcher's), its tables those of the layout of HDF5 1.8 and later. Texts lie where HDF5
-checks nothing: their digest is stored beside them.
+Numbers have HDF5's checksum (Fletcher's), its tables those of the layout of HDF5 1.8 and later. HDF5 has no checksums for
+texts: their digest is stored beside them.
 """
 
 from collections.abc import Iterable, Iterator, Mapping

@@ -1,4 +1,4 @@
-"""What each link is modelled as: elements, unknowns, mass properties."""
+"""Facts about the model of each link: elements, unknowns, mass properties."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""Channels of a large results file, each read on demand, so that the memory of a long run does not grow at its end."""
+"""Channels of a large results file, each read on demand, so that the end of a long run needs no more memory."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field

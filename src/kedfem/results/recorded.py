@@ -1,4 +1,4 @@
-"""A channel with the function that makes its rows, and names of the drive's channels."""
+"""Channels with the functions that compute their rows, and names of the drive's channels."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

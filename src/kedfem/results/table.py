@@ -1,6 +1,6 @@
-"""Results as a table for spreadsheets, and as xarray and pandas have them.
+"""Results as a table for spreadsheets, and as data sets of xarray and pandas.
 
-An OutputError says that a file cannot be written, or what is not installed.
+An OutputError reports a file that cannot be written or a package that is not installed.
 """
 
 import csv

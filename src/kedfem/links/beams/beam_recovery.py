@@ -1,9 +1,9 @@
-"""Stress of a planar beam from the strains at its reduced Gauss points, which are the most accurate there.
+"""Stress of a planar beam from the strains at its reduced Gauss points, which are its most accurate ones.
 
-A probe takes the cubic through the nearest four of them: its error falls with the third power of the elements' length,
-at nodes and in the middle between them with the fourth, where the moment is smooth along a straight run of elements, as
-with loads spread along it. Joints, bodies and forces at a point (kinks) end a run. Elements of more than five nodes have
-more such points each: then it takes as many.
+A probe interpolates the nearest four of them by a cubic. Its error falls with the third power of the elements' length, at
+nodes and half way between them with the fourth, if the moment is smooth along a straight run of elements, as under
+distributed loads. Joints, bodies and forces at a point (kinks) end a run. In elements of more than five nodes the
+interpolation takes as many points as an element has.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Beams element by element, each with frames of its own."""
+"""Beams divided into their elements, each with co-rotational frames."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,17 +1,16 @@
 """Elements of beams in space whose strains are changes of the metric of axis and directors: exact for any rotation.
 
-Node a has the gradient functions g_k, in the reference position X_k, and turns by the rotation Q_a nearest to them, Σ
-g_k ⊗ X_k = Q_a U;
-its directors are d_i = Q_a n_i. With x' and d_i interpolated, and b = n1'·t, n2'·t, n1'·n2, n2'·n1 in the reference
-position,
+Node a has the gradient functions g_k, in the reference position X_k; its rotation Q_a is the nearest to them, Σ g_k ⊗
+X_k = Q_a U, and its directors are d_i = Q_a n_i. With x' and d_i interpolated, and b = n1'·t, n2'·t, n1'·n2, n2'·n1 in
+the reference position,
 
     ε = |x'| − 1,   γ_i = x'·d_i,   a_ij = ½ d_i·d_j
     κ1 = x'·d1' − b1 (ε + a11) − b3 γ2 − b2 a12,   κ2 = x'·d2' − b2 (ε + a22) − b4 γ1 − b1 a12
     τ = ½ (d2·d1' − d1·d2') − b3 (a11 + a22)
 
-less their values in the reference position. No rigid motion, of any size, strains anything, so that there is no frame.
+less their values in the reference position. They vanish for rigid motions of any size, so that no frame is needed.
 For small displacements they are `spatial_beam.space_strains` of p, q = θ × n1, θ × n2. Strains within the section,
-½ (g_k·g_l − X_k·X_l), turn nothing: forces of the beam leave them alone, and their stiffness is not the beam's.
+½ (g_k·g_l − X_k·X_l), do not rotate nodes: they are independent of the beam's forces and have a stiffness of their own.
 """
 
 from dataclasses import replace

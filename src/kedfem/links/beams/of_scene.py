@@ -1,4 +1,4 @@
-"""Beams of a scene: their axes with corners where joints and bodies sit, their sections."""
+"""Beams of a scene: their sections, and their axes with nodes at joints and bodies."""
 
 from itertools import pairwise
 

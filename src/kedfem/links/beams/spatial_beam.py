@@ -1,8 +1,8 @@
 """Beams in space: a line element times a linear section, functions N_a(s) {1, y, z} with a vector in R³ at each.
 
 x = Σ N_a (x_a + y n1_a + z n2_a) and u = Σ N_a (u_a + y p_a + z q_a): isoparametric, so that a rigid motion is in the
-space, and a state is rows of vectors as in a solid: mass m ⊗ I3, [KED, eqs. (4)(9)(11)]. Strains are changes of the
-metric of curve and directions, linearised: no rigid motion strains anything.
+space, and a state is rows of vectors as in a solid: mass m ⊗ I3, [KED, eqs. (4)(9)(11)]. Strains are the linearised
+changes of the metric of curve and directions, which vanish for rigid motions.
 """
 
 import numpy as np

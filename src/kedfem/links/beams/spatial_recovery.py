@@ -1,4 +1,4 @@
-"""A spatial beam at points of its section: displacement weights, stresses, and how it is drawn."""
+"""Displacement weights and stresses of a spatial beam at points of its section, and its surface for pictures."""
 
 import numpy as np
 import scipy.sparse as sp

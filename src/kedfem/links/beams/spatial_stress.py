@@ -1,8 +1,8 @@
 """Stress stiffness of beams in space: the part of their strains that is quadratic in the displacement.
 
 Strains are changes of scalar products of the fields e = (x', n1, n2, n1', n2'), s_i = Σ c_iαβ e_α · e_β / 2, c symmetric.
-The linear part, Σ c e_α · δe_β, is `spatial_beam.space_strains`; the quadratic one is ½ Σ c δe_α · δe_β. Forces S_i times
-that, all along the beam, are ½ uᵀ (k ⊗ I) u.
+The linear part, Σ c e_α · δe_β, is `spatial_beam.space_strains`; the quadratic one is ½ Σ c δe_α · δe_β. Its product with
+the stress resultants S_i, integrated along the beam, is ½ uᵀ (k ⊗ I) u.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
-"""Candidate surfaces for joints on a link: bores, journals, balls, plane faces; by name, or by geometry.
+"""Candidate surfaces for joints on a link: bores, journals, balls, plane faces, by name or by geometry.
 
-For messages, and for bores whose axis nobody gives.
+Messages list them, and a bore whose axis is not given is found among them.
 """
 
 from collections.abc import Iterator

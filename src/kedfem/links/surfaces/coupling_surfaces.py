@@ -1,4 +1,4 @@
-"""Where joints sit: the affine field that best fits a bore or a face, with scalar, rotation-invariant weights."""
+"""Coupling surfaces of joints: the affine field that best fits a bore or face, with scalar weights that do not rotate."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

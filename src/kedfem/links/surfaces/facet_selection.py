@@ -1,4 +1,4 @@
-"""Selection of the facets of a meshed link for a joint: faces by name, else what lies about its point and axis."""
+"""Selection of the facets of a meshed link for a joint: faces by name, else those about its point and axis."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""Messages where a joint finds no surface on a link, or several: what is near, in which direction, in which units."""
+"""Messages for joints that find no surface on a link, or several, with the nearest candidates and likely wrong units."""
 
 from collections.abc import Sequence
 from operator import itemgetter

@@ -1,4 +1,4 @@
-"""Candidate surfaces for joints on a part alone, and the faces that a joint at each of them selects."""
+"""Candidate surfaces for joints on a single part, and the faces that a joint at each of them selects."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

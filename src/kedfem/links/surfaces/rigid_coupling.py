@@ -1,9 +1,8 @@
 """Rigid couplings: coupling surfaces that keep their shape, such as a bore about a pressed-in pin.
 
-What of a coupling surface's displacement is not rigid costs energy: what it is off the affine field through a few of its
-nodes, and what that field is off the rigid motion nearest to it. The link's K0 gets the matrix of that: symmetric, the
-same in every direction of the link, zero on rigid motions. As all nodes of a coupling surface meet only these few, K0
-stays as sparse as it is."""
+A penalty energy keeps the surface rigid: of its deviation from the affine field through a few of its nodes, and of that
+field's deviation from the nearest rigid motion. Its matrix is added to the link's K0: symmetric, the same in every
+direction of the link, zero on rigid motions. Each node of the surface is coupled to these few only: K0 stays sparse."""
 
 from dataclasses import replace
 

@@ -1,6 +1,6 @@
 """The boundary of a solid or plane link: integrals over its facets, bores, balls and faces found by their geometry.
 
-The facets of a plane link are edges, as wide as the link is thick.
+The facets of a plane link are edges, with the link's thickness as their width.
 """
 
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
-"""Continuation along the drives: a few grid points at once, predicted from those before and closed by Newton.
+"""Continuation along the drives: a few grid points at once, predicted from earlier ones and corrected by Newton's method.
 
-A step is halved until Newton converges at once and no singular position lies between two points, so that the assembly
-branch never jumps.
+A step is halved until Newton's method converges at once and no singular position lies between two points, so that the
+solution stays on its assembly branch.
 """
 
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Following a linkage over its drives' range: grid, period, weakest position; the last paths are kept."""
+"""Paths of linkages over the range of their drives, with period and weakest position; the last ones are cached."""
 
 import pickle
 from dataclasses import replace

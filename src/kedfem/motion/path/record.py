@@ -1,6 +1,6 @@
-"""The path of a linkage: poses on a grid of τ, and what lies between grid points.
+"""The path of a linkage: poses on a grid of τ, interpolated between grid points.
 
-τ is the drive's turn or travel; with several drives it is the time.
+τ is the drive's angle or travel; with several drives it is the time.
 """
 
 from dataclasses import dataclass, replace

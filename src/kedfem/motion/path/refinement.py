@@ -1,4 +1,4 @@
-"""Grid points added to a path until poses between two of them can be predicted to rounding."""
+"""Refinement of the grid of a path until poses between its points can be interpolated to rounding."""
 
 from dataclasses import replace
 

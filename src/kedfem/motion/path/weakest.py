@@ -1,4 +1,4 @@
-"""The weakest position of a path: no dead point may lie on it, on the grid or between."""
+"""The weakest position of a path, on the grid or between, and the refusal of dead points."""
 
 from dataclasses import replace
 

@@ -1,7 +1,7 @@
 """Damage at the surfaces of links by the stresses of the last period of a periodic motion.
 
 The stress of a link over the period is a product of a few modes' stresses and their coordinates, which the envelope
-keeps; it is made for a few points at a time (`surface`).
+stores; it is computed for a few points at a time (`surface`).
 """
 
 from collections.abc import Mapping, Sequence

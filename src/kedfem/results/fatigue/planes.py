@@ -1,4 +1,4 @@
-"""Histories of stress at points of a surface by which damage is counted: signed von Mises, or on planes through a point.
+"""Stress histories for damage at points of a surface: signed von Mises stress, or normal stress on several planes.
 
 H (k, 6, T) : stress of points over a period as `links.recovery.stress_modes` has it: five deviatoric components, whose
     norm is the von Mises stress, and the mean

@@ -1,4 +1,4 @@
-"""Forces of a rigid link that a drive prescribes on its drive joint."""
+"""Forces on the drive joint of a rigid link whose motion a drive prescribes."""
 
 import numpy as np
 

@@ -1,10 +1,10 @@
 """The load case of one link at an instant: forces at its nodes in link axes, for a static analysis.
 
-With all in the link's axes the general equation, [KED, eq. (20)], is one of statics:
+In the link's axes the general equation, [KED, eq. (20)], is one of statics:
 
     K0 g = Wᵀ λ (joints) + P (loads) − M R0'' (rigid motion) − M δ'' (elastic motion) − C0 g' (damping)
 
-so a static analysis of the link under the right-hand side finds g but for a rigid motion, and the stresses of the run.
+so a static analysis of the link under the right-hand side gives g, less a rigid motion, and the stresses of the run.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,9 +1,9 @@
 """Moments of nodal fields and rates of the rigid motion, for the energy account.
 
-A field y, forces or a momentum, matters to a rigid motion 1 ⊗ a + X Bᵀ only through Σ y and Σ X ⊗ y, its *moments*, and
-of a planar beam through its couple. So one product per field and block does; all further work is on moments of all links
-together, time last: (1 + k, k, S, T) for S links at T time points, whatever their size, in k dimensions. Products take
-one component after the other, as histories are in memory.
+The work of a field y (forces or a momentum) on a rigid motion 1 ⊗ a + X Bᵀ depends only on Σ y and Σ X ⊗ y, its
+*moments*, and for a planar beam on its couple. So one product per field and block suffices; all further work is on the
+moments of all links together, time last: (1 + k, k, S, T) for S links of any size at T time points, in k dimensions.
+Products take one component after the other, the order of histories in memory.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Channels of rigid inverse dynamics: forces of joints and drives if all links were rigid."""
+"""Channels of rigid inverse dynamics: forces of joints and drives with all links rigid."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field

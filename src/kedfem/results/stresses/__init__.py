@@ -1,1 +1,1 @@
-"""The highest stresses of a run, where they are and what they mean there."""
+"""The highest stresses of a run, their places, and whether they are singular there."""

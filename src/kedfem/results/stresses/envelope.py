@@ -1,7 +1,7 @@
 """The stress envelope: the highest stresses at every point of the links over all steps, and when they occur.
 
-The steps of a link lie in the span of a few modes, found as they come. So its stress is a product, modes' stress times
-coordinates, of a few columns; and `envelope_kernel` leaves out most of the times by bounds. Rigid links have no stress.
+The states of a link lie in the span of a few modes, which are found step by step. So its stress is a product of the
+modes' stress and a few coordinates, and `envelope_kernel` skips most times by bounds. Rigid links have no stress.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""The highest stresses of a run and of its links, from their envelopes: the very highest, and at places apart."""
+"""The highest stresses of a run and of its links, from their envelopes: the highest, and others at distant places."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
