@@ -67,7 +67,7 @@ CHANNELS: dict[str, tuple[Entry, ...]] = {
     ),
     "Joints": (
         Entry("joints/NAME/force|rigid_force", XYZ, "N", "world",
-             "What the joint exerts on the link that the description names first, not on the other. rigid_: were all links rigid, in "
+             "What the joint exerts on the link that the description names first, not on the other. rigid_: with all links rigid, in "
              "scenes whose drives move all of them; it may lack components that statics leave open."),
         Entry("joints/NAME/moment|rigid_moment", XYZ, "N m", "world",
              "On the same link, about the joint's point as it moves with the rigid-body motion, of a slot about the pin. "
@@ -103,7 +103,7 @@ CHANNELS: dict[str, tuple[Entry, ...]] = {
         Entry("energy/kinetic|strain", ("*",), "J", "", "Of all links; strain energy of springs in joints too."),
         Entry("energy/work", ("loads", "supports"), "J", "",
              "Done on the links since the beginning: by loads, motors and springs; by the drive and other supports."),
-        Entry("energy/dissipated", ("dissipated",), "J", "", "What damping took since the beginning; it grows."),
+        Entry("energy/dissipated", ("dissipated",), "J", "", "Energy dissipated by damping since the beginning; it grows."),
         Entry("energy/neglected|residual", ("*",), "J", "",
              "Work that the equation neglects on bent links; what is left of the balance, the integration's error."),
     ),

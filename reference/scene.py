@@ -78,8 +78,8 @@ as *where: what was wanted, what was got*.
   itself.
 * **Without a drive** the mechanism moves by itself: under `motors`, `springs`, gravity and other loads, from
   `analysis.initial_speeds`. Frames are co-rotational then, `analysis.end_time` and `step` are required, and links need
-  not be held by joints. Torques, angles and speeds of a joint are those of its first link that is not the ground against
-  the other, positive about its axis.
+  not be connected by joints. Torques, angles and speeds of a joint are those of its first link that is not the ground
+  against the other, positive about its axis.
 * **From Python** `kedfem.scene.scene_from(dict, folder)` takes the same keys, and records such as
   `kedfem.scene.Bar` in place of tables; `read_scene(path)` reads a file.
 

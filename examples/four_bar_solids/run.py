@@ -16,7 +16,7 @@ def main() -> None:
     difference = rms(torque - rigid) / rms(rigid)
     print(f"drive torque: {rms(torque):.2f} N m rms, {100 * difference:.1f} % from that of the rigid linkage")
     assert difference < 0.06
-    # nothing holds the pins of a planar linkage sideways: their forces stay in its plane
+    # nothing constrains the pins of a planar linkage sideways: their forces stay in its plane
     for joint in "ABCD":
         force = channels[f"joints/{joint}/force"][1]
         assert np.abs(force[:, 2]).max() < 1e-6 * np.abs(force).max()

@@ -43,7 +43,7 @@ def main() -> None:
     assert beside < 0.05
 
     torque, rigid = (channels[f"drive/{name}"][:, 0] for name in ("torque", "rigid_torque"))
-    print(f"drive: {np.abs(torque).max():.2f} N m, were all links rigid {np.abs(rigid).max():.2f} N m")
+    print(f"drive: {np.abs(torque).max():.2f} N m, with all links rigid {np.abs(rigid).max():.2f} N m")
     assert run.balance is not None
     assert run.balance.energy < 1e-3
     assert 1.0 < np.abs(torque).max() / np.abs(rigid).max() < 1.2  # the arm's vibration comes on top

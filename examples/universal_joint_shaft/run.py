@@ -36,7 +36,7 @@ def main() -> None:
     print(f"the torque swings at {got:.2f} Hz, by the shafts' twist {wanted:.2f} Hz")
     assert 0.9 < got / wanted < 1.0  # the joints at 25 deg bend the shafts too, which adds flexibility
     peak, still = (np.abs(channels[f"drive/{name}"]).max() for name in ("torque", "rigid_torque"))
-    print(f"torque up to {peak:.1f} N m, were all links rigid {still:.1f} N m")
+    print(f"torque up to {peak:.1f} N m, with all links rigid {still:.1f} N m")
     assert run.balance is not None
     assert run.balance.energy < 1e-3
 

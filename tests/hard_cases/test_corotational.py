@@ -174,7 +174,7 @@ def test_a_step_that_cannot_be_saved_says_where_and_keeps_what_was_done(tmp_path
         "output": {"folder": str(tmp_path), "plots": False, "picture": False, "animation": False}
     }
     message = (
-        r"^analysis: the iterations of a step must converge, got none that do at step (\d+), t = .* s, "
+        r"^analysis: the iterations of each step must converge, got no convergence at step (\d+), t = .* s, "
         r"not even in 64 parts; link 'strip' moves most .*: give it more elements or segments, take a "
         r"smaller step, or more numerical damping \(rho_inf\)$"
     )

@@ -45,7 +45,7 @@ def test_joint_that_does_not_touch_its_link(model: str) -> None:
     )
     if model == "solid":  # no bore, so the nearest face of six
         assert offered == ["its nearest face is the plane face facing (-1, 0, 0) at (0, 0, 0), 0.1 m away"]
-        assert advice.startswith("move the joint onto the link, or draw the link with a bore")
+        assert advice.startswith("move the joint onto the link, or give the link a bore")
     else:
         assert offered == []
         assert advice == "move the joint onto the beam, or give the beam a point there"

@@ -279,7 +279,7 @@ def test_faults_of_all_rooms_of_a_scene_come_at_once():
 
 def test_a_record_that_nobody_checked_is_refused():
     bare = Scene(**dict(scene_from(tomllib.loads(GOOD))))
-    wanted = "the scene: must be made by scene_from or read_scene, got a record that nobody checked"
+    wanted = "the scene: must be made by scene_from or read_scene, got a record that has not been checked"
     assert faults_of(linkage, bare) == [wanted]
     assert scene_from(bare) == scene_from(tomllib.loads(GOOD))
     linkage(scene_from(bare))

@@ -338,7 +338,7 @@ def test_a_part_elsewhere_is_not_blamed_on_units() -> None:
 def test_what_a_link_offers_is_listed_nearest_first_and_not_without_end() -> None:
     told = refusal(made(turned(CLEVIS)), [0.05, 0, 0.012])
     offered, advice = told.split("; it has ")[1].split("; ")
-    assert advice == "move the joint to one of these, or draw the link with a bore there"
+    assert advice == "move the joint to one of these, or give the link a bore there"
     assert offered == (
         "bore of radius 5 mm about (0, 0, 1) at (0, 0, 0.0125) 50 mm away, "
         "journal of radius 12 mm about (0, 0, 1) at (0, 0, 0.0075) 50 mm away, "

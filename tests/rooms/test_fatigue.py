@@ -202,7 +202,7 @@ def refused(raw: Mapping[str, Any], folder: Path, *said: str) -> None:
 
 def test_what_has_no_period_is_refused_before_the_run(tmp_path: Path) -> None:
     once = arm(bar(), cycloidal(1.0, 0.1), analysis={"end_time": 0.1, "step": 1e-3}, fatigue=DATA)
-    refused(once, tmp_path, "fatigue.period: is required [s]", "does not go on turning or return")
+    refused(once, tmp_path, "fatigue.period: is required [s]", "does not rotate continuously or return")
     refused(swung(revolutions=0.5), tmp_path, "fatigue: needs a whole period, 0.2 s, got an analysis of 0.1 s")
     load = {"kind": "force", "link": "arm", "at": [0.5, 0], "vector": [0, 1]}
     pulse = swung() | {"loads": {"p": load | {"factor": {"at": [0, 1], "value": [0, 1]}}}}

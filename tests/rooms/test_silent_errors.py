@@ -47,7 +47,7 @@ def test_a_pulse_between_two_steps_is_told_and_jumps_are_not() -> None:
     pulse = {"time": [0.0201, 0.02025, 0.0204], "value": [0.0, 1.0, 0.0]}
     (message,) = loaded(pulse)
     assert message.startswith(
-        "loads.P: its table is finer than the time step of 0.0005 s: what the steps see of it is off by 100 %"
+        "loads.P: its table is finer than the time step of 0.0005 s: its integral over the steps is off by 100 %"
     )
     assert loaded({"time": [0.05, 0.0501], "value": [0.0, 1.0]}) == ()
     assert loaded({"over": "angle", "at": [0.0, 1.0, 2.0], "value": [0.0, 1.0, 0.0]}) == ()

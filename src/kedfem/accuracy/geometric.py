@@ -2,7 +2,7 @@
 
 Equation (20) turns K with the rigid-body motion, which leaves three things out:
 
-* **Axial forces.** On a link that has turned by ψ against its direction there an axial force N acts across it. This
+* **Axial forces.** On a link that has rotated by ψ against its direction there an axial force N acts across it. This
   changes the stiffness that the deflection meets by the share
 
       e = ∫ N ψ² ds / 2V,     V = ½ gᵀ K0 g the strain energy,
@@ -193,7 +193,7 @@ def slides(model: Model) -> list[tuple[str, int]]:
 
 
 def slopes(link: Link, of: Slices, history: LinkHistory, R: Float[np.ndarray, "T 3 3"]) -> Float[np.ndarray, "T c 3"]:
-    """ψ between slices: how far the link's line has turned off its axis in the rigid-body motion [rad]."""
+    """ψ between slices: the rotation of the link's line off its axis in the rigid-body motion [rad]."""
     along = (R @ of.axis)[:, None]
     change = np.diff(in_space(link, of.means @ history.u), axis=1)
     across = change - (change * along).sum(axis=2, keepdims=True) * along

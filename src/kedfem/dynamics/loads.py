@@ -45,7 +45,7 @@ class Pattern:
     follows : turns with the link
     factor : times (t,) and angles of the drive (t,) → factors (t,)
     share : unit vectors of the link in the reference position and of the world: the factor times their cosine, once the
-        link has turned
+        link has rotated
     own : turns as the link itself does, which no rigid-body orientation shows: `system.forces.follower_loads`
     load : its name in the scene; of gravity none
     """
@@ -82,7 +82,7 @@ def patterns(scene: Scene, links: Mapping[str, Link], prescribed: bool = False) 
 
 
 def _follows(link: Link, pattern: Pattern) -> bool:
-    """Whether a load depends on how its link has turned: ψ of a planar beam takes a torque however it has."""
+    """Whether a load depends on the rotation of its link: a torque on ψ of a planar beam does not."""
     return pattern.follows and bool(pattern.forces[:, : 2 if link.kind == "beam" else 3].any())
 
 
@@ -105,7 +105,7 @@ def coarse_steps(scene: Scene) -> tuple[str, ...]:
         if missed > MISSED * np.trapezoid(np.abs(value), t):
             out.append(
                 f"{where.rpartition('.')[0]}: its table is finer than the time step of {grid.step:.3g} s: "
-                f"what the steps see of it is off by {100 * missed / np.trapezoid(np.abs(value), t):.0f} %; "
+                f"its integral over the steps is off by {100 * missed / np.trapezoid(np.abs(value), t):.0f} %; "
                 "take a smaller step"
             )
     return tuple(out)

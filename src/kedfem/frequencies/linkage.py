@@ -43,7 +43,8 @@ class Wanted:
     """Options of an analysis of natural frequencies.
 
     modes : frequencies at each position
-    positions : over the last revolution of a drive that goes on turning, else over the whole time; without a drive one
+    positions : over the last revolution of a drive that rotates continuously, else over the whole time; without a drive
+        one
     free : whether the drives release their joints; else they hold them
     harmonics : of the drive whose crossings are looked for
     shapes : lowest mode shapes that are drawn, at the position whose first frequency is the lowest
@@ -60,11 +61,12 @@ class Wanted:
 class Frequencies:
     """Natural frequencies of a linkage frozen at P positions.
 
-    time : (P,) [s]; angle : (P,) drive angle [rad] or travel [m] there, of one that goes on turning from its first turn
+    time : (P,) [s]
+    angle : (P,) drive angle [rad] or travel [m] there, of one that rotates continuously from its first revolution
     values : (P, f) natural frequencies in rising order [Hz], NaN where there are fewer
     errors : (f,) relative, of the meshes, estimated at the first position; NaN where they are not known
     still : motions without strain, at zero frequency
-    speed : of the drive, where it goes on turning, else 0 [rad/s]
+    speed : of the drive, where it rotates continuously, else 0 [rad/s]
     crossings : with harmonics of the drive, over all speeds
     factorisations : of links
     """

@@ -130,7 +130,7 @@ def _at_nodes(
     if len(found) < FEWEST:
         raise MeshError(
             f"{where}: its line must run along the axis of beam '{name}' over {FEWEST} nodes at least, got "
-            f"{len(found)} there: draw it along the beam, or give this more elements"
+            f"{len(found)} there: give a line along the beam, or the beam more elements"
         )
     s = np.array([x[0] for x in found])
     _check_travel(where, name, (s[0], s[-1]), travel, BESIDE * size)
@@ -149,7 +149,7 @@ def _between_nodes(
     found, name, size = _nodes(parts, line), next(iter(parts.values())).name, _size(parts)
     if len(found) < 2:
         wanted = f"the line of a slot must run along the axis of the rigid line '{name}'"
-        raise MeshError(f"{where}: {wanted}, got {len(found)} of its nodes there: draw it along the line")
+        raise MeshError(f"{where}: {wanted}, got {len(found)} of its nodes there: give a line along it")
     (first, key, one), (last, other, two) = found[0], found[-1]
     if endless:
         reach = (min(first, travel[0]) - FAR * size, max(last, travel[1]) + FAR * size)
@@ -198,7 +198,7 @@ def _in_balls(
             reached += [corners.min(), corners.max()]
             longs.append(np.ptp(corners, axis=1))
     if not reached:
-        got = "got one that nowhere comes near it"
+        got = "got one that is nowhere near it"
         raise MeshError(f"{where}: its line must run along link '{links[0].name}', {got}")
     reach = (float(min(reached)), float(max(reached)))
     _check_travel(where, links[0].name, reach, travel, BESIDE * max(link.size for link in links))

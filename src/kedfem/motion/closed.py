@@ -224,7 +224,7 @@ def _up(where: str, up: XYZ | None, segments: list[tuple[XYZ, XYZ]], shift: Shif
     if _tilt(shift, *ups) == 0.0:
         return up
     if len(ups) > 1:
-        wanted = "is required where closing the joints turns a line with steep parts"
+        wanted = "is required where closing the joints rotates a line with steep parts"
         raise MotionError(f"{where}.up: {wanted}, got nothing")
     return shift.rotated(ups[0])
 

@@ -34,7 +34,8 @@ def require_counted(scene: Scene, link: Linkage, along: Path) -> None:
         if most > MOST:
             faults.append(
                 f"{where}: joint {joint!r} must rotate by less than {np.degrees(MOST):.0f} deg between time points, so "
-                f"that its turns can be counted, got {np.degrees(most):.4g} deg: take {most / MOST:.2g} times as many"
+                f"that its revolutions can be counted, got {np.degrees(most):.4g} deg: take {most / MOST:.2g} "
+                "times as many"
             )
     if faults:
         raise MotionError("\n".join(faults))

@@ -85,14 +85,14 @@ def linkage(scene: Scene) -> Linkage:
     Raises
     ------
     SceneError
-        A record that was made beside `scene_from`, so that nobody checked its tables against each other.
+        A record that was made beside `scene_from`, so that its tables have not been checked against each other.
     MotionError
         If a driven linkage cannot move, has a dead point in the reference position, or keeps a free motion of links with
         rigid-body frames.
     """
     if not scene.checked:
         wanted = "must be made by scene_from or read_scene"
-        raise SceneError(f"the scene: {wanted}, got a record that nobody checked")
+        raise SceneError(f"the scene: {wanted}, got a record that has not been checked")
     if any(joint.open for joint in scene.joints.values()):
         raise ValueError("a scene whose links are apart in the reference position must be assembled first")
     rows, driven = _all_rows(scene)

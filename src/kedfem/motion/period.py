@@ -71,7 +71,7 @@ def repeats_after(scene: Scene) -> float:
     base = cycle(scene.motion)
     if base is None:
         several = len(scene.driven_joints) > 1
-        got = "several drives" if several else "one that does not go on turning or return"
+        got = "several drives" if several else "one that does not rotate continuously or return"
         wanted = "is required [s] but with a drive that repeats its motion"
         raise SceneError(f"fatigue.period: {wanted}, got {got}")
     return _periods(scene, linkage(scene), base, FATIGUE)[1]
@@ -144,7 +144,7 @@ def _open(scene: Scene, along: Path, time: float, asked: str) -> Iterator[str]:
         if factor.over == "time" or is_constant(factor) or not gone:
             continue
         if factor.period is None:
-            yield f"{name}.period: is required with {asked} and a drive that goes on turning, got nothing"
+            yield f"{name}.period: is required with {asked} and a drive that rotates continuously, got nothing"
         elif not _whole(gone, factor.period):
             angle = factor.over == "angle"
             got = f"{math.degrees(factor.period):.6g} deg" if angle else f"{factor.period:.6g} m"

@@ -47,7 +47,7 @@ ENERGIES = (
     ("kinetic", ("kinetic",), "kinetic energy of the absolute motion of all links"),
     ("strain", ("strain",), "strain energy of all links, [KED, eq. (13)], and of springs in joints"),
     ("work", ("loads", "supports"), "work done by the loads, motors and springs; by the drive and the other supports"),
-    ("dissipated", ("dissipated",), "energy that damping took"),
+    ("dissipated", ("dissipated",), "energy dissipated by damping"),
     ("neglected", ("neglected",), "work of the elastic forces' moment on bent links, which the equation neglects"),
     ("residual", ("residual",), "residual energy of the integration"),
 )  # fmt: skip
@@ -224,8 +224,8 @@ def balance_warning(found: Balance) -> tuple[str, ...]:
     if found.energy <= UNBALANCED:
         return ()
     return (
-        f"the residual of the balance is {100 * found.energy:.2g} % of energy: the steps are too long for what moves, or "
-        "numerical damping takes what they do not resolve; take shorter ones",
+        f"the residual of the balance is {100 * found.energy:.2g} % of energy: the steps are too long for the motion, or "
+        "numerical damping takes vibrations that they do not resolve; take shorter ones",
     )
 
 

@@ -84,7 +84,7 @@ class CrossChecks:
         self.pairs = []
         for name, each in known.items() if not linkage.mobility else ():
             rigid = known.get(_rigid_name(name))
-            if rigid is not None and "without what is along" not in rigid.description:
+            if rigid is not None and "without the part along" not in rigid.description:
                 columns = [each.columns.index(x) for x in rigid.columns]
                 self.pairs.append(_Pair(name, rigid.name, columns, each.unit))
         self.scene, self.drives = scene, {drive_effort(scene, name)[0]: name for name in scene.driven_joints}

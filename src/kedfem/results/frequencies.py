@@ -21,7 +21,7 @@ class Summary:
     scene : its text; none of a scene made in Python
     positions, free, still : how many; whether drives release their joints; motions without strain
     lowest, highest : of each mode over all positions [Hz]
-    speed : of the drive [rpm]; 0 of one that does not go on turning
+    speed : of the drive [rpm]; 0 of one that does not rotate continuously
     crossings : mode, harmonic of the drive, slowest and fastest speed at which they meet [rpm]
     notes : how exact they are, and warnings
     """

@@ -36,7 +36,7 @@ def kinematics_tables(scene: Scene, moved: KinematicsRun) -> list[Table]:
     return [
         listed(Text(scene.title or "Joints"), joints, _coordinates(scene, moved)),
         listed("Transmission angles", angles, _transmissions(scene, moved)),
-        listed("Largest forces were all links rigid", forces, _forces(scene, moved)),
+        listed("Largest forces with all links rigid", forces, _forces(scene, moved)),
         seconds_table(f"{len(moved.results.time) - 1} steps", moved.seconds),
     ]
 
@@ -129,7 +129,7 @@ def case_tables(found: LoadCases) -> list[Table]:
 
 
 def frequencies_tables(scene: Scene, found: Frequencies) -> list[Table]:
-    """Frequencies at each position; of a drive that goes on turning critical speeds of each harmonic."""
+    """Frequencies at each position; of a drive that rotates continuously critical speeds of each harmonic."""
     still = f"; {found.still} motions without strain, at 0 Hz" if found.still else ""
     stiffened = ", stiffened by its motion" if scene.analysis.stiffening else ""
     title = Text(f"Natural frequencies of the frozen linkage{stiffened} [Hz]{still}")

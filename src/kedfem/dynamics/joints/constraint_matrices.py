@@ -14,7 +14,7 @@ from kedfem.dynamics.system.forces.supports import exerted
 from kedfem.dynamics.system.record import Spring
 from kedfem.motion.rigid import RigidMotion
 
-REPEATED = 1e-10  # of a row on ports: what is left on the interface unknowns if other joints hold the same already
+REPEATED = 1e-10  # of a row on ports: what is left on the interface unknowns if other joints constrain the same
 
 
 @dataclass(frozen=True, slots=True)

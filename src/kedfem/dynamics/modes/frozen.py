@@ -136,7 +136,7 @@ class Frozen:
                 lowest, shapes = self._lowest(motion)
         nothing = max(STILL * self.shift, TURNED * self.least)
         if (lowest < -nothing).any():
-            raise UnstableError("a small push takes away for good", motion)
+            raise UnstableError("is statically unstable", motion)
         still = int((np.abs(lowest) <= nothing).sum())
         end = still + self.count
         omega = np.sqrt(np.where(np.abs(lowest) <= nothing, 0.0, lowest))[:end]

@@ -150,7 +150,7 @@ def _constant(
         square = product(r, M_r)
         p = r + np.divide(square, before, out=np.zeros_like(square), where=before > 0) * p
     raise SolveError(
-        "state space: what a constant input bends must be found, got steps that do not settle: take another position"
+        "state space: iterations for the static response must converge, got none that do: take another position"
     )
 
 

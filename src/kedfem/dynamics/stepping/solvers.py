@@ -14,7 +14,7 @@ from kedfem.scene import Scene, corotational, time_grid
 
 BLOCK_BYTES = 64_000_000
 CONVERGED = 1e-7  # change of a iteration, of the largest that a step has made
-FREE = 1e-9  # the same where nothing holds the motion as a whole: what is left of each step adds up in it
+FREE = 1e-9  # the same for free motions as a whole, in which residuals of steps add up
 
 
 def steps_of(scene: Scene, model: Model) -> Steps:
@@ -61,7 +61,7 @@ def unstable_balance(solvers: Sequence[Steps]) -> str:
         return ""
     more = f" and {len(found) - 1} more of the positions examined" * (len(found) > 1)
     return (
-        f"the balance of forces is unstable at {found[0]}{more}: a small push takes the link away for good, as a column "
+        f"the balance of forces is unstable at {found[0]}{more}: any disturbance moves the link away, as a column "
         "beyond its buckling load or a mast that stands on its tip"
     )
 

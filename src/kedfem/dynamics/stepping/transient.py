@@ -137,7 +137,7 @@ def _stuck(step: int, at: str, failed: ConvergenceError, solver: Steps) -> str:
     if solver.corotational:
         advice, tried = _finer(solver.model, failed), f", not even in {2**HALVINGS} parts"
     return (
-        f"analysis: the iterations of a step must converge, got none that do at step {step}, "
+        f"analysis: the iterations of each step must converge, got no convergence at step {step}, "
         f"{at}{tried}; {moves} moves most from iteration to iteration: "
         f"{advice}, take a smaller step, or more numerical damping (rho_inf)"
     )

@@ -104,7 +104,7 @@ def left_line(system: System, end: int, t: float) -> str:
     s = line.stations.s
     return (
         f"joints.{name}: the pin must stay on link '{carrier}', which reaches from {s[0]:.6g} to {s[-1]:.6g} m along the "
-        f"line, got one that slides off it at t = {t:.6g} s: draw a longer line, or hold the pin"
+        f"line, got one that slides off it at t = {t:.6g} s: give a longer line, or constrain the pin"
     )
 
 

@@ -45,7 +45,7 @@ def add_follower_loads(loads, bodies, R, amounts, u, f, frame):  # type: ignore[
 
 @inner
 def shown_frame(loads, bodies, w, R, u, frame):  # type: ignore[no-untyped-def]
-    """frame becomes the rotation by which load w has turned, from the reference position to the world."""
+    """frame becomes the rotation by which load w has rotated, from the reference position to the world."""
     i, at = loads.body[w], loads.shown_at[w]
     first, n, d = bodies.at[i], bodies.functions[i], bodies.components[i]
     for b in range(3):

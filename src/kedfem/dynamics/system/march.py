@@ -30,8 +30,8 @@ class ConvergenceError(SolveError):
     def __init__(self, t: float, state: State, history: History, taken: int, moves: str) -> None:
         name = f"link '{moves}'" if moves else "a joint or force element"
         super().__init__(
-            f"analysis: the iterations of a step must converge, got none that do at t = {t:.6g} s; {name} moves most "
-            "from one to the next: take a smaller step, or more numerical damping (rho_inf)"
+            f"analysis: the iterations of each step must converge, got no convergence at t = {t:.6g} s; {name} moves "
+            "most from one to the next: take a smaller step, or more numerical damping (rho_inf)"
         )
         self.state, self.history, self.taken, self.moves = state, history, taken, moves
 

@@ -101,7 +101,7 @@ def strain_rows(x: Float[np.ndarray, "m 2"], r: float) -> tuple[Float[np.ndarray
 
 
 def tangent_fit(x: Float[np.ndarray, "m 2"], r: float) -> Float[np.ndarray, "m 3"]:
-    """Weights with which an element's nodes show how its axis has turned at r: Σ x_a ⊗ fit_a = x' ⊗ t, undeformed t."""
+    """Weights with which an element's nodes show the rotation of its axis at r: Σ x_a ⊗ fit_a = x' ⊗ t, undeformed t."""
     _, dN = shape_functions(r, len(x))
     tangent = dN @ x
     return np.asarray(np.outer(dN, [*tangent, 0.0]) / (tangent @ tangent))

@@ -75,10 +75,10 @@ def chosen_surface(link: Link, where: str, choice: ChosenFace, near: Vector, off
     more = f", and {len(offered) - MOST} more" if len(offered) > MOST else ""
     if meant:
         wanted, got = f"mean one face of link '{link.name}'", f"{len(meant)} such faces"
-        advice = "say which is meant by `near`, a point on it; several are given as a list"
+        advice = "choose one by `near`, a point on it, or give several as a list"
     else:
         wanted, got = f"be a face of link '{link.name}'", f"{choice.label}, of which it has none"
-        advice = "a diameter and a direction must be as the part has them"
+        advice = "give a diameter and a direction that the part has"
     those = those or "nothing round or plane"
     raise MeshError(f"{where}: must {wanted}, got {got}; nearest first: {those}{more}; {advice}")
 

@@ -108,8 +108,8 @@ def _advice(link: Link, offered: Sequence[Candidate]) -> str:
     if not link.meshed:
         return "move the joint onto the beam, or give the beam a point there"
     if any(each.cylindrical for each in offered):
-        return "move the joint to one of these, or draw the link with a bore there"
-    return "move the joint onto the link, or draw the link with a bore (a hole of its outline) there"
+        return "move the joint to one of these, or give the link a bore there"
+    return "move the joint onto the link, or give the link a bore (a hole of its outline) there"
 
 
 def described(each: Candidate) -> str:

@@ -13,7 +13,7 @@ def write_over_drive(
     path: Path, t: Float[np.ndarray, " P"], angle: Float[np.ndarray, " P"], values: Float[np.ndarray, "P f"],
     revolutions: bool,
 ) -> None:  # fmt: skip
-    """Natural frequencies [Hz] over the drive angle, of a drive that does not go on turning over time."""
+    """Natural frequencies [Hz] over the drive angle, of a drive that does not rotate continuously over time."""
     x = np.degrees(angle) if revolutions else t
     with figure_saved(path, "Natural frequencies of the linkage frozen at positions") as figure:
         ax = figure.subplots()

@@ -148,7 +148,7 @@ def _beside(results: Results, key: tuple[str, str, str, str], family: Mapping[st
     of, words = first.removesuffix("s"), what.replace("_", " ")
     several = f"{of} {words.removesuffix('y')}{'ies' if words.endswith('y') else 's'}"
     title = f"magnitude of the {several}" if vector else several
-    title = f"{title[0].upper()}{title[1:]}{' were all links rigid' * stiff}{f': {kind}' if kind else ''}"
+    title = f"{title[0].upper()}{title[1:]}{' with all links rigid' * stiff}{f': {kind}' if kind else ''}"
     file = several.replace(" ", "_") + (f"-{kind}" if kind else "")
     return Picture(file, title, None, [readable(words, unit, curves)], paths)
 

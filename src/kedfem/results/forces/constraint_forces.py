@@ -51,7 +51,7 @@ class ConstraintForces:
     def determined(self, name: str) -> tuple[bool, bool]:
         """Whether statics determine the force and the moment of a joint enforced by constraint equations.
 
-        What a planar link holds of a solid out of the plane, other joints hold already; nothing there loads either.
+        A planar link does not constrain a solid out of the plane, where other joints do and nothing loads either.
         """
         if all(joint.name != name for joint in self.model.rows):
             return True, True

@@ -44,7 +44,7 @@ def _reason(scene: Scene, model: Model, rows: ConstraintForces, name: str) -> st
         return f"it joins rigid links alone ({', '.join(links)}), whose constraints are not solved for"
     others = sorted({*_partners(model, name), *rows.shared(name)} - {name, ""})
     if not others:
-        return "the balance of forces does not determine it: it bears on what others constrain already"
+        return "the balance of forces does not determine it: other joints constrain the same directions"
     return (
         f"the balance of forces does not determine how it is shared with joint{'s' * (len(others) > 1)} "
         f"{', '.join(others)} (redundant constraints)"

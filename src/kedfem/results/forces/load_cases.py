@@ -162,6 +162,6 @@ def _force_elements(model: Model, k: int, at: Snapshot, now: LinkMoment) -> Forc
     if link.full is not None:
         raise SolveError(
             f"links.{link.name}: must not be reduced where springs, motors or limits act on it (its modes do not "
-            "show at which nodes), got a reduced link: leave out `reduced` for its load cases"
+            "determine at which nodes), got a reduced link: take reduction = 'none' for its load cases"
         )
     return np.asarray(left @ now.R)

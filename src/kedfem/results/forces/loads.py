@@ -170,7 +170,7 @@ def acted_links(name: str, joint: Joint, description: str) -> tuple[str, str]:
         words = f"force of joint {re.escape(name)} on (link|slider) {re.escape(on)} from (slider )?{re.escape(by)}"
         if re.match(rf"{words}([ ;]|\Z)", description):
             return on, by
-    raise ValueError(f"joint {name}: no link is said that the force acts on, in {description!r}")
+    raise ValueError(f"joint {name}: must name the link on which the force acts, got {description!r}")
 
 
 def drive_loads(scene: Scene, results: Results, linked: Linkage | None, motion: RigidMotion | None) -> list[DriveLoad]:

@@ -166,7 +166,7 @@ def _drive(scene: Scene, linkage: Linkage, name: str) -> RigidChannel:
     joint = scene.joints[name]
     link = ordered(joint, scene.driven_joints[name].about)[0]
     key, what, unit = drive_effort(scene, name, "rigid_")
-    channel = Channel(key, (what,), unit, "world", f"{what} of the drive on link {link} were all links rigid")
+    channel = Channel(key, (what,), unit, "world", f"{what} of the drive on link {link} with all links rigid")
     return RigidChannel(channel, name, 2, linkage.bodies.index(link), np.asarray(joint.at), np.zeros((1, 3)))
 
 
@@ -175,7 +175,7 @@ def _joint(scene: Scene, linkage: Linkage, found: Reactions | BlockReactions, na
     link = stated_link(scene, joint)
     other = next(each for each in joint.links if each != link)
     body, at = linkage.bodies.index(link), np.asarray(joint.at)
-    label = f"of joint {name} on link {link} from {other} were all links rigid"
+    label = f"of joint {name} on link {link} from {other} with all links rigid"
     about = f"moment {label}, about the joint's point of the rigid-body motion"
     sums = [found.open_directions(each) for each in found.on(name, body, at)]
     squares = (linkage.size**2, 1.0)  # forces count by the moments that they may make
@@ -210,7 +210,7 @@ def determined(
     if len(kept) == 3 - lost.shape[1]:  # what is open lies along axes of the world
         return tuple(XYZ[k] for k in kept), np.eye(3)[kept], ""
     which = ", ".join(components(n, 6) for n in lost.T)
-    return XYZ, P, f"; without what is along {which}, which statics leave open"
+    return XYZ, P, f"; without the part along {which}, which is statically indeterminate"
 
 
 def _on_grid(linkage: Linkage, along: Path) -> RigidMotion:

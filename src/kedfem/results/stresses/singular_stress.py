@@ -20,7 +20,7 @@ GROWS = "stress there depends on the mesh and grows when it is refined"
 CONTACT = "the contact itself is not modelled"
 CUT = "a cut between two segments where the link is no prism"
 AFFINE = "the cut transmits only an affine displacement; links.NAME.segments = 1 or another number shows how much that is"
-AWAY = "corners, point forces, surfaces held by joints and cuts"
+AWAY = "corners, point forces, surfaces of joints and cuts"
 
 
 def singular_places(scene: Scene, model: Model, recoveries: Sequence[StressRecovery]) -> list[list[str]]:

@@ -122,7 +122,7 @@ def analysis_faults(parts: Parts) -> Iterator[Fault]:
             yield from drive_and_analysis_faults(parts, drive)
     elif drives:
         got = f"{len(parts.all_drives)} drives"
-        yield from steps_faults(parts, got, "one drive that goes on turning", "several drives")
+        yield from steps_faults(parts, got, "one drive that rotates continuously", "several drives")
 
 
 def _repeats(parts: Parts) -> bool:
@@ -148,8 +148,8 @@ def drive_and_analysis_faults(parts: Parts, drive: Entry) -> Iterator[Fault]:
 
 
 def steps_faults(
-    parts: Parts, got: str, wanted: str = "a drive that goes on turning",
-    doing: str = "a drive that does not go on turning",
+    parts: Parts, got: str, wanted: str = "a drive that rotates continuously",
+    doing: str = "a drive that does not rotate continuously",
 ) -> Iterator[Fault]:  # fmt: skip
     """Turns that are asked for where there are none, and a step that is not given."""
     analysis = parts.analysis

@@ -79,7 +79,7 @@ def _moved_by_drives(shapeless: set[str], scene: Scene) -> Iterator[tuple[str, s
 
 
 def _drive_joint(name: str, known: set[str], shapeless: set[str], scene: Scene) -> str:
-    """The driven joint that moves a link without a shape, "" if other joints hold it or there is none."""
+    """The driven joint that moves a link without a shape, "" if other joints constrain it or there is none."""
     drives, joints = scene.driven_joints, scene.joints.items()
     own = {key: joint for key, joint in joints if name in joint.links}
     inner = [key for key, joint in own.items() if known & (set(joint.links) - {name})]

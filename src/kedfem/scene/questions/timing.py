@@ -31,12 +31,12 @@ class TimeGrid:
 
 
 def continuous_speed(motion: MotionLaw | None) -> float:
-    """The speed [rad/s] (its size) at which a drive goes on turning; 0 for one that does not, or where there is none."""
+    """The absolute speed [rad/s] at which a drive rotates continuously; 0 for others and without one."""
     return abs(motion.speed) if isinstance(motion, (ConstantSpeed, Ramp)) else 0.0
 
 
 def scene_speed(scene: Scene) -> float:
-    """The speed [rad/s] at which the only drive of a scene goes on turning; 0 for a slide, for several and for none."""
+    """The speed [rad/s] at which the only drive of a scene rotates continuously; 0 for a slide, several and none."""
     slides = any(driven_travel(scene, name) for name in scene.driven_joints)
     return 0.0 if slides else continuous_speed(scene.motion)
 
@@ -62,7 +62,7 @@ def without_vibration(scene: Scene) -> bool:
 
 
 def time_of_revolutions(motion: MotionLaw, revolutions: float) -> float:
-    """Time [s] at which a drive that goes on turning has made so many revolutions."""
+    """Time [s] at which a drive that rotates continuously has made so many revolutions."""
     angle, speed = 2.0 * math.pi * revolutions, continuous_speed(motion)
     if isinstance(motion, ConstantSpeed):
         return angle / speed
@@ -120,6 +120,6 @@ def states_step(scene: Scene) -> bool:
 
 
 def revolution_steps(scene: Scene) -> float | None:
-    """Time steps in one turn of the drive at its final speed; None if it does not go on turning."""
+    """Time steps in one revolution of the drive at its final speed; None if it does not rotate continuously."""
     speed = scene_speed(scene)
     return 2.0 * math.pi / (speed * time_grid(scene).step) if speed else None

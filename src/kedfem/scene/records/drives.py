@@ -198,7 +198,7 @@ class Gear(Record):
     joints: tuple[JointName, JointName]
     """the two joints: A and B revolute, cylindrical, screw or planar; of a rack B prismatic, cylindrical or screw"""
     ratio: Number | None = None
-    """turn of B per turn of A, positive in the same direction about their axes; not zero"""
+    """revolutions of B per revolution of A, positive in the same direction about their axes; not zero"""
     teeth: tuple[Teeth, Teeth] | None = None
     """numbers of teeth at A and B, instead of `ratio`: the ratio is −A/B, as wheels that mesh turn against each other"""
     internal: StrictBool = False

@@ -126,7 +126,7 @@ class Fatigue(Record):
     """data of single links, before those of their material"""
     period: PositiveTime | None = None
     """after which stresses repeat; if not given after which linkage, drive and loads are where they were, as for a steady
-    motion; required without a drive, with several, and with one that does not go on turning or return"""
+    motion; required without a drive, with several, and with one that does not rotate continuously or return"""
     criterion: Literal["auto", "signed_von_mises", "normal", "findley"] = "auto"
     """auto: signed von Mises stress where loading is proportional, elsewhere normal: range of the normal stress on the
     critical plane of those at right angles to the surface; findley: shear range with the largest normal stress"""
@@ -140,7 +140,7 @@ class Fatigue(Record):
     required_life: PositiveTime | None = None
     """for which utilisations hold, such as `"20000 h"`; endless if not given"""
     near_joints: StrictBool = False
-    """whether points near corners, point forces, surfaces held by joints and cuts count, where stress is uncertain"""
+    """whether points near corners, point forces, surfaces of joints and cuts count, where stress is uncertain"""
 
     @model_validator(mode="after")
     def _some_data(self) -> Self:

@@ -94,7 +94,7 @@ def si_number(text: str, unit: str) -> float:
     ValueError
         Not a number with a unit, an unknown unit or a unit of another dimension. Hertz are not accepted
         for a rotational speed nor turns for a frequency: the factor 2π between them would be a guess. So it would be of
-        a length per turn, for a lead or a radius: only expressions may leave an angle over, as v = ω r does.
+        a length per revolution, for a lead or a radius: only expressions may leave an angle over, as v = ω r does.
     """
     if isinstance(text, Evaluated):
         quantity = text.quantity

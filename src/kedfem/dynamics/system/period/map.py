@@ -67,7 +67,7 @@ class PeriodMap:
 
     @property
     def speed_words(self) -> str:
-        """The mean speed of a drive that goes on turning, in words; else nothing."""
+        """The mean speed of a drive that rotates continuously, in words; else nothing."""
         first, last = self.motion_at(np.array([0.0, self.period])).phi
         turns = abs(float(last - first)) / TURN  # a slide that comes back has none
         return f", at {60 * turns / self.period:.6g} rpm" if turns > 0.5 else ""

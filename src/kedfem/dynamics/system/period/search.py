@@ -214,7 +214,7 @@ def _repeats(curve: Pieces, gone: float) -> bool:
 
 
 def _refuse_windings(map_: PeriodMap, x: Flat, y: Flat) -> None:
-    """Refuse springs on hinges that go on turning: they are wound up further in each period.
+    """Refuse springs on hinges that rotate continuously: they are wound up further in each period.
 
     Raises
     ------
@@ -230,6 +230,6 @@ def _refuse_windings(map_: PeriodMap, x: Flat, y: Flat) -> None:
         winds = any(term.kind == ANGLE for term in each.terms) and abs(gone) > TURN / 2
         if depends and winds:
             raise SolveError(
-                f"{each.name}: must act on a joint that swings for a steady state, got one that goes on turning: its "
-                "force grows in each period; take kind = 'transient'"
+                f"{each.name}: must act on a joint that swings for a steady state, got one that rotates continuously: "
+                "its force grows in each period; take kind = 'transient'"
             )

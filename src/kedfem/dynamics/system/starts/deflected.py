@@ -32,7 +32,7 @@ WIDER = 6  # times that their instants are taken four times as far apart, while 
 SAME, ENOUGH = 3.0, 1e-7  # times what rounding leaves open of them; share of them that may stay open
 # of rates, or of what rotates at 1 rad/s: the most that may stay open of what is released, which would be shaken else
 OPEN = 1e-3
-UNSETTLED = "rates that dampers feel do not settle: take weaker dampers, less force, a slower drive or short loads"
+UNSETTLED = "rates with dampers do not converge: take weaker dampers, less force, a slower drive or short loads"
 LEAST = 1 / 64  # of loads, that an increment of theirs is
 LATER = np.array([
     [-25, 48, -36, 16, -3], [-3, -10, 18, -6, 1], [1, -8, 0, 8, -1], [-1, 6, -18, 10, 3], [3, -16, 36, -48, 25],

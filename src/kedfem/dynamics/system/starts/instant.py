@@ -44,7 +44,7 @@ class Always:
     rated : which coordinates are linear in these, with a force that depends on their rate
     closed : z from displacements at all interface points, w = B z as nearly as can be
     static : internal forces of bodies
-    least : what the stiffness of body k gets of its mass, so that it is definite where nothing holds it [1/s²]
+    least : what the stiffness of body k gets of its mass, so that it is definite where nothing constrains it [1/s²]
     held, mass : a sparse body with that stiffness, and a body with its mass for a matrix, factored once
     """
 

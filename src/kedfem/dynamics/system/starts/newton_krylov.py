@@ -37,7 +37,7 @@ SHORTEST, IN_A_ROW = 1 / 64, 4  # of a step; so many of them end a search
 FALLS = 0.25  # of a step's length: share by which what is left has to fall
 KRYLOV = 40
 OPEN = 1e-4  # of the largest link: what joints may be open in a balance; found ones are at 1e-9
-FAR = 1e4  # of the largest link: displacements of what nothing holds
+FAR = 1e4  # of the largest link: displacements of unconstrained links
 LEFT = 1e-3  # of a residual by GMRES: an iteration leaves about as much of the error
 ROUNDING = 1e-8  # of the deflection: changes below it that do not fall
 LEAST = 1e-6  # the same of soft directions, where nothing is left to rounding and no step lessens it
@@ -243,7 +243,7 @@ def stands_off(now: Instant, u: Flat, z1: Flat | None) -> str:
         return f"link '{links[int(np.argmax(far))].name}' would move by {max(far):.3g} m"
     size = OPEN * largest
     if max(off) > size:
-        return f"link '{links[int(np.argmax(off))].name}' would stand {max(off):.3g} m off its joints"
+        return f"link '{links[int(np.argmax(off))].name}' would be {max(off):.3g} m off its joints"
     C, e = now.measured(z, z1)
     open_ = np.abs(e[0]) * now.hard(C)
     if open_.max(initial=0.0) > size:
