@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from tests.moving import bar, rising
-from tests.rooms.test_acted import four_bar as hinged
+from tests.rooms.test_force_elements_on_links import four_bar as hinged
 
 from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.reduction import prepared

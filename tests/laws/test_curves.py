@@ -15,7 +15,7 @@ from kedfem.scene import Factor, load_factor, path_parameter, pieces, scene_from
 from tests.laws.test_limits import AXES
 from tests.laws.test_varying_springs import hinged_rod, moment_of_inertia
 from tests.moving import channels, driven_slide, ran
-from tests.rooms.test_acted import four_bar
+from tests.rooms.test_force_elements_on_links import four_bar
 from tests.systems import against_oracle, begun
 
 Raw = dict[str, Any]

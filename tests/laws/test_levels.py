@@ -21,8 +21,8 @@ from kedfem.errors import SolveError
 from kedfem.results.recording import recording, rows
 from kedfem.scene import Scene, scene_from
 from tests.moving import inverted
-from tests.rooms.test_acted import LINE
-from tests.rooms.test_acted import four_bar as hinged
+from tests.rooms.test_force_elements_on_links import LINE
+from tests.rooms.test_force_elements_on_links import four_bar as hinged
 
 Channels = dict[str, np.ndarray]
 END = 0.15

@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 from kedfem.dynamics.system.starts import deflected
 from kedfem.dynamics.system.starts.deflected import quasi_static
 from kedfem.errors import SolveError
+from tests.laws.test_follower_loads import ASKEW
 from tests.laws.test_soft_mounts import ARM, HINGED, MOUNT, MOUNTED, PUSH, TURNS, mounted
 from tests.laws.test_system import elements, four_bar
-from tests.laws.test_turning_loads import ASKEW
 from tests.moving import channels, ran, state
 from tests.rooms.test_initial_deflection import plucked
 from tests.systems import begun

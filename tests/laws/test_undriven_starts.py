@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from tests.moving import channels, ran, state
 from tests.rooms.test_initial_deflection import BENDING, LENGTH, MASS
 
-from .test_turning_loads import ASKEW, arm
+from .test_follower_loads import ASKEW, arm
 
 GRAVITY, AXIS = 9.81, {"x": [[0, 0, 1], [1, 0, 0], [0, 1, 0]], "y": [[0, 1, 0], [0, 0, 1], [1, 0, 0]]}
 

@@ -14,7 +14,7 @@ from kedfem.scene import read_scene, scene_from
 from tests.laws.test_limits import AXES
 from tests.laws.test_steady import steady
 from tests.moving import bar, channels, ran
-from tests.rooms.test_acted import LINE, apart, four_bar, largest, places
+from tests.rooms.test_force_elements_on_links import LINE, apart, four_bar, largest, places
 
 Raw = dict[str, Any]
 OMEGA, DELTA, EPSILON = 40.0, 1.0, 0.4

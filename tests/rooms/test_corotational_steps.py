@@ -18,7 +18,7 @@ from kedfem.results.recording import recording
 from kedfem.scene import scene_from
 from tests.laws.test_capabilities import as_a_run
 from tests.moving import bar, cardan, geared, inverted, turned, two_drives
-from tests.rooms.test_acted import four_bar
+from tests.rooms.test_force_elements_on_links import four_bar
 from tests.spatial_joints import BEAMS
 from tests.systems import against_oracle, begun
 

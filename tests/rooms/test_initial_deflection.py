@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.errors import KedfemError
+from tests.laws.test_follower_loads import ASKEW, arm
 from tests.laws.test_limits import AXES
-from tests.laws.test_turning_loads import ASKEW, arm
 from tests.moving import beam_in_space, channels, ran, state
 
 Raw = dict[str, Any]

@@ -17,7 +17,7 @@ from kedfem import compiled
 from kedfem.dynamics.system import reference
 from kedfem.dynamics.system.arrays import Bodies, Ends
 from kedfem.dynamics.system.ready import ready
-from tests.laws.test_turning_loads import arm, moving
+from tests.laws.test_follower_loads import arm, moving
 from tests.moving import inverted, turning
 from tests.systems import Begun, begun, marched, stiffened
 

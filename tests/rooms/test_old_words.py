@@ -90,6 +90,8 @@ RETIRED = {
     "functions": r"\bfunctions of a reduced link\b",
     "were rigid": r"\bwere all links rigid\b",
     "holds": r"\bheld by (a joint|joints)\b|\bnothing holds\b|\bjoints? holds?\b",
+    "port point": r"(?i)\bport points?\b",
+    "room": r"\bsingle rooms\b",
     "props": r"\bprops\.py\b",
     "noticed": r"\bNOTICED\b",
     "looked at": r"\blooked at\b",

@@ -17,7 +17,7 @@ from kedfem.results.channels import Channel
 from kedfem.results.recording import recording
 from kedfem.scene import Scene, scene_from, time_grid
 from tests.moving import inverted
-from tests.rooms.test_acted import balance, four_bar, line, slider_crank
+from tests.rooms.test_force_elements_on_links import balance, four_bar, line, slider_crank
 
 SOLIDS = {"crank": [4, 1, 1], "coupler": [24, 2, 1], "rocker": [4, 1, 1]}
 CURVE = {"over": "speed", "at": [-10, 10], "value": [5, -5]}

@@ -15,7 +15,7 @@ class Attachment:
 
     nodes, weights : (b,) and (p, b): scalar port weights W of the nodes that carry any
     components : d of the link
-    points : (p, 3) port points, reference position [m]
+    points : (p, 3) interface points, reference position [m]
     joints : (p,) name of each port's joint
     keep : (q,) which of the flattened (p, d) components are held; closed under the link's rotation; independent:
         what other ports of the link imply is left out

@@ -95,7 +95,7 @@ def direction(term: Term) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"
 
 
 def needs_constraints(scene: Scene, name: str) -> bool:
-    """Whether a joint is enforced by constraint equations: where shared port points cannot express it."""
+    """Whether a joint is enforced by constraint equations: where shared interface points cannot express it."""
     if name in scene.driven_joints and name in moving_grounds(scene).values():
         return False
     return enforced_by_equations(scene, name)
@@ -176,7 +176,7 @@ def in_plane(gap: Float[np.ndarray, "*r 3"], turn: Float[np.ndarray, "*r 3"]) ->
 
 
 def surface_ports(surface: CouplingSurface, link: Link, where: str) -> Ports:
-    """Port points of a coupling surface: its middle, and one off it in each direction with a gradient.
+    """Interface points of a coupling surface: its middle, and one off it in each direction with a gradient.
 
     Raises
     ------

@@ -209,7 +209,7 @@ def _lies_across(joint: Joint, points: Float[np.ndarray, "p 3"]) -> bool:
 
 def _target(joint: Joint, others: list[str], sliders: dict[str, np.ndarray], first_of: dict[str, int],
             unknowns: int, components: list[int]) -> tuple[int, np.ndarray, int]:  # fmt: skip
-    """First unknown, (components, unknowns) block and number of new unknowns of one port point."""
+    """First unknown, (components, unknowns) block and number of new unknowns of one interface point."""
     if not others:
         return unknowns, np.eye(len(components)), len(components)
     if others[0] in sliders:

@@ -38,7 +38,7 @@ class CouplingSurface:
 
 
 def port_weights(surface: CouplingSurface, points: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, "p n"]:
-    """Scalar weights W of port points: u(points) = W u.
+    """Scalar weights W of interface points: u(points) = W u.
 
     Parameters
     ----------

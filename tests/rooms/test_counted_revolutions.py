@@ -1,4 +1,4 @@
-"""Springs, motors and limits count the turns of their joints, or time points that are too far apart are refused."""
+"""Springs, motors and limits count the revolutions of their joints, or time points that are too far apart are refused."""
 
 from pathlib import Path
 from typing import Any

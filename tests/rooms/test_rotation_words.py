@@ -1,4 +1,4 @@
-"""How far links turn, in the words of a check."""
+"""Rotations of links in the words of a check."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a part on its own offers to joints, and what its faces are called."""
+"""Candidate surfaces of a part for joints, and the names of its faces."""
 
 from collections.abc import Callable
 from dataclasses import replace

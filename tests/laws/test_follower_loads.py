@@ -1,4 +1,4 @@
-"""Loads that turn with links whose frames are their own: as by the oracle, as by elastica, and the work that they do."""
+"""Follower loads with co-rotational frames: as by the monolithic solver, as by elastica, and the work that they do."""
 
 from pathlib import Path
 from typing import Any
