@@ -27,7 +27,7 @@ def test_parts_of_random_dimensions_are_meshed(seeds: range, tmp_path: Path) -> 
             occ.synchronize()
             volume = 1e-9 * occ.getMass(3, tag)
             gmsh.write(str(tmp_path / "part.step"))
-        mesh = part_mesh(link_from({"material": "steel", "file": "part.step"}), tmp_path)
+        mesh = part_mesh(link_from({"material": "steel", "shape": {"file": "part.step"}}), tmp_path)
         assert mesh_quality(mesh).least >= (0.04 if mesh.tetrahedra else 0.1), kind
         assert valid_everywhere(mesh.points, mesh.cells).all()
         assert solid_link(kind, mesh, UNIT, np.eye(3)).m1[:, 0].sum() == pytest.approx(volume, rel=5e-4), (

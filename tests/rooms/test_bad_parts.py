@@ -13,21 +13,25 @@ from tests import bad_cad
 
 HERE = (10e-3, 10e-3, 5e-3)  # in the first bore of the sound part
 REFUSED = [
-    (bad_cad.empty, r"links.arm.file: must be a CAD file \(.*\), got an empty file at"),
-    (bad_cad.no_step, r"links.arm.file: must hold STEP, as its ending says, got another text in"),
-    (bad_cad.binary, r"links.arm.file: must hold STEP, as its ending says, got another text in"),
-    (bad_cad.truncated, r"links.arm.file: must be a whole file of STEP, got one that breaks off"),
-    (bad_cad.header_only, r"links.arm.file: must be a file that OpenCASCADE can read as STEP, got"),
-    (bad_cad.open_shell, r"links.arm.file: must hold a solid, got faces that do not close \(7 of them, 4 free edges"),
-    (bad_cad.wires, r"links.arm.file: must hold a solid, got 1 curves and no faces"),
+    (bad_cad.empty, r"links.arm.shape.file: must be a CAD file \(.*\), got an empty file at"),
+    (bad_cad.no_step, r"links.arm.shape.file: must hold STEP, as its ending says, got another text in"),
+    (bad_cad.binary, r"links.arm.shape.file: must hold STEP, as its ending says, got another text in"),
+    (bad_cad.truncated, r"links.arm.shape.file: must be a whole file of STEP, got one that breaks off"),
+    (bad_cad.header_only, r"links.arm.shape.file: must be a file that OpenCASCADE can read as STEP, got"),
+    (
+        bad_cad.open_shell,
+        r"links.arm.shape.file: must hold a solid, got faces that do not close \(7 of them, 4 free edges",
+    ),
+    (bad_cad.wires, r"links.arm.shape.file: must hold a solid, got 1 curves and no faces"),
     (bad_cad.two_solids, r"links.arm.shape.solid: is required, or a solid called 'arm' like the link, .* left, right"),
     (bad_cad.same_names, r"links.arm.shape.solid: is required, .* arm 1, arm 2"),
     (bad_cad.overlapping, r"links.arm.shape.solid: is required, .* first, second"),
     (
         bad_cad.self_crossing,
-        r"links.arm.file: must be a closed solid that does not cut itself, got a plane face facing .* \(face \d+\) with",
+        r"links.arm.shape.file: must be a closed solid that does not cut itself, "
+        r"got a plane face facing .* \(face \d+\) with",
     ),
-    (bad_cad.wrong_ending, r"links.arm.file: must hold STEP, as its ending says, got another text"),
+    (bad_cad.wrong_ending, r"links.arm.shape.file: must hold STEP, as its ending says, got another text"),
     (
         bad_cad.no_bore,
         r"joints.A: must sit on a bore or a flat face of link 'arm' at .*got none there .*its nearest face is the plane",
@@ -39,7 +43,7 @@ REFUSED = [
 def arm(file: Path, **joint: Any) -> Any:
     """A scene of one part, hinged to the ground at a bore."""
     raw = {
-        "links": {"arm": {"material": "steel", "file": file.name}},
+        "links": {"arm": {"material": "steel", "shape": {"file": file.name}}},
         "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": HERE, **joint}},
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1.0}},
         "analysis": {"end_time": 0.1, "step": 0.01},

@@ -125,7 +125,7 @@ def test_a_part_from_cad_has_all_its_faces_to_choose_from(tmp_path: Path) -> Non
     """Half cylinders too, by diameter; the plane that is nearest."""
     written(tmp_path, "lever", lever, ("step",))
     raw = {
-        "links": {"arm": {"material": "steel", "file": "lever.step", "element": "hex20"}},
+        "links": {"arm": {"material": "steel", "shape": {"file": "lever.step"}, "element": "hex20"}},
         "joints": {
             "A": {"kind": "revolute", "links": ["ground", "arm"], "at": "0 mm", "faces": {"arm": {"cylinder": "8 mm"}}}
         },

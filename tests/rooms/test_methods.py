@@ -237,17 +237,17 @@ class TestKept:
 class TestScene:
     RAW: dict[str, Any] = {  # noqa: RUF012
         "analysis": {"end_time": 0.01, "step": 1e-3},
-        "links": {"crank": {"material": "steel", "file": "crank.step"}},
+        "links": {"crank": {"material": "steel", "shape": {"file": "crank.step"}}},
     }
 
-    def test_step_is_short_for_a_shape_from_cad(self) -> None:
+    def test_the_ending_of_a_file_says_what_it_is(self) -> None:
         scene = scene_from(self.RAW, GEOMETRY)
         assert scene.links["crank"].shape == link().shape
         again = scene_from(scene.model_dump(mode="json", by_alias=True, exclude_none=True), GEOMETRY)
         assert again.links == scene.links
 
     def test_a_solid_of_an_assembly_is_found_by_the_links_name(self) -> None:
-        raw = self.RAW | {"links": {"rod": {"material": "steel", "file": "engine.step"}}}
+        raw = self.RAW | {"links": {"rod": {"material": "steel", "shape": {"file": "engine.step"}}}}
         mesh = link_mesh("rod", scene_from(raw, GEOMETRY).links["rod"], GEOMETRY)
         alone = made("connecting_rod.step")
         assert_allclose(volume_and_centre(mesh)[0], volume_and_centre(alone)[0], rtol=1e-4)
@@ -255,9 +255,12 @@ class TestScene:
     @pytest.mark.parametrize(
         ("change", "message"),
         [
-            ({"file": "none.step"}, r"links.crank.file: must be a CAD file, got nothing at .*none.step"),
-            ({"shape": {"kind": "cad", "file": "other.step"}}, r"links.crank.file: cannot be combined with "
-            r"shape, got both"),
+            ({"shape": {"file": "none.step"}}, r"links.crank.shape.file: must be a CAD file, got nothing at .*none.step"),
+            ({"shape": {"file": "none.msh"}}, r"links.crank.shape.file: must be a mesh file, got nothing at .*none.msh"),
+            ({"shape": {"file": "none.toml"}}, r"links.crank.shape.between: is required"),
+            ({"shape": {"file": "crank.step", "sloid": "a"}}, r"links.crank.shape.sloid: unknown key, .* 'solid'"),
+            ({"shape": {"file": "crank.step", "scale": "=2*x"}}, r"links.crank.shape.scale: must be an expression"),
+            ({"shape": {"file": 3}}, r"links.crank.shape.kind: is required, one of .*, got nothing"),
             ({"mesh": {"unknowns": 500, "size": 0.003}}, r"links.crank.mesh.unknowns: cannot be combined "
             r"with size, got both"),
             ({"mesh": {"elements": [4, 2, 1]}}, r"links.crank.mesh.elements: must be left out for a cad"),

@@ -14,7 +14,7 @@ from tests.scenes import arm, bar, constant_speed
 
 TABLE = Path(__file__).parents[2] / "docs" / "notation.md"
 PLACES: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(("fidelity", "functions", "modes", "reduced", "step"), ("links", "arm")),
+    **dict.fromkeys(("fidelity", "functions", "modes", "reduced", "step", "file"), ("links", "arm")),
     "reduction": ("analysis",),
     "port": ("joints", "A"),
     "turning_stiffness": ("joints", "A", "bushing"),

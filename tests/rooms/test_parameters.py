@@ -292,6 +292,6 @@ def test_only_regular_files_within_the_folder_where_that_is_asked_for(tmp_path: 
         os.mkfifo(tmp_path / "in" / "pipe.toml")
         with pytest.raises(SceneError, match="must be a regular file"):
             read_scene(written(tmp_path / "in", {"scene.toml": 'include = "pipe.toml"'}))
-    nested = {"scene.toml": 'include = "b.toml"', "b.toml": '[links.arm]\nfile = "../../part.step"\n'}
-    with pytest.raises(SceneError, match=r"links.arm.file: must be within"):
+    nested = {"scene.toml": 'include = "b.toml"', "b.toml": '[links.arm]\nshape.file = "../../part.step"\n'}
+    with pytest.raises(SceneError, match=r"links.arm.shape.file: must be within"):
         read_scene(written(tmp_path / "in", nested), within=True)

@@ -134,20 +134,20 @@ def test_a_shift_moves_points_of_the_pattern_and_leaves_those_of_the_scene() -> 
 
 
 @pytest.mark.parametrize(
-    "link",
-    [{"file": "a.step"}, {"shape": {"kind": "cad", "file": "a.step", "towards": [1, 0, 0]}}, {"file": "a.msh"}],
-    ids=["in short", "towards a point", "a mesh"],
+    "shape",
+    [{"file": "a.step"}, {"kind": "cad", "file": "a.step", "towards": [1, 0, 0]}, {"file": "a.msh"}],
+    ids=["alone", "towards a point", "a mesh"],
 )
-def test_a_shift_moves_files_that_are_drawn_in_their_place(link: Raw, tmp_path: Path) -> None:
+def test_a_shift_moves_files_that_are_drawn_in_their_place(shape: Raw, tmp_path: Path) -> None:
     for name in ("a.step", "a.msh"):
         (tmp_path / name).write_text("")
-    pattern = {"count": 3, "shift": [0, "20 mm", 0.1], "links": {"a": {"material": "steel", **link}}}
+    pattern = {"count": 3, "shift": [0, "20 mm", 0.1], "links": {"a": {"material": "steel", "shape": shape}}}
     raw = {"links": {}, "analysis": {"end_time": 1.0, "step": 0.1}, "patterns": {"p": pattern}}
     scene = scene_from(raw, tmp_path)
     for k in range(3):
-        shape = scene.links[f"a_{k + 1}"].shape
-        assert_allclose(shape.origin, [0, 0.02 * k, 0.1 * k], atol=1e-15)
-        assert shape.towards is None or shape.towards == pytest.approx((1, 0.02 * k, 0.1 * k))
+        moved = scene.links[f"a_{k + 1}"].shape
+        assert_allclose(moved.origin, [0, 0.02 * k, 0.1 * k], atol=1e-15)
+        assert moved.towards is None or moved.towards == pytest.approx((1, 0.02 * k, 0.1 * k))
 
 
 @pytest.mark.parametrize(
@@ -158,7 +158,7 @@ def test_a_shift_moves_files_that_are_drawn_in_their_place(link: Raw, tmp_path: 
         ({"count": 2, "turn": 1.0, "abuot": "z"}, r"patterns\.p\.abuot: unknown key, did you mean 'about'"),
         ({"phase": 1.0, "loads": {"f": {"factor": {"time": [0, 1], "value": [0, 1]}}}}, r"p\.phase: must be of factors"),
         ({"links": {"a": {**BEAM, "width": 1}}}, r"^patterns\.p\.links\.a\.width: unknown key"),
-        ({"links": {"a": {"file": "a.step"}}}, r"patterns\.p\.links\.a: must not be a part of a file"),
+        ({"links": {"a": {"shape": {"file": "a.step"}}}}, r"patterns\.p\.links\.a: must not be a part of a file"),
         ({"links": {"a": {"shape": {"kind": "plate_link"}}}, "about": "x"}, r"patterns\.p\.links\.a: must be a bar"),
         ({"links": {"a": {**BEAM, "shape": {**SHAPE, "between": [[0, 0], [0, 0, 1]]}}}}, r"p\.links\.a: .* `up`"),
         ({"joints": {"j": {"bushing": {"stiffness": [1, 2, 3]}}}}, r"patterns\.p\.joints\.j: must have a bushing alike"),
@@ -174,9 +174,9 @@ def test_what_a_pattern_cannot_be(pattern: Raw, message: str) -> None:
 
 
 def test_a_cad_file_of_a_pattern_is_among_those_that_must_be_within_the_folder(tmp_path: Path) -> None:
-    raw = {"patterns": {"p": {"links": {"a": {"file": "../a.step"}}}}}
+    raw = {"patterns": {"p": {"links": {"a": {"shape": {"file": "../a.step"}}}}}}
     assert [str(fault) for fault in outside(raw, tmp_path)] == [
-        "patterns.p.links.a.file: must be within the scene's folder (--within), got '../a.step'"
+        "patterns.p.links.a.shape.file: must be within the scene's folder (--within), got '../a.step'"
     ]
 
 

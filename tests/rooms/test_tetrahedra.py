@@ -160,7 +160,7 @@ class TestBlends:
         written("plate_with_chamfered_bores", tmp_path)
         for x, kind in ((0.1, "hexahedron27"), (0.0735, "tetra10")):
             raw = {
-                "links": {"arm": {"material": "steel", "file": "plate_with_chamfered_bores.step"}},
+                "links": {"arm": {"material": "steel", "shape": {"file": "plate_with_chamfered_bores.step"}}},
                 "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0.02, 0.015, 0.005]}},
                 "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": 1.0}},
                 "loads": {"p": {"kind": "force", "link": "arm", "at": [x, 0.015, 0.0], "vector": [0, 1, 0]}},

@@ -61,8 +61,8 @@ def link_mesh(name: str, link: LinkScene, folder: Path, kept_whole: KeptWhole = 
             read = mesh_from_file(f"{where}.shape.file", folder / shape.file, shape.scale)
             mesh = placed(read, np.array(shape.origin), file_axes(shape))
         case Cad() as shape:
-            key = f"{where}.file" if link.file is not None else f"{where}.shape.file"
-            mesh = cad_mesh(CadKeys(key, f"{where}.shape.solid"), name, link, shape, folder, kept_whole)
+            keys = CadKeys(f"{where}.shape.file", f"{where}.shape.solid")
+            mesh = cad_mesh(keys, name, link, shape, folder, kept_whole)
         case _:
             mesh = _swept(where, link, link_plate(where, link, folder, kept_whole))
     mesh = FORMS[str(link.element)](mesh)

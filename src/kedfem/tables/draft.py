@@ -52,7 +52,7 @@ def draft_scene(assembly: Path, folder: Path, scale: float | None) -> str:
         The file's name or the scale cannot stand in a scene.
     """
     scaled = {} if scale is None else {"scale": scale}
-    link_from({"shape": {"kind": "cad", "file": assembly.name, **scaled}})
+    link_from({"shape": {"file": assembly.name, **scaled}})
     text = scene_text(assembly_solids(assembly, scale), _relative(assembly, folder), scale)
     scene_from(tomllib.loads(text), folder)
     return text
@@ -111,7 +111,7 @@ def _order(found: AssemblyJoint, ground: int | None, solids: Sequence[AssemblySo
 
 def _link(name: str, solid: AssemblySolid, file: str, scale: float | None) -> str:
     """A link's table."""
-    keys = f'kind = "cad", file = {_quoted(file)}, solid = {_quoted(solid.name)}'
+    keys = f"file = {_quoted(file)}, solid = {_quoted(solid.name)}"
     if scale is not None:
         keys += f", scale = {scale!r}"
     head = f"[links.{_key(name)}]  # {_shown(solid.name)} of the assembly"

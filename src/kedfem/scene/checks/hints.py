@@ -12,6 +12,7 @@ from pydantic.fields import FieldInfo
 
 from kedfem.errors import Where
 from kedfem.scene.records.points import AxisPoints, construction_of, is_construction
+from kedfem.scene.records.shapes import with_kind
 from kedfem.scene.records.units import Quantity
 
 
@@ -103,7 +104,7 @@ def below(hint: Any, part: str | int, raw: Any) -> Any:
     if isinstance(raw, Mapping) and (constructed := construction(hint, raw)) is not None:
         hint = constructed
     for model in models(hint):
-        wanted = raw.get("kind") if isinstance(raw, dict) else None
+        wanted = with_kind(raw).get("kind") if isinstance(raw, dict) else None
         if part in keys(model) and (kind_of(model) in [None, wanted]):
             return key_hints(model)[str(part)]
     return None
@@ -147,7 +148,7 @@ def walked(loc: Where, hint: Any, raw: Any) -> tuple[Where, Any, Any]:
 
 def known_keys(hint: Any, raw: Any) -> list[str]:
     """The keys that a record of a given type may have, for raw input of one kind if there are several."""
-    kind = raw.get("kind") if isinstance(raw, dict) else None
+    kind = with_kind(raw).get("kind") if isinstance(raw, dict) else None
     made = construction(hint, raw) if isinstance(raw, Mapping) else None
     hint = made or hint
     return [key for model in models(hint) if kind_of(model) in [None, kind] for key in keys(model)]

@@ -119,9 +119,7 @@ def file_faults(parts: Parts) -> Iterator[Fault]:
         shape = link.record.shape if link.record is not None else None
         if isinstance(shape, Cad | MeshFile) and not (parts.folder / shape.file).is_file():
             what = "CAD" if isinstance(shape, Cad) else "mesh"
-            keys = ("file",) if link.has("file") else ("shape", "file")
-            message = f"must be a {what} file, got nothing at {parts.folder / shape.file}"
-            yield link.fault(keys[0], message, *keys[1:])
+            yield link.fault("shape", f"must be a {what} file, got nothing at {parts.folder / shape.file}", "file")
         if isinstance(shape, Part):
             try:
                 part = part_geometry(parts.folder / shape.file)

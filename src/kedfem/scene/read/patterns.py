@@ -16,11 +16,10 @@ from kedfem.errors import Fault, Where
 from kedfem.scene.checks.faults import record_faults
 from kedfem.scene.checks.hints import below, marks, members
 from kedfem.scene.records.base import NameOf
-from kedfem.scene.records.links import spelt_out
 from kedfem.scene.records.loads import inertia_tensor, moments_of_inertia
 from kedfem.scene.records.patterns import SECTIONS, Pattern
 from kedfem.scene.records.points import XYZ
-from kedfem.scene.records.shapes import STEEP, Bar, Polyline
+from kedfem.scene.records.shapes import STEEP, Bar, Polyline, with_kind
 from kedfem.scene.records.units import Quantity
 
 BY_LINK = ("at", "coupling", "faces")  # keys of joints that may hold a table by links
@@ -100,12 +99,11 @@ class _Copy:
         """An entry with what it leaves open and does not move by itself; what cannot be moved is a ValueError."""
         if not isinstance(raw, Mapping):
             return made
-        shape = spelt_out(raw).get("shape") if section == "links" else None
+        shape = with_kind(raw.get("shape")) if section == "links" else None
         kind = shape.get("kind") if isinstance(shape, Mapping) else None
         if not self.pattern.turn:
             if kind in PLACED and "origin" not in (shape or {}):  # in coordinates of the scene, which are shifted
-                whole = {key: x for key, x in spelt_out(made).items() if key != "file"}
-                made = {**whole, "shape": {**whole["shape"], "origin": self._vector([0.0, 0.0, 0.0], "m")}}
+                made = {**made, "shape": {**made["shape"], "origin": self._vector([0.0, 0.0, 0.0], "m")}}
             return made
         tilted = not np.allclose(self.R[:, 2], [0, 0, 1])
         if section == "joints":

@@ -35,7 +35,7 @@ def with_rigid_bodies(raw: Mapping[str, Any]) -> Tables:
     for name, link in links.items() if isinstance(links, Mapping) else ():
         if not isinstance(link, Mapping) or link.get("model") != "rigid" or "inertia" not in link:
             continue
-        if link.keys() & {"shape", "file", "material"}:
+        if link.keys() & {"shape", "material"}:
             continue
         try:
             body = RigidBody.model_validate({

@@ -26,10 +26,11 @@ from kedfem.scene.read.rigid_links import with_rigid_bodies
 from kedfem.scene.read.tables import with_tables
 from kedfem.scene.records.base import Record, plain
 from kedfem.scene.records.joints import ChosenFace
-from kedfem.scene.records.links import LinkScene, spelt_out
+from kedfem.scene.records.links import LinkScene
 from kedfem.scene.records.materials import BUILT_IN, Material
 from kedfem.scene.records.points import UNPLACED, XYZ, known_points
 from kedfem.scene.records.scene import Scene
+from kedfem.scene.records.shapes import with_kind
 from kedfem.scene.records.wording import one_of
 
 T = TypeVar("T", bound=Record)
@@ -148,15 +149,20 @@ def refuse_few_rows(scene: Scene) -> None:
 
 
 def _spelt_out(raw: dict[str, Any]) -> dict[str, Any]:
-    """A raw scene with the keys of its links that others stand for."""
+    """A raw scene whose links have the kinds of their shapes, and models where an accuracy is asked for."""
     links = raw.get("links")
     if not isinstance(links, Mapping):
         return raw
-    links = {name: spelt_out(link) for name, link in links.items()}
+    links = {name: _of_a_kind(link) for name, link in links.items()}
     analysis = raw.get("analysis")
     if isinstance(analysis, Mapping) and analysis.get("accuracy", "quick") != "quick":
         links = {name: _left_open(link) for name, link in links.items()}
     return {**raw, "links": links}
+
+
+def _of_a_kind(link: Any) -> Any:
+    """A raw link whose shape has its kind."""
+    return {**link, "shape": with_kind(link["shape"])} if isinstance(link, Mapping) and "shape" in link else link
 
 
 def _left_open(link: Any) -> Any:
@@ -180,7 +186,7 @@ def _prepared(raw: Mapping[str, Any], points: Mapping[str, XYZ]) -> dict[str, An
 
 def link_from(raw: Mapping[str, Any]) -> LinkScene:
     """A solid link on its own, to be meshed; its faults are reported by its keys, e.g. ``mesh.size``."""
-    raw = spelt_out(raw)
+    raw = _of_a_kind(raw)
     try:
         link, faults = LinkScene.model_validate(raw), []
     except ValidationError as error:

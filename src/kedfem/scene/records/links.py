@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import PurePath
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
 from kedfem.errors import Fault, SceneError
-from kedfem.scene.records.base import FileName, MaterialName, Record, refuse
+from kedfem.scene.records.base import MaterialName, Record, refuse
 from kedfem.scene.records.loads import Moments, inertia_faults
 from kedfem.scene.records.points import Point
-from kedfem.scene.records.shapes import MESH_ENDINGS, Bar, Cad, MeshFile, Polyline, Shape
+from kedfem.scene.records.shapes import Bar, Cad, Polyline, Shape
 from kedfem.scene.records.units import Mass, PositiveLength, Quantity, fault
 from kedfem.scene.records.wording import one_of, shown
 
@@ -67,14 +66,6 @@ def checked_reduction(value: object) -> object:
     raise fault(f"must be 'none', 'modal' or a number of modes, got {shown(value)}")
 
 
-def spelt_out(link: Any) -> Any:
-    """A raw link that gives the file of its shape in short, with the shape that this means."""
-    if not isinstance(link, Mapping) or link.get("file") is None or link.get("shape") is not None:
-        return link
-    cad = not isinstance(link["file"], str) or PurePath(link["file"]).suffix.lower() not in MESH_ENDINGS
-    return {**link, "shape": {"kind": "cad" if cad else "mesh", "file": link["file"]}}
-
-
 class LinkScene(Record):
     """A link: its material, shape, model and mesh."""
 
@@ -88,8 +79,6 @@ class LinkScene(Record):
     """a name: built in or in `materials`; not for a rigid slider"""
     shape: Shape | None = None
     """its shape; not for a rigid link given by mass, centre and inertia, a rigid slider or a moving part of the ground"""
-    file: FileName | None = None
-    """a file of its shape: short for `shape = { kind = "cad", file = … }` (STEP, IGES, BREP) or `{ kind = "mesh", … }`"""
     mass: Mass = 0.0
     """mass of a rigid link without a shape: of one with `centre` and `inertia`, of a slider, or of a part of the ground
     that drives alone move (it has no other joint), which these bear"""
@@ -117,16 +106,8 @@ class LinkScene(Record):
     given, fewer where its mesh has fewer layers or it is stubby; chosen where `analysis.accuracy` is given; those of a
     beam are its elements"""
 
-    @model_validator(mode="before")
-    @classmethod
-    def _file_is_a_shape(cls, raw: Any) -> Any:
-        return spelt_out(raw)
-
     @model_validator(mode="after")
     def _defaults(self) -> Self:
-        own = isinstance(self.shape, (Cad, MeshFile)) and self.shape.file == self.file
-        if self.file is not None and not own:
-            refuse([Fault(("file",), "cannot be combined with shape, got both")])
         refuse(self._body_faults())
         self.fill(model=self.model or self.family)
         element = self.element or self._usual_element()

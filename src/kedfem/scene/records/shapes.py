@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations, pairwise
-from typing import Annotated, Literal, Self
+from pathlib import PurePath
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Field, StrictBool, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, StrictBool, model_validator
 
 from kedfem.errors import Fault
 from kedfem.scene.records.base import FileName, Record, refuse
@@ -140,7 +141,7 @@ class Part(Record):
 
     kind: Literal["part"] = "part"
     file: FileName
-    """the file of the part, relative to the scene file"""
+    """the file of the part, .toml, relative to the scene file; where it is given `kind` may be left out"""
     between: Annotated[TwoPoints, AfterValidator(level)]
     """where the part's `origin` and `x_point` go; they must be as far apart as these"""
 
@@ -207,24 +208,34 @@ class MeshFile(_FromFile):
     kind: Literal["mesh"] = "mesh"
     file: FileName
     """the mesh file, relative to the scene file: .msh, .unv, .bdf, .nas, .med, .mesh, .inp, .vtu, .vtk, .xdmf, .xmf,
-    .e or .exo"""
+    .e or .exo; where it is given `kind` may be left out"""
     scale: Annotated[float, Quantity("1", above=0.0)] = 1.0
     """metres per unit of the file: 0.001 for a file in millimetres"""
 
 
 class Cad(_FromFile):
-    """A part from CAD (STEP, IGES or BREP), of hexahedra or tetrahedra. `file = "rod.step"` in a link is short for it."""
+    """A part from CAD (STEP, IGES or BREP), of hexahedra or tetrahedra."""
 
     kind: Literal["cad"] = "cad"
     file: FileName
-    """the file, relative to the scene file; its ending says what it is: .step, .stp, .iges, .igs, .brep"""
+    """the file, relative to the scene file; its ending says what it is: .step, .stp, .iges, .igs, .brep; where it is
+    given `kind` may be left out"""
     solid: str | None = None
     """which solid of an assembly; if not given the one with the link's name; of a file with one solid that one"""
     scale: Annotated[float, Quantity("1", above=0.0)] | None = None
     """metres per unit of the file; if not given the file's own unit, of BREP files, which have none, 0.001"""
 
 
-Shape = Annotated[Bar | PlateLink | Extrusion | Part | Polyline | MeshFile | Cad, Field(discriminator="kind")]
+def with_kind(shape: Any) -> Any:
+    """A raw shape from a file with the kind that its ending says; any other raw input as it is."""
+    if not isinstance(shape, Mapping) or "kind" in shape or not isinstance(shape.get("file"), str):
+        return shape
+    ending = PurePath(shape["file"]).suffix.lower()
+    return {"kind": "part" if ending == ".toml" else "mesh" if ending in MESH_ENDINGS else "cad", **shape}
+
+
+AnyShape = Bar | PlateLink | Extrusion | Part | Polyline | MeshFile | Cad
+Shape = Annotated[Annotated[AnyShape, Field(discriminator="kind")], BeforeValidator(with_kind)]
 
 
 class PartGeometry(Profile):

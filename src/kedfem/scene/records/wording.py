@@ -8,7 +8,7 @@ from typing import Any
 
 KEYS = {  # of scenes by their former names: messages about unknown words name the present ones
     "functions": "reduction", "modes": "reduction", "reduced": "reduction", "fidelity": "model",
-    "step": "file", "reduction": "reduction_tolerance", "port": "coupling",
+    "step": "shape", "file": "shape", "reduction": "reduction_tolerance", "port": "coupling",
     "turning_stiffness": "rotational_stiffness", "turning_damping": "rotational_damping",
     "spin": "angular_velocity", "turns": "revolutions", "last_turns": "last_revolutions",
     "steps_per_turn": "steps_per_revolution", "frames_per_turn": "frames_per_revolution",
