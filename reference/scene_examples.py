@@ -189,9 +189,9 @@ inertia = "0.08 kg*m^2"
     "[patterns.NAME]": '''
 [patterns.pendulums]
 count = 3
-turn = "120 deg"                        # about z, if nothing else is said
+rotation = "120 deg"                    # about z, if nothing else is said
 centre = ["500 mm", 0]
-points = { P = ["600 mm", 0], Q = ["700 mm", 0] }           # of pendulum_1; those of pendulum_2 are turned by 120°
+points = { P = ["600 mm", 0], Q = ["700 mm", 0] }           # of pendulum_1; those of pendulum_2 are rotated by 120°
 
 [patterns.pendulums.links.pendulum]
 material = "steel"

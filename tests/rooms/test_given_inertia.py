@@ -242,7 +242,9 @@ def test_three_values_are_principal_moments_along_x_y_z() -> None:
 def test_a_pattern_turns_their_inertia(inertia: dict[str, Any]) -> None:
     raw = pendulum(np.eye(3), **inertia)
     link, hinge = raw["links"].pop("p"), raw["joints"].pop("H")
-    raw["patterns"] = {"four": {"count": 4, "about": "x", "turn": "90 deg", "links": {"p": link}, "joints": {"H": hinge}}}
+    raw["patterns"] = {
+        "four": {"count": 4, "about": "x", "rotation": "90 deg", "links": {"p": link}, "joints": {"H": hinge}}
+    }
     scene = scene_from(raw)
     R = Rotation.from_rotvec([np.pi / 2, 0, 0]).as_matrix()
     bodies = list(scene.bodies.values())

@@ -20,6 +20,7 @@ PLACES: dict[str, tuple[str, ...]] = {
     "turning_stiffness": ("joints", "A", "bushing"),
     "turning_damping": ("joints", "A", "bushing"),
     "spin": ("analysis", "initial_motions", "arm"),
+    "turn": ("patterns", "p"),
     "turns": ("analysis",),
     "last_turns": ("output", "animation"),
     "steps_per_turn": ("analysis",),

@@ -34,7 +34,7 @@ def radial(count: int) -> Raw:
         "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": "600 rpm"}},
         "patterns": {
             "cylinders": {
-                "count": "=n", "turn": "=360 deg / n", "phase": "=360 deg / n",
+                "count": "=n", "rotation": "=360 deg / n", "phase": "=360 deg / n",
                 "points": {"C": rod},
                 "links": {
                     "rod": {**BEAM, "shape": {**SHAPE, "between": ["B", "C"]}},
@@ -105,7 +105,7 @@ def test_a_turn_about_any_axis_moves_points_axes_and_vectors() -> None:
     bar = {**BEAM, "shape": {**SHAPE, "between": [[0, 0, 0], "P"], "up": "z"}}
     scene = written_out(
         {
-            "count": 3, "turn": "120 deg", "about": [1, 1, 1], "centre": [0, 0, 0], "points": {"P": [1, 0, 0]},
+            "count": 3, "rotation": "120 deg", "about": [1, 1, 1], "centre": [0, 0, 0], "points": {"P": [1, 0, 0]},
             "links": {"arm": bar},
             "joints": {"foot": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0, 0]}},
             "loads": {"pull": {"kind": "force", "link": "arm", "at": "P", "vector": ["1 kN", "2 kN", 0]}},
@@ -153,9 +153,9 @@ def test_a_shift_moves_files_that_are_drawn_in_their_place(shape: Raw, tmp_path:
 @pytest.mark.parametrize(
     ("pattern", "message"),
     [
-        ({"count": 2}, r"patterns\.p\.turn: is required, or a shift"),
-        ({"count": 0, "turn": 1.0}, r"patterns\.p\.count: must be at least 1"),
-        ({"count": 2, "turn": 1.0, "abuot": "z"}, r"patterns\.p\.abuot: unknown key, did you mean 'about'"),
+        ({"count": 2}, r"patterns\.p\.rotation: is required, or a shift"),
+        ({"count": 0, "rotation": 1.0}, r"patterns\.p\.count: must be at least 1"),
+        ({"count": 2, "rotation": 1.0, "abuot": "z"}, r"patterns\.p\.abuot: unknown key, did you mean 'about'"),
         ({"phase": 1.0, "loads": {"f": {"factor": {"time": [0, 1], "value": [0, 1]}}}}, r"p\.phase: must be of factors"),
         ({"links": {"a": {**BEAM, "width": 1}}}, r"^patterns\.p\.links\.a\.width: unknown key"),
         ({"links": {"a": {"shape": {"file": "a.step"}}}}, r"patterns\.p\.links\.a: must not be a part of a file"),
@@ -170,7 +170,7 @@ def test_a_shift_moves_files_that_are_drawn_in_their_place(shape: Raw, tmp_path:
 )  # fmt: skip
 def test_what_a_pattern_cannot_be(pattern: Raw, message: str) -> None:
     with pytest.raises(SceneError, match=message):
-        written_out(pattern if "count" in pattern else {"count": 2, "turn": 1.0, **pattern})
+        written_out(pattern if "count" in pattern else {"count": 2, "rotation": 1.0, **pattern})
 
 
 def test_a_cad_file_of_a_pattern_is_among_those_that_must_be_within_the_folder(tmp_path: Path) -> None:
@@ -183,7 +183,7 @@ def test_a_cad_file_of_a_pattern_is_among_those_that_must_be_within_the_folder(t
 def test_a_name_with_a_number_must_be_free() -> None:
     arm = {**BEAM, "shape": {**SHAPE, "between": [[0, 0], [1, 0]]}}
     with pytest.raises(SceneError, match=r"patterns\.p\.links\.arm: must have a name that is free .* 'arm_2' twice"):
-        written_out({"count": 2, "turn": 1.0, "links": {"arm": arm}}, links={"arm_2": arm})
+        written_out({"count": 2, "rotation": 1.0, "links": {"arm": arm}}, links={"arm_2": arm})
 
 
 def test_names_of_links_and_joints_are_known_as_such_in_all_tables_that_a_pattern_repeats() -> None:

@@ -1,4 +1,4 @@
-"""`patterns` of a scene: links, joints, loads and others that are repeated, turned about an axis or shifted."""
+"""`patterns` of a scene: links, joints, loads and others that are repeated, rotated about an axis or shifted."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class _Copy:
         """Its rotation, (3, 3), by Rodrigues' formula."""
         x, y, z = self.pattern.about
         K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        angle = self.number * self.pattern.turn
+        angle = self.number * self.pattern.rotation
         return np.asarray(np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * K @ K)
 
     def called(self, section: str, name: str) -> str:
@@ -67,11 +67,11 @@ class _Copy:
         }
         if unit == "m":
             level = [key for key in LEVEL if key in value]
-            if level and self.pattern.turn and self.pattern.about != (0.0, 0.0, 1.0):
-                wanted = "must be coordinates in a pattern turned about another axis than z"
+            if level and self.pattern.rotation and self.pattern.about != (0.0, 0.0, 1.0):
+                wanted = "must be coordinates in a pattern rotated about another axis than z"
                 raise ValueError(f"{wanted}, got {LEVEL[level[0]]}")
             if "angle" in value:
-                made["angle"] = ANGLE.number(value["angle"]) + self.number * self.pattern.turn
+                made["angle"] = ANGLE.number(value["angle"]) + self.number * self.pattern.rotation
         if key in FACTORS and self.pattern.phase and value.get("over") == "angle":
             if "at" not in value:
                 raise ValueError("must have its angles in a list in a pattern with a phase, got a file")
@@ -83,7 +83,7 @@ class _Copy:
             section, dot, name = text.partition(".")
             of_joint = dot and section == "joints"
             return f"joints.{self.called('joints', name)}" if of_joint else self.called("points", text)
-        if unit == "1" and text in ("x", "y", "z") and self.pattern.turn:
+        if unit == "1" and text in ("x", "y", "z") and self.pattern.rotation:
             return (self.R @ np.eye(3)["xyz".index(text)]).tolist()
         sections = {each.section for each in marks(hint, NameOf)} & {"links", "joints"}
         return self.called(sections.pop(), text) if sections else text
@@ -91,7 +91,7 @@ class _Copy:
     def _vector(self, value: list[Any], unit: str) -> Any:
         x = np.array([Quantity(unit).number(each) for each in (*value, 0.0)[:3]])
         if unit != "m":
-            return (self.R @ x).tolist() if self.pattern.turn else x.tolist()
+            return (self.R @ x).tolist() if self.pattern.rotation else x.tolist()
         centre = np.array(self.pattern.centre)
         return (centre + self.R @ (x - centre) + self.number * np.array(self.pattern.shift)).tolist()
 
@@ -101,7 +101,7 @@ class _Copy:
             return made
         shape = with_kind(raw.get("shape")) if section == "links" else None
         kind = shape.get("kind") if isinstance(shape, Mapping) else None
-        if not self.pattern.turn:
+        if not self.pattern.rotation:
             if kind in PLACED and "origin" not in (shape or {}):  # in coordinates of the scene, which are shifted
                 made = {**made, "shape": {**made["shape"], "origin": self._vector([0.0, 0.0, 0.0], "m")}}
             return made
@@ -109,7 +109,7 @@ class _Copy:
         if section == "joints":
             bushing = raw.get("bushing")
             if isinstance(bushing, Mapping) and any(isinstance(x, list) for x in bushing.values()):
-                wanted = "must have a bushing alike in all directions in a pattern that turns"
+                wanted = "must have a bushing alike in all directions in a pattern that rotates"
                 raise ValueError(f"{wanted}, got three numbers")
             if raw.get("kind") == "revolute" and "axis" not in raw and tilted:
                 made = {**made, "axis": self.R[:, 2].tolist()}
@@ -117,9 +117,9 @@ class _Copy:
         if isinstance(inertia, list) and len(inertia) in {3, 6}:
             J = inertia_tensor([*map(INERTIA.number, inertia), 0.0, 0.0, 0.0][:6])
             made = {**made, "inertia": list(moments_of_inertia(self.R @ J @ self.R.T))}
-        about = "in a pattern turned about another axis than z"
+        about = "in a pattern rotated about another axis than z"
         if kind in PLACED:
-            wanted = "must not be a part of a file in a pattern that turns"
+            wanted = "must not be a part of a file in a pattern that rotates"
             raise ValueError(f"{wanted}, got one of kind {kind!r}")
         if kind in FLAT and tilted:
             raise ValueError(f"must be a bar or a polyline {about}, got {kind!r}")
@@ -208,15 +208,15 @@ def in_pattern(fault: Fault, origins: Mapping[Where, Where]) -> Fault:
 
 
 def steep_faults(links: Mapping[str, Any], given: object) -> list[Fault]:
-    """Lines whose section does not turn with the copies of a pattern: steep ones, on which x is up unless given."""
+    """Lines whose section does not rotate with the copies of a pattern: steep ones, on which x is up unless given."""
     found = []
     for name, each in given.items() if isinstance(given, Mapping) else ():
         pattern = Pattern.model_validate(each)
-        for link in pattern.links if pattern.turn else ():
+        for link in pattern.links if pattern.rotation else ():
             shape, raw = links[f"{link}_1"].shape, pattern.links[link].get("shape")
             lacks_up = isinstance(raw, Mapping) and "up" not in raw
             if isinstance(shape, Bar | Polyline) and lacks_up and _steep(shape):
-                wanted = "must have a shape with `up` where it is steep in a pattern that turns, got none"
+                wanted = "must have a shape with `up` where it is steep in a pattern that rotates, got none"
                 found.append(Fault(("patterns", str(name), "links", link), wanted))
     return found
 

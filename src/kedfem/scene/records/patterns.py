@@ -1,4 +1,4 @@
-"""`patterns` of a scene: tables that are repeated, turned about an axis or shifted."""
+"""`patterns` of a scene: tables that are repeated, rotated about an axis or shifted."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Entries = dict[str, Any]
 
 
 class Pattern(Record):
-    """Tables that are repeated: NAME_1 as they are written, NAME_2 and so on turned, shifted, or both, ever further.
+    """Tables that are repeated: NAME_1 as they are written, NAME_2 and so on rotated, shifted, or both, ever further.
 
     Coordinates, axes and vectors in them move, and points of the pattern's own; those of the scene, by name, stay.
     Names of the pattern's own links, joints and points mean those of the same copy.
@@ -25,14 +25,14 @@ class Pattern(Record):
 
     count: Count
     """how many there are"""
-    turn: Angle = 0.0
+    rotation: Angle = 0.0
     """from each to the next: `"=360 deg / n"`"""
     about: Axis = (0.0, 0.0, 1.0)
-    """axis of the turn: `"x"`, `"y"`, `"z"` or a vector"""
+    """axis of the rotation: `"x"`, `"y"`, `"z"` or a vector"""
     centre: Point = (0.0, 0.0, 0.0)
     """a point of this axis, by its coordinates"""
     shift: tuple[Length, Length, Length] = (0.0, 0.0, 0.0)
-    """from each to the next, after the turn: in the scene's axes, which no turn changes"""
+    """from each to the next, after the rotation: in the scene's axes, which no rotation changes"""
     phase: Angle = 0.0
     """from each to the next: by how much later on the drive's angle the factors of loads and springs are"""
     points: Entries = Field(default_factory=dict)
@@ -66,9 +66,9 @@ class Pattern(Record):
 
     @model_validator(mode="after")
     def _goes_on(self) -> Pattern:
-        if self.count > 1 and not self.turn and not any(self.shift):
+        if self.count > 1 and not self.rotation and not any(self.shift):
             wanted = "is required, or a shift [m], so that copies are not in one place"
-            refuse([Fault(("turn",), f"{wanted}, got neither")])
+            refuse([Fault(("rotation",), f"{wanted}, got neither")])
         return self
 
 

@@ -10,7 +10,7 @@ KEYS = {  # of scenes by their former names: messages about unknown words name t
     "functions": "reduction", "modes": "reduction", "reduced": "reduction", "fidelity": "model",
     "step": "shape", "file": "shape", "reduction": "reduction_tolerance", "port": "coupling",
     "turning_stiffness": "rotational_stiffness", "turning_damping": "rotational_damping",
-    "spin": "angular_velocity", "turns": "revolutions", "last_turns": "last_revolutions",
+    "spin": "angular_velocity", "turn": "rotation", "turns": "revolutions", "last_turns": "last_revolutions",
     "steps_per_turn": "steps_per_revolution", "frames_per_turn": "frames_per_revolution",
     "angle": "value", "travel": "value", "smooth": "smoothing",
     "levels": "extrapolation_levels", "exaggeration": "deformation_scale", "ignore": "defeature_size",
