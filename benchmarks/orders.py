@@ -72,7 +72,7 @@ def _table(found: Mapping[str, Found], asked: float) -> list[str]:
             shown = name in each.curves and asked > RESOLVED * each.uncertainty
             cells.append(needed(*each.curves[name], asked) if shown else "-")
         rows.append((name, *cells))
-    return table((f"work a turn for {100 * asked:g} %", *found), rows)
+    return table((f"work per revolution for {100 * asked:g} %", *found), rows)
 
 
 def doubled(first: int, last: float) -> Iterator[int]:

@@ -18,7 +18,8 @@ def main() -> None:
 
     coarse, fine, finer = stress(720, 4), stress(720, 8), stress(1440, 8)
     peak = np.abs(fine).max()
-    print(f"bending stress on the rocker's outer side, last turn: {fine.min() / 1e6:.1f} to {fine.max() / 1e6:.1f} MPa")
+    low, high = fine.min() / 1e6, fine.max() / 1e6
+    print(f"bending stress on the rocker's outer side, last revolution: {low:.1f} to {high:.1f} MPa")
     space, time = np.abs(fine - coarse).max() / peak, np.abs(fine - finer[::2]).max() / peak
     print(f"changes with 4 → 8 elements a link by {100 * space:.1f} %, with the step halved by {100 * time:.1f} %")
     assert space < 0.06

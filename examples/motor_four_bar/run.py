@@ -26,7 +26,7 @@ def main() -> None:
     given = np.trapezoid(channels["motors/drive/torque"][last], angle[last])
     taken = -np.trapezoid(channels["springs/load/torque"][last], channels["springs/load/angle"][last])
     gained = np.ptp(channels["energy/kinetic"][last][[0, -1]])
-    print(f"last turn: the motor gives {given:.2f} J, the damper takes {taken:.2f} J, {gained:.3f} J stay")
+    print(f"last revolution: the motor gives {given:.2f} J, the damper takes {taken:.2f} J, {gained:.3f} J stay")
     assert abs(given - taken) < 0.01 * given
 
     # it settles where the motor's mean torque is the damper's, T (1 - w/w0) = c w <(rocker's speed / crank's)^2>

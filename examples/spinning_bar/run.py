@@ -16,7 +16,7 @@ def main() -> None:
     alpha = np.sqrt(RHO * OMEGA**2 / E)
     exact = np.sin(alpha * L) / (alpha * np.cos(alpha * L)) - L  # code_aster V3.04.105: 0.0151572424 m
     stretch = tip[-1, 0]
-    print(f"stretch of the steady turn: {1e3 * stretch:.5f} mm, exact {1e3 * exact:.5f} mm")
+    print(f"stretch of the steady rotation: {1e3 * stretch:.5f} mm, exact {1e3 * exact:.5f} mm")
     assert abs(stretch / exact - 1) < 1e-4
     _, force = results.channels["joints/A/force"]
     # the pull at the root of an axially vibrating bar in steady rotation: E A u'(0) = E A (1/cos αL − 1)

@@ -101,7 +101,7 @@ def cardan_joints() -> list[Outcome]:
         got = turned(motion_at(scene, t), body(scene, "shaft2"), out)
         wanted = np.unwrap(np.arctan2(np.sin(t), np.cos(t) * np.cos(beta)))
         error = float(np.abs(got - wanted).max())
-        outcomes.append(Right(f"shafts at {angle:g}°, one turn: the output's angle [rad]", error, tolerance))
+        outcomes.append(Right(f"shafts at {angle:g}°, one revolution: the output's angle [rad]", error, tolerance))
     square = linkage_scene(cardan(np.radians(90.0)))
     return [*outcomes, refused("shafts at 90°", lambda: motion_at(square, t), "joints.")]
 
@@ -174,14 +174,14 @@ def turning_rows() -> list[Outcome]:
         grown = float(np.abs(force[-1]).max()) / size - 1
         swing = np.abs(np.diff(force[-1], n=4, axis=0)).max() / 16 / size  # of ±1 from step to step: 1
         outcomes += [
-            Right(f"ρ∞ = {rho_inf}: the force in turn 278 above that in turn 10", abs(grown), 1e-4),
+            Right(f"ρ∞ = {rho_inf}: the force in revolution 278 above that in revolution 10", abs(grown), 1e-4),
             Right(f"ρ∞ = {rho_inf}: its swing from step to step", float(swing), 1e-5),
         ]
     raw = inverted("beam", "slot", rho_inf=1.0)
     return [*outcomes, refused("ρ∞ = 1", lambda: scene_from(raw), "analysis.rho_inf")]
 
 
-@case("Ten thousand turns", long=True)
+@case("Ten thousand revolutions", long=True)
 def many_turns() -> list[Outcome]:
     """The linkage must not drift off its joints, nor the elastic motion off its cycle."""
     lengths, last = (0.3048, 0.9144, 0.762, 0.9144), 20000 * np.pi
@@ -200,7 +200,7 @@ def many_turns() -> list[Outcome]:
     change = float(np.abs(torque[-1] - torque[99]).max() / np.abs(torque[99]).max())
     return [
         Right("rocker's angle in the last revolution, from the closed form [rad]", float(np.abs(drift).max()), 2e-11),
-        Right("drive's torque in turn 10,000 against turn 100", change, 1e-9),
+        Right("drive's torque in revolution 10,000 against revolution 100", change, 1e-9),
     ]
 
 

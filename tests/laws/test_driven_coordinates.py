@@ -13,7 +13,7 @@ from kedfem.dynamics.joints.constraint_matrices import constraint_matrices
 from kedfem.dynamics.rigid_body import drive_range
 from kedfem.dynamics.system.monolithic.monolithic import Monolithic
 from kedfem.motion.coordinates import coordinates, driven_name
-from kedfem.motion.counted_revolutions import turn_of
+from kedfem.motion.counted_revolutions import angle_along
 from kedfem.motion.joint_equations import ordered
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path
@@ -124,7 +124,7 @@ def test_turns_are_counted_about_the_axis_that_is_driven(kind: str, coordinate: 
     link = linkage(scene)
     along_path = path(link, *drive_range(scene))
     tau = np.linspace(0.0, FAR, 5)
-    assert_allclose(turn_of(scene, link, along_path, "J", tau, scene.driven_joints["J"].about), tau, atol=1e-8)
+    assert_allclose(angle_along(scene, link, along_path, "J", tau, scene.driven_joints["J"].about), tau, atol=1e-8)
 
 
 @pytest.mark.parametrize(("kind", "coordinate", "name"), COORDINATES)

@@ -102,7 +102,7 @@ RETIRED = {
     "leaves free": r"\bleaves? free\b",
     "action": r"\bactions?\b(?!=)",
     "sweeps": r"\bSWEEPS\b",
-    "turning": r"\bgo(es)? on turning\b|\bhas turned\b|\bper turn\b|\bturning_(loads|bodies|kernel)\b|counted_turns",
+    "turning": r"\bgo(es)? on turning\b|\bhas turned\b|\bper turn\b|\b(work|twice) a turn\b|\b(last|steady) turn\b|\bin turn \d|\bturning_(loads|bodies|kernel)\b|counted_turns",
     "turn": r"\b(two|three|four|five|ten|whole|full|last) turns\b|\b(over|after|within) (a|one) turn\b|\bsteps a turn\b",
     "in thought": r"\bstands? still in thought\b",
     "doubtful": r"[`\"]doubtful|\bDOUBTFUL\b|\.doubt\b",

@@ -142,7 +142,7 @@ def damped_as(scene: Scene, model: Model) -> Model:
 
 
 def training_motion(full: Prepared) -> RigidMotion:
-    """Rigid motion at the instants where the linkage is examined: over the whole time, the last turn more closely."""
+    """Rigid motion at the instants where the linkage is examined: over the whole time, the last revolution more closely."""
     scene, grid = full.scene, time_grid(full.scene)
     per_turn = revolution_steps(scene)
     half = INSTANTS // 2
