@@ -142,7 +142,7 @@ def damped_as(scene: Scene, model: Model) -> Model:
 
 
 def training_motion(full: Prepared) -> RigidMotion:
-    """Rigid motion at the instants where the linkage is examined: over the whole time, the last revolution more closely."""
+    """Rigid motion at instants of the analysis for modes: over the whole time, more closely in the last revolution."""
     scene, grid = full.scene, time_grid(full.scene)
     per_turn = revolution_steps(scene)
     half = INSTANTS // 2
