@@ -11,8 +11,8 @@ SAME = 1e-8  # pairs that repeat each other
 class AndersonAcceleration:
     """Anderson acceleration of iterations: the step whose change, extrapolated from the last few iterations, is smallest.
 
-    Anderson (1965), as Walker and Ni (2011) write it. It costs a few products and settles what single iterations do not:
-    bent segments, whose stiffness in the reference position in their mean frame is not quite theirs.
+    Anderson (1965), as Walker and Ni (2011) write it. It costs a few products and converges where plain iterations do not:
+    for bent segments, whose tangent is only approximated by their reference stiffness in the mean frame.
     """
 
     def __init__(self) -> None:
@@ -21,11 +21,11 @@ class AndersonAcceleration:
         self._last: tuple[np.ndarray, np.ndarray] | None = None
 
     def begin(self) -> None:
-        """A new time step: what was learnt of the last one's iterations still serves."""
+        """Begin a time step; differences of the last step's iterations are kept."""
         self._last = None
 
     def step(self, change: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
-        """The step to take after a iteration that asks for a change."""
+        """The step after an iteration that requests a change."""
         if self._last is not None:
             self._learn(change)
         taken, m = change, self._known
@@ -38,7 +38,7 @@ class AndersonAcceleration:
         return np.asarray(taken)
 
     def _learn(self, change: Float[np.ndarray, " N"]) -> None:
-        """Keep what the last step did to the change, in place of the oldest."""
+        """Replace the oldest difference by that of the last step."""
         if not self._steps.size:
             self._steps, self._changes = np.zeros((2, DEPTH, len(change)))
         taken, before = self._last if self._last is not None else (change, change)

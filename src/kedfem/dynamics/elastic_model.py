@@ -129,7 +129,7 @@ def _shared(name: str, link: Segments) -> list[SharedCut]:
 
 
 def drive_joint_of(scene: Scene, name: str) -> str | None:
-    """The driven joint by which a link, if it is rigid, turns on the ground with a drive; that of a moving ground."""
+    """The driven joint between the ground and a rigid link, or of a moving part of the ground."""
     if scene.links[name].model != "rigid":
         return None
     if name in (ground := moving_grounds(scene)):

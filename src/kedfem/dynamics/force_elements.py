@@ -28,7 +28,7 @@ Place = tuple[str, Float[np.ndarray, "3"]]
 
 
 def force_elements(scene: Scene) -> Iterator[tuple[str, Element]]:
-    """All motors, springs and limits, each by what its system calls it: `motors.NAME`, `springs.NAME`, `limits.NAME`."""
+    """All motors, springs and limits by their names in the system: `motors.NAME`, `springs.NAME`, `limits.NAME`."""
     for kind in ("motors", "springs", "limits"):
         yield from ((f"{kind}.{name}", each) for name, each in getattr(scene, kind).items())
 
@@ -67,7 +67,7 @@ def law_of(element: Element) -> Law:
 
 
 def on_hinge(element: Element) -> bool:
-    """Whether a spring, motor or limit acts on the turn of its joint, not on a travel or distance."""
+    """Whether a spring, motor or limit acts on an angle of its joint, not on a travel or distance."""
     if isinstance(element, Motor):
         return element.torque is not None
     return isinstance(element, TorsionSpring | AngleLimit)

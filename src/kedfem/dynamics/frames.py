@@ -23,7 +23,7 @@ NUDGE = 1e-5  # of a link's size: what it moves by to show the rate of its defor
 
 
 def frames_of(link: Link) -> tuple[Frame, ...]:
-    """The frames of a link: several, one, or none where it keeps the rigid-body frame."""
+    """The frames of a link: several, one, or none with a rigid-body frame."""
     if link.frames or link.fit is None:
         return link.frames
     return (Frame(link.fit, link.K0),)
@@ -40,7 +40,7 @@ class Deformed:
 
 
 def rotation(link: Link, fit: Float[np.ndarray, "n 3"], y: Nodal, angle: float) -> tuple[Float[np.ndarray, "d d"], float]:
-    """Q of Σ y_a ⊗ fit_a; of a planar link with its angle, which counts turns.
+    """Q of Σ y_a ⊗ fit_a; of a planar link with its angle, counted on beyond a revolution.
 
     Parameters
     ----------
@@ -75,9 +75,9 @@ def mean_rotations(
 
 
 def deformation(link: Link, y: Nodal, Q: Float[np.ndarray, "d d"], angle: float) -> Nodal:
-    """g = Qᵀ y − X without its mean, which strains nothing; of a planar beam ψ less the frame's angle.
+    """g = Qᵀ y − X less its mean, a rigid motion; for a planar beam ψ less the frame's angle.
 
-    Of a beam in space a displacement that has its strains, which no frame needs to show.
+    For a beam in space it is a displacement with the same strains, as these need no frame.
     """
     if link.element is not None:
         return np.asarray(link.element.share @ strains_of(link.element, y)).reshape(y.shape)
@@ -90,7 +90,7 @@ def deformation(link: Link, y: Nodal, Q: Float[np.ndarray, "d d"], angle: float)
 
 
 def seen_from(link: Link, frame: Frame, y: Nodal, y1: Nodal | None = None) -> Deformed:
-    """A frame within half a revolution of the rigid-body one, with what it sees of a rate.
+    """A frame within half a revolution of the rigid-body one, with the rate of deformation.
 
     Parameters
     ----------

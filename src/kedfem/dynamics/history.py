@@ -38,7 +38,7 @@ class Forcing:
 
 @dataclass(frozen=True, slots=True)
 class Products:
-    """Products of matrices with the state, which a solver has anyway; all (T, n, d), those not needed (T, 0, 0).
+    """Products of matrices with the state, which a solver has computed; all (T, n, d), unneeded ones (T, 0, 0).
 
     Mv : M δ', world components [kg m/s]
     Kg, Cg : K0 g [N] and C0 g [N s], link frame; Cg is None without damping,
@@ -121,7 +121,7 @@ def bent(u: Float[np.ndarray, "n d"], R: Float[np.ndarray, "d d"]) -> LinkMoment
 
 @dataclass(frozen=True, slots=True)
 class Multipliers:
-    """What a march says of its system's constraints and laws at T time points; `dynamics.system.forces` has their forces.
+    """Multipliers of a system's constraints and laws over a march (T time points); `dynamics.system.forces` has their forces.
 
     system : whose march that is; None where nothing was marched
     z : (T, k) interface unknowns

@@ -76,7 +76,7 @@ class Inertias:
     loads: list[RigidLoad] = field(default_factory=list)
 
     def add(self, body: int, mass: float, at: Vector, second: Float[np.ndarray, "3 3"] | float = 0.0) -> None:
-        """A mass with its centre at a drawn point, and its second moment about that."""
+        """A mass with the reference position of its centre, and its second moment about that."""
         arm = at - self.centre
         self.mass[body] += mass
         self.first[body] += mass * arm
@@ -110,7 +110,7 @@ class Inertias:
 
 
 def inertias_of_model(scene: Scene, linkage: Linkage, model: Model) -> Inertias:
-    """Of an elastic model: attached bodies are in the mass of its links, sliders are bodies of their own again."""
+    """Inertias of an elastic model: links include attached bodies; sliders are separate bodies."""
     out = _none(scene, linkage)
     first = int(any(scene.gravity))
     riding = [sum(len(x.loads) for x in model.sliders if x.carrier == k) for k in range(len(model.links))]
@@ -129,7 +129,7 @@ def inertias_of_model(scene: Scene, linkage: Linkage, model: Model) -> Inertias:
 
 
 def inertias_of_links(scene: Scene, linkage: Linkage, links: Mapping[str, Link]) -> Inertias:
-    """Of records of links without attached bodies, by name; links that are missing there have no mass.
+    """Inertias of links without attached bodies, by name; links without a record have no mass.
 
     Raises
     ------

@@ -18,7 +18,7 @@ Vector = Float[np.ndarray, "3"]
 def load_weights(
     where: str, load: ForceLoad | BodyLoad | SurfaceLoad, parts: Mapping[str, Link]
 ) -> dict[str, Float[np.ndarray, " n"]]:
-    """Which segments of its link a load acts on, and how much of it each function takes."""
+    """The segments of its link on which a load acts, and its weights on their functions."""
     if not parts:
         return {}
     match load:
@@ -31,12 +31,12 @@ def load_weights(
 
 
 def at_point(where: str, name: str, at: Vector, parts: Mapping[str, Link]) -> tuple[str, Float[np.ndarray, " n"]]:
-    """The segment of a link that a force at a point acts on, and how much of it each function takes."""
+    """The segment of a link on which a point force acts, and its weights on the functions."""
     return on_part(parts, name, at, lambda link: point_weights(where, link, at))
 
 
 def point_weights(where: str, link: Link, at: Vector) -> Float[np.ndarray, " n"]:
-    """Of a force at a point of a link; beams take it on their axis alone."""
+    """Weights of a point force on a link; on beams it must be on the axis."""
     rows = point_rows(link, f"{where}.at", at)
     require_on_axis(link, f"{where}.at", at, rows.X)
     return rows.value

@@ -164,7 +164,7 @@ def _couples(scene: Scene, where: str, load: TorqueLoad, link: Link, at: Vector)
 
 
 def initial_forces(scene: Scene, links: Sequence[Link]) -> list[Float[np.ndarray, "n d"]]:
-    """Nodal forces (n, d) on all links, or on their segments, that are let go at the start, world components [N].
+    """Nodal forces (n, d) on all links, or on their segments, that are released at the start, world components [N].
 
     Raises
     ------
@@ -186,7 +186,7 @@ def initial_forces(scene: Scene, links: Sequence[Link]) -> list[Float[np.ndarray
 
 
 def slider_pattern(link: Link, name: str, load: ForceLoad, weights: Float[np.ndarray, " n"]) -> Pattern:
-    """A force on a rigid slider, which never turns, through the weights of its point on the carrier."""
+    """A force on a rigid slider, which never rotates, through the weights of its point on the carrier."""
     forces = np.outer(weights, as_rows(link, np.asarray(load.vector)))
     return Pattern(forces, False, factor_law(load.factor), load=name)
 

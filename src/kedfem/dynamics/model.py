@@ -122,7 +122,7 @@ def mesh_methods(model: Model) -> dict[str, str]:
 
 
 def on_segment(links: Sequence[Link], name: str, at: Float[np.ndarray, "3"], found: Callable[[Link], T]) -> tuple[int, T]:
-    """The number of a link, or of its segment, that has something at a reference point, and what was found.
+    """The number of the link or segment that has a coupling surface or load at a reference point, and that.
 
     Raises
     ------

@@ -18,7 +18,7 @@ ANY = Material(density=1.0, youngs_modulus=1.0, poisson_ratio=0.0)
 
 
 def moving_ground(scene: Scene, name: str, drive_joint: str) -> Link:
-    """The record of a moving part of the ground: a cube at its driven joint, of its own mass there and no other.
+    """The record of a moving part of the ground: a cube at its driven joint, with no mass but its own.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ class OnLink:
         return np.asarray(u[:, :, : self.end.onto.shape[1]].reshape(len(block), -1))
 
     def nodal(self, motion: RigidMotion, force: Vectors, moment: Vectors) -> Float[np.ndarray, "T n d"]:
-        """Nodal forces that do what a force and a moment on the end do in the rigid-body motion, world components."""
+        """Nodal forces equivalent to a force and a moment on the end in the rigid-body motion, world components."""
         if self.weights is None:
             raise ValueError("an end must be on a link to have nodal forces, got one that is on none")
         y = forces_in_place(self.end, motion, force[:, None], moment[:, None])[:, 0]
@@ -83,7 +83,7 @@ def on_links(model: Model, joint: ConstraintJoint, at: Sequence[Float[np.ndarray
 
 
 def links_of(model: Model, names: Sequence[str]) -> tuple[dict[str, Link], LinkageLayout]:
-    """What joints ask of a model: its links by their keys, and lines of slots as they are there."""
+    """Links of a model by their keys, with its lines of slots, for joints."""
     layout = LinkageLayout({name: n for n, name in enumerate(names)}, _lines(model))
     return dict(zip(link_keys(model), model.links, strict=True)), layout
 
@@ -109,7 +109,7 @@ def _lines(model: Model) -> dict[str, Stations]:
 
 @dataclass(frozen=True, slots=True)
 class RigidElement:
-    """A force element between two ends; `turns`: name of the joint whose counted turns it acts on, empty of others."""
+    """A force element between two ends; `turns`: name of the joint on whose counted angle it acts, empty for others."""
 
     law: Law
     term: Term

@@ -41,9 +41,9 @@ def made_rigid(
 ) -> tuple[dict[str, Link], dict[str, StepLimit]]:
     """Links, of which the rigid ones are made far stiffer than the elastic ones, whatever their material.
 
-    Also what steps allow of those that they hold back.
+    Also the step limits of those whose stiffness a step bounds.
 
-    Where no link is elastic they are stiff beside their mounts: of a block on soft ones rounding would leave few digits.
+    Without elastic links they are stiff in comparison with their mounts: on soft mounts rounding would leave few digits.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def for_steps(model: Model, h: float, longest: float | None = None) -> Model:
 
 
 def _angular_speeds(scene: Scene, linkage: Linkage, along: Path | None) -> dict[str, float]:
-    """How fast links turn that drives move [rad/s], at most."""
+    """Largest angular speeds of links that drives move [rad/s]."""
     if along is None or linkage.drive is None:
         return {}
     t = np.linspace(0.0, time_grid(scene).end, INSTANTS)
@@ -121,7 +121,7 @@ def _thickened(link: Link) -> Link:
 def _spread(link: Link) -> Link:
     """A planar beam that is light beside a body on it, with part of the body's inertia spread over its line.
 
-    Its own modes are made as stiff as they are heavy: with next to no mass of its own it would give.
+    The stiffness of its modes is in proportion to their mass: with very little mass it would deform.
     """
     if link.kind != "beam":
         return link
@@ -144,7 +144,8 @@ def _second_moments(link: Link) -> Float[np.ndarray, " e"]:
 def _with_extent(link: Link) -> None:
     """Refuse a rigid link whose mass has no extent along one of its directions, or nearly none at all.
 
-    Nothing shows its functions along it; and as it is made as stiff as it is heavy, its joints would give.
+    Its functions in that direction would be undetermined; and as its stiffness is in proportion to its mass, it would
+    deform.
 
     Raises
     ------

@@ -73,7 +73,7 @@ class Stiffening:
 
     joints : those that are enforced by constraint equations
     elements : motors and springs, whose forces are those that the rigid-body motion has
-    turned : links whose loads turn with frames of their own: number, link, all its loads, as turned by the rigid-body
+    turned : links with follower loads in co-rotational frames: number, link, all its loads, as rotated by the rigid-body
         motion, and number in the linkage
     """
 
@@ -117,7 +117,7 @@ class Stiffening:
 
 
 def stiffening(model: Model, elements: RigidElements | None = None) -> Stiffening:
-    """Stress modes of a model's links; of those with co-rotational frames none, which know what their stresses do.
+    """Stress modes of a model's links; none with co-rotational frames, which include the effect of stresses.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ NEAR_PEAK = 0.5  # of the highest density of the error: an edge there is worth a
 
 @dataclass(frozen=True, slots=True)
 class Indicator:
-    """Of one meshed link in one state.
+    """The error indicator of one meshed link in one state.
 
     elements : (e,) share of each element in η², by volume: its density of the error over the mean energy's [-]
     error, energy : ∫ of the difference, and of the element's own stress: twice strain energies [J]

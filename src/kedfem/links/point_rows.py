@@ -20,7 +20,7 @@ ON_AXIS = 1e-6  # of a planar beam's size: farther beside its axis its state sho
 
 @dataclass(frozen=True, slots=True)
 class PointRows:
-    """What a point of a link reads from the link's state g (n, d), link frame.
+    """Rows that give values at a point of a link from its state g (n, d), link frame.
 
     value : (n,) displacement = value @ g
     stress : (6, dn) stress components in link axes [Pa/m] = stress @ g.ravel()

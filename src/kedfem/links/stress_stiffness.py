@@ -59,7 +59,7 @@ def stress_stiffness(link: Link) -> StressStiffness:
 
 
 def _meshed(link: Link, on: Pattern, g: Float[np.ndarray, "n d"]) -> sp.csr_array:
-    """Of a solid or plane link, at the Gauss points of K0."""
+    """Stress stiffness of a solid or plane link, at the Gauss points of K0."""
     (lam, mu), basis = link.lame, link.basis
     shapes: list[skfem.DiscreteField] = [shape[0] for shape in basis.basis]
     local = np.empty((basis.nelems, len(shapes), len(shapes)))

@@ -27,7 +27,7 @@ Change = Float[np.ndarray, "n 6"]
 
 @dataclass(frozen=True, slots=True)
 class Assembly:
-    """How links that were given apart have been closed; nothing where none were.
+    """Motions of links that closed their joints; empty if no links were given apart.
 
     misfits : by joint [m], how far its links were given apart in the directions that it constrains
     moved : by link, how far the farthest of its joints' points went [m] and how far it turned [rad]
@@ -92,7 +92,7 @@ def _closed(scene: Scene) -> tuple[Scene, Assembly]:
 
 
 def assembly_warning(assembly: Assembly) -> tuple[str, ...]:
-    """That links were moved, in a line; nothing where none were."""
+    """A line about links that were moved; none without any."""
     if not assembly.misfits:
         return ()
     (joint, misfit), way = assembly.worst, max(assembly.moved.values())[0]
@@ -143,7 +143,7 @@ def _linearised(
 
 
 def _poses(x: Change, centres: Float[np.ndarray, "n 3"], size: float) -> Poses:
-    """Of all bodies, the ground first."""
+    """Poses of all bodies, the ground first."""
     R = np.concatenate([np.eye(3)[None], rotation(x[:, 3:])])
     p = np.zeros((len(x) + 1, 3))
     p[1:] = size * x[:, :3] - ((R[1:] - np.eye(3)) @ centres[..., None])[..., 0]
@@ -191,6 +191,6 @@ def _refusal(scene: Scene, name: str, wanted: str, misfit: float) -> str:
 
 
 def _way(scene: Scene, name: str, shift: Shift) -> tuple[float, float]:
-    """How far a link moves [m] and turns [rad]."""
+    """Displacement [m] and rotation [rad] of a link."""
     went = [float(np.linalg.norm(np.subtract(shift.point(at), at))) for at in _points(scene, name)]
     return max(went, default=0.0), float(np.linalg.norm(shift.theta))

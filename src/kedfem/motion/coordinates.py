@@ -65,7 +65,7 @@ def rotation_about(
 
 
 def coordinates(scene: Scene, linkage: Linkage) -> list[Coordinate]:
-    """Of all joints that have any; of a ball none, of a cross the turns of its two hinges."""
+    """Coordinates of all joints: none of spherical ones, of universal ones the rotations about both axes."""
     return [each for name, joint in scene.joints.items() for each in _of(name, joint, linkage)]
 
 

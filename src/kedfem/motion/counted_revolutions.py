@@ -42,7 +42,7 @@ def require_counted(scene: Scene, link: Linkage, along: Path) -> None:
 
 
 def _counting(scene: Scene) -> Iterator[tuple[str, str, str | None]]:
-    """What counts turns of joints, by place: these, and of a universal one the link about whose axis.
+    """Joints whose revolutions are counted, by place, and for a universal one the link about whose axis.
 
     Laws do, and with co-rotational frames gears and threads.
     """
@@ -65,7 +65,7 @@ def _counting(scene: Scene) -> Iterator[tuple[str, str, str | None]]:
 def angle_along(
     scene: Scene, link: Linkage, along: Path, name: str, tau: Float[np.ndarray, " T"], about: str | None = None
 ) -> Float[np.ndarray, " T"]:
-    """Turn of a joint about its axis at places of the path, counted from the reference position [rad].
+    """Angle of a joint about its axis at places of the path, counted from the reference position [rad].
 
     The grid of the path is fine enough for that.
 

@@ -18,7 +18,7 @@ FOLD, CROSSING = 0.5, 1.0  # powers of the distance with which the least singula
 
 @dataclass(frozen=True, slots=True)
 class DeadPoint:
-    """Where over its range a linkage is nearest to a dead point.
+    """The position of the drive's range at which a linkage is nearest to a dead point.
 
     weakness : smallest singular value of the rows there, of the largest
     tau : place on the path: turn or travel of the drive, of several the time [rad, m or s]

@@ -14,7 +14,7 @@ SAMPLES = 4001  # of laws over a path, to find the fastest
 
 @dataclass(frozen=True, slots=True)
 class Drives:
-    """What is driven.
+    """The drives of a linkage.
 
     joints : names
     units : of each drive: 1 of an angle [rad], the linkage's size of a travel [m]

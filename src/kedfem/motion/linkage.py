@@ -219,7 +219,7 @@ def _check_mobility(scene: Scene, reference: Reference) -> int:
 
 
 def _at_reference(scene: Scene) -> str:
-    """Where the only drive is in the reference position, in words; nothing of none, or of several."""
+    """The reference position of the only drive in words; empty without a drive and with several."""
     if len(scene.driven_joints) != 1:
         return ""
     (name,) = scene.driven_joints

@@ -36,7 +36,7 @@ def stopped(link: Linkage, poses: Poses, tau: float, aim: Target) -> str:
 
 
 def place(link: Linkage, tau: float, form: str = ".2f") -> str:
-    """Where a linkage is on its path, in words: the turn or travel of its drive; of several drives the time."""
+    """The position of a linkage on its path in words: the angle or travel of its drive; with several drives the time."""
     if len(link.drives) != 1:
         return f"t = {tau:.6g} s"
     if link.drives.turning[0]:

@@ -91,7 +91,7 @@ def _sped_up(scene: Scene) -> Scene:
 
 
 def _periods(scene: Scene, rigid: Linkage, base: float, asked: str) -> tuple[int, float]:
-    """How many times the base the period is, and the period [s]."""
+    """The period as a multiple of the base, and in seconds."""
     faults = list(_never(scene, asked))
     if faults:
         raise SceneError(faults)
@@ -117,7 +117,7 @@ def _range(scene: Scene, base: float) -> tuple[float, float]:
 
 
 def _never(scene: Scene, asked: str) -> Iterator[str]:
-    """What can have no period."""
+    """Drives and loads that have no period."""
     where = f"must have a period with {asked}"
     for name, drive in scene.driven_joints.items():
         if not isinstance(drive.motion, MotionCurve) and cycle(drive.motion) is None:
@@ -128,7 +128,7 @@ def _never(scene: Scene, asked: str) -> Iterator[str]:
 
 
 def _open(scene: Scene, along: Path, time: float, asked: str) -> Iterator[str]:
-    """What is not where it was after a time."""
+    """Reasons why the linkage has not returned after a time."""
     gone = float(np.ptp(path_parameter(scene, np.array([0.0, time]))[0]))
     laws = {name: drive.motion for name, drive in scene.driven_joints.items()}
     for name, motion in laws.items():

@@ -19,7 +19,7 @@ from kedfem.motion.values import features, jacobian
 
 @dataclass(frozen=True, slots=True)
 class Reactions:
-    """How rows bear on bodies at T times, moments about the bodies' points that are drawn at the linkage's centre.
+    """Forces of rows on bodies at T times, with moments about the bodies' points at the linkage's centre.
 
     motion : the rigid motion
     each : (T, m, B − 1, 6) force and moment on each body of a unit of scaled λ, world components; without the ground
@@ -128,12 +128,12 @@ def effort(linkage: Linkage, drive: int) -> Float[np.ndarray, " m"]:
 
 
 def rows_of(linkage: Linkage, joint: str) -> Bool[np.ndarray, " m"]:
-    """Which rows are a joint's."""
+    """The rows of a joint."""
     return np.array([name == joint for name in linkage.joints], bool)
 
 
 def reactions(linkage: Linkage, motion: RigidMotion) -> Reactions | BlockReactions:
-    """How all joints and drives bear on the bodies at the times of a motion."""
+    """Forces of all joints and drives on the bodies at the times of a motion."""
     bodies, c = len(linkage.bodies), linkage.centre
     poses = (motion.R, motion.p + motion.R @ c - c)
     f = features(linkage.rows, poses)

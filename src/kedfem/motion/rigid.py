@@ -39,15 +39,15 @@ class RigidMotion:
     drives: Float[np.ndarray, "T D"]
 
     def position(self, body: int, X: Float[np.ndarray, "3"]) -> Float[np.ndarray, "T 3"]:
-        """Of a body's point that is at X in the reference position [m]."""
+        """Position of a body's point with the reference position X [m]."""
         return np.asarray(self.p[:, body] + self.R[:, body] @ X)
 
     def velocity(self, body: int, X: Float[np.ndarray, "3"]) -> Float[np.ndarray, "T 3"]:
-        """Of the same point [m/s]."""
+        """Velocity of the same point [m/s]."""
         return np.asarray(self.v[:, body] + cross(self.omega[:, body], self.R[:, body] @ X))
 
     def acceleration(self, body: int, X: Float[np.ndarray, "3"]) -> Float[np.ndarray, "T 3"]:
-        """Of the same point [m/s²]."""
+        """Acceleration of the same point [m/s²]."""
         return np.asarray(self.p2[:, body] + self.R2[:, body] @ X)
 
     def part(self, first: int, end: int) -> "RigidMotion":
@@ -66,7 +66,7 @@ def joined(parts: Sequence["RigidMotion"]) -> "RigidMotion":
 
 
 def seen_from(motion: RigidMotion, bodies: tuple[int, int], at: Float[np.ndarray, "3"]) -> Float[np.ndarray, "T 3"]:
-    """Where a point of body i is in the frame of body j, from where both are drawn (T, 3) [m]."""
+    """Displacement of a point of body i in the frame of body j, from the reference position (T, 3) [m]."""
     i, j = bodies
     point = motion.p[:, i] + motion.R[:, i] @ at
     return np.asarray(((point - motion.p[:, j])[:, None] @ motion.R[:, j])[:, 0] - at)

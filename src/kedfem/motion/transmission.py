@@ -60,7 +60,7 @@ class Transmission:
 
 
 def transmissions(scene: Scene, linkage: Linkage) -> list[Transmission]:
-    """Of all couplers: links of just two joints that can bear no moment together, whose far end is driven."""
+    """Transmissions of all couplers: links with two joints that transmit no moment, whose far end is driven."""
     apart = _distances(scene)
     out: list[Transmission] = []
     for name in scene.links:
@@ -113,7 +113,7 @@ def _same(linkage: Linkage, a: Float[np.ndarray, "3"], b: Float[np.ndarray, "3"]
 
 
 def _distances(scene: Scene) -> dict[str, int]:
-    """How many joints each link is away from a driven one, not counting ways through the ground."""
+    """Number of joints between each link and a driven one, not through the ground."""
     out = {link: 0 for name in scene.driven_joints for link in scene.joints[name].links if link != GROUND}
     here = list(out)
     while here:

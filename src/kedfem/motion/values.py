@@ -17,7 +17,7 @@ Twists = tuple[Float[np.ndarray, "T B 3"], Float[np.ndarray, "T B 3"]]
 
 @dataclass(frozen=True, slots=True)
 class Features:
-    """What E elementary rows with A angles among them are made of at T time points.
+    """Vectors of E elementary rows, A of them angles, at T time points.
 
     u : (3, E, T) gap: x_i − x_j; turn, angle: a in world components
     w : (3, E, T) b in world components
@@ -40,7 +40,7 @@ class Features:
 
     @property
     def about(self) -> np.ndarray:
-        """Of angles: derivative by ω_i − ω_j (3, A, T); the axis itself where the hinge is closed."""
+        """Derivative of angles by ω_i − ω_j (3, A, T); the axis itself where the hinge is closed."""
         return self.rate.imag
 
 
@@ -132,7 +132,7 @@ def convective(rows: Rows, f: Features, twists: Twists) -> Float[np.ndarray, "T 
 
 
 def _angle_convective(f: Features, wi: np.ndarray, wj: np.ndarray) -> np.ndarray:
-    """Of angles: second derivative of Im ln z, z the product of both hands; real multiples of z left out."""
+    """Second derivative of angles, of Im ln z, z the product of both hands; real multiples of z left out."""
     apart = wi - wj
     z2 = _dot(wi, f.hand_j) * _dot(apart, f.hand_i) - _dot(wj, f.hand_i) * _dot(apart, f.hand_j)
     return np.asarray((z2 / f.product - _dot(apart, f.rate) ** 2).imag)

@@ -59,7 +59,7 @@ def interface_matrix(joints: Sequence[Attachment]) -> sp.csr_array:
 
 @dataclass(frozen=True, slots=True)
 class SharedCut:
-    """Where two segments of a link meet: their keys, the points of the cut (k, 3) and each one's weights (k, n).
+    """The cut between two segments of a link: their keys, its points (k, 3) and each one's weights (k, n).
 
     uneven : facets of each where the link is no prism around the cut, so that stresses there are not those of the whole
     """

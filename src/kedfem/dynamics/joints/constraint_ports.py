@@ -31,7 +31,7 @@ from kedfem.scene.records.materials import LINE
 
 @dataclass(frozen=True, slots=True)
 class LinkageLayout:
-    """What joints need of the linkage: numbers of bodies by name, and the travel of each slot's pin along its line [m].
+    """Data of the linkage for joints: numbers of bodies by name, and the travel of each slot's pin along its line [m].
 
     Where its stations are known already, these in its place.
     """
@@ -113,7 +113,7 @@ def rigid_points(link: Link, key: str, layout: LinkageLayout) -> ConstraintJoint
 
 
 def _slider_side(scene: Scene, on: str, at: Float[np.ndarray, "3"], layout: LinkageLayout) -> Side | None:
-    """A point of a rigid slider; None on what is none."""
+    """A point of a rigid slider; None for other links."""
     axis = slider_axis(scene, on) if on in scene.links else None
     return None if axis is None else Side(layout.bodies[on], at[None], slider=on, axis=axis)
 
@@ -121,7 +121,7 @@ def _slider_side(scene: Scene, on: str, at: Float[np.ndarray, "3"], layout: Link
 def _point_side(
     where: str, scene: Scene, on: str, at: Float[np.ndarray, "3"], links: dict[str, Link], layout: LinkageLayout
 ) -> Side | None:  # fmt: skip
-    """A point of a link; nothing on the ground and on what the drive prescribes."""
+    """A point of a link; None on the ground and on prescribed links."""
     if (rider := _slider_side(scene, on, at, layout)) or all(link.name != on for link in links.values()):
         return rider
     key, rows = on_part(links, on, at, lambda link: point_rows(link, where, at))
@@ -132,7 +132,7 @@ def _point_side(
 
 
 def _side(scene: Scene, name: str, on: str, links: dict[str, Link], layout: LinkageLayout) -> Side | None:
-    """What a joint has on one of its links: a coupling surface, or the line of a slot; nothing where links have no
+    """The coupling surface of a joint on one of its links, or the line of a slot; None where links have no
     unknowns."""
     joint, where = scene.joints[name], f"joints.{name}"
     at = np.asarray(joint.at)

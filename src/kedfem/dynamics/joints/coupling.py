@@ -47,7 +47,7 @@ class _Port:
 
 
 def _attachment(link: Link, ports: Sequence[_Port]) -> Attachment:
-    """Without what the interface unknowns are to its components."""
+    """An attachment before its relation to the interface unknowns is known."""
     W = np.array([port.weights for port in ports]) if ports else np.zeros((0, 0))
     nodes = np.flatnonzero(W.any(axis=0))
     points = np.array([port.point for port in ports]).reshape(-1, 3)
@@ -147,7 +147,7 @@ def joined(
 
 
 def _on(row: ConstraintJoint, columns: Mapping[int, list[int]], Z: sp.csr_array) -> ConstraintJoint:
-    """A joint with rows on the interface unknowns, as these turned out."""
+    """A joint by constraint equations, with the final interface unknowns."""
     one, other = (side and _seeing(side, Z[columns[id(side)]]) for side in row.sides)
     return replace(row, sides=(one, other), plus=tuple((c, _on(each, columns, Z)) for c, each in row.plus))
 
@@ -186,7 +186,7 @@ def _mixed(
 
 
 def _components(scene: Scene, name: str, joint: Joint, held: list[Link]) -> list[int]:
-    """Which of a port's components the joint constrains: of a beam (u, v, ψ) a pin releases ψ."""
+    """Components of a port that the joint constrains: of a beam's (u, v, ψ) a pin releases ψ."""
     turning = name in scene.driven_joints or joint.kind in {"weld", "prismatic"}
     if not any(link.planar for link in held):
         return [0, 1, 2]

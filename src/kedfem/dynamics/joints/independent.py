@@ -20,7 +20,7 @@ Block = tuple[Int[np.ndarray, " r"], Int[np.ndarray, " c"], Float[np.ndarray, "r
 def independent(
     every: Sequence[Attachment], selected: Sequence[sp.csr_array], own: Sequence[int] = (), riding: Sequence[int] = ()
 ) -> tuple[list[Attachment], sp.csr_array]:
-    """Joints on one coupling surface repeat rows of W: w_d = Σ l w_r. Each is held once, and the rest said of z instead.
+    """Joints on one coupling surface repeat rows of W: w_d = Σ l w_r. Each is constrained once; others relate z.
 
     With all rows W = L W_r of the independent ones W_r, (B − L B_r) z = 0. An orthonormal basis Z of these z makes
     B_r Z the new B. L is scalar, so it commutes with the link's rotation.
@@ -89,7 +89,7 @@ def _port_forces(
 ) -> tuple[sp.csr_array, sp.csr_array, sp.csr_array]:
     """Forces μ at all ports from the λ at the independent ones, Lᵀ μ = λ, every joint in balance, Bᵀ μ = p.
 
-    p is zero but for what rows exert on their own unknowns.
+    p is zero but for forces of constraint equations on their own unknowns.
 
     Returns
     -------

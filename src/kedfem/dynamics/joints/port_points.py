@@ -53,7 +53,7 @@ def port_points(
 
 
 def _unheld(link: Link, kind: str) -> str:
-    """What to do about a coupling surface that does not hold a joint's points."""
+    """Advice for a coupling surface that does not determine a joint's points."""
     if link.kind == "spatial_beam":
         return (
             f"must sit at an end or a corner of beam '{link.name}', or need its section only, got a joint that "

@@ -60,9 +60,9 @@ def rotated_ports(
 
 
 def in_balance(link: Link, joint: Attachment, S: Float[np.ndarray, "c c"]) -> Float[np.ndarray, "c c"]:
-    """Stiffness seen from ports, the first of its rows, that bear nothing where the link moves rigidly.
+    """Stiffness at ports, the first of its rows, with exactly no force in rigid motions of the link.
 
-    Rounding would let those of a stiff link without mass bear more of that than soft mounts do.
+    Otherwise rounding of a stiff massless link could exceed the forces of soft mounts.
     """
     N, size, _ = np.linalg.svd(port_columns(joint, link.n).T @ rigid_modes(link), full_matrices=False)
     N = N[:, size > RIGIDLY * size.max(initial=0.0)]

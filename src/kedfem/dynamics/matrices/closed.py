@@ -93,7 +93,7 @@ def closed(
 
 
 def _bodies(parts: Sequence[Substructure], made: Profile) -> Bodies:
-    """What the interface has of links; of anchors it has nothing, each is a point of its own."""
+    """Data of links for the interface, in which each anchor is a separate point."""
     joints, sizes = [part.attachment for part in parts], [len(part.S) for part in parts]
     B, component, port = [], [], []
     for joint, q in zip(joints, sizes, strict=True):

@@ -24,9 +24,9 @@ ANCHORAGE = 0.1  # κ, of the anchor nodes' own stiffness: 0.01 to 1 do equally 
 
 @dataclass(frozen=True, slots=True)
 class Substructure:
-    """A link seen from its q port components and e anchors, all constant in the link frame.
+    """A link condensed onto its q port components and e anchors, all constant in the link frame.
 
-    A holds a free link by its inertia only, so a long step would leave it nearly singular. Factored is therefore
+    Only inertia makes A of a free link regular, so a long step would leave it nearly singular. The factored matrix is
     Ã = A + κ E Eᵀ, E a few components of nodes far apart (the anchors): A g = r + Wᵀ λ is Ã g = r + Wᵀ λ + E μ with
     μ = κ Eᵀ g. Exact for every κ. With C = [Wᵀ E] and y = Ã⁻¹ r,
 
@@ -121,7 +121,7 @@ def _held(link: Link, joint: Attachment, c_M: float, c_K: float) -> Substructure
 
 
 class _Dense:
-    """As `Cholesky`, of a reduced link, whose matrices are dense."""
+    """The same interface as `Cholesky`, for the dense matrices of a reduced link."""
 
     def __init__(self, A: sp.csr_array, name: str) -> None:
         try:
@@ -153,7 +153,7 @@ def mass_substructure(link: Link, joint: Attachment) -> Substructure:
 
 
 def anchors_of(link: Link) -> Int[np.ndarray, " e"]:
-    """Components that hold a link against rigid motion: of a beam's middle node, else those of d nodes far apart."""
+    """Components that prevent rigid motion of a link: those of a beam's middle node, else of d distant nodes."""
     if link.full is not None:
         # as functions are mass-orthonormal, those with most of 1 and x move the link most
         share = link.one**2 / (link.one**2).sum() + (link.X**2).sum(axis=1) / (link.X**2).sum()

@@ -15,7 +15,7 @@ LEFT_OUT = 1e-4  # of the energy norm of its deflections there
 
 
 def coarse_model(scene: Scene, linkage: Linkage, along: Path, model: Model) -> Model | None:
-    """The model with its large links reduced; None if it has none, or is free to move where its drives are held."""
+    """The model with its large links reduced; None if it has none, or has free motions with its drives fixed."""
     large = {link.name for link in model.links if link.unknowns > SMALL and link.full is None}
     if not large or linkage.mobility:
         return None

@@ -40,7 +40,7 @@ NEAR = (1e-3, 1e6)  # ω² of the first vibration over s; beyond, links are fact
 
 
 class UnstableError(SolveError):
-    """A linkage would leave the position in which it is frozen by itself.
+    """A linkage is statically unstable in the position in which it is frozen.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class Modes:
 
 
 class Frozen:
-    """A system whose modes are asked for at positions.
+    """A system whose modes are computed at positions.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ class Frozen:
 
 
 def asked(now: Instant) -> ConstraintTerms:
-    """What joints, drives and force laws ask of a small motion about a position: laws with their tangents there."""
+    """Terms of joints, drives and force laws for a small motion about a position: laws with their tangents there."""
     z = np.zeros((3, now.of.system.unknowns))
     C, e = now.gradients(z[0]), now.coordinates(z)
     hard, stiffness = now.hard(C), now.forces(e)[:, 1]

@@ -111,7 +111,7 @@ def _constant(
     still: tuple[Float[np.ndarray, "N m"], Float[np.ndarray, "k m"]],
     forces: tuple[Float[np.ndarray, "N i"], Float[np.ndarray, "k i"]],
 ) -> tuple[Float[np.ndarray, "N i"], Float[np.ndarray, "k i"]]:
-    """What constant forces bend, without motions without strain, and the interface with it.
+    """Static response to constant forces, less rigid-body motions, with the interface.
 
     Parameters
     ----------

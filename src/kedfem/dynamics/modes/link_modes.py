@@ -34,7 +34,7 @@ HOLDS = 1e-7  # of the firmest hold on a rigid-body motion: less is rounding
 class Support:
     """The support of a link.
 
-    rows : (m, dn) of which each vanishes: G
+    rows : (m, dn) G, each constrained to zero
     clamped : (n,) functions without unknowns
     """
 
@@ -125,7 +125,7 @@ def link_modes(link: Link, support: Support, count: int) -> Modes:
 
 
 def motions_without_strain(link: Link, support: Support) -> int:
-    """Rigid-body motions of a link that its support lets be."""
+    """Rigid-body motions of a link that its support releases."""
     B = rigid_modes(link)
     B = B / np.sqrt(np.einsum("kr,kr->r", B, mass_matrix(link) @ B))
     clamped = B[np.repeat(support.clamped, link.d)]

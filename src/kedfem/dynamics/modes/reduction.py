@@ -32,7 +32,7 @@ REPEATED = 1e-9  # of a deflection: what is left of it beside those before is ro
 class Basis:
     """Modes of one link, most important first.
 
-    needed : (n, k) what every basis must hold: 1, position, one mode per port
+    needed : (n, k) modes of every basis: 1, position, one mode per port
     modes : (n, f) orthonormal in strain energy to those and to each other
     weights : (f,) share of the training deflections' strain-energy norm that each carries [-]
     """
@@ -47,7 +47,7 @@ class Basis:
         return np.concatenate([self.needed, self.modes[:, :more]], axis=1)
 
     def count(self, tolerance: float) -> int:
-        """How many modes leave out no more than a part of the strain-energy norm."""
+        """The number of modes whose truncation error is no more than a part of the strain-energy norm."""
         left = np.sqrt(np.cumsum((self.weights**2)[::-1])[::-1])
         return int(self.needed.shape[1] + np.count_nonzero(left > tolerance))
 

@@ -77,7 +77,7 @@ def _relative(link: Link, g: Float[np.ndarray, "k c"]) -> Float[np.ndarray, "k c
 def _answers(
     link: Link, joint: Attachment, part: Substructure, deflections: Float[np.ndarray, "k c"]
 ) -> Float[np.ndarray, "k a"]:
-    """Static answers of a segment to forces at its ports that hold each other, each of a small strain energy."""
+    """Static deflections of a segment under balanced forces at its ports, each of a small strain energy."""
     g = _free(link, part, port_columns(joint, link.n), np.arange(len(joint.keep)))
     energy, whole = (np.sqrt(np.maximum((x * np.asarray(link.K0 @ x)).sum(axis=0), 0.0)) for x in (g, deflections))
     return np.asarray(g / np.where(energy > 0, energy, 1.0) * (UNIT * (np.linalg.norm(whole) or 1.0)))
@@ -86,7 +86,7 @@ def _answers(
 def _free(
     link: Link, part: Substructure, W: Float[np.ndarray, "k q"], here: Int[np.ndarray, " g"]
 ) -> Float[np.ndarray, "k c"]:
-    """K0⁻¹ of forces at some port components that hold each other."""
+    """K0⁻¹ of balanced forces at some port components."""
     balanced = scipy.linalg.null_space(rigid_modes(link).T @ W[:, here], rcond=1e-9)
     q = W.shape[1]
     y = part.Y[:, here] @ balanced
@@ -97,9 +97,9 @@ def _free(
 def _rotated_ports(
     link: Link, joint: Attachment, part: Substructure, deflections: Float[np.ndarray, "k c"]
 ) -> Float[np.ndarray, "k a"]:
-    """How cuts and joints strain a segment that sees their turns w as small: by ½ w × (w × r) at their points r.
+    """Strain of a segment that treats rotations w of cuts and joints as small: ½ w × (w × r) at their points r.
 
-    Neighbours with other turns share the points of a cut; what one takes for a turn is a stretch for the other.
+    Neighbours with other rotations share the points of a cut; a rotation of one is a stretch of the other.
     """
     W, rigid = port_columns(joint, link.n), rigid_modes(link)
     port = joint.keep // link.d
@@ -149,7 +149,7 @@ def _eliminated(
     K: Float[np.ndarray, "k k"], C: Float[np.ndarray, "m f d"], rigid: Float[np.ndarray, "p r"],
     ports: Float[np.ndarray, "p f"],
 ) -> tuple[Float[np.ndarray, "f s"], Float[np.ndarray, "f c"], Float[np.ndarray, " c"]]:  # fmt: skip
-    """Coefficients of modes that cannot go, of those that can, most important first, and what their loss costs.
+    """Coefficients of required modes, of others by importance, and the strain energy that the loss of each adds.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def _eliminated(
 def _held(
     flexibility: Float[np.ndarray, "f d f d"], now: Float[np.ndarray, "f d m"], q: Float[np.ndarray, " f"]
 ) -> tuple[Float[np.ndarray, "f d f d"], Float[np.ndarray, "f d m"], float]:
-    """Flexibility and deflections once a mode is held at zero, and the strain energy that this costs them: J(q)."""
+    """Flexibility and deflections with a mode fixed at zero, and the strain energy that this adds: J(q)."""
     f, d = flexibility.shape[:2]
     response = np.tensordot(flexibility, q, axes=(2, 0))  # to forces on the mode, (f, d, d)
     L = np.linalg.cholesky(np.tensordot(q, response, axes=1))  # of F(q)

@@ -36,7 +36,7 @@ AMPLE = 2.0  # times what holds a link that its stresses alone would let turn ov
 
 
 class Stiffened:
-    """As `Frozen`, of links that the motion stiffens: each is factored anew at each position.
+    """`Frozen` for links with geometric stiffening, which are factored anew at each position.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def _unstable(rigid: Rigid, added: sp.csr_array) -> float:
 def frozen_linkage(
     scene: Scene, system: System, linkage: Linkage, along: Path, count: int, free: bool
 ) -> Frozen | Stiffened:
-    """What finds the modes of a scene's system at positions.
+    """The solver for the modes of a scene's system at positions.
 
     Parameters
     ----------

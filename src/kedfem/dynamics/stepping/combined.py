@@ -91,7 +91,7 @@ class Combination:
 
 
 def _fields(model: Model, k: int, block: Block) -> Fields:
-    """What of a link's states is combined; its port forces in world components where its frame is its own."""
+    """The combined fields of a link's states; its port forces in world components with a co-rotational frame."""
     link, history = model.links[k], block.links[k]
     out = {name: getattr(history, name) for name in LINEAR}
     if link.fit is not None:

@@ -70,7 +70,7 @@ def _blocks(scene: Scene, model: Model) -> float:
 
 
 def factor_words(model: Model) -> str:
-    """What is about to be factored, of large models with the memory that it takes, for whoever watches."""
+    """The progress message before factorisation, for large models with the memory that it takes."""
     unknowns = float(_unknowns(model).sum())
     if unknowns <= TRIED:
         return "factor"

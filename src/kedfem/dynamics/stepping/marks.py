@@ -60,5 +60,5 @@ class Marks:
 
     @classmethod
     def of(cls, solvers: int, kept: bool = True) -> "Marks":
-        """Before the first time point, of so many levels whose states are kept."""
+        """Marks before the first time point, for a number of levels whose states are kept."""
         return cls(levels=[Mark(kept=kept) for _ in range(solvers)])

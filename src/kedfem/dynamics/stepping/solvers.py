@@ -25,7 +25,7 @@ def steps_of(scene: Scene, model: Model) -> Steps:
     SolveError
         If an effective matrix is not positive definite.
     MeshError
-        If a force element finds no coupling surface on its link that shows how it turns.
+        If a force element finds no coupling surface on its link that determines its rotation.
     """
     scheme = generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf)
     tolerance = (FREE if scene.driven is None else CONVERGED) if corotational(scene) else None

@@ -27,7 +27,7 @@ def motion_of(scene: Scene, linkage: Linkage, along: Path) -> Motion:
 
 
 def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> State:
-    """How the elastic motion begins: at rest, quasi-static, or with the steady state of the solver's own steps.
+    """The initial state of the elastic motion: at rest, quasi-static, or the steady state of the solver's steps.
 
     Raises
     ------

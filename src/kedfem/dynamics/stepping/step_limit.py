@@ -9,11 +9,11 @@ RESOLVED, FIRM = 30.0, 3e3
 
 @dataclass(frozen=True, slots=True)
 class StepLimit:
-    """The frequency of a rigid link's own strain, as a step allows it.
+    """The frequency of a rigid link's deformation, bounded by the step.
 
-    highest : that it has in steps however short [rad/s]
-    turning : how fast it turns at most [rad/s]; inf where that is not known beforehand
-    stable_rotation : rotation in a step at which numerical damping holds stiff vibration down [rad]
+    highest : frequency for arbitrarily short steps [rad/s]
+    turning : its largest angular speed [rad/s]; inf if that is not known beforehand
+    stable_rotation : rotation in a step up to which numerical damping damps stiff vibration [rad]
     step : h [s]
     longest : the longest of several steps whose results are compared: it decides for all of them whether the link turns
         little, so that what it gives falls with the square of the step [s]

@@ -104,7 +104,7 @@ def _positions(scene: Scene, linkage: Linkage, along: Path, model: Model, solver
 
 
 def _unbalanced(scene: Scene, moment: str, moves: str) -> str:
-    """What to do about a position without a balance of forces."""
+    """Advice for a position without a balance of forces."""
     kind = scene.analysis.kind
     advice = (
         "a link that nothing constrains, a load beyond buckling, or links that rotate too far under their loads for the "
@@ -121,7 +121,7 @@ def _unbalanced(scene: Scene, moment: str, moves: str) -> str:
 
 
 def _marched(solver: Steps, last: Any) -> None:
-    """What a period leaves of a steady state, from the state with which the recorded one ends."""
+    """The residual of a steady state after one more period, from the state with which the recorded one ends."""
     if solver.steady is not None and solver.over is not None:
         over, steady = solver.over, solver.steady
         left = residual_of(over, over.vector(steady.state), over.vector(last), steady.scale)
@@ -129,7 +129,7 @@ def _marched(solver: Steps, last: Any) -> None:
 
 
 def _stuck(step: int, at: str, failed: ConvergenceError, solver: Steps) -> str:
-    """What to do about a step whose iterations do not converge; `at` is when that is."""
+    """Advice for a step whose iterations do not converge; `at` is its time in words."""
     advice, tried = "give it more elements", ""
     moves = f"link '{failed.moves}'" if failed.moves else "a joint or force element"
     if solver.stiffening is not None:
@@ -144,7 +144,7 @@ def _stuck(step: int, at: str, failed: ConvergenceError, solver: Steps) -> str:
 
 
 def _finer(model: Model, failed: ConvergenceError) -> str:
-    """What helps a link with co-rotational frames."""
+    """Advice for a link with co-rotational frames."""
     beams = {link.name for link in model.links if link.kind == "spatial_beam"}
     needed = " (beams in space: shorter than some 100 radii of gyration where they bend much)"
     return "give it more elements or segments" + needed * (failed.moves in beams)

@@ -111,7 +111,7 @@ class Steps:
         ]
 
     def start(self, motion_at: Motion, rates: Sequence[Float[np.ndarray, "_ _"]]) -> State:
-        """The state at t = 0 that the scene asks for: at rest, without vibration, or as forces are let go.
+        """The state at t = 0 that the scene specifies: at rest, without vibration, or as forces are released.
 
         Parameters
         ----------

@@ -88,7 +88,7 @@ def _surface_of(mesh: SolidMesh) -> Link:
 
 
 def _point(link: Link, each: LinkFace) -> Float[np.ndarray, "3"]:
-    """Where one would put a joint on a face [m]."""
+    """The point for a joint on a face [m]."""
     centre = each.face.centre
     return centre if each.face.kind != "plane" else middle_facet(link, each.facets, centre)
 
