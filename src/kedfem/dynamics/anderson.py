@@ -11,8 +11,8 @@ SAME = 1e-8  # pairs that repeat each other
 class AndersonAcceleration:
     """Anderson acceleration of iterations: the step whose change, extrapolated from the last few iterations, is smallest.
 
-    Anderson (1965), as Walker and Ni (2011) write it. It costs a few products and converges where plain iterations do not:
-    for bent segments, whose tangent is only approximated by their reference stiffness in the mean frame.
+    Anderson (1965), as Walker and Ni (2011) write it. It costs a few products and converges where plain iterations do
+    not: for bent segments, whose tangent is only approximated by their reference stiffness in the mean frame.
     """
 
     def __init__(self) -> None:

@@ -121,7 +121,7 @@ def bent(u: Float[np.ndarray, "n d"], R: Float[np.ndarray, "d d"]) -> LinkMoment
 
 @dataclass(frozen=True, slots=True)
 class Multipliers:
-    """Multipliers of a system's constraints and laws over a march (T time points); `dynamics.system.forces` has their forces.
+    """Multipliers of constraints and laws over T time points of a march; `dynamics.system.forces` has their forces.
 
     system : whose march that is; None where nothing was marched
     z : (T, k) interface unknowns
