@@ -44,7 +44,7 @@ def write_summary(folder: Path, summary: Summary) -> None:
 
 
 def read_summary(folder: Path) -> Summary | None:
-    """What :func:`write_summary` wrote; None where there is none, or another program's."""
+    """The contents of the file of :func:`write_summary`; None without one, or if another program wrote it."""
     try:
         found = Summary(**json.loads((folder / SUMMARY).read_text(encoding="utf-8")))
         numbers = np.array([*found.lowest, *found.highest, *np.ravel(found.crossings)], float)

@@ -87,7 +87,7 @@ def write_facts(item: Any, facts: Mapping[str, Any]) -> None:
 
 
 def write_text(group: Any, key: str, text: str) -> None:
-    """Store a text as a dataset: an attribute holds no more than 64 kB."""
+    """Store a text as a dataset, as an attribute is limited to 64 kB."""
     data = _encoded(text)
     group.create_dataset(key, data=data, dtype=_text_type(len(data)))
 

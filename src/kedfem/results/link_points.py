@@ -94,7 +94,7 @@ def _at_rest(block: Block, field: str) -> Rows:
 
 
 def _read(k: int, link: Link, value: Float[np.ndarray, " n"]) -> Callable[[Block, str], Rows]:
-    """What link k's state means where its functions have given values."""
+    """The state of link k at a point with given values of its functions."""
     nodes = np.flatnonzero(value)
     weights = value[nodes]
 

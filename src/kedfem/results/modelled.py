@@ -30,7 +30,7 @@ def modelled(scene: Scene, linkage: Linkage, model: Model) -> dict[str, Mapping[
 
 
 def element_facts(parts: Sequence[Link]) -> Mapping[str, Any]:
-    """What a link, or its segments, is made of: `model`, `elements`, `unknowns`."""
+    """Facts of a link, or of its segments: `model`, `elements`, `unknowns`."""
     elements, unknowns = sum(len(part.cells) for part in parts), sum(part.unknowns for part in parts)
     return {"model": element_words(parts), "elements": elements, "unknowns": unknowns}
 

@@ -107,7 +107,7 @@ def _stress(scene: Scene, model: Model, where: str, name: str, probe: Probe) -> 
 
 
 def _kinks(scene: Scene, link: str) -> Float[np.ndarray, "_ 3"]:
-    """Where single forces act on a link: its joints, bodies and loads at a point [m]."""
+    """Points of a link with single forces: its joints, bodies and loads at a point [m]."""
     joints = [joint.at for joint in scene.joints.values() if link in joint.links]
     bodies = [body.at for body in scene.bodies.values() if body.link == link]
     single = [x for x in scene.loads.values() if isinstance(x, ForceLoad | TorqueLoad) and x.link == link]

@@ -28,7 +28,7 @@ class ConstraintForces:
 
     @cached_property
     def rows(self) -> tuple[Float[np.ndarray, "r k"], Float[np.ndarray, "r n"]]:
-        """Rows of all joints in the reference position, and combinations of what holds that say nothing; springs tell."""
+        """Rows of all joints in the reference position, and redundant combinations of those without springs."""
         still = resting(1 + max((b for joint in self.model.rows for b in joint.bodies), default=0), np.zeros(1))
         found = constraint_matrices(self.model.rows, still, self.model.interface_unknowns)
         if found is None:

@@ -27,7 +27,7 @@ class DampingWork:
     """Energy that damping dissipates in all links, in each of the steps that end at T time points.
 
     dissipated : (T,) h ġᵀ C0 ġ with ġ = (g1 − g0)/h [J]
-    drag : (T,) work of the damping forces against the rigid-body motion, where these turn with it [J]
+    drag : (T,) work of the damping forces against the rigid-body motion, where these rotate with it [J]
     """
 
     dissipated: Scalars
@@ -81,7 +81,7 @@ def damping_work(
 
 
 def _drag(rows: Float[np.ndarray, "m S T"], arms: Float[np.ndarray, "c S T"], at: RigidRates) -> Scalars:
-    """Drag of damping forces that turn with the rigid-body motion."""
+    """Drag of damping forces that rotate with the rigid-body motion."""
     y = rows[:-1].reshape(at.rates.shape[1:])
     moment = turned(y[1:]) + arms
     moment[-1] += rows[-1]

@@ -29,10 +29,10 @@ POSITION, SPEED, EFFORT = "e", "rate", "multiplier"  # of `Multipliers`
 
 @dataclass
 class ElementForces:
-    """Force elements, and hinges whose turns are counted on over successive blocks, once for each block.
+    """Force elements, and hinges whose angles are counted on over successive blocks, once for each block.
 
     ends : names and numbers in the linkage of the links that each force element acts on
-    hinges : joints by name, the turn of each and the ends between which it is
+    hinges : joints by name, the angle of each and the ends between which it is
     """
 
     every: Mapping[str, Element]
@@ -82,7 +82,7 @@ class ElementForces:
 
 
 def element_forces(scene: Scene, model: Model) -> ElementForces:
-    """Motors, springs and limits of a scene and, without a drive, the turns of its hinges."""
+    """Motors, springs and limits of a scene and, without a drive, the angles of its hinges."""
     every, names = dict(force_elements(scene)), body_names(scene)
     ends = {key: [(link, names.index(link)) for link, _ in places(scene, x)] for key, x in every.items()}
     links, hinges = links_of(model, names), {}

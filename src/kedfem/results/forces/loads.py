@@ -100,7 +100,7 @@ def rms(t: Scalars, x: Scalars) -> float:
 
 
 def equivalent_load(t: Scalars, P: Scalars, rate: Scalars, p: float) -> float:
-    """P_m = (∫ P^p |ω| dt / ∫ |ω| dt)^(1/p) [N]; nan where nothing turns.
+    """P_m = (∫ P^p |ω| dt / ∫ |ω| dt)^(1/p) [N]; nan without rotation.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def in_axes(x: Vectors, R: Float[np.ndarray, "T 3 3"]) -> Vectors:
 
 
 def joint_loads(scene: Scene, results: Results, linked: Linkage | None, motion: RigidMotion | None) -> list[JointLoad]:
-    """Of all joints whose whole force the results show, elastic if they have it, else that of rigid links.
+    """Loads of all joints with complete forces in the results: elastic ones if present, else those of rigid links.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def acted_links(name: str, joint: Joint, description: str) -> tuple[str, str]:
 
 
 def drive_loads(scene: Scene, results: Results, linked: Linkage | None, motion: RigidMotion | None) -> list[DriveLoad]:
-    """Of all drives whose effort the results show, elastic if they have it, else that of rigid links."""
+    """Loads of all drives with efforts in the results: elastic ones if present, else those of rigid links."""
     out = []
     for name in scene.driven_joints:
         keys = [drive_effort(scene, name, rigid)[0] for rigid in ("", "rigid_")]

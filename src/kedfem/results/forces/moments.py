@@ -94,7 +94,7 @@ class RigidRates:
 
     R : (k, k, S, T)
     rates : (2, 1 + k, k, S, T) of x' and x'': [p', R'ᵀ] and [p'', R''ᵀ]
-    omega, alpha : (3, S, T) turning rate and its own; in a plane (1, S, T)
+    omega, alpha : (3, S, T) angular velocity and acceleration; in a plane (1, S, T)
     """
 
     R: Float[np.ndarray, "k k S T"]
@@ -103,7 +103,7 @@ class RigidRates:
     alpha: Float[np.ndarray, "c S T"]
 
     def of(self, bodies: Int[np.ndarray, " S"], k: int = 3) -> "RigidRates":
-        """Of some of the bodies, in k dimensions."""
+        """Rates of some of the bodies, in k dimensions."""
         turns = (x[2 * (3 - k) :, bodies] for x in (self.omega, self.alpha))
         return RigidRates(self.R[:k, :k, bodies], self.rates[:, : 1 + k, :k, bodies], *turns)
 
@@ -113,7 +113,7 @@ class RigidRates:
 
 
 def rates_of_bodies(motion: RigidMotion) -> RigidRates:
-    """Of all bodies of a motion."""
+    """Rates of all bodies of a motion."""
     T, B = motion.p.shape[:2]
     R, rates = np.ascontiguousarray(motion.R.transpose(2, 3, 1, 0)), np.empty((2, 4, 3, B, T))
     rates[0, 0], rates[1, 0] = motion.v.T, motion.p2.T

@@ -149,7 +149,7 @@ def rigid_forces(scene: Scene, linkage: Linkage, inertias: Inertias, along: Path
 
 
 def returning(scene: Scene, along: Path | None) -> int:
-    """Time steps of a turn, or a few, after which all poses return; 0 if they do not, or are too many to be kept."""
+    """Time steps of one or a few revolutions after which all poses return; 0 if they do not, or for too many."""
     if along is None or not along.periodic or not isinstance(scene.motion, ConstantSpeed):
         return 0
     turn = (revolution_steps(scene) or 0.0) * along.period / (2 * np.pi)

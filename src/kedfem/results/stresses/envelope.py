@@ -75,7 +75,7 @@ class Modes:
         self.gain = 0.0  # highest stress of a mode, so far
 
     def coordinates(self, G: Float[np.ndarray, "T k"], highest: float) -> Float[np.ndarray, "T r"]:
-        """Of steps G (T, dn); new modes are made until the residual stress is nothing beside the highest so far."""
+        """Coordinates of steps G (T, dn); modes are added until the residual stress is negligible beside the highest."""
         floor = NOTHING * largest_row(G)
         G = G - (G @ self.rigid.T) @ self.rigid
         C = np.zeros((len(G), 0))
@@ -220,7 +220,7 @@ class Envelope:
         return max((float(x[0].max()) for x, _ in self._stressed()), default=-np.inf)
 
     def links(self) -> list[LinkEnvelope]:
-        """What was found, per link or segment, then per prescribed rigid link; at the links' own points."""
+        """The extremes found, per link or segment, then per prescribed rigid link, at the links' points."""
         self.flush()
         out = []
         names = [*self.model.links, *(prescribed.link for prescribed in self.model.prescribed)]

@@ -35,7 +35,7 @@ def peaks(found: Sequence[LinkEnvelope], near: Sequence[Sequence[str]]) -> dict[
 
 
 def highest(every: Mapping[str, Peak]) -> Peak | None:
-    """Of all links; away from singular places that of all links, too."""
+    """The highest stresses of all links, with that of all links away from singular places."""
     if not every:
         return None
     peak = max(every.values(), key=lambda x: x.stress)
