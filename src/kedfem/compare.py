@@ -104,7 +104,7 @@ def _missing(names: Sequence[str], runs: Sequence[Results]) -> tuple[str, ...]:
 
 def _thinned(names: Sequence[str], runs: Sequence[Results]) -> tuple[str, ...]:
     """Runs that did not write all rows."""
-    seen = "alone (output.every): curves are compared there, and what differs between is not seen"
+    seen = "alone (output.every): curves are compared there, and differences between them are not reported"
     every = zip(names, runs, strict=True)
     return tuple(f"{name}: has rows of one step in {run.every} {seen}" for name, run in every if run.every > 1)
 

@@ -176,7 +176,7 @@ def _written(target: FilePath, scene: Scene, link: Link, cases: list[LoadCase], 
 def _head(scene: Scene, link: Link) -> list[str]:
     return [
         f"Load cases of link {link.name}: {scene.title or 'kedfem'}. SI units: m, N, Pa.",
-        "Axes are the world's in the reference position and turn with the link; so do all loads.",
+        "Axes are the world's in the reference position and rotate with the link; so do all loads.",
         "Forces at nodes are those of joints, loads, damping and inertia together, of bodies on the link too.",
     ]
 

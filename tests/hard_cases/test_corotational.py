@@ -186,7 +186,7 @@ def test_a_step_that_cannot_be_saved_says_where_and_keeps_what_was_done(tmp_path
     assert np.isfinite(kept.time).all()
 
 
-@pytest.mark.parametrize(("rho_inf", "said"), [(0.95, "grows in links that turn"), (0.8, "")])
+@pytest.mark.parametrize(("rho_inf", "said"), [(0.95, "grows in links that rotate"), (0.8, "")])
 def test_links_that_turn_too_far_in_a_step_are_warned_of(rho_inf: float, said: str) -> None:
     """0.15 rad a step: more than 1 − ρ∞ lets what no step resolves grow, without any damping."""
     motion = {"kind": "ramp", "speed": 15.0, "time": 1.0}

@@ -138,7 +138,7 @@ def test_what_an_expression_comes_to(text: str, wanted: float, unit: str) -> Non
         ({"links.arm.mesh.elements": "=r"}, "links.arm.mesh.elements", ["whole number", "25 mm"]),
         ({"springs": {"k": {"kind": "torsion", "joint": "A", "free_angle": "=1/6 turn"}}}, "springs.k.free_angle",
          ["0.166667 1/turn", "another kind"]),
-        ({"drive.motion.speed": "=2*pi*50 Hz"}, "drive.motion.speed", ["turns or radians per second"]),
+        ({"drive.motion.speed": "=2*pi*50 Hz"}, "drive.motion.speed", ["revolutions or radians per second"]),
         ({"drive.motion.speed": "=omega + 1 Hz"}, "drive.motion.speed", ["mixes cycles and turns"]),
         ({"drive.motion.speed": "=10 rad*(3 + 5 deg)/(1 s)"}, "drive.motion.speed", ["mixes units"]),
         ({"parameters.r": "=width"}, "parameters.width", ["itself: r → width → r"]),

@@ -113,7 +113,7 @@ def test_a_number_with_a_unit_becomes_si(text, unit, number):
 )
 def test_what_is_off_by_an_angle_or_a_turn_is_refused(text, unit):
     """A lead of 5 mm/turn was 0.8 mm, a speed of 1 kHz 1000 rad/s."""
-    with pytest.raises(ValueError, match=r"turns or radians per second|is of another kind"):
+    with pytest.raises(ValueError, match=r"revolutions or radians per second|is of another kind"):
         si_number(text, unit)
 
 

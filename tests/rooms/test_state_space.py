@@ -252,7 +252,7 @@ def test_loads_on_what_the_drive_holds_are_named(tmp_path: Path) -> None:
         pytest.fail("the other link bends")
     _, warnings = state_space(scene_from(raw, tmp_path), 2)
     assert tuple(each for each in warnings if not each.startswith(MESHES)) == (
-        "state space: input loads/f does nothing: what it acts on is held by the drive or the ground",
+        "state space: input loads/f has no effect: the drive or the ground fixes what it acts on",
     )
 
 

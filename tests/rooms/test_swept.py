@@ -221,10 +221,10 @@ def test_what_is_no_solid_of_revolution_is_refused_with_the_face(tmp_path: Path)
         shaft, key = occ.addCylinder(0, 0, 0, 40, 0, 0, 10), occ.addBox(5, -2, 7, 20, 4, 9)
         occ.cut([(3, shaft)], [(3, key)])
 
-    message = r"no solid of revolution, as the plane face .* near .* does not turn about x"
+    message = r"no solid of revolution, as the plane face .* near .* is not one of revolution about x"
     with pytest.raises(OtherMethodError, match=message):
         swept(drawn(tmp_path, keyed)[0])
-    with pytest.raises(OtherMethodError, match="no solid of revolution, as no face turns about an axis"):
+    with pytest.raises(OtherMethodError, match="no solid of revolution, as no face is a surface of revolution"):
         swept(drawn(tmp_path, lambda occ: occ.addBox(0, 0, 0, 1, 2, 3))[0])
 
 

@@ -103,7 +103,7 @@ def _unreached(found: _Halved, asked: float, until: float, error: float) -> str:
     return (
         f"{message}: {found.steps // 2:,} and {found.steps:,} steps agree within {100 * asked:.3g} % until t = "
         f"{until:.3g} s only. The motion is sensitive to the smallest differences (chaotic), or "
-        "holds vibration that these steps do not resolve: damping, a smoother start or a shorter analysis would help"
+        "has vibration that these steps do not resolve: damping, a smoother start or a shorter analysis would help"
     )
 
 

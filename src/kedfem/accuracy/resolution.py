@@ -230,7 +230,7 @@ def stability_warning(scene: Scene) -> tuple[str, ...]:
     cause = "co-rotational frames" if corotational(scene) else "damping in proportion to the stiffness"
     if not corotational(scene) and (name := _moving(scene)):
         cause = f"joint {name} between links that move"
-    what = f"with {cause} vibration that the step cannot resolve grows in links that turn"
+    what = f"with {cause} vibration that the step cannot resolve grows in links that rotate"
     if fewest == math.inf:
         return (f"analysis.rho_inf = 1: {what}; take 0.95",)
     return (

@@ -215,7 +215,7 @@ def _idle(space: StateSpace) -> tuple[str, ...]:
     size, units = np.abs(space.B).max(axis=0, initial=0.0), np.array(space.input_units)
     least = np.array([NOTHING * size[units == unit].max() for unit in units])
     return tuple(
-        f"state space: input {space.inputs[n]} does nothing: what it acts on is held by the drive or the ground"
+        f"state space: input {space.inputs[n]} has no effect: the drive or the ground fixes what it acts on"
         for n in np.flatnonzero(size <= least)
     )
 

@@ -156,7 +156,7 @@ def frequencies_table(found: Summary) -> Table:
     if found.still:
         message += f" {found.still} motions without strain are left out."
     if found.speed:
-        message += f" The scene's drive turns at {found.speed:.4g} rpm."
+        message += f" The scene's drive rotates at {found.speed:.4g} rpm."
     message += "".join(f" {note[0].upper()}{note[1:]}." for note in found.notes)
     columns = len(head) if found.speed else 3
     return Table("Natural frequencies", head[:columns], [row[:columns] for row in rows], message)

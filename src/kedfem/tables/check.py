@@ -116,7 +116,7 @@ def resolution_table(found: Resolution, scene: Scene) -> Table:
     """First frequency of the linkage against step and drive."""
     span = "over the last revolution" if revolution_steps(scene) else "over the analysis"
     low, high = found.first.min(), found.first.max()
-    return facts("First frequency (drive held, of what the loads excite)", [
+    return facts("First frequency (drive fixed, of what the loads excite)", [
         (span, f"{low:.4g} Hz" if high < 1.001 * low else f"{low:.4g} to {high:.4g} Hz"),
         ("steps in a period", f"{found.steps_per_period:.3g} at least"),
         *((f"met by harmonic {each.harmonic}", f"{each.frequency:.4g} Hz, near {np.degrees(each.angle) % 360:.0f}°")

@@ -150,7 +150,7 @@ def frequencies_tables(scene: Scene, found: Frequencies) -> list[Table]:
 
 
 def _speeds(found: Frequencies, ranges: Mapping[tuple[int, int], str], harmonics: Sequence[int]) -> Table:
-    turns = f"the drive turns at {found.speed * RPM:.4g}"
+    turns = f"the drive rotates at {found.speed * RPM:.4g}"
     beyond = any(np.isinf(x.fastest) for x in found.crossings)
     caption = "* at the drive's speed" + ("; – alone: beyond the speeds examined" if beyond else "")
     columns = [*left("mode"), *right(*(f"{k}×" for k in harmonics))]

@@ -120,7 +120,7 @@ def mobility_table(scene: Scene, link: Linkage, found: Mobility, works: bool = F
     for motion in found.free:
         table.add_row("free", motion.words)
         if found.drives and not works:
-            table.add_row("to hold it", held_by(motion))
+            table.add_row("to constrain it", held_by(motion))
     for row in _dead_point(link, found.dead_point):
         table.add_row(*row)
     return table

@@ -60,9 +60,9 @@ def revolution(gmsh: ModuleType, solid: Solid) -> Frame:
         if not others:
             return _framed(gmsh, solid, every, axis)
         words = face_in_words(max(others, key=lambda face: face.area))
-        reason = f"the {words} does not turn about {direction_in_words(axis[1])}"
+        reason = f"the {words} is not one of revolution about {direction_in_words(axis[1])}"
         obstacles.append((sum(face.area for face in others), reason))
-    reason = min(obstacles)[1] if obstacles else "no face turns about an axis"
+    reason = min(obstacles)[1] if obstacles else "no face is a surface of revolution"
     raise OtherMethodError(f"{solid.name}: no solid of revolution, as {reason}")
 
 

@@ -69,7 +69,7 @@ class Refusal:
 
 UNLIKE = Refusal("joints", {"joint": ("slot",), "bushing": ("unlike across the line",), "drive": ("none",)},
     "{where}.bushing", "be alike in all directions across the line of a slot in space that no drive moves",
-    "its stations do not show how the line turns about itself", "one that is not",
+    "its stations do not determine the rotation of the line about itself", "one that is not",
     "give it one stiffness and one damping, or take a drive")  # fmt: skip
 SLIDERS = Refusal("model", {"enforced": (CONSTRAINED,), "link": ("slider",)}, "{where}.links",
     "join links with a shape by a {kind} joint that moves with both", "it is a point mass on another link",

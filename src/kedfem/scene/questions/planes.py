@@ -78,7 +78,7 @@ def _common_obstacles(scene: Scene, whose: str) -> Iterator[Fault]:
         yield from tilted(where, joint, whose, {"revolute", "cylindrical", "screw", "planar"})
         if joint.kind == "universal":
             got = "got a universal joint"
-            yield Fault((*where, "kind"), f"must be one that turns about z only {whose}, {got}")
+            yield Fault((*where, "kind"), f"must be one that rotates about z only {whose}, {got}")
     yield from leaving(scene, whose)
 
 

@@ -111,7 +111,7 @@ def si_number(text: str, unit: str) -> float:
     got = quantity.units
     if crossed(quantity._units, unit):
         clear = "rpm or rad/s" if unit == "rad/s" else "Hz"
-        raise ValueError(f"turns or radians per second? give it in {clear}")
+        raise ValueError(f"revolutions or radians per second? give it in {clear}")
     turns = revolutions(got._units)
     if isinstance(text, Evaluated) and not (unit == "rad" and turns < 0.0):  # 1/6 turn is 1/(6 turn), no angle
         turns = 0.0
