@@ -179,8 +179,8 @@ def test_a_message_says_what_was_wanted_why_what_was_got_and_what_to_take() -> N
     (said,) = faults(unlike_across())
     assert said == (
         "joints.J.bushing: must be alike in all directions across the line of a slot in space that no drive moves (its "
-        "stations do not determine the rotation of the line about itself), got one that is not: give it one stiffness and "
-        "one damping, or take a drive"
+        "stations do not determine the rotation of the line about itself), got one that is not: give it one stiffness "
+        "and one damping, or take a drive"
     )
 
 
