@@ -85,7 +85,7 @@ CHANNELS: dict[str, tuple[Entry, ...]] = {
              "What the drive exerts on its link along the driven joint's axis; times the drive's rate it is the power that the drive gives, "
              "positive where it drives."),
         Entry("drive/NAME/torque|rigid_torque|force|rigid_force", ("*",), "N m|N m|N|N", "world",
-             "The same, where there are several drives, of the drive of that joint."),
+             "The same, where there are several drives, of the drive of that joint; of several on one joint NAME is JOINT.DRIVE."),
     ),
     "Gears, motors, springs and limits": (
         Entry("gears/NAME/torque", ("torque",), "N m", "world",

@@ -72,8 +72,7 @@ def free_twists(ready: Prepared, at: Bodies, name: str) -> np.ndarray:
         "cylindrical": [(z, zero), (zero, z)], "planar": [(x, zero), (np.cross(z, x), zero), (zero, z)],
         "slot": [(z, zero), *along], "screw": [(pitch * z, z)],
     }[joint.kind]  # fmt: skip
-    drive = ready.scene.driven_joints.get(name)
-    if drive is not None and drive.shaft_stiffness is None:
+    if any(drive.shaft_stiffness is None for drive in ready.scene.driven_joints.get(name, ())):
         turns = []
     out = [np.hstack([Rj @ v, LENGTH * (Rj @ w)]) for v, w in turns]
     if joint.axes is not None:

@@ -70,7 +70,7 @@ def loads(file: FilePath, last: float | None = None, folder: FilePath | None = N
         write_joint_load(target / f"joint {joint.joint}.csv", joint, results, rows)
         write_polar(target / f"joint {joint.joint}.png", joint, rows)
     for drive in drives:
-        write_drive_load(target / f"drive {drive.joint}.csv", drive, results, rows)
+        write_drive_load(target / f"drive {drive.name}.csv", drive, results, rows)
     tables = summaries(joints, drives, results, rows)
     write_summary(target / JOINTS, "joint", tables[0])
     write_summary(target / DRIVES, "drive", tables[1])
@@ -90,7 +90,7 @@ def summaries(
     """Numbers of all joints and drives."""
     return (
         {each.joint: summary(each, results, rows) for each in joints},
-        {each.joint: drive_summary(each, results, rows) for each in drives},
+        {each.name: drive_summary(each, results, rows) for each in drives},
     )
 
 

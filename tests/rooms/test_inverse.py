@@ -450,7 +450,7 @@ def test_all_drives_together_give_the_power(raw: dict[str, Any], channels: tuple
     masses = inertias_of_links(scene, linked, bare_links(scene))
     motion = rigid_motion(linked, along, t, path_parameter(scene, t))
     found = rigid_forces(scene, linked, masses, along).rows(motion)
-    speeds = [drive_angle(each.motion, t)[1] for each in scene.driven_joints.values()]
+    speeds = [drive_angle(each.motion, t)[1] for each in scene.all_drives.values()]
     T = kinetic_energy(masses, motion)
     growth = np.gradient(T, h, edge_order=2)
     power = load_power(masses, motion)

@@ -51,7 +51,7 @@ class Driven:
     analysis: Analysis
 
     @property
-    def driven_joints(self):
+    def all_drives(self):
         return {"A": Drive(joint="A", motion=self.motion)}
 
     @property

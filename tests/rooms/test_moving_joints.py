@@ -177,7 +177,8 @@ def test_multipliers_of_the_system_are_what_bears_the_port_forces(kind: str) -> 
                 axis = block.motion.R[:, row.bodies[1]] @ row.axis
                 slides = ready.scene.joints[row.name].kind == "prismatic"
                 wanted = ((force if slides else moment) * axis).sum(axis=1)
-                assert_allclose(effort(forces, row.name), wanted, rtol=0, atol=near)
+                number = list(ready.scene.all_drives).index(row.name)
+                assert_allclose(effort(forces, number), wanted, rtol=0, atol=near)
 
 
 @pytest.mark.parametrize("kind", list(KINDS))

@@ -210,7 +210,7 @@ def fewest_steps(scene: Scene) -> float:
         return math.inf
     end = time_grid(scene).end
     t = np.linspace(0.0, end, 2001)
-    driven = scene.driven_joints.items()
+    driven = scene.all_drives.items()
     turning = [each.motion for name, each in driven if not driven_travel(scene, name)]
     fastest = max((float(np.abs(drive_angle(law, t)[1]).max()) for law in turning), default=0.0)
     return fastest * end / stable_rotation(rho_inf)

@@ -60,7 +60,7 @@ def sizes(scene: Scene, model: Model) -> Sizes:
     every = {name: np.concatenate(parts) for name, parts in nodes.items()}
 
     elastic = [link.material for link in scene.links.values() if link.model != "rigid" and link.material]
-    motions = {name: drive.motion for name, drive in scene.driven_joints.items()}
+    motions = {name: drive.motion for name, drive in scene.all_drives.items()}
     final = {name: float(x.speed) for name, x in motions.items() if isinstance(x, ConstantSpeed | Ramp)}
     slides = {name for name in final if driven_travel(scene, name)}
     return Sizes(
@@ -130,7 +130,8 @@ def _other_warnings(scene: Scene, found: Sizes) -> Iterator[str]:
     for name, turns in found.turns.items():
         if abs(turns) > TURNS:
             yield f"drive of joint {name}: {turns:.4g} rpm is faster than any machine's: which unit is it in?"
-        links = [link for link in scene.joints[name].links if link in found.lengths and link not in suspicious]
+        joint = scene.joints[scene.all_drives[name].joint]
+        links = [link for link in joint.links if link in found.lengths and link not in suspicious]
         tip = max((found.lengths[link] for link in links), default=0.0) * abs(turns) * np.pi / 30
         if tip > TIP:
             yield (

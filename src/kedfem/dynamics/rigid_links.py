@@ -182,7 +182,7 @@ def _mounts(scene: Scene) -> tuple[float, float]:
         (about if isinstance(spring, TorsionSpring) else along).append(stiffness)
     for limit in scene.limits.values():
         (about if isinstance(limit, AngleLimit) else along).append(limit.stiffness)
-    for name, drive in scene.driven_joints.items():
+    for name, drive in scene.all_drives.items():
         slides = driven_travel(scene, name)
         (along if slides else about).append(drive.shaft_stiffness or 0.0)
     return max(along), max(about)

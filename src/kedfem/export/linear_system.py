@@ -128,11 +128,11 @@ def _require(scene: Scene, modes: int, at: float, free: bool) -> None:
 def _let_go(scene: Scene) -> tuple[Scene, tuple[_Element, ...]]:
     """A scene whose drives have become motors that exert nothing."""
     elements, motors = [], dict(scene.motors)
-    for joint, drive in scene.driven_joints.items():
-        turns = not driven_travel(scene, joint)
-        channel = drive_prefix(scene, joint).removesuffix("/")
-        element = _Element(f"drive of {joint}", channel, turns)
-        given = {"joint": joint, "about": drive.about, "along": drive.along, "torque" if turns else "force": 0.0}
+    for name, drive in scene.all_drives.items():
+        turns = not driven_travel(scene, name)
+        channel = drive_prefix(scene, name).removesuffix("/")
+        element = _Element(f"drive of {name}", channel, turns)
+        given = {"joint": drive.joint, "about": drive.about, "along": drive.along, "torque" if turns else "force": 0.0}
         motors[element.motor] = Motor.model_validate({key: x for key, x in given.items() if x is not None})
         elements.append(element)
     return scene.model_copy(update={"drive": None, "drives": {}, "motors": motors}), tuple(elements)

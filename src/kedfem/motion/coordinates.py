@@ -69,13 +69,11 @@ def coordinates(scene: Scene, linkage: Linkage) -> list[Coordinate]:
     return [each for name, joint in scene.joints.items() for each in _of(name, joint, linkage)]
 
 
-def driven_name(scene: Scene, joint: str) -> str | None:
-    """Name of the coordinate that a joint's drive prescribes; None without one, and of a direction in a plane."""
-    drive = scene.driven_joints.get(joint)
-    if drive is None or drive.along is not None:
-        return None
-    name = "travel" if driven_travel(scene, joint) else "angle"
-    return name if drive.about is None else f"{name}_about_{drive.about}"
+def driven_names(scene: Scene, joint: str) -> list[str]:
+    """Names of the coordinates that a joint's drives prescribe, but for directions in a plane."""
+    drives = [each for each in scene.all_drives.items() if each[1].joint == joint and each[1].along is None]
+    names = ["travel" if driven_travel(scene, name) else "angle" for name, _ in drives]
+    return [x if drive.about is None else f"{x}_about_{drive.about}" for x, (_, drive) in zip(names, drives, strict=True)]
 
 
 def counted_on(angle: Float[np.ndarray, "T c"], before: Float[np.ndarray, " c"] | None) -> Float[np.ndarray, "T c"]:

@@ -16,7 +16,7 @@ SAMPLES = 4001  # of laws over a path, to find the fastest
 class Drives:
     """The drives of a linkage.
 
-    joints : names
+    joints : name of the joint of each drive
     units : of each drive: 1 of an angle [rad], the linkage's size of a travel [m]
     turning : whether it prescribes an angle
     laws : their motions over time; not needed where there is only one drive
@@ -59,7 +59,7 @@ class Drives:
 
 def drives(scene: Scene, size: float) -> Drives:
     """The drives of a scene, its linkage of some size [m]."""
-    driven = scene.driven_joints
+    driven = scene.all_drives
     turning = tuple(not driven_travel(scene, name) for name in driven)
     units = tuple(1.0 if turns else size for turns in turning)
-    return Drives(tuple(driven), units, turning, tuple(each.motion for each in driven.values()))
+    return Drives(tuple(x.joint for x in driven.values()), units, turning, tuple(x.motion for x in driven.values()))

@@ -127,9 +127,9 @@ def cross_row(joint: Joint, name: str, bodies: tuple[str, ...], about: str) -> C
 
 
 def driven_row(scene: Scene, name: str, bodies: tuple[str, ...]) -> ConstraintEquation:
-    """Turn or travel that the drive of a joint prescribes."""
-    drive = scene.driven_joints[name]
-    return coordinate_row(scene, name, bodies, not driven_travel(scene, name), drive.about, drive.along)
+    """Turn or travel that one of `Scene.all_drives` prescribes."""
+    drive = scene.all_drives[name]
+    return coordinate_row(scene, drive.joint, bodies, not driven_travel(scene, name), drive.about, drive.along)
 
 
 def gear_row(scene: Scene, name: str, bodies: tuple[str, ...]) -> ConstraintEquation:

@@ -135,7 +135,7 @@ def _well_driven(rows: Rows, plan: Blocks, size: float) -> bool:
 def _all_rows(scene: Scene) -> tuple[list[ConstraintEquation], Drives]:
     """All rows of joints, couplings and drives, and these."""
     driven, bodies = drives(scene, scene_size(scene)), body_names(scene)
-    driving = [replace(driven_row(scene, name, bodies), drive=k) for k, name in enumerate(driven.joints)]
+    driving = [replace(driven_row(scene, name, bodies), drive=k) for k, name in enumerate(scene.all_drives)]
     return undriven_rows(scene) + driving, driven
 
 
@@ -220,9 +220,9 @@ def _check_mobility(scene: Scene, reference: Reference) -> int:
 
 def _at_reference(scene: Scene) -> str:
     """The reference position of the only drive in words; empty without a drive and with several."""
-    if len(scene.driven_joints) != 1:
+    if len(scene.all_drives) != 1:
         return ""
-    (name,) = scene.driven_joints
+    (name,) = scene.all_drives
     return "drive travel 0 mm, " if driven_travel(scene, name) else "drive angle 0 deg, "
 
 
@@ -253,16 +253,16 @@ def _across(reference: Reference, bodies: tuple[str, ...]) -> list[ConstraintEqu
 def _holding(scene: Scene, reference: Reference, free: int) -> list[ConstraintEquation]:
     """Rows that hold as many joint motions as are free in the reference position, of driven joints the last.
 
-    Of a driven joint they are those of its motions that the drive leaves.
+    Of a driven joint they are those of its motions that its drives leave.
     """
     if not free:
         return []
     bodies, motions = (GROUND, *reference.links), scipy.linalg.svd(reference.J)[2][-free:].T
     rows = []
     for name in sorted(scene.joints, key=lambda name: name in scene.driven_joints):
-        about = scene.driven_joints[name].about if name in scene.driven_joints else None
+        across = [drive.about for drive in scene.driven_joints.get(name, ()) if drive.about is not None]
         every = _free_rows(scene, name, bodies, reference.size, motions)
-        rows += every if about is None else [cross_row(scene.joints[name], name, bodies, about)]
+        rows += [cross_row(scene.joints[name], name, bodies, about) for about in across] or every
     return _most_changed(rows, motions, len(bodies), reference.size)
 
 

@@ -29,7 +29,7 @@ def stopped(link: Linkage, poses: Poses, tau: float, aim: Target) -> str:
         got = f"it locks (dead point) {at}"
     else:
         got = f"a dead point {at}, where the linkage could go on in two ways"
-    drives = ", ".join(f"joints.{name}" for name in link.drives.joints)
+    drives = ", ".join(f"joints.{name}" for name in dict.fromkeys(link.drives.joints))
     whose = joint if joint.startswith("gears.") else f"joints.{joint}"
     noun = "drive" if len(link.drives) == 1 else "drives"
     return f"{whose}: the linkage must follow its {noun} {drives} over the whole range, got: {got}"

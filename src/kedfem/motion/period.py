@@ -70,7 +70,7 @@ def repeats_after(scene: Scene) -> float:
     scene = _sped_up(scene)
     base = cycle(scene.motion)
     if base is None:
-        several = len(scene.driven_joints) > 1
+        several = len(scene.all_drives) > 1
         got = "several drives" if several else "one that does not rotate continuously or return"
         wanted = "is required [s] but with a drive that repeats its motion"
         raise SceneError(f"fatigue.period: {wanted}, got {got}")
@@ -109,7 +109,7 @@ def _periods(scene: Scene, rigid: Linkage, base: float, asked: str) -> tuple[int
 def _range(scene: Scene, base: float) -> tuple[float, float]:
     """Least and greatest place on the linkage's path in as many periods as are tried; it ends where it returns."""
     if cycle(scene.motion) is None:
-        most = base if len(scene.driven_joints) < 2 else (MOST_TURNS + 1) * base
+        most = base if len(scene.all_drives) < 2 else (MOST_TURNS + 1) * base
     else:
         most = (MOST_TURNS + 1) * base if isinstance(scene.motion, ConstantSpeed) else base
     tau = path_parameter(scene, np.linspace(0.0, most, 64 * (1 + round(most / base))))[0]
@@ -119,7 +119,7 @@ def _range(scene: Scene, base: float) -> tuple[float, float]:
 def _never(scene: Scene, asked: str) -> Iterator[str]:
     """Drives and loads that have no period."""
     where = f"must have a period with {asked}"
-    for name, drive in scene.driven_joints.items():
+    for name, drive in scene.all_drives.items():
         if not isinstance(drive.motion, MotionCurve) and cycle(drive.motion) is None:
             yield f"the drive of joint {name!r}: {where}, got {drive.motion.kind!r} without return_time"
     for name, curve in curves(scene):
@@ -130,7 +130,7 @@ def _never(scene: Scene, asked: str) -> Iterator[str]:
 def _open(scene: Scene, along: Path, time: float, asked: str) -> Iterator[str]:
     """Reasons why the linkage has not returned after a time."""
     gone = float(np.ptp(path_parameter(scene, np.array([0.0, time]))[0]))
-    laws = {name: drive.motion for name, drive in scene.driven_joints.items()}
+    laws = {name: drive.motion for name, drive in scene.all_drives.items()}
     for name, motion in laws.items():
         if isinstance(motion, MotionCurve):
             yield from _open_curve(name, motion, time)

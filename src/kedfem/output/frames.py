@@ -237,14 +237,16 @@ def joint_field(scene: Scene, linked: Linkage, motion: RigidMotion, rows: Rows, 
         points[n] = motion.p[k, i] + motion.R[k, i] @ joint.at
         force[n] = rows[f"joints/{name}/force"][k]
         moment[n] = rows.get(f"joints/{name}/moment", np.zeros((k + 1, 3)))[k]
-        if (drive := scene.driven_joints.get(name)) is not None:
-            key, what, _ = drive_effort(scene, name)
-            j = linked.bodies.index(ordered(joint, drive.about)[1])
-            if (found := rows.get(key)) is not None:
-                axis = motion.R[k, j] @ coordinate_axis(joint, drive.about, drive.along)
-                (push if what == "force" else torque)[n] = found[k] * axis
+        on = ""  # the link on which the first of the joint's drives acts, and the arrow shows all
+        for driven, drive in scene.all_drives.items():
+            key, what, _ = drive_effort(scene, driven)
+            if drive.joint == name and (found := rows.get(key)) is not None:
+                one, other = ordered(joint, drive.about)
+                on = on or one
+                axis = motion.R[k, linked.bodies.index(other)] @ coordinate_axis(joint, drive.about, drive.along)
+                (push if what == "force" else torque)[n] += (1 if one == on else -1) * found[k] * axis
     vectors = {FORCE: force, MOMENT: moment}
-    slides = {driven_travel(scene, name) for name in scene.driven_joints}
+    slides = {driven_travel(scene, name) for name in scene.all_drives}
     vectors |= {DRIVE_FORCE: push} if True in slides else {}
     vectors |= {DRIVE_TORQUE: torque} if False in slides else {}
     return JointField(tuple(names), points, vectors)

@@ -102,7 +102,7 @@ def write_state(scene: Scene, results: Results, peak: Peak | None, folder: Path)
 def _arrows(scene: Scene, results: Results) -> str:
     """Arrows of forces of joints and of efforts of drives, the longest of each a share of the mechanism's size."""
     forces = [f"joints/{name}/force" for name in scene.joints]
-    slides = {driven_travel(scene, name) for name in scene.driven_joints}
+    slides = {driven_travel(scene, name) for name in scene.all_drives}
     drives = {
         array: [name for name in results.channels if name.startswith("drive/") and name.endswith(f"/{what}")]
         for array, what, there in ((DRIVE_FORCE, "force", True), (DRIVE_TORQUE, "torque", False))

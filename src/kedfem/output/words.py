@@ -82,9 +82,9 @@ def clock(scene: Scene, frozen: bool = False) -> str:
     ----------
     frozen : whether the mechanism is frozen at positions of its drive, wherever that goes from there
     """
-    if len(scene.driven_joints) != 1 or not (frozen or _keeps_on(scene)):
+    if len(scene.all_drives) != 1 or not (frozen or _keeps_on(scene)):
         return "time"
-    (name,) = scene.driven_joints
+    (name,) = scene.all_drives
     return "drive travel" if driven_travel(scene, name) else "drive angle"
 
 

@@ -87,7 +87,7 @@ class CrossChecks:
             if rigid is not None and "without the part along" not in rigid.description:
                 columns = [each.columns.index(x) for x in rigid.columns]
                 self.pairs.append(_Pair(name, rigid.name, columns, each.unit))
-        self.scene, self.drives = scene, {drive_effort(scene, name)[0]: name for name in scene.driven_joints}
+        self.scene, self.drives = scene, {drive_effort(scene, name)[0]: name for name in scene.all_drives}
         self.account = account
         all_known = bool(self.drives) and known.keys() >= self.drives.keys()
         self.worked = all_known and not without_vibration(scene)  # else there is no account of energy

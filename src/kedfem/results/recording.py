@@ -45,7 +45,7 @@ def recording(
     forces = Forces(ConstraintForces(model), force_elements or element_forces(scene, model))
     account = account or Account(model, forces.force_elements, lambda: stresses_of(scene, model))
     joints = [channel for name in scene.joints for channel in joint_channels(scene, model, name, forces)]
-    driven = scene.driven_joints
+    driven = scene.all_drives
     drive = [channel for name in driven for channel in drive_channels(scene, model, name, forces)]
     gears = [gear_channel(model, name) for name in scene.gears]
     energies = [Recorded(*each) for each in energy_channels(account)]

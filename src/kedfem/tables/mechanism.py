@@ -11,7 +11,7 @@ from kedfem.frequencies import Crossing, Frequencies, PartFrequencies
 from kedfem.kinematics import KinematicsRun, first_largest
 from kedfem.load_cases import LoadCases
 from kedfem.loads import Loads
-from kedfem.motion.coordinates import driven_name
+from kedfem.motion.coordinates import driven_names
 from kedfem.output.words import NOTHING, clock, moment, number_in, with_prefix
 from kedfem.results.channels import largest_by_unit
 from kedfem.results.kinematic import transmission_key
@@ -53,7 +53,7 @@ def _coordinates(scene: Scene, moved: KinematicsRun) -> Iterator[tuple[str, ...]
         shown = _length if each.kind == "length" else _degrees
         words = [shown(x) for x in (low, high, high - low)]
         driven, links = "", scene.joints[each.joint].links
-        if driven_name(scene, each.joint) == each.name:  # between moving links it is easily taken the other way round
+        if each.name in driven_names(scene, each.joint):  # between moving links it is easily taken the other way round
             driven = " (driven)" if "ground" in links else f" of {links[0]} against {links[1]} (driven)"
         yield each.joint, each.name.replace("_", " ") + driven, *words
 

@@ -111,7 +111,7 @@ def bore_axis(joint: Joint, link: str) -> Float[np.ndarray, "3"] | None:
 
 
 def constrained(scene: Scene, name: str) -> tuple[Constraint, ...]:
-    """What a joint constrains, each with its law: held, a bushing's spring, the drive's motion or its shaft."""
+    """What a joint constrains, each with its law: held, a bushing's spring, drives' motions or their shafts."""
     joint, at, frame = scene.joints[name], np.asarray(scene.joints[name].at), joint_frame(scene.joints[name])
     (gaps, turns), found = CONSTRAINED[joint.kind], list[tuple[Law, tuple[Term, ...]]]()
     for n in map("xyz".index, gaps):
@@ -125,10 +125,11 @@ def constrained(scene: Scene, name: str) -> tuple[Constraint, ...]:
     if joint.kind == "screw":  # its thread, a constraint of two terms
         lead = -(joint.lead or 0.0) / (2 * np.pi)
         found.append((Held(), (coordinate(joint, turns=False), coordinate(joint, lead, turns=True))))
-    if (drive := scene.driven_joints.get(name)) is not None:
-        number, shaft = list(scene.driven_joints).index(name), drive.shaft_stiffness
-        law = Driven(number) if shaft is None else Spring(shaft, drive.shaft_damping, drive=number)
-        found.append((law, (driven_coordinate(scene, name),)))
+    for number, (key, drive) in enumerate(scene.all_drives.items()):
+        if drive.joint == name:
+            shaft = drive.shaft_stiffness
+            law = Driven(number) if shaft is None else Spring(shaft, drive.shaft_damping, drive=number)
+            found.append((law, (driven_coordinate(scene, key),)))
     return tuple(Constraint(name, terms, law, linear=True) for law, terms in found)
 
 
@@ -147,8 +148,9 @@ def coordinate(
 
 
 def driven_coordinate(scene: Scene, name: str) -> Term:
-    """Angle or travel that the drive of a joint prescribes, between the joint's ends."""
-    joint, drive = scene.joints[name], scene.driven_joints[name]
+    """Angle or travel that one of `Scene.all_drives` prescribes, between its joint's ends."""
+    drive = scene.all_drives[name]
+    joint = scene.joints[drive.joint]
     term = coordinate(joint, turns=not driven_travel(scene, name), about=drive.about, along=drive.along)
     return term if ordered(joint, drive.about) == ordered(joint) else replace(term, i=1, j=0)
 

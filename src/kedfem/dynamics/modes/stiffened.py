@@ -135,7 +135,7 @@ def frozen_linkage(
     SceneError
         Stiffening of a link that a released drive has prescribed, or beside links with co-rotational frames.
     """
-    released = linkage.mobility + (len(scene.driven_joints) if free else 0)
+    released = linkage.mobility + (len(scene.all_drives) if free else 0)
     if not scene.analysis.stiffening:
         return Frozen(system, count, released)
     if names := ", ".join(sorted(corotational_links(scene))):

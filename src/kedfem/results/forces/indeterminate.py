@@ -20,9 +20,9 @@ def indeterminate_channels(scene: Scene, model: Model, channels: Collection[str]
         for what in ("force", "moment"):
             if f"joints/{name}/{what}" not in channels and not (what == "moment" and _on_slider(model, name)):
                 out[f"joints/{name}/{what}"] = _reason(scene, model, rows, name)
-    for name in scene.driven_joints:
+    for name, drive in scene.all_drives.items():
         if (key := drive_effort(scene, name)[0]) not in channels:
-            out[key] = _reason(scene, model, rows, name)
+            out[key] = _reason(scene, model, rows, drive.joint)
     return out
 
 

@@ -71,12 +71,12 @@ class JointLoad:
 class DriveLoad:
     """The effort of a drive.
 
-    joint : that it drives
+    name : as of `Scene.all_drives`
     effort : (T,) torque [N m], of a slide force [N], as `unit` says
     rate : (T,) of the joint [rad/s or m/s]; None where the motion is not known
     """
 
-    joint: str
+    name: str
     unit: str
     effort: Scalars
     rate: Scalars | None
@@ -176,7 +176,7 @@ def acted_links(name: str, joint: Joint, description: str) -> tuple[str, str]:
 def drive_loads(scene: Scene, results: Results, linked: Linkage | None, motion: RigidMotion | None) -> list[DriveLoad]:
     """Loads of all drives with efforts in the results: elastic ones if present, else those of rigid links."""
     out = []
-    for name in scene.driven_joints:
+    for name in scene.all_drives:
         keys = [drive_effort(scene, name, rigid)[0] for rigid in ("", "rigid_")]
         found = next((results.channels[key] for key in keys if key in results.channels), None)
         if found is not None:
@@ -187,8 +187,9 @@ def drive_loads(scene: Scene, results: Results, linked: Linkage | None, motion: 
 
 
 def drive_rate(scene: Scene, name: str, linked: Linkage, motion: RigidMotion) -> Scalars:
-    """(T,) rate of the angle [rad/s] or travel [m/s] that the drive of a joint prescribes."""
-    joint, drive = scene.joints[name], scene.driven_joints[name]
+    """(T,) rate of the angle [rad/s] or travel [m/s] that one of `Scene.all_drives` prescribes."""
+    drive = scene.all_drives[name]
+    joint = scene.joints[drive.joint]
     one, other = (linked.bodies.index(link) for link in ordered(joint, drive.about))
     axis = motion.R[:, other] @ coordinate_axis(joint, drive.about, drive.along)
     if not driven_travel(scene, name):

@@ -18,7 +18,7 @@ from kedfem.motion.reactions import BlockReactions, Reactions, effort, reactions
 from kedfem.motion.released_motions import components
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.channels import XYZ, Channel
-from kedfem.results.recorded import Rows, drive_effort
+from kedfem.results.recorded import Rows, effort_channel
 from kedfem.scene import GROUND, ConstantSpeed, Joint, Scene, revolution_steps
 
 Responses = Float[np.ndarray, "T c k"]
@@ -32,7 +32,7 @@ KEPT = 4000  # time points of a revolution whose responses are kept, some kiloby
 class RigidChannel:
     """A channel of the force of a joint or drive.
 
-    which : 0 force, 1 moment, 2 effort of the drive
+    which : 0 force, 1 moment, 2 + k effort of drive k
     body, at : the body that it acts on, and the point that moments are about, in the reference position [m]
     project : (c, 3) from world components to columns of a force or moment; what statics leave open is not in them
     """
@@ -100,8 +100,7 @@ class RigidForces:
                 exerted = found.joint_wrench(each.joint, each.body, each.at, multipliers)
                 yield exerted[each.which] @ each.project.T
             else:
-                drive = self.linkage.drives.joints.index(each.joint)
-                yield (multipliers @ effort(self.linkage, drive))[:, None]
+                yield (multipliers @ effort(self.linkage, each.which - 2))[:, None]
 
     def _responses(self, motion: RigidMotion, step: int | None) -> Responses:
         """All channels from forces and moments; where poses return, those of the first revolution again."""
@@ -127,7 +126,7 @@ class RigidForces:
         """A channel from scaled λ."""
         if each.which < 2:
             return np.asarray(found.on(each.joint, each.body, each.at)[each.which] @ each.project.T)
-        of_rows = effort(self.linkage, self.linkage.drives.joints.index(each.joint))
+        of_rows = effort(self.linkage, each.which - 2)
         return np.broadcast_to(of_rows[:, None], (*found.Q.shape[:2], 1))
 
 
@@ -141,7 +140,7 @@ def rigid_forces(scene: Scene, linkage: Linkage, inertias: Inertias, along: Path
         if along is not None:
             found = reactions(linkage, _on_grid(linkage, along))
             every += [x for name in scene.joints for x in _joint(scene, linkage, found, name)]
-        every += [_drive(scene, linkage, name) for name in scene.driven_joints]
+        every += [_drive(scene, linkage, k) for k in range(len(linkage.drives))]
     elements = None
     if scene.springs or scene.motors or scene.limits:
         elements = rigid_elements(scene, linkage, along or path(linkage, *drive_range(scene)))
@@ -162,12 +161,12 @@ def stated_link(scene: Scene, joint: Joint) -> str:
     return min(links, key=lambda name: len(links) > 1 and slider_axis(scene, name) is not None)
 
 
-def _drive(scene: Scene, linkage: Linkage, name: str) -> RigidChannel:
-    joint = scene.joints[name]
-    link = ordered(joint, scene.driven_joints[name].about)[0]
-    key, what, unit = drive_effort(scene, name, "rigid_")
-    channel = Channel(key, (what,), unit, "world", f"{what} of the drive on link {link} with all links rigid")
-    return RigidChannel(channel, name, 2, linkage.bodies.index(link), np.asarray(joint.at), np.zeros((1, 3)))
+def _drive(scene: Scene, linkage: Linkage, k: int) -> RigidChannel:
+    name, drive = list(scene.all_drives.items())[k]
+    joint = scene.joints[drive.joint]
+    link = ordered(joint, drive.about)[0]
+    channel = effort_channel(scene, name, "rigid_")
+    return RigidChannel(channel, drive.joint, 2 + k, linkage.bodies.index(link), np.asarray(joint.at), np.zeros((1, 3)))
 
 
 def _joint(scene: Scene, linkage: Linkage, found: Reactions | BlockReactions, name: str) -> list[RigidChannel]:

@@ -27,6 +27,12 @@ from kedfem.scene.records.units import Quantity, si_number
 
 ROUGH = 0.05  # share of a curve's acceleration that may be noise
 AXES = {"revolute": TURNING, "prismatic": SLIDING}  # joints with one motion, and its speed
+SEVERAL = {  # joints with several coordinates: the key of a drive that says which, and what there is
+    "cylindrical": ("coordinate", "it has two, 'angle' and 'travel'"),
+    "universal": ("about", "it has two, an angle about the axis of either link"),
+    "planar": ("along", "it has three, the angle, for which along is left out, and travels along two directions"),
+}
+PARALLEL = 1e-3  # rad between travels in a plane, which are one below it: their drives would push against each other
 STARTED = {
     **AXES,
     "cylindrical": SLIDING,
@@ -36,22 +42,43 @@ STARTED = {
 
 
 def drive_faults(parts: Parts) -> Iterator[Fault]:
-    """Drives on joints that cannot be driven, or twice, or with a law for another kind of joint."""
+    """Drives on joints that cannot be driven, or of one coordinate twice, or with a law for another kind of joint."""
     if parts.drive.where and parts.drives:
         yield Fault(("drives",), "cannot be combined with drive, got both")
-    met: dict[str, Entry] = {}
+    met: dict[str, list[Entry]] = {}
     for drive in parts.all_drives:
         joint = parts.joints.get(drive.word("joint") or "")
         if joint is None:
             continue
-        if joint.name in met:
-            other = place(met[joint.name].where)
-            yield drive.fault("joint", f"must name a joint of its own, got {joint.name!r} as in {other}")
-        met[joint.name] = drive
-        kind = str(joint.word("kind"))
+        kind, before = str(joint.word("kind")), met.setdefault(joint.name, [])
         if kind in DRIVEN:
+            yield from shared_joint_faults(joint, kind, before, drive) if before else ()
             yield from coordinate_of_drive_faults(drive, kind)
             yield from law_faults(drive, kind)
+        before.append(drive)
+
+
+def shared_joint_faults(joint: Entry, kind: str, before: list[Entry], drive: Entry) -> Iterator[Fault]:
+    """A further drive on a joint, of a coordinate that those before it prescribe already."""
+    others = ", ".join(place(each.where) for each in before)
+    if kind not in SEVERAL:
+        why = "its travel is one lead for each of its turns" if kind == "screw" else f"a {kind} joint has one coordinate"
+        wanted = f"must name a joint of its own, as {why}"
+        yield drive.fault("joint", f"{wanted}, got {joint.name!r} as in {others}: leave one of these drives out")
+        return
+    key, take = SEVERAL[kind]
+    travels = sum(each.has("along") for each in (*before, drive))
+    if travels > 2 or any(same_coordinate(kind, drive, each) for each in before):
+        wanted = f"must be of another coordinate of joint {joint.name!r} than {others}"
+        yield drive.fault(key, f"{wanted}, got {drive.given(key) or 'the angle'}: {take}")
+
+
+def same_coordinate(kind: str, one: Entry, other: Entry) -> bool:
+    """Whether two drives on one joint prescribe the same; of a plane travels whose directions are parallel."""
+    if len({(driven_coordinate(each, kind), each.word("about")) for each in (one, other)}) > 1:
+        return False
+    a, b = (getattr(each.record, "along", None) for each in (one, other))
+    return not (a and b) or abs(sum(x * y for x, y in zip(a, b, strict=True))) > 1.0 - PARALLEL**2 / 2.0
 
 
 def coordinate_of_drive_faults(drive: Entry, kind: str) -> Iterator[Fault]:

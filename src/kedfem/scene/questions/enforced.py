@@ -11,7 +11,7 @@ def enforced_by_equations(scene: Scene, name: str) -> bool:
     """Whether a joint of a scene is enforced by constraint equations."""
     joint = scene.joints[name]
     kinds = frozenset(scene.links[each].category for each in joint.links if each in scene.links)
-    return by_constraint_equations(joint, scene.driven_joints.get(name), kinds) or _unlike(scene, name)
+    return by_constraint_equations(joint, scene.driven_joints.get(name, ()), kinds) or _unlike(scene, name)
 
 
 def _unlike(scene: Scene, name: str) -> bool:
@@ -36,6 +36,6 @@ def _displaced(scene: Scene, name: str) -> bool:
     link = scene.links[name]
     if link.category != "rigid":
         return True
-    drives = ((scene.joints[x], drive) for x, drive in scene.driven_joints.items() if x in scene.joints)
-    prescribed = any(name in joint.links and not by_constraint_equations(joint, drive) for joint, drive in drives)
+    driven = ((scene.joints[x], drives) for x, drives in scene.driven_joints.items() if x in scene.joints)
+    prescribed = any(name in joint.links and not by_constraint_equations(joint, drives) for joint, drives in driven)
     return not prescribed and (link.shape is not None or link.inertia is not None)

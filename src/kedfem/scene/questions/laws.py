@@ -65,7 +65,7 @@ def path_parameter(scene: Scene, t: Times) -> Law:
         A time outside a curve without a period.
     """
     t = np.asarray(t, dtype=float)
-    several = len(scene.driven_joints) > 1
+    several = len(scene.all_drives) > 1
     found = (t, np.ones_like(t), np.zeros_like(t)) if several else drive_angle(scene.motion, t)
     if scene.analysis.kind != "static":
         return found

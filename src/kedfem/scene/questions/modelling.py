@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from kedfem.scene.records.drives import Drive, prescribes_travel
 from kedfem.scene.records.joints import Joint
@@ -31,29 +31,29 @@ def corotational(scene: Scene) -> bool:
 
 
 def driven_travel(scene: Scene, name: str) -> bool:
-    """Whether the drive of a joint prescribes its travel, not its angle."""
-    drive = scene.driven_joints[name]
-    return prescribes_travel(scene.joints[name].kind, drive.coordinate, drive.along)
+    """Whether one of `Scene.all_drives` prescribes a travel of its joint, not an angle."""
+    drive = scene.all_drives[name]
+    return prescribes_travel(scene.joints[drive.joint].kind, drive.coordinate, drive.along)
 
 
 SHARED = ("revolute", "spherical", "weld")  # kinds that hold points together, wherever these go
 
 
-def by_constraint_equations(joint: Joint, drive: Drive | None = None, kinds: frozenset[str] = frozenset()) -> bool:
+def by_constraint_equations(joint: Joint, drives: Sequence[Drive] = (), kinds: frozenset[str] = frozenset()) -> bool:
     """Whether a joint cannot be said of points that its links share for good.
 
     Parameters
     ----------
-    drive : of the joint, if it is driven
+    drives : of the joint
     kinds : what its links are meshed as: a plane link has no rotation that it could share with a beam
     """
     if joint.kind == "weld" and kinds == {"plane", "beam"}:
         return True
-    if joint.bushing is not None or (drive is not None and drive.shaft_stiffness is not None):
+    if joint.bushing is not None or any(drive.shaft_stiffness is not None for drive in drives):
         return True
     if joint.kind in SHARED:
-        return drive is not None and GROUND not in joint.links
-    return joint.kind != "prismatic" or drive is not None or GROUND not in joint.links
+        return bool(drives) and GROUND not in joint.links
+    return joint.kind != "prismatic" or bool(drives) or GROUND not in joint.links
 
 
 def moving_grounds(scene: Scene) -> dict[str, str]:
@@ -83,13 +83,13 @@ def _drive_joint(name: str, known: set[str], shapeless: set[str], scene: Scene) 
     drives, joints = scene.driven_joints, scene.joints.items()
     own = {key: joint for key, joint in joints if name in joint.links}
     inner = [key for key, joint in own.items() if known & (set(joint.links) - {name})]
-    if len(inner) != 1 or (drive := drives.get(inner[0])) is None:
+    if len(inner) != 1 or inner[0] not in drives:
         return ""
     drive_joint = own[inner[0]]
-    if drive_joint.kind not in ("revolute", "prismatic") or drive_joint.bushing or drive.shaft_stiffness is not None:
+    if drive_joint.kind not in ("revolute", "prismatic") or drive_joint.bushing or drives[inner[0]][0].shaft_stiffness:
         return ""
     if drive_joint.kind == "prismatic" and GROUND in drive_joint.links:
         others = {key: x for key, x in own.items() if key != inner[0] and not shapeless >= set(x.links)}
-        if others and not any(by_constraint_equations(each, drives.get(key)) for key, each in others.items()):
+        if others and not any(by_constraint_equations(each, drives.get(key, ())) for key, each in others.items()):
             return ""
     return inner[0]

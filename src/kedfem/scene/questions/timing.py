@@ -37,7 +37,7 @@ def continuous_speed(motion: MotionLaw | None) -> float:
 
 def scene_speed(scene: Scene) -> float:
     """The speed [rad/s] at which the only drive of a scene rotates continuously; 0 for a slide, several and none."""
-    slides = any(driven_travel(scene, name) for name in scene.driven_joints)
+    slides = any(driven_travel(scene, name) for name in scene.all_drives)
     return 0.0 if slides else continuous_speed(scene.motion)
 
 

@@ -161,13 +161,14 @@ MotionLaw = Annotated[ConstantSpeed | Ramp | MotionCurve | Cycloidal | Polynomia
 
 class Drive(Record):
     """A joint that turns or slides in a given way: its first link that is not the ground against the other, of a slot the
-    pin along the line."""
+    pin along the line. Several may move one joint, each another coordinate."""
 
     only_with = (("shaft_damping", "shaft_stiffness"),)
     joint: JointName
     """name of the driven joint: any but spherical and weld"""
     coordinate: Literal["angle", "travel"] | None = None
-    """of a cylindrical or screw joint: which of its two is prescribed; the angle if not given"""
+    """of a cylindrical or screw joint: which of its two is prescribed; the angle if not given. A screw has one
+    drive, as one follows from the other"""
     about: EndName | None = None
     """of a universal joint: the link about whose axis the angle is, as the cross has both axes"""
     along: Axis | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -114,7 +115,7 @@ class Scene(Record):
     @property
     def motion(self) -> MotionLaw | None:
         """How the driven joint moves; None without a drive, and with several."""
-        drives = list(self.driven_joints.values())
+        drives = list(self.all_drives.values())
         return drives[0].motion if len(drives) == 1 else None
 
     @property
@@ -123,10 +124,19 @@ class Scene(Record):
         return next(iter(self.driven_joints), None)
 
     @property
-    def driven_joints(self) -> dict[str, Drive]:
-        """The joints whose motion is prescribed, and the drive of each."""
-        own = [] if self.drive is None else [self.drive]
-        return {drive.joint: drive for drive in [*own, *self.drives.values()]}
+    def all_drives(self) -> dict[str, Drive]:
+        """Each drive by the name of its joint; as `JOINT.DRIVE`, with a name of its own, where several move one joint."""
+        named = self.drives if self.drive is None else {"": self.drive, **self.drives}
+        count = Counter(drive.joint for drive in named.values())
+        return {x.joint if count[x.joint] == 1 else f"{x.joint}.{name}": x for name, x in named.items()}
+
+    @property
+    def driven_joints(self) -> dict[str, list[Drive]]:
+        """The joints whose motion is prescribed, and the drives of each."""
+        out: dict[str, list[Drive]] = {}
+        for drive in self.all_drives.values():
+            out.setdefault(drive.joint, []).append(drive)
+        return out
 
     @property
     def results_folder(self) -> Path:

@@ -32,11 +32,10 @@ def wrench(forces: Supports, joint: ConstraintJoint) -> tuple[Vectors, Vectors, 
     return force, moment, point
 
 
-def effort(forces: Supports, name: str) -> Float[np.ndarray, " T"]:
-    """Along the coordinate of a joint's drive, or of gears along that of their first joint [N or N m]."""
-    every = [(n, each) for n, each in enumerate(forces.constraints) if each.name == name]
-    driven = (n for n, each in every if len(every) == 1 or getattr(each.law, "drive", -1) >= 0)
-    return np.asarray(forces.of.multiplier[:, next(driven)])
+def effort(forces: Supports, of: str | int) -> Float[np.ndarray, " T"]:
+    """Along the coordinate of a drive, by its number, or along that of the first joint of gears, by name [N or N m]."""
+    known = [each.name if isinstance(of, str) else getattr(each.law, "drive", -1) for each in forces.constraints]
+    return np.asarray(forces.of.multiplier[:, known.index(of)])
 
 
 def springs(forces: Supports) -> tuple[np.ndarray, ...]:
