@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from kedfem.scene.records.loads import inertia_tensor
@@ -142,3 +143,18 @@ def test_the_drive_of_one_coordinate_leaves_the_others_to_forces(name: str) -> N
     assert_allclose(run.position("body", BODY["centre"]), wanted, atol=1e-3 * moved)  # of steps of 1 ms
     kind = "force" if hops[driven][0] == "prismatic" else "torque"
     assert_allclose(run.channel(f"drive/{kind}")[100:, 0], effort[100:], atol=1e-2 * np.abs(effort).max())
+
+
+@pytest.mark.parametrize("step", [0.01, 0.1])
+def test_positions_of_a_driven_joint_balance_its_free_motion(step: float) -> None:
+    """However far apart they are: the weight's moment about the ground's axis is that of the spring, which is stiffer."""
+    raw, _, _ = CASES["universal, about the body's axis"]
+    run = ran({**raw, "analysis": {**raw["analysis"], "kind": "static", "step": step}})
+    weight = BODY["mass"] * np.array(GRAVITY)
+
+    def moment(turn: float, driven: float) -> float:
+        R = Rotation.from_rotvec([turn, 0, 0]) * Rotation.from_rotvec([0, driven, 0])
+        return float(np.cross(R.apply(BODY["centre"]), weight)[0] - 4.0 * turn)
+
+    wanted = [brentq(moment, -3, 3, args=(np.cos(4 * np.pi * t) - 1,)) for t in run.t]
+    assert_allclose(run.channel("springs/a/angle")[:, 0], wanted, atol=1e-6)  # rigid links give 1e-7

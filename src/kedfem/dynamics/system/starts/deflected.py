@@ -106,7 +106,8 @@ def static(
     Parameters
     ----------
     forces : per body (n, d), world components, beside its loads [N]; the march goes on without: a plucked start
-    near : a state whose deflection the search begins with, and from which turns are counted on; none if not given
+    near : a state whose deflection, rotated with the links, the search begins with, and from which turns are counted
+        on; none if not given
     like : another instant, with what does not depend on time
 
     Raises
@@ -117,7 +118,10 @@ def static(
     now = Instant(of, motion_at, time, like, None if near is None else near.turned)
     none = np.zeros(int(of.bodies.at[-1]))
     pull = none if forces is None else as_work(of, forces)
-    return begun(now, _balance(now, none if near is None else near.u, pull, None), none)
+    if near is None:
+        return begun(now, _balance(now, none, pull, None), none)
+    before = Instant(of, motion_at, float(near.time[0]), now)
+    return begun(now, _balance(now, _with_links(before, now, near.u), pull, None), none)
 
 
 def _constant(forces: Flat) -> Callable[[Flat, Flat], Flat]:
@@ -238,7 +242,7 @@ def differenced_rates(first: Instant, motion_at: Motion, h: float, pull: Flat) -
 
 
 def _with_links(first: Instant, now: Instant, pull: Flat) -> Flat:
-    """Forces as they are at a first instant, at another that links have turned to."""
+    """Forces or deflections as they are at a first instant, at another that links have turned to."""
     out = np.empty_like(pull)
     for k, link in enumerate(now.of.system.model.links):
         here, turn = own(now.of, k), (now.R[k] @ first.R[k].T)[: link.d, : link.d]
