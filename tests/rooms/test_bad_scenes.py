@@ -244,7 +244,7 @@ def test_a_message_may_be_reworded_but_keeps_place_and_substance(fault, heard):
     assert says(fault, "links.a.width: positive … [m] … -4") is heard
 
 
-def test_faults_of_all_rooms_of_a_scene_come_at_once():
+def test_faults_of_all_tables_of_a_scene_come_at_once():
     change = {
         "links/crank/shape/width": -0.04,
         "links/crank/material": "stel",
@@ -270,14 +270,14 @@ def test_faults_of_all_rooms_of_a_scene_come_at_once():
         "links.coupler.shape.bore_diameter: must be a length [m], got '600 rpm': the unit 'rpm' is of another kind",
         "links.crank.material: must name a material, got 'stel', did you mean 'steel'?",
         "links.crank.shape.width: must be positive [m], got -0.04",
-        "links.rocker.colour: unknown key, known: model, reduction, material, shape, file, mass, centre, inertia, "
+        "links.rocker.colour: unknown key, known: model, reduction, material, shape, mass, centre, inertia, "
         "mesh, element, min_quality, shear_coefficient, beam, frames, segments",
         "output.probes.middle.link: must name a link, got 'roker', did you mean 'rocker'?",
         "points.C: circles of radius 0.05 and 0.05 must meet [m], got centres 0.264575 apart: a gap of 0.164575",
     ]
 
 
-def test_a_record_that_nobody_checked_is_refused():
+def test_a_record_that_has_not_been_checked_is_refused():
     bare = Scene(**dict(scene_from(tomllib.loads(GOOD))))
     wanted = "the scene: must be made by scene_from or read_scene, got a record that has not been checked"
     assert faults_of(linkage, bare) == [wanted]

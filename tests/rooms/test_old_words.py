@@ -84,7 +84,7 @@ RETIRED = {
     "literal": r"\bliteral\b|\bLiteralS|literal_(?!e)",
     "as drawn": r"(?i)\bas drawn\b(?! by hand)|\blinks were drawn\b|\b(drawn shape|point drawn)\b|\bdrawn .* apart$",
     "drawn position": r"(?i)\bdrawn position|\b(where|from where) (it is|they are|its pin is|the pin is) drawn",
-    "in full": r"(?i)\blinks in full\b|\bin_full\b",
+    "in full": r"(?i)\blinks in full\b|\bin_full\b|\bfull links?\b",
     "told": r"(?i)is to be reported of|\bwatch : reported of|\btold\b(?! (?:of|to|apart)\b)|_told\b|\btold of\b",
     "oracle": r"(?i)oracle(?!\.py)",
     "mixing": r"(?i)\bAnderson mixing\b|\bmixing\b|mixing_",

@@ -56,7 +56,7 @@ class Reduction:
     """A prepared scene with reduced links.
 
     ready : its model reduced
-    estimate : relative error of every channel that counts, compared with the full links
+    estimate : relative error of every channel that counts, compared with the unreduced links
     tolerance : that was asked for
     """
 

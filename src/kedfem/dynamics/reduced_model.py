@@ -36,7 +36,7 @@ def stored_model(model: Model) -> Model | None:
 
 
 def restored_model(model: Model) -> Model:
-    """The model that `stored_model` was given; full links come without their matrices."""
+    """The model that `stored_model` was given; unreduced links come without their matrices."""
     return _with_links(model, restored)
 
 

@@ -83,7 +83,7 @@ def require_on_axis(
 
 
 def _on_functions(stress: sp.csr_array, Q: Float[np.ndarray, "n s"], d: int) -> sp.csr_array:
-    """Stress rows of a full link seen from the functions of a reduced one: (6, dn) → (6, ds)."""
+    """Stress rows of an unreduced link on the modes of a reduced one: (6, dn) → (6, ds)."""
     columns = np.unique(stress.indices)
     dense, node, component = stress[:, columns].toarray(), *np.divmod(columns, d)
     out = np.zeros((6, Q.shape[1], d))

@@ -103,7 +103,7 @@ class StressRecovery:
 
 
 def stress_recovery(link: Link) -> StressRecovery:
-    """Prepare nodal stresses of a link; of a reduced one those of the link that it was made from, in full detail."""
+    """Prepare nodal stresses of a link; of a reduced one those of the unreduced link."""
     if link.full is not None:
         return stress_recovery(link.full)
     if link.meshed:

@@ -48,7 +48,7 @@ def reduced(link: Link, Q: Float[np.ndarray, "n s"]) -> Link:
 
 
 def on_functions(link: Link) -> Float[np.ndarray, "n s"]:
-    """Q of a reduced link: weights of the full link @ Q are weights of its functions."""
+    """Q of a reduced link: weights of the unreduced link @ Q are weights of its modes."""
     if link.Q is None:
         raise ValueError(f"link {link.name} is not reduced")
     return link.Q
@@ -86,7 +86,7 @@ def _unstrained(K0: Float[np.ndarray, "k k"], modes: Float[np.ndarray, "k r"]) -
 
 
 def stiffness_blocks(link: Link) -> sp.bsr_array:
-    """K0 of a full link, a (d, d) block for each pair of functions."""
+    """K0 of an unreduced link, a (d, d) block for each pair of modes."""
     return sp.bsr_array(link.K0, blocksize=(link.d, link.d))
 
 
@@ -182,7 +182,7 @@ def can_be_stored(link: Link) -> bool:
 
 
 def stored(link: Link) -> Link:
-    """A changed copy that can be pickled: of the full link only geometry and function space are left."""
+    """A changed copy that can be pickled: of the unreduced link only geometry and function space are left."""
     if link.full is None:
         return link
     full, none = link.full, sp.csr_array((0, 0))
