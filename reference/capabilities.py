@@ -16,7 +16,7 @@ INTRODUCTION = """\
 Which combinations of joints, frames, drives, links and force elements a scene may have. What no line of the table at the
 end meets is not refused for its combination; numbers in the matrices are lines of it. Scenes are checked by the same
 table, and messages are its words; words in capitals are those of a scene. `enforced` is how a joint is: by points that
-its links share for good, or by constraint equations, as joints are between links that slide or turn on each other,
+its links share, or by constraint equations, as joints are between links that slide or rotate on each other,
 driven ones, gears and bushings, and in space hinges and welds of links with unlike frames. What a single part needs (a
 key of a kind of link, a surface at a joint, points of planar links in one plane) is in [scene.md](scene.md) and
 [meshing.md](meshing.md).

@@ -67,7 +67,7 @@ as *where: what was wanted, what was got*.
 * **Names** (of points, links, joints ...) are made of letters, digits, `_`, `-` and inner spaces. `ground` is
   the frame.
 * **Materials** that are built in: {materials}.
-* **Plane links** know no third dimension. A scene with any lies in one plane z = constant, with hinges along z and
+* **Plane links** are two-dimensional. A scene with any lies in one plane z = constant, with hinges along z and
   forces in the plane; solids and beams in space may share it, joined to them by hinges, welds and slides, where they stay
   upright.
 * **Beams** are planar where they can be: if all that touches the beam is in one plane z = constant, all hinges of the
