@@ -93,7 +93,7 @@ class Analysis(Record):
     stability: StrictBool = True
     """of a steady motion: whether it is found out by how much vibrations about it grow or fall in a period"""
     revolutions: Positive | None = None
-    """revolutions of the drive; for drives that turn at a constant speed, or speed up to one"""
+    """revolutions of the drive; for drives that rotate at a constant speed, or speed up to one"""
     end_time: PositiveTime | None = None
     """end of the analysis, instead of `revolutions`; of a static analysis without a drive 1 s, reached in one step, if it
     is not given"""
@@ -111,9 +111,9 @@ class Analysis(Record):
     initial: Literal["rest", "quasi-static"] = "rest"
     """elastic state at the start: none, or the deflection with which the mechanism moves on without vibrating"""
     frames: Frames | None = None
-    """rigid-body: the stiffness of links turns with the rigid-body motion, deflections are small; co-rotational: with the
-    links themselves, which may bend as far as they like, or move freely. Rigid-body if not given, but without a drive
-    co-rotational"""
+    """rigid-body: the stiffness of links rotates with the rigid-body motion, deflections are small; co-rotational: with
+    the links themselves, which may bend as far as they like, or move freely. Rigid-body if not given, but without a
+    drive co-rotational"""
     initial_speeds: dict[JointName, JointSpeed] = Field(default_factory=dict)
     """speeds of joints at the start, by name of the joint, of what the drive does not move: of its first link that is not
     the ground against the other, of a hinge and a screw about its axis [rad/s], of a slide and a cylindrical joint along
@@ -122,7 +122,7 @@ class Analysis(Record):
     """velocities of links at the start, by name of the link: those of the drive's motion included"""
     initial_deflection: dict[str, InitialForce] = Field(default_factory=dict)
     """forces that deflect the mechanism and are released at the start, by name: without a drive from static balance,
-    with one beside the deflection of `initial = "quasi-static"`, at rest in links that turn; limits take the forces
+    with one beside the deflection of `initial = "quasi-static"`, at rest in links that rotate; limits take the forces
     against them, and may be its only supports"""
     accuracy: Annotated[float | Literal["quick"], BeforeValidator(accuracy_or_quick)] = 0.01
     """relative error to aim at in probes, joint forces and the drive's torque: what the scene leaves open is chosen for

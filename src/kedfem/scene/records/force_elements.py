@@ -98,7 +98,7 @@ class _Elastic(Record):
 
     @property
     def curve(self) -> PullCurve | TorqueCurve | None:
-        """What it pulls or turns back with beside its constants."""
+        """Its pull or restoring torque in addition to that of its constants."""
         curve: PullCurve | TorqueCurve | None = getattr(self, self.effort, None)
         return curve
 
@@ -147,11 +147,11 @@ class LineSpring(_Elastic):
     free_travel: Length | None = None
     """l0 along a slide or slot, at which it does not pull; 0, the reference position, if not given"""
     preload: Force | None = None
-    """with what it pulls in the reference position, instead of l0; negative: it pushes"""
+    """its pull in the reference position, instead of l0; negative: it pushes"""
     force: PullOver | None = None
-    """F: a pull beside these, or instead: a number, or a curve over the length (of a gas spring, a stop of rubber), over
-    the speed (of a damper) or over time (of a cylinder whose force is given): `{ over = "speed", at = [...], value =
-    [...] }`"""
+    """F: a pull in addition to these, or alone: a number, or a curve over the length (of a gas spring, a stop of
+    rubber), over the speed (of a damper) or over time (of a cylinder whose force is given): `{ over = "speed", at =
+    [...], value = [...] }`"""
 
     @model_validator(mode="after")
     def _has_a_direction(self) -> Self:
@@ -185,7 +185,7 @@ class LineSpring(_Elastic):
 
 
 class TorsionSpring(_Elastic):
-    """A spring and a damper about a hinge: they turn back with k (φ − φ0) + c φ' + T."""
+    """A spring and a damper about a hinge, with the restoring torque k (φ − φ0) + c φ' + T."""
 
     effort = "torque"
     kind: Literal["torsion"] = "torsion"
@@ -198,12 +198,12 @@ class TorsionSpring(_Elastic):
     damping: RotationalDamper = 0.0
     """c"""
     free_angle: Angle | None = None
-    """φ0, at which it does not turn, from the reference position; 0 if not given: the rotation of the joint's first link
-    that is not the ground against the other, about the joint's axis"""
+    """φ0, at which its torque is zero, from the reference position; 0 if not given: the rotation of the joint's first
+    link that is not the ground against the other, about the joint's axis"""
     preload: Torque | None = None
-    """with what it turns back in the reference position, −k φ0, instead of φ0"""
+    """its restoring torque in the reference position, −k φ0, instead of φ0"""
     torque: TorqueOver | None = None
-    """T: a torque that turns back beside these, or instead: a number, or a curve over the angle, the speed or time"""
+    """T: a restoring torque in addition to these, or alone: a number, or a curve over the angle, the speed or time"""
 
     @property
     def free(self) -> float:
@@ -245,7 +245,7 @@ class _Range(Record):
 
 
 class TravelLimit(_Range):
-    """Stops along a slide or slot: beyond one they push back with k s + c s', s how far beyond, and never pull.
+    """Stops along a slide or slot: beyond a limit they push back with k s + c s', s the travel beyond it, and never pull.
 
     The travel is that of the joint's first link that is not the ground against the other, along a slot that of its pin,
     from the reference position.
@@ -267,7 +267,7 @@ class TravelLimit(_Range):
 
 
 class AngleLimit(_Range):
-    """Stops about a hinge: beyond one they turn back with k s + c s', s how far beyond, and never pull.
+    """Stops about a hinge: beyond a limit they push back with k s + c s', s the angle beyond it, and never pull.
 
     The angle is the rotation of the joint's first link that is not the ground against the other, about the joint's axis,
     from the reference position.

@@ -156,10 +156,10 @@ class Joint(Record):
     """A joint between two links, or a link and the ground."""
 
     kind: JointKind
-    """revolute: hinge; spherical: ball; weld: rigid connection; prismatic: slides along its axis without turning;
-    cylindrical: slides along its axis and turns about it; screw: the same, one tied to the other; universal: cross of two
-    axes; planar: slides in a plane and turns about its normal; slot: a pin of the first link slides along a line of
-    the second"""
+    """revolute: hinge; spherical: ball; weld: rigid connection; prismatic: slides along its axis without rotation;
+    cylindrical: slides along its axis and rotates about it; screw: the same, one tied to the other; universal: cross of
+    two axes; planar: slides in a plane and rotates about its normal; slot: a pin of the first link slides along a line
+    of the second"""
     links: tuple[EndName, EndName]
     """the two links that it joins; `"ground"` for the frame; of a slot first the link with the pin"""
     at: JointPoint

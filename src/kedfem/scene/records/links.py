@@ -52,7 +52,7 @@ class Meshing(Record):
     """a part from CAD: rounds of less radius, chamfers of shorter sides and grooves are left out where it can be swept
     then, concave ones too; if not given, convex ones below 1.5 % of its size; none where a joint, load or probe sits"""
     fillet_angle: Annotated[float, Quantity("rad", least=math.radians(2), most=math.radians(45))] | None = None
-    """a part from CAD, extrusion or part: most that an element turns along a fillet, or a bore without a joint; if not
+    """a part from CAD, extrusion or part: largest angle of an element along a fillet, or a bore without a joint; if not
     given 22.5° of extrusions and parts, 45° of CAD that is swept, 30° of tetrahedra; where `analysis.accuracy` finds the
     mesh open 15° to 45°"""
     kind: Literal["hexahedra"] | None = None

@@ -77,7 +77,7 @@ class _Directed(_Load):
     """What loads share that have a direction."""
 
     frame: Literal["world", "link"] = "world"
-    """world: keeps its direction; link: given in the reference position, turns with the link from there"""
+    """world: keeps its direction; link: given in the reference position, rotates with the link from there"""
 
 
 class ForceLoad(_Directed):
@@ -109,7 +109,7 @@ class SurfaceLoad(_Directed):
 
 
 class PressureLoad(_Load):
-    """A pressure on a face of a solid or plane link: across the face everywhere, as it turns with the link."""
+    """A pressure on a face of a solid or plane link: normal to the face everywhere, also as it rotates with the link."""
 
     kind: Literal["pressure"] = "pressure"
     at: Point
