@@ -21,11 +21,12 @@ import numpy as np
 from kedfem.accuracy.error_budget import Budget, Share, by_kind, joined
 from kedfem.accuracy.geometric import GeometricError, bent, geometric_warning
 from kedfem.accuracy.histories import Histories, counted, extent, histories
+from kedfem.accuracy.longer_steps import can_double, differs_alike, doubled, in_steps
 from kedfem.accuracy.mesh_estimate import FUNCTIONS, link_errors, mesh_share, plain_mesh_share
 from kedfem.accuracy.positions import positions_share
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, first_reduced
-from kedfem.accuracy.resolution import StepError, fewest_steps, step_error
+from kedfem.accuracy.resolution import StepError, step_error
 from kedfem.accuracy.rigid_link_compliance import RigidLinkCompliance
 from kedfem.accuracy.rounding import Rounding
 from kedfem.accuracy.step_estimate import SINGLE, single_errors
@@ -147,11 +148,15 @@ def budget(
         counts = by_kind(sizes)
         here = [kind for kind in kinds if kind in counts]
         shares[1:] = [frames_share(seen.geometric, here), seen.rounding.share(here)]
+        longer = None
         if seen.steps:
-            known = known or step_errors(small, base)
+            if not known:
+                known, longer = step_errors(small, base)
             shares.append(Share("step", by_kind({n: error for n, error in known.items() if n in sizes})))
         elif not states_step(ready.scene):  # stated positions are wanted there
             shares.append(positions_share(base, sizes))
+        if longer is not None and differs_alike(small):
+            small, base = replace(small, scene=doubled(small.scene)), longer
         shares.append(mesh_share(small, base, eta))
     except KedfemError as fault:
         limits.append(f"step and mesh: a run beside this one failed ({str(fault).splitlines()[0]})")
@@ -186,26 +191,20 @@ def frames_share(geometric: GeometricError, kinds: Sequence[str]) -> Share | Non
     return Share("frames", errors, f"{how}; {remedy}" if remedy else "")
 
 
-def step_errors(ready: Prepared, base: Histories) -> dict[str, float]:
+def step_errors(ready: Prepared, base: Histories) -> tuple[dict[str, float], Histories | None]:
     """Channel → step error of a run of a single level in memory: its difference from another level.
 
-    That one has steps twice as long; where those would grow without bound, or rigid links would turn too far in them to
-    stay as stiff beside a step, half as long.
+    That one has steps twice as long; where it cannot, half as long.
+
+    Returns
+    -------
+    And the run in steps twice as long
     """
-    grid = time_grid(ready.scene)
-    firm = [x for x in ready.model.step_limits if x is not None and x.in_steps(grid.step).rotates_little]
-    alike = all(x.in_steps(2 * grid.step).rotates_little for x in firm)
-    longer = alike and grid.steps // 2 >= max(fewest_steps(ready.scene), 4)
-    h, steps = (2.0 * grid.step, grid.steps // 2) if longer else (0.5 * grid.step, 2 * grid.steps)
-    scene = with_analysis(in_steps(ready.scene, h, steps), extrapolation_levels=1)
-    other = histories(replace(ready, scene=scene), near=base.begun)
+    longer, grid = can_double(ready), time_grid(ready.scene)
+    finer = with_analysis(in_steps(ready.scene, 0.5 * grid.step, 2 * grid.steps), extrapolation_levels=1)
+    other = histories(replace(ready, scene=doubled(ready.scene) if longer else finer), near=base.begun)
     fine, coarse = (base, other) if longer else (other, base)
-    return single_errors(fine, coarse, bool(ready.scene.limits))[0 if longer else 1]
-
-
-def in_steps(scene: Scene, h: float, steps: int) -> Scene:
-    """The scene in so many steps of h."""
-    return with_analysis(scene, end_time=h * steps, revolutions=None, step=h, steps_per_revolution=None)
+    return single_errors(fine, coarse, bool(ready.scene.limits))[0 if longer else 1], other if longer else None
 
 
 def _limits(ready: Prepared, found: Mapping[int, Indicator]) -> list[str]:

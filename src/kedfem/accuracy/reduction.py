@@ -19,6 +19,7 @@ from functools import partial
 import numpy as np
 
 from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
+from kedfem.accuracy.longer_steps import differs_alike, doubled
 from kedfem.accuracy.prepared import Prepared, damped_as, key, last_of, meshed, moving, training_motion
 from kedfem.accuracy.variants import shortened, with_analysis
 from kedfem.arrays import Float
@@ -164,9 +165,10 @@ def reduced(
 
 
 def _beginning(full: Prepared) -> Prepared:
-    """A prepared scene for the estimate of the reduction error: with vibration, and short."""
+    """A prepared scene for the estimate of the reduction error: with vibration, short, in long steps where it may be."""
     scene = full.scene if without_vibration(full.scene) else with_analysis(full.scene, kind="transient")
-    return replace(full, scene=shortened(scene))
+    short = replace(full, scene=shortened(scene))
+    return replace(short, scene=doubled(short.scene)) if differs_alike(short) else short
 
 
 def _same(Q: Functions, share: float) -> Functions:

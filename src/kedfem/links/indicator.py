@@ -48,11 +48,10 @@ def indicator(link: Link, g: Float[np.ndarray, "n d"]) -> Indicator:
     g, link = nodal_state(link, g), link.full or link
     d, basis = link.d, skfem.Basis(link.basis.mesh, link.basis.elem, intorder=4)
     H = np.stack([G @ g for G in nodal_gradients(link)], axis=2)  # (n, i, j)
-    own = np.stack([np.asarray(basis.interpolate(g[:, i]).grad) for i in range(d)])  # (i, j, e, q)
-    recovered = np.empty_like(own)
-    for i in range(d):
-        for j in range(d):
-            recovered[i, j] = np.asarray(basis.interpolate(np.ascontiguousarray(H[:, i, j])))
+    own, recovered = np.zeros((2, d, d, *basis.dx.shape))  # (i, j, e, q)
+    for (shape,), dofs in zip(basis.basis, basis.element_dofs, strict=True):
+        own += g[dofs].T[:, None, :, None] * np.asarray(shape.grad)
+        recovered += H[dofs].transpose(1, 2, 0)[..., None] * np.asarray(shape)
     both = recovered - own, own
     error, energy = ((_density(link, x) * basis.dx).sum(axis=1) * link.thickness for x in both)
     volume = basis.dx.sum(axis=1) * link.thickness

@@ -228,6 +228,17 @@ def mass_times(mass: Mass, u: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "n 
     return out
 
 
+def mass_times_over(mass: Mass, u: Float[np.ndarray, "T n d"]) -> Float[np.ndarray, "T n d"]:
+    """M u for states u at many times."""
+    T, n, d = u.shape
+    columns = u.transpose(1, 2, 0)  # (n, d, T)
+    if all(m is mass[0] for m in mass):
+        out = np.asarray(mass[0] @ columns.reshape(n, d * T)).reshape(n, d, T)
+    else:
+        out = np.stack([m @ np.ascontiguousarray(columns[:, k]) for k, m in enumerate(mass)], axis=1)
+    return np.ascontiguousarray(out.transpose(2, 0, 1))
+
+
 def mass_constants(
     mass: Mass, one: Float[np.ndarray, " n"], X: Float[np.ndarray, "n 3"]
 ) -> tuple[Float[np.ndarray, "n d"], Float[np.ndarray, "n 3"]]:

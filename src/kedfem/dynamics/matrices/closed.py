@@ -11,7 +11,7 @@ from kedfem.arrays import Float
 from kedfem.dynamics.joints.constraint_matrices import ConstraintMatrices
 from kedfem.dynamics.matrices.profile import Profile, profile_of
 from kedfem.dynamics.matrices.substructure import Substructure
-from kedfem.dynamics.system.arrays import Bodies, Constraints, ends_of, flat, groups
+from kedfem.dynamics.system.arrays import Bodies, Constraints, ends_of, flat, groups, reach
 from kedfem.dynamics.system.state import Trial
 from kedfem.errors import SolveError
 
@@ -105,8 +105,8 @@ def _bodies(parts: Sequence[Substructure], made: Profile) -> Bodies:
         Bodies, motion=np.arange(len(parts)), port_at=ends_of(sizes), component=flat(component, int), group=groups(port),
         S_at=ends_of([part.S.size for part in parts]), S=flat([part.S for part in parts]),
         B_at=ends_of([each.size for each in B]), B=flat(B), column_at=ends_of([len(joint.columns) for joint in joints]),
-        columns=flat([made.number[joint.columns] for joint in joints], int), place=made.unknown, first=made.first,
-        row_at=made.at, multiplier=made.multiplier,
+        columns=flat([made.number[joint.columns] for joint in joints], int), reach=reach(B, port), place=made.unknown,
+        first=made.first, row_at=made.at, multiplier=made.multiplier,
     ))  # fmt: skip
 
 
@@ -115,7 +115,8 @@ def _room(bodies: Bodies, of: Constraints) -> Trial:
     k, r = len(bodies.place), len(of.place)
     q, B, size = (int(x[-1]) for x in (bodies.port_at, bodies.B_at, bodies.row_at))
     sizes = {"reaction": q, "w": q, "force": q, "RB": B, "SRB": B, "H": size, "K": size, "inverse": k + r, "x": k + r,
-             "C": len(of.columns), "target": r, "compliance": r, "beside": r, "m": r, "right": k, "dz": k}  # fmt: skip
+             "C": len(of.columns), "target": r, "compliance": r, "beside": r, "m": r, "right": k, "dz": k,
+             "known": int(np.diff(bodies.column_at).max(initial=0))}  # fmt: skip
     room = {name: np.zeros(n) for name, n in sizes.items()}
     return cast("Trial", _with(Trial, Rp=np.zeros((len(bodies.motion), 3, 3)), **room))
 

@@ -187,5 +187,7 @@ def effective_matrix(link: Link, c_M: float, c_K: float) -> sp.csr_array:
 
 def mass_matrix(link: Link) -> sp.csr_array:
     """M = m ⊗ I, (dn, dn), [KED, eqs. (9)(11)]."""
+    if all(m is link.mass[0] for m in link.mass):
+        return sp.csr_array(sp.kron(link.mass[0], sp.eye_array(link.d), format="csr"))
     unit = np.eye(link.d)
     return sp.csr_array(sum(sp.kron(m, sp.diags_array(unit[k]), format="csr") for k, m in enumerate(link.mass)))

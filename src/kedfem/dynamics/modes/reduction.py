@@ -19,13 +19,15 @@ from kedfem.dynamics.matrices.substructure import Substructure, factored
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.stepping.state import NodalOf
-from kedfem.links.record import Link, mass_times
+from kedfem.links.record import Link, mass_times_over
 from kedfem.links.reduced import mass_orthonormal, on_functions, rigid_functions, scalar_block, stiffness_blocks
 from kedfem.motion.rigid import RigidMotion
 
 LANCZOS = 6  # modes of the linkage per instant (docs/performance/reduction.md)
 INDEPENDENT = 1e-14  # of the largest energy: modes below repeat others
 REPEATED = 1e-9  # of a deflection: what is left of it beside those before is rounding
+
+Rows = Float[np.ndarray, "T _ _"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,14 +64,16 @@ def excited(
 ) -> list[list[NodalOf]]:
     """Static deflections at the times of a motion, with their shares in modes of the frozen linkage; per link."""
     out: list[list[NodalOf]] = [[] for _ in model.links]
-    for krylov in _krylov(model, parts, motion, levels):
-        for kept, x in zip(out, krylov.static, strict=True):
-            kept.append(x)
-        _, Z = np.linalg.eigh(krylov.T)
-        share = Z.T @ np.array([_dot(M_b, krylov.static) for M_b in krylov.images])
-        for mode, amount in zip(Z.T, share, strict=True):
-            for kept, *several in zip(out, *krylov.vectors, strict=True):
-                kept.append(amount * sum(c * x for c, x in zip(mode, several, strict=True)))
+    krylov = _krylov(model, parts, motion, levels)
+    shares = np.array([_dots(M_b, krylov.static) for M_b in krylov.images])  # (l, T)
+    for t, found in enumerate(krylov.found):
+        Z = np.linalg.eigh(krylov.T[t, :found, :found])[1]
+        Z = Z * (Z.T @ shares[:found, t])
+        for k, kept in enumerate(out):
+            kept.append(krylov.static[k][t])
+            if found:
+                several = np.stack([each[k][t] for each in krylov.vectors[:found]])
+                kept += list(np.tensordot(Z.T, several, axes=1))
     return out
 
 
@@ -80,79 +84,68 @@ def frozen_frequencies(
 
     1/ω² are Ritz values of K⁻¹ M: the first is good, those after it less and less. None where nothing is loaded.
     """
-    out = []
-    for krylov in _krylov(model, parts, motion, levels):
-        values = np.linalg.eigvalsh(krylov.T)[::-1]
+    out, krylov = [], _krylov(model, parts, motion, levels)
+    for T, found in zip(krylov.T, krylov.found, strict=True):
+        values = np.linalg.eigvalsh(T[:found, :found])[::-1]
         out.append(np.asarray(1 / np.sqrt(values[values > REPEATED * values[:1]])))
     return out
 
 
 class _Krylov:
-    """Mass-orthonormal deflections b of a frozen linkage by K⁻¹ M from its static one, M b, and T = Bᵀ M K⁻¹ M B."""
+    """Mass-orthonormal deflections b of a linkage frozen at some times by K⁻¹ M from its static ones, M b, and
+    T = Bᵀ M K⁻¹ M B.
 
-    def __init__(self, model: Model, static: list[NodalOf], levels: int) -> None:
+    static : (T, n, d) of each link; vectors, images : the same of each level, zero at times with fewer levels
+    T : (T, l, l); found : (T,) levels at each time
+    """
+
+    def __init__(self, model: Model, static: list[Rows], levels: int) -> None:
         self.static = static
-        self.vectors: list[list[NodalOf]] = []
-        self.images: list[list[NodalOf]] = []
-        self._T = np.zeros((levels, levels))
-        self._model, self._next, self._size = model, static, _mass_norm(model, static)[0]
-
-    @property
-    def T(self) -> Float[np.ndarray, "l l"]:
-        """Of as many deflections as there are."""
-        found = len(self.vectors)
-        return self._T[:found, :found]
+        self.vectors: list[list[Rows]] = []
+        self.images: list[list[Rows]] = []
+        self.T = np.zeros((len(static[0]), levels, levels))
+        self.found = np.zeros(len(static[0]), int)
+        self._model, self._next, self._size = model, static, _mass_norms(model, static)[0]
 
     def grows(self) -> bool:
-        """Whether there is one more deflection b, the last of `vectors`; its K⁻¹ M b is to be given to `add`."""
-        x, whole = self._next, self._size
+        """Whether there is one more deflection b at any time, the last of `vectors`; K⁻¹ M b is to be given to `add`."""
+        x, level = self._next, len(self.vectors)
         for _ in range(2):
             for b, M_b in zip(self.vectors, self.images, strict=True):
-                c = _dot(M_b, x)
+                c = _dots(M_b, x)[:, None, None]
                 x = [y - c * z for y, z in zip(x, b, strict=True)]
-        size, Mx = _mass_norm(self._model, x)
-        if size <= REPEATED * whole:
-            return False
-        self.vectors.append([y / size for y in x])
-        self.images.append([y / size for y in Mx])
-        return True
+        size, Mx = _mass_norms(self._model, x)
+        grown = (self.found == level) & (size > REPEATED * self._size)
+        self.found += grown
+        factor = np.where(grown, 1 / np.where(grown, size, 1.0), 0.0)[:, None, None]
+        self.vectors.append([y * factor for y in x])
+        self.images.append([y * factor for y in Mx])
+        return bool(grown.any())
 
-    def add(self, x: list[NodalOf]) -> None:
-        """The static deflection K⁻¹ M b under the last one's inertia."""
-        self._next, self._size = x, _mass_norm(self._model, x)[0]
+    def add(self, x: list[Rows]) -> None:
+        """The static deflections K⁻¹ M b under the last ones' inertia."""
+        self._next, self._size = x, _mass_norms(self._model, x)[0]
         level = len(self.vectors) - 1
         for k, M_b in enumerate(self.images):
-            self._T[level, k] = self._T[k, level] = _dot(M_b, x)
+            self.T[:, level, k] = self.T[:, k, level] = _dots(M_b, x)
 
 
-def _krylov(model: Model, parts: Sequence[Substructure], motion: RigidMotion, levels: int) -> list[_Krylov]:
-    """Of the linkage frozen at the times of a motion, from its static deflection under P − M R0'' there, link frames.
-
-    All times go level by level, so that their solves go together.
-    """
+def _krylov(model: Model, parts: Sequence[Substructure], motion: RigidMotion, levels: int) -> _Krylov:
+    """Of the linkage frozen at the times of a motion, from its static deflection under P − M R0'' there, link frames."""
     forcing = forcings(model, motion)
     frozen = closed(parts, [x.R for x in forcing], constraint_matrices(model.rows, motion, model.interface_unknowns))
-    static = frozen.deflections([x.F @ x.R for x in forcing])
-    found = [_Krylov(model, [x[t] for x in static], levels) for t in range(len(motion.t))]
-    growing = np.ones(len(found), bool)
+    found = _Krylov(model, list(frozen.deflections([x.F @ x.R for x in forcing])), levels)
     for _ in range(levels):
-        growing &= [grows and each.grows() for grows, each in zip(growing, found, strict=True)]
-        if not growing.any():
+        if not found.grows():
             break
-        loads = [np.zeros_like(x) for x in static]
-        for t in np.flatnonzero(growing):
-            for load, image in zip(loads, found[t].images[-1], strict=True):
-                load[t] = image
-        new = frozen.deflections(loads)
-        for t in np.flatnonzero(growing):
-            found[t].add([x[t] for x in new])
+        found.add(list(frozen.deflections(found.images[-1])))
     return found
 
 
-def _mass_norm(model: Model, x: Sequence[NodalOf]) -> tuple[float, list[NodalOf]]:
-    """√(xᵀ M x) of the linkage, and M x."""
-    Mx = [mass_times(link.mass, y) for link, y in zip(model.links, x, strict=True)]
-    return float(np.sqrt(max(_dot(x, Mx), 0.0))), Mx
+def _mass_norms(model: Model, x: Sequence[Rows]) -> tuple[Float[np.ndarray, " T"], list[Rows]]:
+    """√(xᵀ M x) of the linkage at each time, and M x."""
+    Mx = [mass_times_over(link.mass, y) for link, y in zip(model.links, x, strict=True)]
+    return np.sqrt(np.maximum(_dots(x, Mx), 0.0)), Mx
 
 
 def energy_sorted(link: Link, ports: Float[np.ndarray, "n p"], deflections: Sequence[Float[np.ndarray, "n d"]]) -> Basis:
@@ -211,5 +204,6 @@ def orthonormal(
     return S @ (vectors[:, kept] / np.sqrt(values[kept])), np.sqrt(values[kept])
 
 
-def _dot(a: Sequence[NodalOf], b: Sequence[NodalOf]) -> float:
-    return sum(float(np.vdot(x, y)) for x, y in zip(a, b, strict=True))
+def _dots(a: Sequence[Rows], b: Sequence[Rows]) -> Float[np.ndarray, " T"]:
+    """Products of states of the linkage at each time."""
+    return np.asarray(np.sum([np.einsum("tnd,tnd->t", x, y) for x, y in zip(a, b, strict=True)], axis=0))

@@ -165,11 +165,13 @@ def _eliminated(
     Z, gone, losses = np.eye(f), [], []
     flexibility, now = np.linalg.inv(K).reshape(f, d, f, d), C.transpose(1, 2, 0)  # of what is left, 0 along what is gone
     while Z.shape[1] > 1:
-        needed = Z.T @ np.einsum("adm,bdm->ab", now, now) @ Z
+        moved = Z.T @ now.reshape(f, -1)
         trace = Z.T @ np.einsum("akbk->ab", flexibility) @ Z
-        cheapest = Z @ scipy.linalg.eigh(needed, (trace + trace.T) / 2)[1]
+        L = np.linalg.cholesky((trace + trace.T) / 2)
+        moved = np.linalg.solve(L, moved)
+        cheapest = Z @ np.linalg.solve(L.T, np.linalg.eigh(moved @ moved.T)[1])
         for q in (cheapest / np.linalg.norm(cheapest, axis=0)).T:
-            rest = Z @ scipy.linalg.null_space((q @ Z)[None])
+            rest = Z @ np.linalg.qr((q @ Z)[:, None], mode="complete")[0][:, 1:]
             if _smallest(np.concatenate([rigid, ports @ rest], axis=1)) >= least:
                 break
         else:
@@ -186,11 +188,12 @@ def _held(
 ) -> tuple[Float[np.ndarray, "f d f d"], Float[np.ndarray, "f d m"], float]:
     """Flexibility and deflections with a mode fixed at zero, and the strain energy that this adds: J(q)."""
     f, d = flexibility.shape[:2]
-    response = np.tensordot(flexibility, q, axes=(2, 0))  # to forces on the mode, (f, d, d)
-    L = np.linalg.cholesky(np.tensordot(q, response, axes=1))  # of F(q)
-    response = np.linalg.solve(L, response.reshape(f * d, d).T).T.reshape(f, d, d)
-    force = np.linalg.solve(L, np.tensordot(q, now, axes=1))
-    return flexibility - np.tensordot(response, response, axes=(2, 2)), now - response @ force, float((force**2).sum())
+    response = np.einsum("akbl,b->akl", flexibility, q)  # to forces on the mode, (f, d, d)
+    L = np.linalg.cholesky((q @ response.reshape(f, d * d)).reshape(d, d))  # of F(q)
+    response = np.linalg.solve(L, response.reshape(f * d, d).T).T
+    force = np.linalg.solve(L, (q @ now.reshape(f, -1)).reshape(d, -1))
+    left = flexibility - (response @ response.T).reshape(flexibility.shape)
+    return left, now - response.reshape(f, d, d) @ force, float((force**2).sum())
 
 
 def _smallest(values: Float[np.ndarray, "p c"]) -> float:

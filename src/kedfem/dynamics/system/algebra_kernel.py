@@ -72,19 +72,17 @@ def interface_columns(bodies, i, R, RB):  # type: ignore[no-untyped-def]
     """RB (q × c, flat) becomes Rᵀ B of a body."""
     first, last = bodies.port_at[i], bodies.port_at[i + 1]
     c, at = bodies.column_at[i + 1] - bodies.column_at[i], bodies.B_at[i]
+    B, group, component = bodies.B[at : bodies.B_at[i + 1]], bodies.group[first:last], bodies.component[first:last]
+    reach = bodies.reach[bodies.column_at[i] : bodies.column_at[i + 1]]
     RB[:] = 0.0
-    for q in range(first, last):
-        own = RB[(q - first) * c : (q - first + 1) * c]
-        for o in range(bodies.group[q], last):
-            if bodies.group[o] != bodies.group[q]:
-                break
-            x, its = (
-                R[bodies.component[o], bodies.component[q]],
-                bodies.B[at + (o - first) * c : at + (o - first + 1) * c],
-            )
-            if x != 0.0:
-                for m in range(c):
-                    own[m] += x * its[m]
+    for m in range(c):
+        for q in range(reach[m, 0], reach[m, 1]):
+            total = 0.0
+            for o in range(group[q] - first, last - first):
+                if group[o] != group[q]:
+                    break
+                total += R[component[o], component[q]] * B[o * c + m]
+            RB[q * c + m] = total
 
 
 @inner

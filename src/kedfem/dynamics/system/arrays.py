@@ -29,6 +29,22 @@ def groups(ports: Sequence[Int[np.ndarray, " q"]]) -> Int[np.ndarray, " _"]:
     return flat([at + np.searchsorted(each, each) for at, each in zip(starts, ports, strict=True)], int)
 
 
+def reach(B: Sequence[np.ndarray], ports: Sequence[Int[np.ndarray, " q"]]) -> Int[np.ndarray, "c 2"]:
+    """First row of each column of each Rᵀ B that may have something, and the one after the last: (0, 0) of none.
+
+    Parameters
+    ----------
+    B : (q, c) of each body
+    ports : number of the interface point of each row, in rising order
+    """
+    out = [np.zeros((0, 2), int)]
+    for each, port in zip(B, ports, strict=True):
+        for column in each.T != 0:
+            rows = np.flatnonzero(np.isin(port, port[column]))
+            out.append(np.array([[rows[0], rows[-1] + 1]] if len(rows) else [[0, 0]]))
+    return np.concatenate(out)
+
+
 class Coefficients(NamedTuple):
     """Of one member of generalised-α at a fixed step, and of Rayleigh damping.
 
@@ -93,7 +109,7 @@ class Masses(namedtuple("Masses", "of at row column value")):
 
 class Bodies(namedtuple("Bodies", (
     "at functions components motion frame kind dense arrays passed port_at component group G_at Y_at S_at B_at "
-    "G Y W S B column_at columns place first row_at multiplier X one fit K beams elements mass turning "
+    "G Y W S B column_at columns reach place first row_at multiplier X one fit K beams elements mass turning "
     "stiffness size rigid stresses"
 ))):  # fmt: skip
     """All bodies as flat arrays, constant; i counts bodies.
@@ -106,7 +122,8 @@ class Bodies(namedtuple("Bodies", (
     passed : where its coordinates stand among those that passes change, −1 if none
     port_at : (i + 1,) held components q; component : of each; group_at : (i + 2...) where interface points begin
     G, Y, W : N × N, q × N, q × N of each, in `G_at`, `Y_at`; S, B : q × q and q × c, in `S_at`, `B_at`
-    column_at, columns : interface unknowns that each body knows
+    column_at, columns : interface unknowns that each body knows; reach : (c, 2) rows that Rᵀ B may have of each, from
+        the first to the last
     place, first, row_at, multiplier : row of each of these in the matrix of the interface, and its profile, see `Profile`
     X, one, fit : coordinates of position and of unity, and the frames' weights; K : N × N of co-rotational ones
     beams : those that know their strains at points; elements : of beams in space, whose strains need no frame

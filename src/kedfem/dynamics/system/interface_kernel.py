@@ -12,7 +12,7 @@ Constraints that repeat others get no force.
 
 from kedfem.compiled import inner
 from kedfem.dynamics.matrices.profile_kernel import profile_factored, profile_solved
-from kedfem.dynamics.system.algebra_kernel import copied, interface_columns
+from kedfem.dynamics.system.algebra_kernel import add_transposed, copied, interface_columns, product
 from kedfem.dynamics.system.constraints_kernel import coordinate, law
 from kedfem.dynamics.system.ends_kernel import placed
 from kedfem.dynamics.system.products_kernel import take_ports
@@ -30,21 +30,22 @@ def gathered(bodies, trial):  # type: ignore[no-untyped-def]
         at, columns = bodies.B_at[i], bodies.columns[bodies.column_at[i] : bodies.column_at[i + 1]]
         RB, SRB = trial.RB[at : at + q * c], trial.SRB[at : at + q * c]
         interface_columns(bodies, i, trial.Rp[i], RB)
-        SRB[:] = 0.0
-        for p in range(q):
-            S = bodies.S[bodies.S_at[i] + p * q : bodies.S_at[i] + (p + 1) * q]
-            for m in range(c):
-                x, own = RB[p * c + m], SRB[m * q : (m + 1) * q]
-                if x != 0.0:
-                    for r in range(q):
-                        own[r] += x * S[r]
+        reach, S = bodies.reach[bodies.column_at[i] : bodies.column_at[i + 1]], bodies.S[bodies.S_at[i] :]
         for m in range(c):
-            row = place[columns[m]]
+            own = SRB[m * q : (m + 1) * q]
+            own[:] = 0.0
+            for p in range(reach[m, 0], reach[m, 1]):
+                x, its = RB[p * c + m], S[p * q : (p + 1) * q]
+                for r in range(q):
+                    own[r] += x * its[r]
+        for m in range(c):
+            row, first, last = place[columns[m]], reach[m, 0], reach[m, 1]
             own = H[bodies.row_at[row] : bodies.row_at[row + 1]]
             for o in range(c):
-                column, its, total = place[columns[o]], SRB[o * q : (o + 1) * q], 0.0
+                column = place[columns[o]]
                 if column <= row:
-                    for r in range(q):
+                    total, its = 0.0, SRB[o * q : (o + 1) * q]
+                    for r in range(first, last):
                         total += RB[r * c + m] * its[r]
                     own[column - bodies.first[row]] += total
 
@@ -59,29 +60,33 @@ def offset(bodies, i, u, trial, base):  # type: ignore[no-untyped-def]
     base : whether it has the second part
     """
     first, last, c = bodies.port_at[i], bodies.port_at[i + 1], bodies.column_at[i + 1] - bodies.column_at[i]
-    RB, z, w, at = trial.RB, trial.z, trial.w, bodies.B_at[i]
-    columns = bodies.columns[bodies.column_at[i] : bodies.column_at[i + 1]]
-    for r in range(last - first):
-        x = 0.0
-        for m in range(c):
-            x += RB[at + r * c + m] * z[columns[m]]
-        w[first + r] = x
+    w = trial.w[first:last]
+    known(bodies, i, trial.z, trial.known)
+    product(trial.RB, bodies.B_at[i], last - first, c, trial.known, w)
     if base:
-        take_ports(bodies, i, u, w[first:last])
+        take_ports(bodies, i, u, w)
+
+
+@inner
+def known(bodies, i, z, out):  # type: ignore[no-untyped-def]
+    """out becomes the interface unknowns that a body knows."""
+    columns = bodies.columns[bodies.column_at[i] : bodies.column_at[i + 1]]
+    for m in range(len(columns)):
+        out[m] = z[columns[m]]
 
 
 @inner
 def pushed(bodies, i, trial):  # type: ignore[no-untyped-def]
     """Add to the right-hand side what a body exerts on z: Bᵀ R (Yᵀ Rᵀ r − S w₀)."""
     first, last, c = bodies.port_at[i], bodies.port_at[i + 1], bodies.column_at[i + 1] - bodies.column_at[i]
-    q, at = last - first, bodies.B_at[i]
-    RB, SRB, reaction, w, right = trial.RB, trial.SRB, trial.reaction, trial.w, trial.right
+    q, at, pushes, right = last - first, bodies.B_at[i], trial.known, trial.right
     columns = bodies.columns[bodies.column_at[i] : bodies.column_at[i + 1]]
+    product(trial.SRB, at, c, q, trial.w[first:last], pushes)
     for m in range(c):
-        x = 0.0
-        for r in range(q):
-            x += RB[at + r * c + m] * reaction[first + r] - SRB[at + m * q + r] * w[first + r]
-        right[columns[m]] += x
+        pushes[m] = -pushes[m]
+    add_transposed(trial.RB, at, q, c, trial.reaction[first:last], pushes)
+    for m in range(c):
+        right[columns[m]] += pushes[m]
 
 
 @inner

@@ -14,7 +14,7 @@ from kedfem.dynamics.metric import element_tables
 from kedfem.dynamics.stepping.scheme import Scheme
 from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.dynamics.system import record
-from kedfem.dynamics.system.arrays import Beams, Bodies, Coefficients, Constraints, Ends, ends_of, flat, groups
+from kedfem.dynamics.system.arrays import Beams, Bodies, Coefficients, Constraints, Ends, ends_of, flat, groups, reach
 from kedfem.dynamics.system.forces.follower_loads import follower_loads
 from kedfem.dynamics.system.forces.stresses import stress_tables
 from kedfem.dynamics.system.record import Constraint, Curve, Driven, Held, Law, Spring, Stop, System, curve_of
@@ -94,6 +94,7 @@ def body_arrays(system: System, parts: Sequence[Part], profile: Profile) -> Bodi
         G=flat([x.G for x in parts]), Y=flat(Y), W=flat(W),
         S=flat([x.S for x in parts]), B=flat([joint.B for joint in joints]),
         column_at=ends_of([len(c) for c in columns]), columns=flat([profile.number[c] for c in columns], int),
+        reach=reach([joint.B for joint in joints], [joint.keep // joint.components for joint in joints]),
         place=profile.unknown, first=profile.first, row_at=profile.at, multiplier=profile.multiplier,
         X=flat([x for x, _, _ in fits]), one=flat([x for _, x, _ in fits]), fit=flat([x for _, _, x in fits]),
         K=flat(stiff),

@@ -5,7 +5,7 @@ from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, ports_tu
 from kedfem.dynamics.system.bodies_kernel import right_hand_side, rigid_frame_end
 from kedfem.dynamics.system.constraints_kernel import coordinate
 from kedfem.dynamics.system.ends_kernel import placed
-from kedfem.dynamics.system.interface_kernel import along, gradient, newmark_rate
+from kedfem.dynamics.system.interface_kernel import along, gradient, known, newmark_rate
 from kedfem.dynamics.system.products_kernel import add_at_ports, displaced, sparse_held
 
 
@@ -48,14 +48,14 @@ def ports_end(c, bodies, i, trial, state, history, t, room):  # type: ignore[no-
 def ported(bodies, i, trial):  # type: ignore[no-untyped-def]
     """trial.w and trial.force become displacements and forces at a body's interface points, in its frame."""
     first, last, c = bodies.port_at[i], bodies.port_at[i + 1], bodies.column_at[i + 1] - bodies.column_at[i]
-    q, at = last - first, bodies.B_at[i]
-    RB, w, dz, columns = (trial.RB, trial.w, trial.dz, bodies.columns[bodies.column_at[i] : bodies.column_at[i + 1]])
+    q, w, force, reaction = last - first, trial.w[first:last], trial.force[first:last], trial.reaction[first:last]
+    known(bodies, i, trial.dz, trial.known)
+    product(trial.RB, bodies.B_at[i], q, c, trial.known, force)
     for r in range(q):
-        for m in range(c):
-            w[first + r] += RB[at + r * c + m] * dz[columns[m]]
-    product(bodies.S, bodies.S_at[i], q, q, trial.w[first:last], trial.force[first:last])
-    for r in range(first, last):
-        trial.force[r] -= trial.reaction[r]
+        w[r] += force[r]
+    product(bodies.S, bodies.S_at[i], q, q, w, force)
+    for r in range(q):
+        force[r] -= reaction[r]
 
 
 @inner

@@ -65,7 +65,7 @@ class Driving(namedtuple("Driving", (
 
 class Trial(namedtuple("Trial", (
     "u f damped seen Q angle base resisted strained r held reaction w force Rp RB SRB H K inverse x z e turned "
-    "C target compliance beside m right dz row change memory fixed moving stress response foreseen"
+    "C target compliance beside m right dz known row change memory fixed moving stress response foreseen"
 ))):  # fmt: skip
     """The end of a step while it is sought; arrays as in `State`.
 
@@ -75,6 +75,7 @@ class Trial(namedtuple("Trial", (
         its profile
     memory : room of `anderson_kernel`
     C : gradients on what each constraint couples, in `columns`; target, compliance, beside, m : (r,); right, dz : (k,)
+    known : room for the interface unknowns that one body knows, or what it exerts on them
     K, inverse, x : H with constraints in it, factored, the inverse of its pivots, and what is solved for
     row : (k,) room for one gradient, zero between; change : what a pass asks for
     fixed, moving : places of all ends in the rigid-body motion, and at z
@@ -121,6 +122,7 @@ def empty_trial(bodies: Bodies, ends: Ends, of: Constraints, like: State) -> Tri
         inverse=np.zeros(k + r), x=np.zeros(k + r), z=np.zeros(k), e=np.zeros(r), turned=like.turned.copy(),
         C=np.zeros(len(of.columns)), target=np.zeros(r), compliance=np.zeros(r), beside=np.zeros(r), m=np.zeros(r),
         right=np.zeros(k), dz=np.zeros(k), row=np.zeros(k),
+        known=np.zeros(int(np.diff(bodies.column_at).max(initial=0))),
         change=np.zeros(like.last.shape[1]), memory=np.zeros((DEPTH + 1, DEPTH)),
         fixed=place, moving=tuple(x.copy() for x in place), stress=np.zeros(int(bodies.stresses.at[-1])),
         response=np.zeros(len(like.u)), foreseen=np.zeros(len(like.u)),

@@ -185,10 +185,15 @@ def asked(c, bodies, ends, of, driving, t, iteration, state, trial, work, solved
             first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
             N, to = last - first, bodies.passed[i]
             displaced(bodies, i, trial, work.y)
-            turned(trial.Rp[i], d, work.y[:N], trial.change[to : to + N])
-            for x in range(N):
-                before = trial.u[first + x] if bodies.frame[i] == STRESSED else 0.0
-                trial.change[to + x] = bodies.size[i] * (trial.change[to + x] - before)
+            change, size = trial.change[to : to + N], bodies.size[i]
+            turned(trial.Rp[i], d, work.y[:N], change)
+            if bodies.frame[i] == STRESSED:
+                before = trial.u[first:last]
+                for x in range(N):
+                    change[x] -= before[x]
+            if size != 1.0:
+                for x in range(N):
+                    change[x] *= size
             if bodies.rigid[i]:
                 foresee(bodies.K, c, bodies, i, work.y, trial, work)
     k = len(trial.z)
@@ -204,10 +209,12 @@ def sizes(c, bodies, state, trial):  # type: ignore[no-untyped-def]
     for i in range(len(bodies.motion)):
         if bodies.frame[i] == NOMINAL:
             continue
-        own, to = 0.0, bodies.passed[i]
-        for x in range(bodies.at[i], bodies.at[i + 1]):
-            own += change[to + x - bodies.at[i]] ** 2
-            reached += (bodies.size[i] * (u[x] - u0[x])) ** 2
+        own, moved, to, first, last = 0.0, 0.0, bodies.passed[i], bodies.at[i], bodies.at[i + 1]
+        asks, now, before = change[to : to + last - first], u[first:last], u0[first:last]
+        for x in range(last - first):
+            own += asks[x] ** 2
+            moved += (now[x] - before[x]) ** 2
+        reached += bodies.size[i] ** 2 * moved
         size += own
         if own > most:
             most, worst = own, i
@@ -234,8 +241,10 @@ def taken(c, bodies, trial):  # type: ignore[no-untyped-def]
     u, change = trial.u, trial.change
     for i in range(len(bodies.motion)):
         if bodies.frame[i] != NOMINAL:
-            for x in range(bodies.at[i + 1] - bodies.at[i]):
-                u[bodies.at[i] + x] += change[bodies.passed[i] + x] / bodies.size[i]
+            own, by = u[bodies.at[i] : bodies.at[i + 1]], 1.0 / bodies.size[i]
+            step = change[bodies.passed[i] : bodies.passed[i] + len(own)]
+            for x in range(len(own)):
+                own[x] += by * step[x]
     k = len(trial.z)
     for m in range(k):
         trial.z[m] += trial.change[len(trial.change) - k + m] / c.weight
