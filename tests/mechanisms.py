@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from kedfem.compiled import compiling
 from kedfem.errors import MotionError, SolveError
-from tests.cells import apart, as_a_run, run_of
+from tests.cells import apart, run_of
 from tests.driven_mechanisms import FRAMES, LAWS, tried
 from tests.moving import beam_in_space, turned
 from tests.partners import joint
@@ -63,9 +63,9 @@ def as_lists(made: Raw) -> Raw:
     return {key: np.asarray(x).tolist() if key in {"at", "axis", "axes"} else x for key, x in made.items()}
 
 
-def stepped(raw: Raw) -> tuple[Begun, np.ndarray, np.ndarray]:
-    """A scene with displacements and rates (T, N) of its steps."""
-    of = as_a_run(begun(raw))
+def stepped(raw: Raw, today: bool = False) -> tuple[Begun, np.ndarray, np.ndarray]:
+    """A scene with displacements and rates (T, N) of its steps; see `begun`."""
+    of = begun(raw, today=today, as_run=True)
     history = marched(of, STEPS)[1]
     return of, rows(of.ready, history.u), rows(of.ready, history.v)
 
@@ -93,9 +93,10 @@ def momentum(of: Begun, v: np.ndarray) -> float:
 def checked(seed: int, most: int = 12) -> dict[str, float]:
     """How far a mechanism is from each law, of the peak."""
     raw = mechanism(seed, most)
-    of, u, v = stepped(raw)
+    all_elastic = not any(link["model"] == "rigid" for link in raw["links"].values())
+    of, u, v = stepped(raw, today=all_elastic)
     found = {"monolithic": apart(u, by_oracle(of, STEPS, keeps=True)[0])}
-    if not any(link["model"] == "rigid" for link in raw["links"].values()):
+    if all_elastic:
         found["run"] = apart(run_of(of), u)
     if not any("ground" in each["links"] for each in raw["joints"].values()):
         found["momentum"] = momentum(of, v)

@@ -19,8 +19,10 @@ from kedfem.dynamics.system.monolithic.monolithic import Monolithic
 from kedfem.dynamics.system.monolithic.monolithic_steps import begun as as_the_oracle_begins
 from kedfem.dynamics.system.monolithic.monolithic_tangent import inverse, rotated_stiffness
 from kedfem.dynamics.system.ready import Ready, displacements, ready
+from kedfem.dynamics.system.starts.accelerations import accelerated_in_a_step, accelerations
 from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.dynamics.system.state import History, State
+from kedfem.links.build import bare_links
 from kedfem.links.record import mass_times
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.rigid import RigidMotion, rigid_motion
@@ -42,8 +44,9 @@ class Begun:
 
 
 def begun(
-    raw: dict[str, Any], frames: str | None = None, driven: bool = True, today: bool = True, **unchecked: Any
-) -> Begun:
+    raw: dict[str, Any], frames: str | None = None, driven: bool = True, today: bool = True, as_run: bool = False,
+    **unchecked: Any,
+) -> Begun:  # fmt: skip
     """A scene as a system.
 
     Parameters
@@ -51,6 +54,7 @@ def begun(
     frames : given after the scene has been checked: what today's solvers refuse
     driven : whether its drives stay
     today : whether there is a model as today's solvers have it, without points for springs, motors and rigid links
+    as_run : whether it begins as runs with co-rotational frames begin
     unchecked : sections put in after the check
     """
     raw = {**raw, "analysis": {**raw["analysis"], "initial": "rest"}}
@@ -61,8 +65,9 @@ def begun(
         scene.fill(drive=None, drives={})
     scene.fill(**unchecked)
     linkage, path = moving(scene)
-    system = system_of(scene, linkage, path)
-    model = elastic_model(scene, linkage, along=path) if today else system.model
+    known = bare_links(scene)
+    system = system_of(scene, linkage, path, elastic_model(scene, linkage, known, path, elements=True))
+    model = elastic_model(scene, linkage, known, path) if today else system.model
     made = Prepared(scene, linkage, path, model)
     of = ready(system, generalised_alpha(time_grid(scene).step, scene.analysis.rho_inf))
 
@@ -70,7 +75,8 @@ def begun(
         return rigid_motion(made.linkage, made.path, t, path_parameter(scene, t))
 
     rates = initial_rates(scene, made.linkage, made.path, system.model)
-    return Begun(made, of, rest(of, motion, rates), motion)
+    found = accelerated_in_a_step if as_run else accelerations
+    return Begun(made, of, rest(of, motion, rates, accelerated=found), motion)
 
 
 def stiffened(of: Begun) -> Begun:

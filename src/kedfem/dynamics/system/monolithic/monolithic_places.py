@@ -15,6 +15,7 @@ from kedfem.dynamics.system.forces.follower_loads import shown_by
 from kedfem.dynamics.system.record import Constraint, Curve, End, Spring, Stop, System, Term, law_at
 from kedfem.links.record import Link
 from kedfem.motion.constraints import ConstraintEquation, stacked
+from kedfem.motion.newton import cross_matrix
 from kedfem.motion.rigid import RigidMotion
 from kedfem.motion.values import features, gradients
 
@@ -126,7 +127,7 @@ def placed(end: End, R: Any, p: Any, z: Column) -> Pose:
 def point(pose: Pose, end: End, a: Float[np.ndarray, "3"]) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 k"]]:
     """Where a point of an end is, and how this changes with z."""
     arm = pose.Q @ (a - end.origin)
-    return pose.x + arm, pose.by_x + np.cross(pose.by_Q, arm, axisa=0, axisb=0, axisc=0)
+    return pose.x + arm, pose.by_x - cross_matrix(arm) @ pose.by_Q
 
 
 def of_rows(
@@ -149,7 +150,7 @@ def of_rows(
 
 def _by_z(pose: Pose, start: Float[np.ndarray, "3"], twist: Float[np.ndarray, "6"]) -> Column:
     """How a value changes with z, by the twist of a body at the origin of the coordinates: v = δx − δθ × (x − start)."""
-    return np.asarray(twist[:3] @ pose.by_x + (twist[3:] - np.cross(pose.x - start, twist[:3])) @ pose.by_Q)
+    return np.asarray(twist[:3] @ pose.by_x + (twist[3:] - cross_matrix(pose.x - start) @ twist[:3]) @ pose.by_Q)
 
 
 def valued(system: System, term: Term, one: Pose, other: Pose) -> tuple[float, Column]:
