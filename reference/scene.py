@@ -154,6 +154,7 @@ NAMED = {
     loads.ForceVector: ("vector", "N"),
     loads.TorqueVector: ("vector", "N m"),
     loads.BodyVector: ("vector", "N/m³"),
+    loads.LineVector: ("vector", "N/m"),
     loads.SurfaceVector: ("vector", "Pa"),
     curves.FactorOver: ("number or curve", ""),
     curves.TorqueOver: ("number or curve", "N·m"),

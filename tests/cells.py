@@ -43,6 +43,7 @@ LAWS = (
     "damping of mass", "no numerical damping",
 )  # fmt: skip
 LIMIT = "limit of the joint"
+LINE = "load along a line"
 ON_JOINT = {"drive on the joint": DRIVEN, "drive of the travel": ("cylindrical", "screw", "planar")}
 WITHIN = {"rigid-body": 1e-8, "stiffening": 1e-8, "co-rotational": 1e-7}
 #: rigid-body, with beams in space: rounding beside the stiff rigid parts at their ends limits the fast step; a diameter
@@ -100,7 +101,7 @@ class Cell:
 
 
 FACTORS: dict[str, tuple[Any, ...]] = {
-    "joint": KINDS, "frames": FRAMES, "driven": (True, False), "links": tuple(LINKS), "law": (*LAWS, LIMIT),
+    "joint": KINDS, "frames": FRAMES, "driven": (True, False), "links": tuple(LINKS), "law": (*LAWS, LIMIT, LINE),
 }  # fmt: skip
 
 
@@ -118,7 +119,7 @@ def all_cells() -> list[Cell]:
     first = [Cell(*x) for x in product(KINDS, FRAMES, (True, False), LINKS)]
     first += [Cell(*x) for x in product(DRIVEN, FRAMES, (True,), ("beams in space", "on the ground"), ON_JOINT)]
     found = [cell for cell in first if cell.drawn]
-    for laws in (LAWS, (LIMIT,)):
+    for laws in (LAWS, (LIMIT,), (LINE,)):
         every = [cell for x in product(*{**FACTORS, "law": laws}.values()) if (cell := Cell(*x)).drawn]
         np.random.default_rng(12).shuffle(every)  # type: ignore[arg-type]
         left = set().union(*map(pairs, every)) - set().union(*map(pairs, found))
@@ -158,6 +159,8 @@ def scene_of(cell: Cell) -> Raw:
     frame = "link" if cell.law == "loads that turn" else "world"
     vector = [10.0, 20.0, 0.0 if cell.plane else 5.0]
     raw["loads"] = {"f": {"kind": "force", "link": "crank", "at": crank, "vector": vector, "frame": frame}}
+    if cell.law == LINE:
+        raw["loads"]["q"] = along_a_line(raw["links"], cell.plane)
     more: Raw = {**raw, **sections(cell, crank, raw["joints"]["J"])}
     J, laws = raw["joints"]["J"], BUSHINGS.get(cell.law)
     if laws is not None:
@@ -169,6 +172,13 @@ def scene_of(cell: Cell) -> Raw:
     if cell.law in GEARS:
         geared(more, cell)
     return more
+
+
+def along_a_line(links: Raw, plane: bool) -> Raw:
+    """A load that changes along a beam or a bar, and turns with it; where there is neither, one that is refused."""
+    lines = [name for name, x in links.items() if x["model"] == "beam" or (x["model"] == "rigid" and "shape" in x)]
+    vector, end = ([40.0, -80.0, 0.0 if plane else 30.0], [10.0, 90.0, 0.0 if plane else -20.0])
+    return {"kind": "line", "link": (lines or ["crank"])[0], "frame": "link", "vector": vector, "end_vector": end}
 
 
 BUSHINGS: dict[str, Raw] = {

@@ -59,6 +59,12 @@ def loads(kind: str, R: np.ndarray) -> dict[str, Raw]:
     found = {"force": force}
     if kind in {"beam", "spatial beam"}:
         found["torque"] = torque
+    if kind in {"beam", "spatial beam"}:
+        ends = [(R @ [0.05, 0, 0]).tolist(), (R @ [0.38, 0, 0]).tolist()]
+        pull = {"vector": (R @ [20, 200, 50]).tolist(), "end_vector": (R @ [0, 90, -30]).tolist(), "between": ends}
+        if kind == "beam":
+            pull = {"vector": [20, 200], "end_vector": [0, 90], "between": [x[:2] for x in ends]}
+        found["line"] = {"kind": "line", "link": "arm", "frame": "link", **pull}
     if kind == "spatial beam":
         found["world"] = torque | {"frame": "world"}
     if kind in {"plane", "solid"}:
@@ -82,8 +88,9 @@ def moving(kind: str, R: np.ndarray, driven: bool) -> Raw:
 
 
 CASES = [
-    ("beam", "force"), ("beam", "torque"), ("plane", "force"), ("plane", "pressure"), ("solid", "force"),
-    ("solid", "pressure"), ("spatial beam", "force"), ("spatial beam", "torque"), ("spatial beam", "world"),
+    ("beam", "force"), ("beam", "torque"), ("beam", "line"), ("plane", "force"), ("plane", "pressure"),
+    ("solid", "force"), ("solid", "pressure"), ("spatial beam", "force"), ("spatial beam", "torque"),
+    ("spatial beam", "line"), ("spatial beam", "world"),
 ]  # fmt: skip
 
 

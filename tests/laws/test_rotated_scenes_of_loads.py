@@ -18,7 +18,8 @@ ACROSS = {  # what turns the load, along z where it is drawn, into these
     "z": np.eye(3), "oblique": Rotation.from_rotvec([0.9, -0.7, 1.3]).as_matrix(),
 }  # fmt: skip
 CASES = [
-    ("rigid", "force"), ("beam", "force"), ("beam", "body"), ("solid", "force"), ("solid", "body"),
+    ("rigid", "force"), ("rigid", "line"), ("beam", "force"), ("beam", "body"), ("beam", "line"), ("beam", "pressure"),
+    ("solid", "force"), ("solid", "body"),
     ("solid", "surface"), ("solid", "pressure"),
 ]  # fmt: skip
 
@@ -42,6 +43,7 @@ def push(load: str, R: np.ndarray, size: float) -> Raw:
     down, end, face = R @ [0, 0, -size], (R @ [LONG, 0, 0]).tolist(), (R @ [LONG / 2 + 0.01, 0, WIDE / 2]).tolist()
     return {"link": "arm", "kind": load} | {
         "force": {"at": end, "vector": down.tolist(), "frame": "link"},
+        "line": {"vector": (down / LONG).tolist(), "frame": "link"},
         "body": {"vector": (down / (LONG * WIDE**2)).tolist(), "frame": "link"},
         "surface": {"at": face, "vector": (down / (LONG * WIDE)).tolist(), "frame": "link"},
         "pressure": {"at": face, "pressure": size / (LONG * WIDE)},

@@ -54,6 +54,17 @@ def bare(**load: Any) -> Raw:
     return changed(BASES["beam"], {"loads/l": {"link": "shoe", **load}})
 
 
+def line(more: Raw) -> Raw:
+    """A polyline of some section."""
+    return {"kind": "polyline", "points": [[0, 0, 0], [0.5, 0, 0], [1, 0, 0]], **more}
+
+
+def loaded(model: str, shape: Raw | None = None, **load: Any) -> Raw:
+    """A load on a link with a shape."""
+    change: Raw = {"links/arm/model": model, "loads/l": {"link": "arm", **load}}
+    return changed(BASES["beam"], change | ({"links/arm/shape": shape} if shape else {}))
+
+
 def planar(kind: str, other: str) -> Raw:
     """A plane link joined to a solid or rigid one between hinges."""
     links = {"a": bar("beam", (0, 0), (0.1, 0), 1), "b": bar("plane", (0.1, 0), (0.3, 0)),
@@ -125,6 +136,10 @@ SCENES: list[Raw] = [
     planar("weld", "rigid"),
     bare(kind="torque", at=[1, 0], vector=[0, 0, 1]), bare(kind="body", force_density=[0, 1]),
     bare(kind="surface", at=[1, 0], axis="x", force=[0, 1]), bare(kind="pressure", at=[1, 0], axis="x", pressure=5),
+    bare(kind="line", vector=[0, 1]),
+    loaded("beam", kind="surface", at=[0.1, 0.1], vector=[0, 1]), loaded("plane", kind="line", vector=[0, 1]),
+    loaded("beam", line({"section": {"kind": "round", "diameter": 0.2}}), kind="pressure", at=[0.1, 0.1], pressure=1),
+    loaded("beam", line({"width": 0.2, "thickness": 0.2, "smooth": True}), kind="pressure", at=[0.1, 0.1], pressure=1),
     {**inverted(), **over("travel")}, {**driven_slide(), **over("angle", "one")},
     {**inverted(), **over("angle"), "drive": None, "drives": {"a": turning(), "b": {**turning(), "joint": "B"}}},
     changed(BASES["free"], {

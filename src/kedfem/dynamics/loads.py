@@ -1,6 +1,6 @@
 """Loads P of the general equation: constant patterns on the link, times factors over time.
 
-[KED, eqs. (15)(16)]: body, surface and concentrated forces by Nᵀ; couples by the rotation of a coupling surface.
+[KED, eqs. (15)(16)]: body, line, surface and point forces by Nᵀ; couples by the rotation of a coupling surface.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -10,14 +10,15 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.joints.places import on_part, surface_of
-from kedfem.dynamics.load_weights import Vector, at_point, face, load_weights, point_weights
+from kedfem.dynamics.load_weights import Vector, at_point, line_forces, load_weights, point_weights, pressed
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import Link, as_rows
-from kedfem.links.surfaces.coupling_surfaces import face_normals, joint_surface, surface_couples
+from kedfem.links.surfaces.coupling_surfaces import joint_surface, surface_couples
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import (
     BodyLoad,
     ForceLoad,
+    LineLoad,
     Load,
     PressureLoad,
     Scene,
@@ -123,9 +124,10 @@ def _load_patterns(scene: Scene, where: str, load: Load, links: Mapping[str, Lin
         case TorqueLoad() if parts:
             return _torque(scene, where, load, parts)
         case PressureLoad() if parts:
-            faces = face(where, load, parts)
-            pushed = {key: face_normals(parts[key], surface) for key, surface in faces.items()}
-            return {key: [Pattern(-load.pressure * x, True, factor)] for key, x in pushed.items()}
+            return {key: [Pattern(load.pressure * x, True, factor)] for key, x in pressed(where, load, parts).items()}
+        case LineLoad() if parts:
+            forces = line_forces(scene, where, load, parts)
+            return {key: [Pattern(x, load.frame == "link", factor)] for key, x in forces.items()}
         case ForceLoad() | BodyLoad() | SurfaceLoad():
             follows, vector = load.frame == "link", np.asarray(load.vector)
             return {

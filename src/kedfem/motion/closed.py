@@ -26,7 +26,6 @@ from kedfem.scene import (
     Part,
     PlateLink,
     Polyline,
-    Probe,
     RigidBody,
     Scene,
     Spring,
@@ -112,10 +111,12 @@ def _moved(record: AnyRecord, shift: Shift) -> AnyRecord:
     """What is on a link: its points, a vector in the link's frame, inertia."""
     given = [key for key in ("at", "centre") if getattr(record, key, None) is not None]
     change: dict[str, Any] = {key: shift.point(getattr(record, key)) for key in given}
-    if getattr(record, "frame", None) == "link" and hasattr(record, "vector"):
-        change["vector"] = shift.rotated(record.vector)
-    if isinstance(record, Probe) and record.chord is not None:
-        change["chord"] = tuple(shift.point(x) for x in record.chord)
+    for key in ("vector", "end_vector") if getattr(record, "frame", None) == "link" else ():
+        if getattr(record, key, None) is not None:
+            change[key] = shift.rotated(getattr(record, key))
+    for key in ("chord", "between"):  # of probes and of loads along a line
+        if getattr(record, key, None) is not None:
+            change[key] = tuple(shift.point(x) for x in getattr(record, key))
     if isinstance(record, RigidBody):
         J = shift.R @ inertia_tensor(record.inertia) @ shift.R.T
         change["inertia"] = moments_of_inertia(J)

@@ -16,7 +16,7 @@ from kedfem.results.channels import STRESS, XYZ, Channel
 from kedfem.results.deflections import deflection
 from kedfem.results.link_points import LinkPoint, Point, link_point
 from kedfem.results.recorded import Recorded, Rows
-from kedfem.scene import ForceLoad, Probe, Scene, TorqueLoad
+from kedfem.scene import ForceLoad, LineLoad, Probe, Scene, TorqueLoad
 
 ELASTIC = {"displacement": "u", "velocity": "v", "acceleration": "a"}
 UNITS = {"velocity": "m/s", "acceleration": "m/s^2", "total_velocity": "m/s", "total_acceleration": "m/s^2"}
@@ -107,9 +107,10 @@ def _stress(scene: Scene, model: Model, where: str, name: str, probe: Probe) -> 
 
 
 def _kinks(scene: Scene, link: str) -> Float[np.ndarray, "_ 3"]:
-    """Points of a link with single forces: its joints, bodies and loads at a point [m]."""
+    """Points of a link with single forces, or with ends of forces per length: joints, bodies and loads [m]."""
     joints = [joint.at for joint in scene.joints.values() if link in joint.links]
     bodies = [body.at for body in scene.bodies.values() if body.link == link]
     single = [x for x in scene.loads.values() if isinstance(x, ForceLoad | TorqueLoad) and x.link == link]
     forces = [load.at for load in single if load.at is not None]
-    return np.array([*joints, *bodies, *forces]).reshape(-1, 3)
+    lines = [x.between for x in scene.loads.values() if isinstance(x, LineLoad) and x.link == link and x.between]
+    return np.array([*joints, *bodies, *forces, *(end for line in lines for end in line)]).reshape(-1, 3)

@@ -56,6 +56,7 @@ from kedfem.scene.records.loads import (
     BodyLoad,
     Flywheel,
     ForceLoad,
+    LineLoad,
     Load,
     PointMass,
     PressureLoad,

@@ -56,6 +56,18 @@ def lagrange(at: float, points: Float[np.ndarray, " q"]) -> Float[np.ndarray, " 
     return np.array([np.prod([(at - q) / (p - q) for q in points if q != p]) for p in points])
 
 
+def between_gauss(r: float, nodes: int) -> Float[np.ndarray, " q"]:
+    """What dM/ds at the Gauss points says of M beyond the polynomial through its values there, at r, divided by det J.
+
+    That is c P_q(r), zero at all q Gauss points, whose derivative has the highest term of dM/ds, the shear force. So M is
+    exact where the force per length is constant, though an element may have two such points alone.
+    """
+    q = nodes - 1
+    points, weights = np.polynomial.legendre.leggauss(q)
+    last, before = (np.polynomial.legendre.Legendre.basis(k) for k in (q, q - 1))
+    return np.asarray(last(r) * weights * before(points) / 2)
+
+
 def nearest_parameter(x: Float[np.ndarray, "m d"], point: Float[np.ndarray, " d"]) -> float:
     """Parent coordinate in [-1, 1] of the point of a line element that is nearest to a point."""
     r = 0.0

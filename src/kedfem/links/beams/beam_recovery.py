@@ -1,17 +1,20 @@
 """Stress of a planar beam from the strains at its reduced Gauss points, which are its most accurate ones.
 
+Within an element the bending moment is the polynomial through them, and one degree more, given by the shear force, which
+is the derivative of the moment: exact under a force per length that is constant.
+
 A probe interpolates the nearest four of them by a cubic. Its error falls with the third power of the elements' length, at
 nodes and half way between them with the fourth, if the moment is smooth along a straight run of elements, as under
-distributed loads. Joints, bodies and forces at a point (kinks) end a run. In elements of more than five nodes the
-interpolation takes as many points as an element has.
+distributed loads. Joints, bodies, forces at a point and ends of forces per length (kinks) end a run. In elements of more
+than five nodes the interpolation takes as many points as an element has.
 """
 
 import numpy as np
 import scipy.sparse as sp
 
 from kedfem.arrays import Float, Int
-from kedfem.links.beams.beam import lagrange, nearest_parameter, parent_nodes, shape_functions, strain_rows
-from kedfem.links.record import Link
+from kedfem.links.beams.beam import between_gauss, lagrange, nearest_parameter, parent_nodes, shape_functions, strain_rows
+from kedfem.links.record import Link, section_of
 
 THROUGH = 4  # Gauss points of a probe at least
 STRAIGHT = 1e-9  # sine of the angle between elements of a run
@@ -52,6 +55,8 @@ def fibre_row(link: Link, element: int, r: float, offset: float, kinks: Points |
     kinks : places of joints, bodies and forces [m]; the element's own Gauss points alone if not given
     """
     run = np.array([element]) if kinks is None else straight_run(link, element, kinks)
+    if len(run) == 1:
+        return _within(link, element, r, offset)
     start, along = link.X[link.cells[element][0], :2], _side(link, element)
     length = np.linalg.norm(along)
     points = [(int(e), float(q)) for e in run for q in _gauss(link)]
@@ -64,6 +69,19 @@ def fibre_row(link: Link, element: int, r: float, offset: float, kinks: Points |
         e, q = points[j]
         rows = strain_rows(link.X[link.cells[e]][:, :2], q)[0]
         out[link.cells[e]] += w * link.E * (rows[0] - offset * rows[2]).reshape(-1, 3)
+    return out.ravel()
+
+
+def _within(link: Link, element: int, r: float, offset: float) -> Float[np.ndarray, " k"]:
+    """`fibre_row` by one element alone: M at its Gauss points, and what its shear force says between, dM/ds = −κGA γ."""
+    cell, section = link.cells[element], section_of(link)
+    x, gauss = link.X[cell][:, :2], _gauss(link)
+    points = [strain_rows(x, float(q)) for q in gauss]
+    of_shear = section.shear_coefficient * link.lame[1] * section.area / (link.E * section.second_moment)
+    out = np.zeros((link.n, 3))
+    for (rows, det_J), w, more in zip(points, lagrange(r, gauss), between_gauss(r, len(cell)), strict=True):
+        curvature = w * rows[2] - more * det_J * of_shear * rows[1]
+        out[cell] += link.E * (w * rows[0] - offset * curvature).reshape(-1, 3)
     return out.ravel()
 
 

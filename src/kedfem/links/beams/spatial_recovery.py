@@ -4,9 +4,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from kedfem.arrays import Float, Int
-from kedfem.links.beams.beam import lagrange, line_pairs, nearest_parameter, parent_nodes, shape_functions
+from kedfem.links.beams.beam import between_gauss, lagrange, line_pairs, nearest_parameter, parent_nodes, shape_functions
 from kedfem.links.beams.section import Section, outline, torsion_stress
-from kedfem.links.beams.spatial_beam import space_strains
+from kedfem.links.beams.spatial_beam import STRAIGHT, rigidities, space_strains
 from kedfem.links.record import Link, section_of
 
 
@@ -22,10 +22,18 @@ def section_value(link: Link, element: int, r: float, y: float, z: float) -> Flo
 
 
 def beam_strains(link: Link, element: int, r: float) -> Float[np.ndarray, "6 k"]:
-    """Rows (6, 3n) of (ε, γ1, γ2, κ1, κ2, τ): those of the reduced Gauss points, extended to r."""
+    """Rows (6, 3n) of (ε, γ1, γ2, κ1, κ2, τ): those of the reduced Gauss points, extended to r.
+
+    In a straight element bending moments between these are what its shear forces say too, dM1/ds = κ1 GA γ1.
+    """
     x = element_frame(link, element)
     gauss = np.polynomial.legendre.leggauss(len(x) - 1)[0]
-    rows = sum(w * space_strains(x, float(p))[0] for w, p in zip(lagrange(r, gauss), gauss, strict=True))
+    points = [space_strains(x, float(p)) for p in gauss]
+    rows = sum(w * of for w, (of, _) in zip(lagrange(r, gauss), points, strict=True))
+    if np.ptp(x[:, 1:], axis=0).max() < STRAIGHT:
+        rigidity = rigidities(section_of(link), link.E, link.lame[1])
+        for more, (of, det_J) in zip(between_gauss(r, len(x)), points, strict=True):
+            rows[3:5] += more * det_J * (rigidity[1:3] / rigidity[3:5])[:, None, None, None] * of[1:3]
     triples = _triples(link, link.cells[element])
     out = np.einsum("smfc,mfn->snc", rows, triples.reshape(len(x), 3, link.n))
     return np.asarray(out.reshape(6, -1))

@@ -210,7 +210,9 @@ def loads(parts: Parts) -> Iterator[Reported]:
             continue
         kind = "slider" if slider(link) else category(link)
         facts = {"element": str(load.word("kind")), "link": kind}
-        words = {"name": link.name, "noun": NOUNS.get(kind, kind)}
+        section, smooth = link.word("shape", "section", "kind") or "", link.given("shape", "smooth") is True
+        facts |= {"section": section, "line": "smooth" if smooth else "straight"}
+        words = {"name": link.name, "noun": NOUNS.get(kind, kind), "section": section}
         facts |= {"factor": load.word("factor", "over") or "", **driven(parts)}
         yield "loads", facts, load.where, words
 

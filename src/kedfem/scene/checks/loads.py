@@ -10,6 +10,7 @@ from kedfem.scene.checks.parts import Entry, Parts, category, link_names
 from kedfem.scene.records.analysis import ELASTIC
 from kedfem.scene.records.joints import ROTARY
 from kedfem.scene.records.links import GROUND
+from kedfem.scene.records.materials import LINE
 from kedfem.scene.records.wording import unknown_name
 
 
@@ -21,6 +22,8 @@ def load_faults(parts: Parts) -> Iterator[Fault]:
             here = [x.name for x in parts.joints.values() if load.word("link") in link_names(x)]
             if at in parts.joints and at not in here:
                 yield load.fault("joint", unknown_name("a joint of the link", at, here))
+        if (link := parts.links.get(load.word("link") or "")) is not None and load.word("kind") == "line":
+            yield from line_faults(load, link)
     for probe in parts.probes.values():
         link, quantity = parts.links.get(probe.word("link") or ""), probe.word("quantity")
         if link is not None and category(link) == "rigid" and quantity in {"stress", "deflection"}:
@@ -32,6 +35,14 @@ def load_faults(parts: Parts) -> Iterator[Fault]:
             yield probe.fault("quantity", f"must be {wanted} {why}, got {quantity!r}")
     for body in parts.bodies.values():
         yield from flywheel_faults(body, parts)
+
+
+def line_faults(load: Entry, link: Entry) -> Iterator[Fault]:
+    """A load along a line of a rigid link that has no line of its own."""
+    own = link.word("shape", "kind") in {"bar", "polyline"} and not (link.word("material") or "").startswith(LINE)
+    if category(link) == "rigid" and link.has("shape") and not own and not load.has("between"):
+        wanted = "is required [m] on a rigid link that is no bar or polyline: two points of a line, got nothing"
+        yield load.fault("between", wanted)
 
 
 def flywheel_faults(body: Entry, parts: Parts) -> Iterator[Fault]:

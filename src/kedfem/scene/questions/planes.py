@@ -119,7 +119,8 @@ def leaving(scene: Scene, whose: str) -> Iterator[Fault]:
 def _vectors(scene: Scene) -> Iterator[tuple[Where, XYZ | None, bool]]:
     """What acts on links and moves them at the start, and whether it turns them."""
     for name, load in scene.loads.items():
-        yield ("loads", name, "vector"), getattr(load, "vector", None), load.kind == "torque"
+        for key in ("vector", "end_vector"):
+            yield ("loads", name, key), getattr(load, key, None), load.kind == "torque"
     start = scene.analysis
     for name, force in start.initial_deflection.items():
         yield ("analysis", "initial_deflection", name, "force"), force.force, False
@@ -205,6 +206,8 @@ def _points(record: Any) -> Iterator[tuple[Where, XYZ]]:
     at = getattr(record, "at", None)
     for name, point in at.points.items() if isinstance(at, Apart) else ():
         yield ("at", name), point
+    for i, point in enumerate(getattr(record, "between", None) or ()):
+        yield ("between", i), point
     for key in ("at", "centre"):
         if getattr(record, key, None) is not None:
             yield (key,), getattr(record, key)

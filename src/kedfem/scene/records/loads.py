@@ -13,6 +13,7 @@ from kedfem.errors import Fault
 from kedfem.scene.records.base import JointName, LinkName, Record, refuse
 from kedfem.scene.records.curves import ONE, FactorOver, Force, Torque
 from kedfem.scene.records.points import Point, as_vector
+from kedfem.scene.records.shapes import TwoPoints
 from kedfem.scene.records.units import Mass, Pressure, Quantity, fault
 
 Inertia = Annotated[float, Quantity("kg*m^2")]
@@ -56,10 +57,12 @@ def inertia_faults(inertia: Sequence[float]) -> list[Fault]:
 
 
 ForcePerVolume = Annotated[float, Quantity("N/m^3")]
+ForcePerLength = Annotated[float, Quantity("N/m")]
 PositiveInertia = Annotated[float, Quantity("kg*m^2", above=0.0)]
 ForceVector = Annotated[tuple[Force, Force, Force], BeforeValidator(as_vector)]
 TorqueVector = Annotated[tuple[Torque, Torque, Torque], BeforeValidator(as_vector)]
 BodyVector = Annotated[tuple[ForcePerVolume, ForcePerVolume, ForcePerVolume], BeforeValidator(as_vector)]
+LineVector = Annotated[tuple[ForcePerLength, ForcePerLength, ForcePerLength], BeforeValidator(as_vector)]
 SurfaceVector = Annotated[tuple[Pressure, Pressure, Pressure], BeforeValidator(as_vector)]
 
 
@@ -98,6 +101,19 @@ class BodyLoad(_Directed):
     """the force per volume"""
 
 
+class LineLoad(_Directed):
+    """A force per length along the axis of a beam, or along a line of a rigid link."""
+
+    kind: Literal["line"] = "line"
+    vector: LineVector
+    """the force per length of the axis"""
+    end_vector: LineVector | None = None
+    """the force per length where the load ends, changing linearly from `vector` to it; constant if not given"""
+    between: TwoPoints | None = None
+    """two points of the axis, from which and to which it acts; if not given on all of it. Of a rigid link two points on a
+    straight line, of a polyline or a bar if not given those of its shape"""
+
+
 class SurfaceLoad(_Directed):
     """A force per area on a face of a solid link."""
 
@@ -109,11 +125,12 @@ class SurfaceLoad(_Directed):
 
 
 class PressureLoad(_Load):
-    """A pressure on a face of a solid or plane link: normal to the face everywhere, also as it rotates with the link."""
+    """A pressure on a face of a solid or plane link, or a flat side of a beam: normal to it, also as the link rotates."""
 
     kind: Literal["pressure"] = "pressure"
     at: Point
-    """a point of the flat or curved face, in the reference position"""
+    """a point of the flat or curved face, in the reference position; of a beam a point of one side of its section, half
+    the width or thickness off its axis: it acts on this side of all of the axis in line with it"""
     pressure: Pressure
     """force per area, positive pushing on the face"""
 
@@ -132,7 +149,7 @@ class TorqueLoad(_Directed):
     """the torque"""
 
 
-Load = Annotated[ForceLoad | BodyLoad | SurfaceLoad | PressureLoad | TorqueLoad, Field(discriminator="kind")]
+Load = Annotated[ForceLoad | BodyLoad | LineLoad | SurfaceLoad | PressureLoad | TorqueLoad, Field(discriminator="kind")]
 
 
 class Flywheel(Record):
