@@ -299,8 +299,14 @@ def test_everything_on_a_link_goes_with_it(shift: Shift) -> None:
     force = {"kind": "force", "link": "arm", "at": [0.4, 0], "vector": [1.0, 2.0]}
     body = {"kind": "rigid_body", "link": "arm", "at": [0, 0], "mass": 1.0, "inertia": list(inertia), "centre": [0, 0.01]}
     ends = [{"link": "arm", "at": [0.4, 0]}, {"link": "ground", "at": [0.4, 1]}]
+    line = {"kind": "line", "link": "arm", "vector": [3.0, 4.0], "end_vector": [5.0, 6.0], "between": [[0, 0], [0.4, 0]]}
     raw = arm(
-        loads={"world": force, "link": {**force, "frame": "link"}},
+        loads={
+            "world": force,
+            "link": {**force, "frame": "link"},
+            "line": line,
+            "turning line": {**line, "frame": "link"},
+        },
         bodies={"wheel": body},
         springs={"spring": {"kind": "spring", "between": ends, "stiffness": 1.0}},
     )
@@ -313,8 +319,12 @@ def test_everything_on_a_link_goes_with_it(shift: Shift) -> None:
     raw["analysis"] |= {"initial": "quasi-static", "initial_deflection": {"pluck": pluck}}
     scene = closed_scene(scene_from(raw), {"arm": shift})
     R, tip = Rotation.from_rotvec(shift.theta).as_matrix(), moved(shift, [0.4, 0, 0])
-    for load in scene.loads.values():
-        assert_allclose(load.at, tip, rtol=0, atol=1e-15)  # type: ignore[union-attr]
+    for name in ("world", "link"):
+        assert_allclose(scene.loads[name].at, tip, rtol=0, atol=1e-15)  # type: ignore[union-attr]
+    for name, T in (("line", np.eye(3)), ("turning line", R)):
+        load: Any = scene.loads[name]
+        assert_allclose(load.between, [moved(shift, [0, 0, 0]), tip], rtol=0, atol=1e-15)
+        assert_allclose([load.vector, load.end_vector], [T @ [3, 4, 0], T @ [5, 6, 0]], rtol=0, atol=1e-14)
     assert scene.loads["world"].vector == (1.0, 2.0, 0.0)  # type: ignore[union-attr]
     assert_allclose(scene.loads["link"].vector, R @ [1, 2, 0], rtol=0, atol=1e-14)  # type: ignore[union-attr]
     wheel = scene.bodies["wheel"]
