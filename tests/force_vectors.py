@@ -12,8 +12,8 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.dynamics.force_elements import law_of, on_hinge
 from kedfem.dynamics.history import LinkHistory
-from kedfem.dynamics.joints.places import slider_axis, surface_of
-from kedfem.dynamics.model import Model, Slider, on_segment
+from kedfem.dynamics.joints.places import surface_of
+from kedfem.dynamics.model import Model, on_segment
 from kedfem.dynamics.system.record import Law, Times
 from kedfem.links.point_rows import point_rows, require_on_axis
 from kedfem.links.record import Link
@@ -175,8 +175,7 @@ def _all(find: "_Ends") -> tuple[ForceElement, ...]:
 
 def _on_model(scene: Scene, model: Model) -> "_Ends":
     fixed = {x.link.name: x.body for x in model.prescribed} | {GROUND: 0}
-    fixed |= {name: 0 for name in scene.links if slider_axis(scene, name) is not None}
-    return _Ends(scene, fixed, model.links, model.bodies, model.sliders)
+    return _Ends(scene, fixed, model.links, model.bodies)
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,21 +183,16 @@ class _Ends:
     """Where ends are.
 
     fixed : links that only move as given, with the bodies that they move with
-    links, numbers, sliders : of a model
+    links, numbers : of a model
     """
 
     scene: Scene
     fixed: Mapping[str, int]
     links: Sequence[Link] = ()
     numbers: Sequence[int] = ()
-    sliders: Sequence[Slider] = ()
 
     def point(self, where: str, name: str, at: Vector) -> End:
-        """A point of a link, the ground or a slider, which rides on its carrier and never turns."""
-        for slider in self.sliders:
-            if slider.name == name:
-                port = np.asarray(self.scene.joints[slider.joint].at)
-                return self._end(slider.carrier, POINT, slider.weights[None], port[None], at - port, name)
+        """A point of a link or the ground."""
         if name in self.fixed:
             return End(-1, self.fixed[name], POINT, np.zeros((1, 0)), at[None], link=name)
         k, rows = on_segment(self.links, name, at, lambda link: point_rows(link, where, at))

@@ -131,6 +131,9 @@ def chain(
     seeds = SEEDS | DRIVEN_SEEDS if driven and driven != "travel" else SEEDS
     random = np.random.default_rng(seeds.get((kind, form), 0))
     axes = [direction(kind if k == here else each, k, places, plane, random) for k, each in enumerate(kinds, start=1)]
+    swapped = partners[0] == "bare" and not on_ground  # what slides on the ground comes second
+    if kind == "slot" and swapped:  # the line is on the link before
+        axes[here - 1] = places[here] - places[here - 1]
     R = turned(axes[here - 1])
 
     def vector(x: Any) -> list[float]:
@@ -140,15 +143,14 @@ def chain(
 
     names = ["ground", "crank", *(f"link {k}" for k in range(1, last)), "ground"]
     of = dict.fromkeys(names[1:-1], "planar beam" if plane else "beam")
-    swapped = partners[0] == "bare" and not on_ground  # what slides on the ground comes second
     of[names[here]] = partners[1] if swapped else partners[0]
     if not on_ground:
         of[names[here + 1]] = partners[0] if swapped else partners[1]
     links = {}
     for k, name in enumerate(names[1:-1]):
         a, b = places[k], places[k + 1]
-        if kind == "slot" and k == here:
-            a, b = b, b + 1.8 * (a - b)  # the pin in the middle
+        if kind == "slot" and k == here - swapped:  # the pin in the middle
+            a, b = (a, a + 1.8 * (b - a)) if swapped else (b, b + 1.8 * (a - b))
         links[name] = partner(of[name], vector(a), vector(b), vector(Z))
     first = flat * np.cross(places[1], GENERIC) if not plane else Z
     joints = {"A": hinge("ground", "crank", vector(places[0]), vector(first))}

@@ -10,7 +10,6 @@ from kedfem.accuracy.prepared import moving
 from kedfem.accuracy.variants import moved
 from kedfem.arrays import Float
 from kedfem.dynamics.inertias import Inertias, inertias_of_links
-from kedfem.dynamics.joints.places import slider_axis
 from kedfem.dynamics.rigid_body import all_motions
 from kedfem.errors import MeshError
 from kedfem.links.build import bare_link, part_meshes
@@ -32,7 +31,7 @@ from kedfem.results.forces.rigid import RigidForces, rigid_forces
 from kedfem.results.kinematic import Kinematics, kinematics_of, transmission_key
 from kedfem.results.recorded import drive_channel
 from kedfem.results.table import drive_heading
-from kedfem.scene import Bar, Cad, LinkScene, MeshFile, Meshing, Scene, time_grid
+from kedfem.scene import Bar, Cad, LinkScene, MeshFile, Meshing, Scene, masses_alone, time_grid
 from kedfem.stepping import Clock, Watch, frame_steps
 
 
@@ -156,7 +155,7 @@ def _missing(scene: Scene, linked: Linkage, masses: Inertias) -> Iterator[str]:
     """What rigid forces do not hold."""
     bare = [name for name in scene.links if not masses.mass[linked.bodies.index(name)] > 0]
     if bare:
-        sliders = [name for name in bare if slider_axis(scene, name) is not None]
+        sliders = masses_alone(scene)
         got = ", ".join(f"{name} (a slider without mass)" if name in sliders else name for name in bare)
         yield f"rigid forces: links without shape and material are taken to have no mass: {got}"
     if linked.mobility:

@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 
 from kedfem.errors import KedfemError
 from kedfem.scene import scene_from, spatial_beams
-from kedfem.scene.questions.modelling import SHARED
 from tests.cells import as_a_run
 from tests.laws.test_joint_rows import ROUNDING, assert_the_same, moved
 from tests.moving import channels, ran
@@ -35,14 +34,14 @@ BOTH_RIGID = 1e-3
 
 def refusal(kind: str, partners: tuple[str, str], driven: bool, plane: bool) -> str | None:
     """What the message says where the two do not go together; None if they do."""
-    bare = partners.count("bare")
-    if kind == "slot" and plane and bare and {"rigid", "bare"}.issuperset(partners):
-        return "links: must have a link whose motion no drive prescribes"
-    moving_ground = driven and kind == "revolute" and partners == ("bare", "ground")
-    if bare == 2 or (bare and partners[1] == "ground" and kind != "prismatic" and not moving_ground):
-        return r"links\.[\w ]+\.shape: is required for a rigid link that is neither a slider"
-    if bare and partners[1] != "ground" and (driven or kind not in SHARED):
-        return rf"joints\.J\.links: must join links with a shape by a {kind} joint .* a rigid slider"
+    raw = chain(kind, partners, driven, plane)
+    for name, link in raw["links"].items():
+        on = {key: joint for key, joint in raw["joints"].items() if name in joint["links"]}
+        guided = any(joint["kind"] == "prismatic" for joint in on.values())
+        drive_joint = on.get(raw["drive"]["joint"], {"kind": "", "links": ()})
+        moved = drive_joint["kind"] == "revolute" and "ground" in drive_joint["links"]
+        if link.keys() == {"model", "mass"} and not guided and not moved:
+            return r"links\.[\w ]+\.shape: is required for a rigid link that is neither a slider"
     return None
 
 

@@ -9,7 +9,6 @@ from numpy.testing import assert_allclose
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import prepared
 from kedfem.accuracy.variants import with_analysis
-from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.constraint_matrices import constraint_matrices
 from kedfem.dynamics.stepping.solvers import steps_of
@@ -17,7 +16,6 @@ from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.forces.exerted import effort, wrench
 from kedfem.dynamics.system.forces.supports import supports
 from kedfem.errors import MeshError, SceneError
-from kedfem.motion.linkage import linkage
 from kedfem.output.words import clock, moment
 from kedfem.scene import scene_from
 from tests.cells import Cell, scene_of
@@ -380,17 +378,6 @@ def test_what_does_not_suit_such_joints_is_refused() -> None:
     raw["joints"]["S"]["bushing"] = {"rotational_stiffness": 1.0}
     with pytest.raises(SceneError, match=r"joints\.S\.bushing\.rotational_stiffness: must .* got a slot joint"):
         scene_from(raw)
-
-
-def test_a_rigid_slider_bears_no_joint_with_rows() -> None:
-    raw = inverted("beam", "slot")
-    raw["links"]["shoe"] = {"model": "rigid", "mass": 1.0}
-    raw["joints"]["G"] = {"kind": "prismatic", "links": ["shoe", "ground"], "at": [0.5, 0], "axis": "x"}
-    raw["joints"]["T"] = {"kind": "slot", "links": ["shoe", "arm"], "at": [0.5, 0], "axis": "y"}
-    scene = scene_from(raw)
-    wanted = r"joints\.T\.links: must join links with a shape by a slot joint .*, got 'shoe', a rigid slider"
-    with pytest.raises(SceneError, match=wanted):
-        elastic_model(scene, linkage(scene))
 
 
 def test_a_light_block_on_a_pin_and_the_pin_itself_in_a_slot_press_alike() -> None:

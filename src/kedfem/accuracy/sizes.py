@@ -37,7 +37,7 @@ class Sizes:
     """Sizes, masses and speeds of a scene, in SI.
 
     overall : largest extent of the linkage in the reference position [m]
-    lengths, masses : of each link by name [m, kg]; sliders without a shape have no length
+    lengths, masses : of each link by name [m, kg]
     moduli : Young's modulus of each material that elastic links are made of [Pa]
     turns, speeds : of drives at a constant (final) speed [rpm, m/s]
     """
@@ -53,7 +53,7 @@ class Sizes:
 def sizes(scene: Scene, model: Model) -> Sizes:
     """The sizes of a scene and its model."""
     nodes: dict[str, list[np.ndarray]] = {}
-    masses = {slider.name: slider.mass for slider in model.sliders}
+    masses: dict[str, float] = {}
     for link in [*model.links, *(prescribed.link for prescribed in model.prescribed)]:
         nodes.setdefault(link.name, []).append((link.full or link).nodes)
         masses[link.name] = masses.get(link.name, 0.0) + float(link.one @ link.m1[:, 0])

@@ -1,4 +1,4 @@
-"""The elastic model of a scene: meshed links, with loads, bodies and sliders, connected by the joints."""
+"""The elastic model of a scene: meshed links, with loads and bodies, connected by the joints."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,13 +11,12 @@ from kedfem.dynamics.joints.attachments import SharedCut
 from kedfem.dynamics.joints.constraint_joints import needs_constraints
 from kedfem.dynamics.joints.constraint_ports import LinkageLayout, slot_travels
 from kedfem.dynamics.joints.coupling import joined
-from kedfem.dynamics.joints.places import on_part, part_surface, slider_axis, slider_guide
+from kedfem.dynamics.joints.places import on_part
 from kedfem.dynamics.joints.rigid_couplings import with_rigid_couplings
-from kedfem.dynamics.loads import patterns, slider_pattern
-from kedfem.dynamics.model import Model, PrescribedBody, Slider
-from kedfem.dynamics.moving_ground import moving_ground
-from kedfem.dynamics.reduced_model import slider_on
+from kedfem.dynamics.loads import patterns
+from kedfem.dynamics.model import Model, PrescribedBody
 from kedfem.dynamics.rigid_links import made_rigid
+from kedfem.dynamics.shapeless import mass_alone, moving_ground
 from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.errors import Fault, MeshError, SceneError
 from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body, with_point_mass
@@ -31,26 +30,24 @@ from kedfem.links.surfaces.coupling_surfaces import (
     determines_gradient,
     is_flat,
     joint_surface,
-    port_weights,
     rigid_link_surface,
 )
-from kedfem.motion.joint_equations import joint_axis, unit
+from kedfem.motion.joint_equations import unit
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.scene import (
     GROUND,
     Body,
     Flywheel,
-    ForceLoad,
     Joint,
     PointMass,
     RigidBody,
     Scene,
     inertia_tensor,
+    masses_alone,
     moving_grounds,
     rayleigh,
 )
-from kedfem.scene.checks.capabilities import SLIDERS
 
 PARALLEL = 1e-9  # sine of the angle between axes
 
@@ -77,12 +74,11 @@ def elastic_model(
     cut = {name: parted(scene, name, link) for name, link in bare_links(scene, known).items()}
     links = {key: part for name, link in cut.items() for key, part in zip(keys(name, link), link.parts, strict=True)}
     links = with_rigid_couplings(scene, links)
-    ground = moving_grounds(scene)
-    links |= {name: moving_ground(scene, name, drive_joint) for name, drive_joint in ground.items()}
+    ground, alone = moving_grounds(scene), {name: mass_alone(scene, name, links) for name in masses_alone(scene)}
+    links |= {name: moving_ground(scene, name) for name in ground} | {name: x.link for name, x in alone.items()}
     for key, body in scene.bodies.items():
-        if body.link in cut or body.link in ground:
-            on, carrier = with_scene_body(scene, f"bodies.{key}", body, links)
-            links[on] = carrier
+        on, carrier = with_scene_body(scene, f"bodies.{key}", body, links)
+        links[on] = carrier
     prescribed = tuple(
         PrescribedBody(x if (x := links.pop(name)).rigid else rigid(x), linkage.bodies.index(name), drive_joint, ())
         for name in [*cut, *ground] if (drive_joint := drive_joint_of(scene, name)) is not None
@@ -93,23 +89,16 @@ def elastic_model(
     prescribed = tuple(
         replace(x, loads=patterns(scene, {x.link.name: x.link}, prescribed=True)[x.link.name]) for x in prescribed
     )
-    numbers = {key: k for k, key in enumerate(links)}
-    sliders = tuple(_slider(scene, name, links, numbers) for name in scene.links if slider_axis(scene, name) is not None)
-    for slider in sliders:
-        key = list(links)[slider.carrier]
-        links[key] = with_point_mass(links[key], slider.weights, slider.mass)
     links, limits = made_rigid(scene, links, linkage, along, thicken=elements)
-    sliders = tuple(slider_on(slider, list(links.values())[slider.carrier]) for slider in sliders)
+    links |= {name: each.concentrated(links[name]) for name, each in alone.items()}
     cuts = [shared for name, link in cut.items() for shared in _shared(name, link)]
     layout = LinkageLayout({name: k for k, name in enumerate(linkage.bodies)}, slot_travels(scene, linkage, along))
     held = joined(scene, links, cuts, layout, elements, bars=elements)
     loads = patterns(scene, links)
-    for slider in sliders:
-        loads[list(links)[slider.carrier]] += slider.loads
     return Model(
         links=tuple(links.values()), bodies=tuple(linkage.bodies.index(x.name) for x in links.values()),
         joints=tuple(held.attachments[key] for key in links), loads=tuple(loads[key] for key in links),
-        sliders=sliders, damping=Rayleigh(*rayleigh(scene.damping)), prescribed=prescribed,
+        damping=Rayleigh(*rayleigh(scene.damping)), prescribed=prescribed,
         rows=held.rows, cuts=tuple(cuts), step_limits=tuple(map(limits.get, links)) if limits else (),
     )  # fmt: skip
 
@@ -145,7 +134,7 @@ def with_scene_body(scene: Scene, where: str, body: Body, links: Mapping[str, Li
     here = [j for j in scene.joints.values() if body.link in j.links and np.linalg.norm(np.subtract(j.at, at)) <= near]
     axis = next((unit(j.axis) for j in here if j.axis and j.kind != "prismatic"), None)
     faces = next((j.face_names(body.link) for j in here if body.link in j.faces), ())
-    if scene.links[body.link].model == "rigid" and links[body.link].kind == "solid":
+    if scene.links[body.link].model == "rigid" and links[body.link].meshed:
         return body.link, _carrying(scene, links[body.link], rigid_link_surface(links[body.link], at), where, body)
     try:
         key, surface = on_part(links, body.link, at, lambda link: joint_surface(link, f"{where}.at", at, axis, faces))
@@ -204,27 +193,3 @@ def _wide_surface(link: Link) -> str:
     if link.kind == "spatial_beam":
         return "an end or a corner of the beam, or have its axis across the beam"
     return "a bore, or on a flat face that contains its axis"
-
-
-def _slider(scene: Scene, name: str, links: dict[str, Link], numbers: dict[str, int]) -> Slider:
-    joints = {key: joint for key, joint in scene.joints.items() if name in joint.links}
-    guide = slider_guide(scene, name)
-    for key, joint in joints.items():
-        if key != guide and needs_constraints(scene, key):
-            raise SceneError([SLIDERS.fault(("joints", key), {"kind": joint.kind, "name": name})])
-    elastic = {link.name for link in links.values()}
-    held = [(key, other) for key, joint in joints.items() for other in joint.links if other in elastic]
-    if not held:
-        raise MeshError(f"links.{name}: a rigid slider must be joined to an elastic link, got none: give it a shape")
-    key, other = held[0]
-    carrier, surface = part_surface(scene, key, links, other)
-    weights = port_weights(surface, np.array([joints[key].at]))[0]
-    extra = sum(body.mass for body in scene.bodies.values() if body.link == name)
-    loads = tuple(
-        slider_pattern(links[carrier], load, x, weights)
-        for load, x in scene.loads.items()
-        if x.link == name and isinstance(x, ForceLoad)
-    )
-    mass = scene.links[name].mass + extra
-    axis = joint_axis(joints[guide])
-    return Slider(name, mass, guide, key, numbers[carrier], axis, weights, loads)

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.joints.places import slider_axis
 from kedfem.dynamics.loads import Pattern, Times, patterns, shares
 from kedfem.dynamics.model import Model
 from kedfem.links.bodies import euler_tensor
@@ -29,6 +28,8 @@ from kedfem.scene import (
     Scene,
     factor_law,
     inertia_tensor,
+    mass_place,
+    masses_alone,
     moving_grounds,
 )
 
@@ -110,21 +111,15 @@ class Inertias:
 
 
 def inertias_of_model(scene: Scene, linkage: Linkage, model: Model) -> Inertias:
-    """Inertias of an elastic model: links include attached bodies; sliders are separate bodies."""
+    """Inertias of an elastic model: links include attached bodies."""
     out = _none(scene, linkage)
     first = int(any(scene.gravity))
-    riding = [sum(len(x.loads) for x in model.sliders if x.carrier == k) for k in range(len(model.links))]
-    for link, body, loads, last in zip(model.links, model.bodies, model.loads, riding, strict=True):
+    for link, body, loads in zip(model.links, model.bodies, model.loads, strict=True):
         out.add_link(body, link)
-        out.add_loads(body, link, loads[first : len(loads) - last])
+        out.add_loads(body, link, loads[first:])
     for prescribed in model.prescribed:
         out.add_link(prescribed.body, prescribed.link)
         out.add_loads(prescribed.body, prescribed.link, prescribed.loads[first:])
-    for slider in model.sliders:
-        carrier = model.links[slider.carrier]
-        at = slider.weights @ carrier.X
-        out.add(model.bodies[slider.carrier], -slider.mass, _flat(carrier, at, out.centre))
-    _add_sliders(out, scene, linkage)
     return out
 
 
@@ -143,13 +138,10 @@ def inertias_of_links(scene: Scene, linkage: Linkage, links: Mapping[str, Link])
         out.add_link(body, link)
         out.add_loads(body, link, loads[name][int(any(scene.gravity)) :])
     for each in scene.bodies.values():
-        if slider_axis(scene, each.link) is None:
-            _add_body(out, scene, linkage, each)
-    bare = [name for name in scene.links if name not in links and slider_axis(scene, name) is None]
-    _add_forces(out, scene, linkage, bare)
-    for name, drive_joint in moving_grounds(scene).items():
-        out.add(linkage.bodies.index(name), scene.links[name].mass, np.asarray(scene.joints[drive_joint].at))
-    _add_sliders(out, scene, linkage)
+        _add_body(out, scene, linkage, each)
+    _add_forces(out, scene, linkage, [name for name in scene.links if name not in links])
+    for name in (*moving_grounds(scene), *masses_alone(scene)):
+        out.add(linkage.bodies.index(name), scene.links[name].mass, np.asarray(mass_place(scene, name)))
     return out
 
 
@@ -195,22 +187,6 @@ def _axial(N: Float[np.ndarray, "... 3 3"]) -> Float[np.ndarray, "... 3"]:
 def _none(scene: Scene, linkage: Linkage) -> Inertias:
     B, gravity = len(linkage.bodies), np.asarray(scene.gravity)
     return Inertias(np.zeros(B), np.zeros((B, 3)), np.zeros((B, 3, 3)), np.zeros(B), linkage.centre, gravity)
-
-
-def _flat(link: Link, at: Vector, centre: Vector) -> Vector:
-    """A point of a link; of a planar one at the height of the linkage's centre, as all its mass."""
-    return np.where([True, True, not link.planar], at, centre)
-
-
-def _add_sliders(out: Inertias, scene: Scene, linkage: Linkage) -> None:
-    """Rigid sliders: their mass, and that of bodies on them, at the joint with the link that they belong to."""
-    sliders = [name for name in scene.links if slider_axis(scene, name) is not None]
-    for name in sliders:
-        joints = [x for x in scene.joints.values() if name in x.links]
-        pin = next((x for x in joints if x.kind != "prismatic"), joints[0])
-        extra = sum(x.mass for x in scene.bodies.values() if x.link == name)
-        out.add(linkage.bodies.index(name), scene.links[name].mass + extra, np.asarray(pin.at))
-    _add_forces(out, scene, linkage, sliders)
 
 
 def _add_forces(out: Inertias, scene: Scene, linkage: Linkage, links: Iterable[str]) -> None:

@@ -187,12 +187,6 @@ def initial_forces(scene: Scene, links: Sequence[Link]) -> list[Float[np.ndarray
     return out
 
 
-def slider_pattern(link: Link, name: str, load: ForceLoad, weights: Float[np.ndarray, " n"]) -> Pattern:
-    """A force on a rigid slider, which never rotates, through the weights of its point on the carrier."""
-    forces = np.outer(weights, as_rows(link, np.asarray(load.vector)))
-    return Pattern(forces, False, factor_law(load.factor), load=name)
-
-
 def rigid_acceleration(link: Link, motion: RigidMotion, body: int) -> Float[np.ndarray, "T d"]:
     """p'' of a link over time; of a planar beam (x'', y'', θ'')."""
     if link.kind == "beam":

@@ -1,4 +1,4 @@
-"""The elastic model of a scene: links with their attached bodies and sliders, joints, loads, damping."""
+"""The elastic model of a scene: links with their attached bodies, joints, loads, damping."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -18,28 +18,6 @@ from kedfem.links.record import Link
 from kedfem.mesh.memory_forecast import least_bytes
 
 T = TypeVar("T")
-
-
-@dataclass(frozen=True, slots=True)
-class Slider:
-    """A rigid slider on a line of the ground: its mass and forces act on the link that it is joined to.
-
-    name, mass [kg] : of the slider
-    guide, joint : its prismatic joint, and the joint with the elastic link
-    carrier : number of that link
-    axis : (3,) along which it slides
-    weights : (n,) of the joint's point on the carrier
-    loads : its own loads, as patterns of the carrier
-    """
-
-    name: str
-    mass: float
-    guide: str
-    joint: str
-    carrier: int
-    axis: Float[np.ndarray, "3"]
-    weights: Float[np.ndarray, " n"]
-    loads: tuple[Pattern, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +52,6 @@ class Model:
     bodies: tuple[int, ...]
     joints: tuple[Attachment, ...]
     loads: tuple[tuple[Pattern, ...], ...]
-    sliders: tuple[Slider, ...]
     damping: Rayleigh
     prescribed: tuple[PrescribedBody, ...] = ()
     rows: tuple[ConstraintJoint, ...] = ()

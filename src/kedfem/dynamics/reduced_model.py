@@ -8,7 +8,7 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.dynamics.joints.attachments import SharedCut
 from kedfem.dynamics.loads import Pattern
-from kedfem.dynamics.model import Model, Slider, link_keys
+from kedfem.dynamics.model import Model, link_keys
 from kedfem.links.record import Link
 from kedfem.links.reduced import can_be_stored, on_functions, reduced, restored, stored
 
@@ -16,7 +16,7 @@ from kedfem.links.reduced import can_be_stored, on_functions, reduced, restored,
 def reduced_model(model: Model, functions: Sequence[Float[np.ndarray, "_ s"] | None]) -> Model:
     """The changed copy of a model whose links move in the span of given functions; None leaves a link as it is."""
     links, joints, loads = list(model.links), list(model.joints), list(model.loads)
-    sliders, cuts, names = list(model.sliders), model.cuts, link_keys(model)
+    cuts, names = model.cuts, link_keys(model)
     for k, Q in enumerate(functions):
         if Q is not None:
             links[k] = link = reduced(model.links[k], Q)
@@ -24,8 +24,7 @@ def reduced_model(model: Model, functions: Sequence[Float[np.ndarray, "_ s"] | N
             on, joint = on_functions(link), model.joints[k]
             joints[k] = replace(joint, nodes=np.arange(link.n), weights=joint.weights @ on[joint.nodes])
             loads[k] = tuple(_load_on(load, link) for load in model.loads[k])
-            sliders = [slider_on(slider, link) if slider.carrier == k else slider for slider in sliders]
-    return replace(model, links=tuple(links), joints=tuple(joints), loads=tuple(loads), sliders=tuple(sliders), cuts=cuts)
+    return replace(model, links=tuple(links), joints=tuple(joints), loads=tuple(loads), cuts=cuts)
 
 
 def stored_model(model: Model) -> Model | None:
@@ -55,10 +54,3 @@ def _cut_on(cut: SharedCut, key: str, link: Link) -> SharedCut:
         return cut
     one, other = (x @ on_functions(link) if key == name else x for name, x in zip(cut.keys, cut.weights, strict=True))
     return replace(cut, weights=(one, other))
-
-
-def slider_on(slider: Slider, link: Link) -> Slider:
-    """A slider on the reduced copy of its carrier."""
-    if link.Q is None:
-        return slider
-    return replace(slider, weights=slider.weights @ link.Q, loads=tuple(_load_on(load, link) for load in slider.loads))

@@ -69,16 +69,14 @@ def on_links(model: Model, joint: ConstraintJoint, at: Sequence[Float[np.ndarray
     """
     keys, first, found = link_keys(model), 0, list[OnLink]()
     for side, body, point in zip(joint.sides, joint.bodies, at, strict=True):
-        rider = next((x for x in model.sliders if side is not None and x.name == side.slider), None)
         if side is None or len(set(side.keys)) > 1:  # frames of a line's segments know what their stresses do
             found.append(OnLink(rigid_end(body, point)))
             continue
-        k = rider.carrier if rider else keys.index(side.keys[0])
-        d = (2 if model.links[k].planar else 3) if rider else side.components
+        k, d = keys.index(side.keys[0]), side.components
         c = d * len(side.points)
         own = replace(side, onto=np.eye(c).reshape(-1, d, c), columns=first + np.arange(c))
-        weights, first = (rider.weights[None] if rider else np.asarray(side.weights)), first + c
-        found.append(OnLink(end_of(own, joint), k, model.links[k].d, weights))
+        first += c
+        found.append(OnLink(end_of(own, joint), k, model.links[k].d, np.asarray(side.weights)))
     return found[0], found[1]
 
 

@@ -53,7 +53,8 @@ def made_rigid(
     made = {key for key, link in links.items() if scene.links[link.name].model == "rigid"}
     elastic = [link for key, link in links.items() if key not in made]
     out, limits, soft = dict(links), {}, _mounts(scene)
-    in_steps = not without_vibration(scene) and any(links[key].fit is not None for key in made)
+    limited = [key for key in made if links[key].fit is not None or links[key].anywhere]
+    in_steps = bool(limited) and not without_vibration(scene)
     turning = _angular_speeds(scene, linkage, along) if in_steps else {}
     for key in made:
         link = _spread(_thickened(links[key]) if thicken else links[key])
@@ -61,10 +62,11 @@ def made_rigid(
         highest = RIGID * max(map(wave_frequency, elastic or [links[key]]))
         if not elastic and any(soft):
             highest = min(highest, MOUNTED * _mounted(link, *soft))
-        if link.fit is not None:
+        if key in limited:
             if in_steps:
                 stable, h = stable_rotation(scene.analysis.rho_inf, stiff=True), time_grid(scene).step
-                limits[key] = StepLimit(highest, turning.get(link.name, np.inf), stable, h, h)
+                turns = 0.0 if link.fit is None else turning.get(link.name, np.inf)
+                limits[key] = StepLimit(highest, turns, stable, h, h)
                 highest = limits[key].frequency
             else:
                 highest = min(highest, _beside(link, elastic))

@@ -12,6 +12,7 @@ from kedfem.links.beams.beam_recovery import fibre_row, nearest_on_beam
 from kedfem.links.beams.spatial_recovery import beam_strains, nearest_on_axis, section_stress, section_value
 from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_gradients, stress_of_gradient
+from kedfem.links.surfaces.coupling_surfaces import rigid_link_surface
 from kedfem.mesh.elements.shape_functions import barycentric
 
 POINT_TOLERANCE = 1e-3  # how far outside its link a probe may lie, of the link's size
@@ -52,6 +53,9 @@ def point_rows(
     if link.full is not None and link.Q is not None:
         at = point_rows(link.full, where, point, kinks)
         return PointRows(at.value @ link.Q, _on_functions(at.stress, link.Q, link.d), at.X)
+    if link.anywhere:
+        value = rigid_link_surface(link, point).fit[0]
+        return PointRows(value, sp.csr_array((6, link.unknowns)), np.asarray(point))
     match link.kind:
         case "spatial_beam":
             return _section_rows(link, where, point)

@@ -114,6 +114,7 @@ class Link:
     full, Q : of a reduced link the link that it was made from and its functions there, (n_full, n); its matrices are
         dense. Else None.
     rigid : whether the link only moves rigidly; then it has no stress
+    anywhere : whether any point is one of its own, as of a mass alone, whose shape is drawn only
     fit : (n, 3) of a segment whose frame follows it: weights of its rotation, that of Σ x_a ⊗ fit_a; else None
     frames : of a segment that several frames follow: its strain energy in parts, K0 their sum
     element : of a segment of a beam in space: its strains, exact for any turn, K0 their linearisation
@@ -143,6 +144,7 @@ class Link:
     full: "Link | None" = None
     Q: Float[np.ndarray, "_ n"] | None = None
     rigid: bool = False
+    anywhere: bool = False
     fit: Float[np.ndarray, "n 3"] | None = None
     frames: tuple[Frame, ...] = ()
     element: BeamElement | None = None

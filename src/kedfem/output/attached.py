@@ -8,8 +8,8 @@ import numpy as np
 
 from kedfem.arrays import Float, Int
 from kedfem.dynamics.history import Snapshot
-from kedfem.dynamics.model import Model, Slider
-from kedfem.links.record import Link, in_space
+from kedfem.dynamics.model import Model
+from kedfem.links.record import Link
 from kedfem.mesh.elements.shape_functions import HEX27
 from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import Linkage
@@ -50,10 +50,6 @@ class Carriers:
         """As :meth:`place`, and the rotation of the link there from the reference position."""
         if name == GROUND:
             return at, np.zeros(3), np.eye(3)
-        for slider in self.model.sliders:
-            if slider.name == name:
-                there, moved = slider_place(self.model, slider, self.snapshot, self.deformation_scale)
-                return there + at - slider_drawn(self.model, slider), moved, np.eye(3)
         on = [i for i, link in enumerate(every_link(self.model)) if link.name == name]
         if not on:
             return None
@@ -88,27 +84,13 @@ def every_link(model: Model) -> list[Link]:
     return [*model.links, *(x.link for x in model.prescribed)]
 
 
-def slider_drawn(model: Model, slider: Slider) -> Point:
-    """Joint of a slider without a shape to its link, in the reference position [m]."""
-    return np.asarray(slider.weights @ model.links[slider.carrier].X)
-
-
-def slider_place(model: Model, slider: Slider, snapshot: Snapshot, deformation_scale: float) -> tuple[Point, Point]:
-    """Position of that joint at one time point, and its elastic displacement."""
-    link, body = model.links[slider.carrier], model.bodies[slider.carrier]
-    motion, k = snapshot.motion, snapshot.k
-    moved = slider.weights @ in_space(link, snapshot.states[slider.carrier].u)
-    rigid = motion.p[k, body] + motion.R[k, body] @ slider_drawn(model, slider)
-    return rigid + deformation_scale * moved, moved
-
-
 def balls(carriers: Carriers, bodies: Mapping[str, Body]) -> list[LinkField]:
-    """Masses that links carry; those on a slider without a shape are drawn as that."""
-    out, sliders = [], {slider.name for slider in carriers.model.sliders}
+    """Masses that links carry."""
+    out = []
     size = _size([x.points for x in carriers.fields])
     for name, body in bodies.items():
         centre = np.asarray(getattr(body, "centre", body.at))
-        found = None if body.link in sliders else carriers.place(body.link, centre)
+        found = carriers.place(body.link, centre)
         if found is None:
             continue
         points, moved = found[0] + ball(body.mass, size), np.tile(found[1], (27, 1))

@@ -14,30 +14,16 @@ from kedfem.links.beams.spatial_recovery import drawn
 from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import StressRecovery, extreme_stresses, nodal_state, nodal_stress, rotated_stress
 from kedfem.mesh.cad.sides import boundary_sides, side_corners
-from kedfem.mesh.elements.shape_functions import HEX8
-from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.joint_equations import coordinate_axis, ordered
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
-from kedfem.output.attached import (
-    Carriers,
-    ball,
-    ball_words,
-    balls,
-    every_link,
-    rigidly_moved,
-    slider_place,
-    springs,
-    unstressed,
-)
+from kedfem.output.attached import Carriers, ball, ball_words, balls, every_link, rigidly_moved, springs, unstressed
 from kedfem.output.fields import DRIVE_FORCE, DRIVE_TORQUE, FORCE, MOMENT, JointField, LinkField, RigidField
 from kedfem.results.recorded import drive_effort
 from kedfem.scene import Scene, driven_travel
 
 Place = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]
 Rows = Mapping[str, Float[np.ndarray, "T c"]]
-BLOCK = 0.8  # width of the block that represents a slider without a shape, relative to that of its link
-STOUT = 0.25  # of that link's length: most that its width is taken for
 
 
 def _joined(fields: Sequence[LinkField]) -> list[LinkField]:
@@ -82,7 +68,7 @@ def link_fields(
         points = motion.p[k, prescribed.body] + X @ motion.R[k, prescribed.body].T
         drawn_as = prescribed.link.name, recovery.cell_type, recovery.cells
         fields.append(unstressed(*drawn_as, points, np.zeros_like(X), section=_section(prescribed.link)))
-    out = _joined(fields) + _blocks(model, snapshot, deformation_scale)
+    out = _joined(fields)
     if scene is None or not (scene.bodies or scene.springs):
         return out
     drawn = zip(every_link(model), recoveries, strict=True)
@@ -126,31 +112,6 @@ def _section(link: Link) -> tuple[float, float, bool] | None:
     if link.kind != "beam" or of is None:
         return None
     return of.height, of.thickness, of.kind in {"round", "tube"}
-
-
-def _blocks(model: Model, snapshot: Snapshot, deformation_scale: float) -> list[LinkField]:
-    """Sliders without a shape: blocks along their guides, at the joints with the links that carry them."""
-    out = []
-    for slider in model.sliders:
-        link = model.links[slider.carrier]
-        place, moved = slider_place(model, slider, snapshot, deformation_scale)
-        z = slider.axis
-        x, y = perpendiculars(z)
-        frame = np.array([1.5 * z, y, x])  # longer along the guide
-        points = place + BLOCK * width_across(link) / 2 * HEX8 @ frame
-        cell = np.arange(8)[None]
-        out.append(unstressed(slider.name, "hexahedron", cell, points, np.tile(moved, (8, 1))))
-    return out
-
-
-def width_across(link: Link) -> float:
-    """Width of a link across its length: that of its section, else of the whole link [m]."""
-    whole = link.full or link
-    if whole.section is not None:
-        return max(whole.section.height, whole.section.thickness)
-    principal = np.linalg.svd(whole.X - whole.X.mean(axis=0), full_matrices=False)[2]
-    extents = np.sort(np.ptp(whole.X @ principal.T, axis=0))
-    return float(min(extents[1], STOUT * extents[2]))
 
 
 @dataclass(frozen=True, slots=True)

@@ -179,7 +179,7 @@ def sources_of(first: Any, reference: Any) -> tuple[list[_Source], tuple[str, ..
     X = np.array(first.points, float)
     highest = np.full(first.n_points, np.nan)
     if reference is not None and reference.n_points <= first.n_points:
-        known = reference.n_points  # sliders without a shape are not in the envelope
+        known = reference.n_points
         X[:known] = reference.points
         if HIGHEST in reference.point_data:
             highest[:known] = reference.point_data[HIGHEST]

@@ -48,16 +48,11 @@ class LinkPoint:
 
 
 def link_point(model: Model, linked: Linkage, where: str, name: str, at: Point) -> LinkPoint:
-    """A point of a link: elastic, rigid, prescribed by a drive, or a slider without a shape, which moves with a pin."""
+    """A point of a link: elastic, rigid or prescribed by a drive."""
     prescribed = next((x for x in model.prescribed if x.link.name == name), None)
     if prescribed is not None:
         link = prescribed.link
         return LinkPoint(prescribed.body, at, _at_rest, link.axes, link.planar)
-    slider = next((x for x in model.sliders if x.name == name), None)
-    if slider is not None:
-        moved = _read(slider.carrier, model.links[slider.carrier], slider.weights)
-        planar = model.links[slider.carrier].planar
-        return LinkPoint(linked.bodies.index(name), at, moved, np.eye(3), planar)
     if all(link.name != name for link in model.links):
         raise SceneError(f"{where.removesuffix('.at')}.link: must name a link with a shape, got {name!r}")
     try:

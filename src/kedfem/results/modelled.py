@@ -25,7 +25,6 @@ def modelled(scene: Scene, linkage: Linkage, model: Model) -> dict[str, Mapping[
     inertias = inertias_of_model(scene, linkage, model)
     out = {name: element_facts(parts) for name, parts in segments(model).items()}
     out |= {prescribed.link.name: {"model": "rigid, with the drive"} for prescribed in model.prescribed}
-    out |= {slider.name: {"model": "rigid slider"} for slider in model.sliders}
     return {name: {**facts, **_masses(inertias, linkage.bodies.index(name))} for name, facts in out.items()}
 
 

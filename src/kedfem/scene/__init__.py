@@ -12,7 +12,15 @@ from kedfem.scene.questions.laws import (
     load_factor,
     path_parameter,
 )
-from kedfem.scene.questions.modelling import corotational, corotational_links, driven_travel, link_frames, moving_grounds
+from kedfem.scene.questions.modelling import (
+    corotational,
+    corotational_links,
+    driven_travel,
+    link_frames,
+    mass_place,
+    masses_alone,
+    moving_grounds,
+)
 from kedfem.scene.questions.planes import plane_scene, spatial_beams
 from kedfem.scene.questions.timing import TimeGrid, cycle, revolution_steps, states_step, time_grid, without_vibration
 from kedfem.scene.read.files import part_geometry

@@ -75,9 +75,6 @@ def link_tables(model: Model) -> list[Table]:
         for name, parts in segments(model).items()
     ]
     rows += [(x.link.name, "rigid, with the drive", "-", "0", _mass(x.link), "-") for x in model.prescribed]
-    for slider in model.sliders:
-        mass = f"{slider.mass:.4g} kg, on {model.links[slider.carrier].name}"
-        rows.append((slider.name, "rigid slider", "-", "1", mass, "-"))
     joined = f"{model.unknowns} unknowns in all, {model.coordinates} generalised coordinates once joined"
     caption = f"{joined}; mass: with what is attached; quality: worst scaled Jacobian"
     columns = [*left("link", "kind"), *right("elements", "unknowns", "mass", "quality")]

@@ -33,7 +33,6 @@ class Side:
     components : d of displacements there; turns : whether the last is ψ of a planar beam
     stations : of the link along which a slot's pin slides; its ports are these
     keys, weights : of each port the link, or segment of one, and (n,) weights on it; none once z is known
-    slider, axis : name of a rigid slider, which rides on another link and has no ports, and along which it slides
     onto : (p, d, c) displacements at the ports, world components, from the interface unknowns z[columns]
     """
 
@@ -44,8 +43,6 @@ class Side:
     stations: Stations | None = None
     keys: tuple[str, ...] = ()
     weights: Float[np.ndarray, "p n"] | Sequence[Float[np.ndarray, " _"]] = ()
-    slider: str = ""
-    axis: Float[np.ndarray, "3"] | None = None
     onto: Float[np.ndarray, "p d c"] = field(default_factory=lambda: np.zeros((0, 0, 0)))
     columns: Int[np.ndarray, " c"] = field(default_factory=lambda: np.zeros(0, int))
 

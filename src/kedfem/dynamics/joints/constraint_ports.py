@@ -15,7 +15,7 @@ from kedfem.dynamics.joints.constraint_joints import (
     in_plane,
     surface_ports,
 )
-from kedfem.dynamics.joints.places import on_part, part_surface, slider_axis
+from kedfem.dynamics.joints.places import on_part, part_surface
 from kedfem.dynamics.system.record import Constraint, Held
 from kedfem.links.point_rows import point_rows, require_on_axis
 from kedfem.links.record import Link
@@ -75,7 +75,7 @@ def constraint_joint(
     i, j = ordered(joint, about)
     first, second = (_side(scene, name, on, links, layout) for on in (i, j))
     here = [link for link in links.values() if link.name in (i, j)]
-    planar = bool(here) and all(link.planar for link in here)  # a slider on the ground is of no plane
+    planar = bool(here) and all(link.planar for link in here)
     every = constrained(scene, name) if only is None else only
     kept = tuple(each for each in every if not planar or any(in_plane(*direction(term)) for term in each.terms))
     bodies = layout.bodies[i], layout.bodies[j]
@@ -98,8 +98,8 @@ def element_joint(
 
 
 def can_be_bars(link: Link) -> bool:
-    """Whether a link is a rigid one in space, which four of its points show."""
-    return link.rigid and link.d == 3 and link.n == 4 and link.kind != "beam"
+    """Whether a link is a rigid one in space, which four of its points show, and no slider, which its guide may hold."""
+    return link.rigid and link.d == 3 and link.n == 4 and link.kind != "beam" and not link.anywhere
 
 
 def rigid_points(link: Link, key: str, layout: LinkageLayout) -> ConstraintJoint:
@@ -112,18 +112,12 @@ def rigid_points(link: Link, key: str, layout: LinkageLayout) -> ConstraintJoint
     return ConstraintJoint(f"rigid.{key}", centre, (side.body, 0), (side, None))
 
 
-def _slider_side(scene: Scene, on: str, at: Float[np.ndarray, "3"], layout: LinkageLayout) -> Side | None:
-    """A point of a rigid slider; None for other links."""
-    axis = slider_axis(scene, on) if on in scene.links else None
-    return None if axis is None else Side(layout.bodies[on], at[None], slider=on, axis=axis)
-
-
 def _point_side(
     where: str, scene: Scene, on: str, at: Float[np.ndarray, "3"], links: dict[str, Link], layout: LinkageLayout
 ) -> Side | None:  # fmt: skip
     """A point of a link; None on the ground and on prescribed links."""
-    if (rider := _slider_side(scene, on, at, layout)) or all(link.name != on for link in links.values()):
-        return rider
+    if all(link.name != on for link in links.values()):
+        return None
     key, rows = on_part(links, on, at, lambda link: point_rows(link, where, at))
     link = links[key]
     require_on_axis(link, where, at, rows.X)
@@ -136,8 +130,8 @@ def _side(scene: Scene, name: str, on: str, links: dict[str, Link], layout: Link
     unknowns."""
     joint, where = scene.joints[name], f"joints.{name}"
     at = np.asarray(joint.at)
-    if (rider := _slider_side(scene, on, at, layout)) or all(link.name != on for link in links.values()):
-        return rider
+    if all(link.name != on for link in links.values()):
+        return None
     if joint.kind == "slot" and on == ordered(joint)[1]:
         parts = {key: link for key, link in links.items() if link.name == on}
         line = layout.slots[name]

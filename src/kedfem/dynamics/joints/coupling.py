@@ -22,7 +22,7 @@ from kedfem.dynamics.joints.constraint_ports import (
     rigid_points,
 )
 from kedfem.dynamics.joints.independent import independent
-from kedfem.dynamics.joints.places import part_surface, slider_axis
+from kedfem.dynamics.joints.places import part_surface
 from kedfem.dynamics.joints.port_points import port_points
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
@@ -92,9 +92,7 @@ def joined(
         If a joint finds no bore, face or node on one of its links.
     """
     ports: dict[str, list[_Port]] = {name: [] for name in links}
-    sliders = {name: axis for name in scene.links if (axis := slider_axis(scene, name)) is not None}
-    first_of: dict[str, int] = {name: k for k, name in enumerate(sliders)}
-    unknowns = len(sliders)
+    unknowns = 0
     enforced = [constraint_joint(scene, name, links, layout) for name in scene.joints if needs_constraints(scene, name)]
     geared = [gear_joint(scene, name, links, layout) for name in scene.gears]
     acting = [
@@ -105,10 +103,10 @@ def joined(
     stiff = [rigid_points(link, key, layout) for key, link in links.items() if bars and can_be_bars(link)]
     rows = [row for row in (*enforced, *geared, *acting, *stiff) if any(row.all_sides)]
     sides = [(row.name, side) for row in rows for side in row.all_sides]
-    columns: dict[int, list[int]] = {}  # of each side's own unknowns: all components of its ports; a slider's own travel
+    columns: dict[int, list[int]] = {}  # of each side's own unknowns: all components of its ports
     for name, side in sides:
         d = side.components
-        columns[id(side)] = [first_of[side.slider]] if side.slider else [*range(unknowns, unknowns + d * len(side.keys))]
+        columns[id(side)] = [*range(unknowns, unknowns + d * len(side.keys))]
         for key, weights, point in zip(side.keys, side.weights, side.points if side.keys else (), strict=True):
             ports[key].append(_Port(weights, point, name, range(d), unknowns, np.eye(d)))
             unknowns += d
@@ -118,16 +116,17 @@ def joined(
         elastic = {link.name for link in links.values()}
         surfaces = dict(part_surface(scene, name, links, link) for link in joint.links if link in elastic)
         held = list(surfaces)
-        others = [link for link in joint.links if link not in elastic]
+        grounded = len(held) < 2
         if len({links[link].planar for link in held}) == 2:
             unknowns += _mixed(scene, name, surfaces, links, ports, unknowns)
             continue
         points = port_points(scene, name, joint, surfaces, links) if held else np.zeros((0, 3))
-        across, travel = _lies_across(joint, points), unknowns
+        one_travel = any(links[link].rigid for link in held) or _lies_across(joint, points)
+        travel = unknowns
         for k, point in enumerate(points):
             components = _components(scene, name, joint, [links[link] for link in held])
-            first, block, new = _target(joint, others, sliders, first_of, unknowns, components)
-            if across and k and new:  # one travel for all, so that the surface cannot tilt
+            first, (block, new) = unknowns, _target(joint, grounded, components)
+            if one_travel and k and joint.kind == "prismatic":  # so that the surface cannot tilt
                 first, new = travel, 0
             for link in held:
                 weights = port_weights(surfaces[link], point[None, :])[0]
@@ -140,9 +139,8 @@ def joined(
                 ports[key].append(_Port(row_, point, "", range(d), unknowns, np.eye(d)))
             unknowns += d
     every = [_attachment(links[name], ports[name]) for name in links]
-    bear = [k for _, side in sides if not side.slider for k in columns[id(side)]]
-    riding = [k for _, side in sides if side.slider for k in columns[id(side)]]
-    found, Z = independent(every, [_selected(ports[name], unknowns) for name in links], bear, riding)
+    bear = [k for _, side in sides for k in columns[id(side)]]
+    found, Z = independent(every, [_selected(ports[name], unknowns) for name in links], bear)
     return Joined(dict(zip(links, found, strict=True)), tuple(_on(row, columns, Z) for row in rows))
 
 
@@ -153,8 +151,8 @@ def _on(row: ConstraintJoint, columns: Mapping[int, list[int]], Z: sp.csr_array)
 
 
 def _seeing(side: Side, Z: sp.csr_array) -> Side:
-    """A side whose ports know the interface unknowns, from its own unknowns: a slider's along its axis."""
-    columns, onto = used_columns(Z if side.axis is None else sp.csr_array(side.axis[:, None]) @ Z)
+    """A side whose ports know the interface unknowns, from its own unknowns."""
+    columns, onto = used_columns(Z)
     onto = onto.reshape(len(side.points), side.components, len(columns))
     return replace(side, onto=onto, columns=columns, weights=())
 
@@ -207,14 +205,10 @@ def _lies_across(joint: Joint, points: Float[np.ndarray, "p 3"]) -> bool:
     return bool(np.abs(along).max() < ACROSS * np.linalg.norm(away - np.outer(along, axis), axis=1).max())
 
 
-def _target(joint: Joint, others: list[str], sliders: dict[str, np.ndarray], first_of: dict[str, int],
-            unknowns: int, components: list[int]) -> tuple[int, np.ndarray, int]:  # fmt: skip
-    """First unknown, (components, unknowns) block and number of new unknowns of one interface point."""
-    if not others:
-        return unknowns, np.eye(len(components)), len(components)
-    if others[0] in sliders:
-        slider = others[0]
-        return first_of[slider], sliders[slider][components, None], 0
+def _target(joint: Joint, grounded: bool, components: list[int]) -> tuple[np.ndarray, int]:
+    """(components, unknowns) block and number of new unknowns of one interface point."""
+    if not grounded:
+        return np.eye(len(components)), len(components)
     if joint.kind == "prismatic":
-        return unknowns, joint_axis(joint)[components, None], 1
-    return unknowns, np.zeros((len(components), 0)), 0
+        return joint_axis(joint)[components, None], 1
+    return np.zeros((len(components), 0)), 0

@@ -18,7 +18,7 @@ Block = tuple[Int[np.ndarray, " r"], Int[np.ndarray, " c"], Float[np.ndarray, "r
 
 
 def independent(
-    every: Sequence[Attachment], selected: Sequence[sp.csr_array], own: Sequence[int] = (), riding: Sequence[int] = ()
+    every: Sequence[Attachment], selected: Sequence[sp.csr_array], own: Sequence[int] = ()
 ) -> tuple[list[Attachment], sp.csr_array]:
     """Joints on one coupling surface repeat rows of W: w_d = Σ l w_r. Each is constrained once; others relate z.
 
@@ -29,7 +29,6 @@ def independent(
     ----------
     selected : (q, k) held components of each, in world axes, from all interface unknowns
     own : unknowns z of ports on which rows of joints bear, side by side
-    riding : those of rigid sliders on which rows bear
 
     Returns
     -------
@@ -44,7 +43,7 @@ def independent(
         L = sp.block_diag([L for _, L in relations], format="csr")
         left = every_B - L @ every_B[np.concatenate([kept for kept, _ in relations])]
         Z = _null_space(left, list(blocks(left)))
-        shares, from_rows, loose = _port_forces(L, every_B, own, riding)
+        shares, from_rows, loose = _port_forces(L, every_B, own)
     found, first = [], 0
     for each, own_B, (kept, _) in zip(every, selected, relations, strict=True):
         here = slice(first, first := first + len(each.keep))
@@ -84,9 +83,7 @@ def _independent_rows(W: Float[np.ndarray, "p b"]) -> tuple[Int[np.ndarray, " r"
     return order[:r][in_order], coefficients[:, in_order]
 
 
-def _port_forces(
-    L: sp.csr_array, B: sp.csr_array, own: Sequence[int], riding: Sequence[int]
-) -> tuple[sp.csr_array, sp.csr_array, sp.csr_array]:
+def _port_forces(L: sp.csr_array, B: sp.csr_array, own: Sequence[int]) -> tuple[sp.csr_array, sp.csr_array, sp.csr_array]:
     """Forces μ at all ports from the λ at the independent ones, Lᵀ μ = λ, every joint in balance, Bᵀ μ = p.
 
     p is zero but for forces of constraint equations on their own unknowns.
@@ -95,8 +92,7 @@ def _port_forces(
     -------
     (h, q) μ from λ, (h, o) μ from p of the rows' own unknowns, and (h, r) the μ that neither equation sees
     """
-    determined = np.setdiff1d(np.arange(B.shape[1]), riding)  # supports of a slider are not determined
-    G = sp.vstack([L.T, B.T.tocsr()[determined]], format="csr")
+    G = sp.vstack([L.T, B.T], format="csr")
     of_G = list(blocks(G))
     parts = []
     for rows, columns, dense in of_G:
@@ -104,7 +100,7 @@ def _port_forces(
         parts.append((columns, rows, np.where(np.abs(part) < DEPENDENT, 0.0, part)))  # rounding
     inverse = _assembled(parts, G.T.shape)
     q = L.shape[1]
-    return (inverse[:, :q], inverse[:, q + np.searchsorted(determined, np.asarray(own, int))], _null_space(G, of_G))
+    return inverse[:, :q], inverse[:, q + np.asarray(own, int)], _null_space(G, of_G)
 
 
 def _null_space(A: sp.csr_array, parts_of: Sequence[Block]) -> sp.csr_array:

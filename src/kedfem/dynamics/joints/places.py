@@ -10,24 +10,9 @@ from kedfem.dynamics.joints.constraint_joints import bore_axis
 from kedfem.errors import KedfemError, MeshError, SceneError
 from kedfem.links.record import Link
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, joint_surface
-from kedfem.motion.joint_equations import joint_axis
-from kedfem.scene import GROUND, Scene, moving_grounds
+from kedfem.scene import Scene
 
 T = TypeVar("T")
-
-
-def slider_axis(scene: Scene, name: str) -> Float[np.ndarray, "3"] | None:
-    """Direction in which a rigid slider (a rigid link without a shape) can move; None if the link is not one."""
-    if scene.links[name].model != "rigid" or scene.links[name].shape is not None or name in moving_grounds(scene):
-        return None
-    guide = slider_guide(scene, name)
-    return joint_axis(scene.joints[guide]) if guide else None
-
-
-def slider_guide(scene: Scene, name: str) -> str:
-    """The joint that a rigid slider slides in, "" if there is none: one on the ground first, as it may carry others."""
-    on = [key for key, joint in scene.joints.items() if joint.kind == "prismatic" and name in joint.links]
-    return next((key for key in on if GROUND in scene.joints[key].links), on[0] if on else "")
 
 
 def surface_of(scene: Scene, name: str, link: Link) -> CouplingSurface:

@@ -55,7 +55,7 @@ def rigid_end(body: int, at: Vector) -> End:
 
 
 def end_of(side: Side, joint: ConstraintJoint) -> End:
-    """An end on a body, on a slider that rides on one, or on a line along which the joint's pin slides."""
+    """An end on a body, or on a line along which the joint's pin slides."""
     onto = side.onto
     p, d, _ = onto.shape
     if side.stations is not None:

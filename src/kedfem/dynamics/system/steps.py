@@ -38,7 +38,6 @@ from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.dynamics.system.starts.instant import Instant, renumbered
 from kedfem.dynamics.system.starts.internal_forces import own
 from kedfem.dynamics.system.state import History, State, empty_history
-from kedfem.motion.joint_equations import body_names
 from kedfem.motion.linkage import linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import Scene, corotational
@@ -99,8 +98,6 @@ class Steps:
 
             self.monolithic = Monolithic(system, scheme)
         self.elements = bool(scene.motors or scene.springs or scene.limits)
-        bodies = body_names(scene)
-        self.riders = {bodies.index(x.name): (x.carrier, x.weights) for x in system.model.sliders}
         joints = list(zip(model.links, model.joints, system.model.joints, strict=True))
         self._inverse = [
             np.linalg.pinv(port_columns(joint, link.n)) if self.elements else None for link, joint, _ in joints
@@ -178,7 +175,7 @@ class Steps:
         T = len(found.u)
         forcing, motion = [x.part(0, T) for x in forcing], motion.part(0, T)
         multipliers = multipliers_of(self.ready, found)
-        acting = on_links(Supports(multipliers, motion), self.riders) if self.elements else {}
+        acting = on_links(Supports(multipliers, motion)) if self.elements else {}
         every = [self._link(k, found, each, acting.get(k)) for k, each in enumerate(forcing)]
         return self._with_follower_loads(every, motion) if self.corotational else every, multipliers
 

@@ -85,6 +85,8 @@ def joint_surface(
     if link.full is not None and link.Q is not None:
         surface = joint_surface(link.full, where, point, axis, faces)
         return replace(surface, fit=surface.fit @ link.Q)
+    if link.anywhere:
+        return rigid_link_surface(link, point)
     if link.kind == "beam":
         return _node_surface(link, where, point)
     if link.kind == "spatial_beam":
@@ -94,18 +96,19 @@ def joint_surface(
 
 
 def rigid_link_surface(link: Link, at: Float[np.ndarray, "3"]) -> CouplingSurface:
-    """The coupling surface that a rigid solid offers at any point: its affine field, determined by four of its nodes.
+    """The coupling surface that a rigid solid or plane link offers at any point: its affine field, determined by four, or
+    three, of its nodes.
 
     Parameters
     ----------
     at : reference position, in the link or outside it [m]
     """
-    known = np.column_stack([link.one, (link.X - np.outer(link.one, at)) / link.size])
-    order = qr(known.T, mode="r", pivoting=True)[1]
-    four = order[:4]
+    d = link.d
+    known = np.column_stack([link.one, (link.X - np.outer(link.one, at))[:, :d] / link.size])
+    few = qr(known.T, mode="r", pivoting=True)[1][: d + 1]
     fit = np.zeros((4, link.n))
-    fit[:, four] = np.linalg.inv(known[four]) / np.array([1.0, *[link.size] * 3])[:, None]
-    return CouplingSurface(fit, np.asarray(at, float), np.eye(3), np.full(3, link.size))
+    fit[: d + 1, few] = np.linalg.inv(known[few]) / np.array([1.0, *[link.size] * d])[:, None]
+    return CouplingSurface(fit, np.asarray(at, float), np.eye(3), link.size * (np.arange(3) < d))
 
 
 def face_surface(link: Link, where: str, point: Float[np.ndarray, "3"]) -> CouplingSurface:

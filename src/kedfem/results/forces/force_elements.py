@@ -49,7 +49,7 @@ class ElementForces:
                 yield from ((body, *found) for (link, body), found in every if link in links)
 
     def on(self, link: str, block: Block, about: Rows) -> tuple[Rows, Rows]:
-        """Force and moment of all force elements on a link without unknowns of its own: a slider, a prescribed one.
+        """Force and moment of all force elements on a link without unknowns of its own: a prescribed one.
 
         Parameters
         ----------

@@ -18,7 +18,7 @@ def indeterminate_channels(scene: Scene, model: Model, channels: Collection[str]
     out, rows = {}, ConstraintForces(model)
     for name in scene.joints:
         for what in ("force", "moment"):
-            if f"joints/{name}/{what}" not in channels and not (what == "moment" and _on_slider(model, name)):
+            if f"joints/{name}/{what}" not in channels:
                 out[f"joints/{name}/{what}"] = _reason(scene, model, rows, name)
     for name, drive in scene.all_drives.items():
         if (key := drive_effort(scene, name)[0]) not in channels:
@@ -30,11 +30,6 @@ def indeterminate_warning(found: dict[str, str]) -> tuple[str, ...]:
     """A warning for each force; moments are in the notes of the results only."""
     forces = {name: reason for name, reason in found.items() if name.endswith(("force", "torque"))}
     return tuple(f"{name}: not reported, {reason}" for name, reason in forces.items())
-
-
-def _on_slider(model: Model, name: str) -> bool:
-    """Whether a joint is of a rigid slider, a point mass, whose moments nothing asks for."""
-    return any(name in (x.guide, x.joint) for x in model.sliders)
 
 
 def _reason(scene: Scene, model: Model, rows: ConstraintForces, name: str) -> str:

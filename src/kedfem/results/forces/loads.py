@@ -167,7 +167,7 @@ def acted_links(name: str, joint: Joint, description: str) -> tuple[str, str]:
     """
     one, other = joint.links
     for on, by in ((one, other), (other, one)):
-        words = f"force of joint {re.escape(name)} on (link|slider) {re.escape(on)} from (slider )?{re.escape(by)}"
+        words = f"force of joint {re.escape(name)} on link {re.escape(on)} from {re.escape(by)}"
         if re.match(rf"{words}([ ;]|\Z)", description):
             return on, by
     raise ValueError(f"joint {name}: must name the link on which the force acts, got {description!r}")

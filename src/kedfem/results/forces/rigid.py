@@ -7,7 +7,6 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.inertias import Inertias, acting
-from kedfem.dynamics.joints.places import slider_axis
 from kedfem.dynamics.rigid_body import drive_range
 from kedfem.dynamics.rigid_elements import RigidElements, rigid_elements
 from kedfem.motion.constraints import cross
@@ -156,9 +155,8 @@ def returning(scene: Scene, along: Path | None) -> int:
 
 
 def stated_link(scene: Scene, joint: Joint) -> str:
-    """The link on which a joint's force is reported: the first that is neither the ground nor a slider beside another."""
-    links = [name for name in joint.links if name != GROUND]
-    return min(links, key=lambda name: len(links) > 1 and slider_axis(scene, name) is not None)
+    """The link on which a joint's force is reported: the first that is not the ground."""
+    return next(name for name in joint.links if name != GROUND)
 
 
 def _drive(scene: Scene, linkage: Linkage, k: int) -> RigidChannel:

@@ -71,12 +71,8 @@ UNLIKE = Refusal("joints", {"joint": ("slot",), "bushing": ("unlike across the l
     "{where}.bushing", "be alike in all directions across the line of a slot in space that no drive moves",
     "its stations do not determine the rotation of the line about itself", "one that is not",
     "give it one stiffness and one damping, or take a drive")  # fmt: skip
-SLIDERS = Refusal("model", {"enforced": (CONSTRAINED,), "link": ("slider",)}, "{where}.links",
-    "join links with a shape by a {kind} joint that moves with both", "it is a point mass on another link",
-    "{name!r}, a rigid slider", "give it a shape")  # fmt: skip
 REFUSALS = (
     UNLIKE,
-    SLIDERS,
     Refusal("joints", {"enforced": (CONSTRAINED,), "rho_inf": ("1",)}, "analysis.rho_inf",
         "be less than 1 with {where}", "its force would swing from step to step, and grow", "1", "take 0.95"),
     Refusal("joints", {"joint": ("spherical", "slot"), "bushing": ("against rotations",)},

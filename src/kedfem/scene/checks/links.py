@@ -44,8 +44,7 @@ def rigid_faults(link: Entry, parts: Parts) -> Iterator[Fault]:
     """A rigid link without a shape that is not a slider, or keys of an elastic one."""
     on = [joint for joint in parts.joints.values() if link.name in link_names(joint)]
     riding = [joint for joint in on if joint.word("kind") == "prismatic"]
-    slides = any(GROUND in link_names(joint) for joint in riding)
-    slides = slides or link.record is None or link.name in moving_grounds(parts.good)
+    slides = riding or link.record is None or link.name in moving_grounds(parts.good)
     if link.has("inertia") or link.has("centre"):  # a body by numbers, with a fault that its record shows
         return
     if link.has("shape"):
@@ -57,7 +56,7 @@ def rigid_faults(link: Entry, parts: Parts) -> Iterator[Fault]:
     else:
         if not slides and not parts.sketch:
             wanted = (
-                "is required for a rigid link that is neither a slider (a prismatic joint to the ground) nor a "
+                "is required for a rigid link that is neither a slider (on a prismatic joint) nor a "
                 "moving part of the ground (held by a driven joint alone); or give its mass, centre and inertia"
             )
             yield link.fault("shape", f"{wanted}, got nothing")

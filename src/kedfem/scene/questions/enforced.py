@@ -1,7 +1,8 @@
 """Which joints of a scene are enforced by constraint equations, and which by points that their links share."""
 
-from kedfem.scene.questions.modelling import by_constraint_equations, link_frames
+from kedfem.scene.questions.modelling import by_constraint_equations, link_frames, masses_alone
 from kedfem.scene.questions.planes import plane_scene, spatial_beams
+from kedfem.scene.records.links import GROUND
 from kedfem.scene.records.scene import Scene
 
 TURNED = ("revolute", "weld")  # joints by shared points that make links rotate together
@@ -11,7 +12,9 @@ def enforced_by_equations(scene: Scene, name: str) -> bool:
     """Whether a joint of a scene is enforced by constraint equations."""
     joint = scene.joints[name]
     kinds = frozenset(scene.links[each].category for each in joint.links if each in scene.links)
-    return by_constraint_equations(joint, scene.driven_joints.get(name, ()), kinds) or _unlike(scene, name)
+    if joint.kind == "weld" and "plane" not in kinds and plane_scene(scene):
+        kinds |= {"plane"} if not masses_alone(scene).keys().isdisjoint(joint.links) else set()
+    return by_constraint_equations(joint, scene.driven_joints.get(name, ()), kinds - {"rigid"}) or _unlike(scene, name)
 
 
 def _unlike(scene: Scene, name: str) -> bool:
@@ -32,10 +35,11 @@ def _unlike(scene: Scene, name: str) -> bool:
 
 
 def _displaced(scene: Scene, name: str) -> bool:
-    """Whether a link has displacements of its own: not a slider (its mass is on a link), nor what a drive prescribes."""
+    """Whether a link has displacements of its own that may turn it: no drive and no guide on the ground says how."""
     link = scene.links[name]
     if link.category != "rigid":
         return True
     driven = ((scene.joints[x], drives) for x, drives in scene.driven_joints.items() if x in scene.joints)
     prescribed = any(name in joint.links and not by_constraint_equations(joint, drives) for joint, drives in driven)
-    return not prescribed and (link.shape is not None or link.inertia is not None)
+    guide = masses_alone(scene).get(name)
+    return not prescribed and (guide is None or GROUND not in scene.joints[guide].links)

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from kedfem.scene.records.drives import Drive, prescribes_travel
 from kedfem.scene.records.joints import Joint
 from kedfem.scene.records.links import GROUND, Frames
+from kedfem.scene.records.points import XYZ
 from kedfem.scene.records.scene import Scene
 
 
@@ -42,10 +43,10 @@ SHARED = ("revolute", "spherical", "weld")  # kinds that hold points together, w
 def by_constraint_equations(joint: Joint, drives: Sequence[Drive] = (), kinds: frozenset[str] = frozenset()) -> bool:
     """Whether a joint cannot be said of points that its links share for good.
 
-    Parameters
-    ----------
+        Parameters
+        ----------
     drives : of the joint
-    kinds : what its links are meshed as: a plane link has no rotation that it could share with a beam
+    kinds : what its links are meshed as, but for rigid ones: a plane link has no rotation that it could share with a beam
     """
     if joint.kind == "weld" and kinds == {"plane", "beam"}:
         return True
@@ -57,19 +58,35 @@ def by_constraint_equations(joint: Joint, drives: Sequence[Drive] = (), kinds: f
 
 
 def moving_grounds(scene: Scene) -> dict[str, str]:
-    """Rigid links without a shape that drives alone move: parts of the ground. Each with its driven joint.
-
-    One that slides on the ground and whose other joints all share points is a slider instead: its mass rides on a link.
-    """
+    """Rigid links without a shape that drives alone move: parts of the ground. Each with its driven joint."""
     shapeless = {name for name, link in scene.links.items() if link.model == "rigid" and link.shape is None}
     return dict(_moved_by_drives(shapeless, scene)) if shapeless else {}
+
+
+def masses_alone(scene: Scene) -> dict[str, str]:
+    """Sliders: rigid links without a shape that a guide keeps from rotating. Each with that joint, of several one on the
+    ground."""
+    guides = [(key, joint) for key, joint in scene.joints.items() if joint.kind == "prismatic"]
+    guides.sort(key=lambda each: GROUND not in each[1].links)
+    bare = [name for name, link in scene.links.items() if link.model == "rigid" and link.shape is None]
+    found = {name: next((key for key, joint in guides if name in joint.links), "") for name in bare}
+    moved = moving_grounds(scene) if any(found.values()) else {}
+    return {name: guide for name, guide in found.items() if guide and name not in moved}
+
+
+def mass_place(scene: Scene, name: str) -> XYZ:
+    """Where a rigid link without a shape has its mass: at its driven joint, on a guide at its first other joint."""
+    if drive_joint := moving_grounds(scene).get(name):
+        return scene.joints[drive_joint].at
+    on = [joint for joint in scene.joints.values() if name in joint.links]
+    return next((joint.at for joint in on if joint.kind != "prismatic"), on[0].at)
 
 
 def _moved_by_drives(shapeless: set[str], scene: Scene) -> Iterator[tuple[str, str]]:
     """Links that are held by one driven joint, on the ground or on another such link, nearest to the ground first."""
     known, left = {GROUND}, dict.fromkeys(shapeless)
     while left:
-        found = [(name, drive_joint) for name in left if (drive_joint := _drive_joint(name, known, shapeless, scene))]
+        found = [(name, drive_joint) for name in left if (drive_joint := _drive_joint(name, known, scene))]
         if not found:
             return
         for name, drive_joint in found:
@@ -78,7 +95,7 @@ def _moved_by_drives(shapeless: set[str], scene: Scene) -> Iterator[tuple[str, s
             yield name, drive_joint
 
 
-def _drive_joint(name: str, known: set[str], shapeless: set[str], scene: Scene) -> str:
+def _drive_joint(name: str, known: set[str], scene: Scene) -> str:
     """The driven joint that moves a link without a shape, "" if other joints constrain it or there is none."""
     drives, joints = scene.driven_joints, scene.joints.items()
     own = {key: joint for key, joint in joints if name in joint.links}
@@ -88,8 +105,4 @@ def _drive_joint(name: str, known: set[str], shapeless: set[str], scene: Scene) 
     drive_joint = own[inner[0]]
     if drive_joint.kind not in ("revolute", "prismatic") or drive_joint.bushing or drives[inner[0]][0].shaft_stiffness:
         return ""
-    if drive_joint.kind == "prismatic" and GROUND in drive_joint.links:
-        others = {key: x for key, x in own.items() if key != inner[0] and not shapeless >= set(x.links)}
-        if others and not any(by_constraint_equations(each, drives.get(key, ())) for key, each in others.items()):
-            return ""
     return inner[0]

@@ -80,8 +80,8 @@ class LinkScene(Record):
     shape: Shape | None = None
     """its shape; not for a rigid link given by mass, centre and inertia, a rigid slider or a moving part of the ground"""
     mass: Mass = 0.0
-    """mass of a rigid link without a shape: of one with `centre` and `inertia`, of a slider, or of a part of the ground
-    that drives alone move (it has no other joint), which these bear"""
+    """mass of a rigid link without a shape: of one with `centre` and `inertia`, of a slider, whose rotation a prismatic
+    joint constrains and whose mass is at its first other joint, or of a part of the ground, which drives alone move"""
     centre: Point | None = None
     """of a rigid link given by mass, centre and inertia instead of a shape: its centre in the reference position"""
     inertia: Moments | None = None

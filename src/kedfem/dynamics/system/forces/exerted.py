@@ -3,14 +3,14 @@
 A multiplier is a force along its coordinate; `Supports` turns it into forces and moments at the displaced ends.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from kedfem.arrays import Float, Int
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side
-from kedfem.dynamics.system.ends import end_of, same_end
+from kedfem.dynamics.system.ends import end_of
 from kedfem.dynamics.system.forces.poses import Vectors
 from kedfem.dynamics.system.forces.supports import Supports
 from kedfem.dynamics.system.record import Spring
@@ -62,35 +62,18 @@ def on_ports(forces: Supports) -> Float[np.ndarray, "T m"]:
     return forces.on_interface([row for row in rows if not row.name.startswith((*ELEMENTS, "rigid."))])
 
 
-def on_links(forces: Supports, riders: Mapping[int, tuple[int, np.ndarray]]) -> dict[int, Rows]:
-    """Nodal forces (T, n, d) of force elements on the links that they act on, by number, world components.
-
-    Parameters
-    ----------
-    riders : of rigid sliders, by number in the linkage: the link that carries each, and its weights there
-    """
+def on_links(forces: Supports) -> dict[int, Rows]:
+    """Nodal forces (T, n, d) of force elements on the links that they act on, by number, world components."""
     model, out = forces.of.system.model, dict[int, Rows]()
     for row in model.rows:
         for side in row.sides if row.name.startswith(ELEMENTS) else ():
             if side is None:
                 continue
-            if side.axis is None:
-                y = forces.on_end(row.name, end_of(side, row))
-                every = [
-                    (k, model.joints[k].nodes, np.einsum("pn,tpd->tnd", W, y[:, points]))
-                    for k, points, W in _placed(model.joints, model.bodies, row.name, side)
-                ]
-            else:
-                k, weights = riders[side.body]
-                end, pull = end_of(side, row), np.zeros((len(forces), 3))
-                for _, _, ends in forces.pushes(row.name):
-                    pull += sum(f for other, _, f, _ in ends if same_end(other, end))
-                pull[:, 2] *= not model.links[k].planar
-                every = [(k, np.arange(len(weights)), np.einsum("n,td->tnd", weights, pull))]
-            for k, nodes, f in every:
+            y = forces.on_end(row.name, end_of(side, row))
+            for k, points, W in _placed(model.joints, model.bodies, row.name, side):
                 link = model.links[k]
                 total = out.setdefault(k, np.zeros((len(forces), link.n, link.d)))
-                total[:, nodes] += f[:, :, : link.d]
+                total[:, model.joints[k].nodes] += np.einsum("pn,tpd->tnd", W, y[:, points])[:, :, : link.d]
     return out
 
 

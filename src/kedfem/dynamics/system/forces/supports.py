@@ -74,7 +74,7 @@ class Supports:
             seen: list[End] = []
             for joint in (row, *(other for _, other in row.plus)):
                 for side in joint.sides:
-                    if side is not None and side.axis is None:
+                    if side is not None:
                         ends = corners(side) if row.name.startswith("rigid.") else [end_of(side, joint)]
                         for end in ends:
                             again = any(same_end(end, other) for other in seen)
