@@ -103,6 +103,7 @@ RETIRED = {
     "action": r"\bactions?\b(?!=)",
     "sweeps": r"\bSWEEPS\b",
     "turning": r"\bgo(es)? on turning\b|\bhas turned\b|\bturning_(loads|bodies|kernel)\b|counted_turns",
+    "loads that turn": r"\bloads? that turns? with\b|\bturns? (back )?with (the|its) link\b",
     "turn (a full one)": r"\bper turn\b|\b(work|twice) a turn\b|\b(last|steady) turn\b|\bin turn \d",
     "turn": r"\b(two|three|four|five|ten|whole|full|last) turns\b|\b(over|after|within) (a|one) turn\b|\bsteps a turn\b",
     "in thought": r"\bstands? still in thought\b",

@@ -43,7 +43,7 @@ class Pattern:
     """Nodal forces of one load on one link.
 
     forces : (n, d) at factor one, reference components [N]
-    follows : turns with the link
+    follows : rotates with the link
     factor : times (t,) and angles of the drive (t,) → factors (t,)
     share : unit vectors of the link in the reference position and of the world: the factor times their cosine, once the
         link has rotated

@@ -62,7 +62,7 @@ def with_body(
 
 
 def with_point_mass(link: Link, weights: Float[np.ndarray, " n"], mass: float) -> Link:
-    """A link with a mass that follows one interface point and does not turn with the link, such as a slider's [kg]."""
+    """A link with a mass that follows one interface point and does not rotate with the link, such as a slider's [kg]."""
     w = sp.csr_array(weights[None, :])
     lump = sp.csr_array(mass * (w.T @ w))
     m = sp.csr_array(link.mass[0] + lump)

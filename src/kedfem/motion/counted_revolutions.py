@@ -17,7 +17,7 @@ MOST = 0.9 * np.pi  # between two time points [rad]: below half a turn, so that 
 
 
 def require_counted(scene: Scene, link: Linkage, along: Path) -> None:
-    """Refuse time points between which a joint turns so far that its direction is unknown, where a law counts turns.
+    """Refuse time points between which a joint rotates so far that its direction is unknown to laws that count.
 
     Raises
     ------

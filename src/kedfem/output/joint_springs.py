@@ -37,7 +37,7 @@ class DrawnSpring:
 
 @dataclass(frozen=True, slots=True)
 class DrawnWinding:
-    """A spring or damper about a hinge, which turns with the link whose angle it is over.
+    """A spring or damper about a hinge, which rotates with the link whose angle it is over.
 
     link, at : that link, and the joint's point
     shape : around that point, in the reference position

@@ -127,7 +127,7 @@ class Bodies(namedtuple("Bodies", (
     place, first, row_at, multiplier : row of each of these in the matrix of the interface, and its profile, see `Profile`
     X, one, fit : coordinates of position and of unity, and the frames' weights; K : N × N of co-rotational ones
     beams : those that know their strains at points; elements : of beams in space, whose strains need no frame
-    turning : loads that turn with bodies
+    turning : follower loads
     stiffness : K0 of sparse co-rotational bodies, row by row, the number of its matrix first in `of`
     size : √ of the mass that a coordinate of a body counts with where passes are judged: one of dense ones [kg^½]
     rigid : whether it is so stiff that passes foresee K of its strain, see `unforeseen`

@@ -79,7 +79,7 @@ def driving(of: Ready, motion: RigidMotion, loads: Loads | None = None) -> Drivi
 
 
 def amounts(of: Ready, motion: RigidMotion) -> Float[np.ndarray, "T w"]:
-    """Amounts of the loads that turn with bodies over time."""
+    """Amounts of the follower loads over time."""
     every = [load.factor(motion.t, motion.phi) for _, load in own_patterns(of.system.model.loads)]
     return np.stack(every, axis=1) if every else np.zeros((len(motion.t), 0))
 

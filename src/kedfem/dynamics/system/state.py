@@ -55,7 +55,7 @@ class Driving(namedtuple("Driving", (
 
     t : (T,); R, p : (T, M, 3, 3), (T, M, 3) of all bodies of the linkage; v, omega : (T, M, 3) their rates
     drives : (T, D)
-    F : (T, N) P − M R0'' on the coordinates, world components; amounts : (T, w) of loads that turn with bodies
+    F : (T, N) P − M R0'' on the coordinates, world components; amounts : (T, w) of follower loads
     stations : (T, n) weights of the stations of all lines, where their pins are
     stiffness_factors : (T, r) what the stiffness of each law is multiplied by
     factors : (T, m) of the terms of stress stiffness; terms_at : (i + 1,) where those of each body begin

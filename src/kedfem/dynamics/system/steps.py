@@ -180,7 +180,7 @@ class Steps:
         return self._with_follower_loads(every, motion) if self.corotational else every, multipliers
 
     def _with_follower_loads(self, every: list[LinkHistory], motion: RigidMotion) -> list[LinkHistory]:
-        """Forces F with those of loads that turn with links."""
+        """Forces F with those of follower loads."""
         for k, load in own_patterns(self.model.loads):
             R, factor = motion.R[:, self.model.bodies[k]], load.factor(motion.t, motion.phi)
             every[k] = replace(every[k], F=every[k].F + rotated_forces(self.links[k], load, R, every[k].u, factor))

@@ -22,7 +22,7 @@ Shown = tuple[Float[np.ndarray, "m 3"], Float[np.ndarray, "m n"]]
 
 
 def own_patterns(loads: Loads) -> list[tuple[int, Pattern]]:
-    """All loads that turn with their bodies, with the bodies' numbers."""
+    """All follower loads, with the bodies' numbers."""
     return [(k, load) for k, own in enumerate(loads) for load in own if load.own]
 
 

@@ -50,7 +50,7 @@ def _on_curve(curve: Curve | None, at: RigidMotion, e: float, rate: float) -> fl
 def rotated_load(
     link: Link, load: Pattern, R: Float[np.ndarray, "3 3"], u: Float[np.ndarray, "n d"]
 ) -> Float[np.ndarray, "n d"]:
-    """Nodal forces of a load that turns with a link of orientation R, displaced by u: rotations that align best."""
+    """Nodal forces of a follower load on a link of orientation R, displaced by u: rotations that align best."""
     from scipy.spatial.transform import Rotation
 
     drawn, weights = shown_by(link, load.forces)

@@ -56,7 +56,7 @@ def accelerations(now: Instant, r: Flat, u: Flat, v: Flat, asked: ConstraintTerm
 
 
 def accelerated_in_a_step(now: Instant, r: Flat, u: Flat, v: Flat, asked: ConstraintTerms) -> Solved:
-    """The same, but for what springs, motors and loads that turn with bodies do: A x = c_M Wᵀ λ with a step's matrix.
+    """The same, but for what springs, motors and follower loads do: A x = c_M Wᵀ λ with a step's matrix.
 
     Their whole force would at first accelerate next to no mass about their points: no step resolves that, and laws would
     see its rates. What stands against it in that matrix, c_K/c_M K x, is internal force at the start, so that all

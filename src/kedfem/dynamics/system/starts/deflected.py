@@ -1,10 +1,8 @@
 """Deflections without vibration for starts, and for static and quasi-static analyses: quasi-static, static or plucked.
 
-With a drive the deflection rotates with its links, K δ = P − M R0'' − M ([α]× + [ω]×²) δ, each with its own rigid-body
-motion: the matrix includes that inertia, so that a natural frequency near the speed does no harm. The rate is a
-difference of fourth order over one step, over more steps with dampers, as each new difference adds rounding. Without a
-drive links accelerate as rigid bodies in their positions, and K δ = P − M a.
-"""
+With a drive the deflection rotates with the rigid-body motion of its links, K δ = P − M R0'' − M ([α]× + [ω]×²) δ, with
+the last term in the matrix. The rate is a difference of fourth order over one step, or more with dampers, as differences
+add rounding. Without a drive links accelerate as rigid bodies in their positions, and K δ = P − M a."""
 
 from collections.abc import Callable, Sequence
 from copy import copy
@@ -48,9 +46,7 @@ Rows = Sequence[Float[np.ndarray, "_ _"]]
 class MovingDeflection:
     """A deflection u with its rate v, (N,) world components.
 
-    strained : the rate again, by differences of what rigid-body frames see, for what damps deformations: the error of v
-        strains a link that moves as a rigid one, and what a stiff one is damped by would be that error
-    """
+    strained : the rate by differences in rigid-body frames, for damping, as the error of v strains a stiff link"""
 
     u: Flat
     v: Flat
@@ -84,7 +80,7 @@ def quasi_static_position(
 
     Parameters
     ----------
-    near : a state before, from which turns are counted on
+    near : a state before, from which revolutions are counted on
     like : another instant, with what does not depend on time
 
     Raises
@@ -106,14 +102,14 @@ def static(
     Parameters
     ----------
     forces : per body (n, d), world components, beside its loads [N]; the march goes on without: a plucked start
-    near : a state whose deflection the search begins with, and again rotated with the links if it finds nothing; turns
-        are counted on from there; none if not given
+    near : a state whose deflection the search begins with, and again rotated with the links if it finds nothing;
+        revolutions are counted on from there; none if not given
     like : another instant, with what does not depend on time
 
     Raises
     ------
     NoBalanceError
-        If no balance is found: as of a link that hangs, and is not held.
+        If no balance is found, as of an unconstrained link.
     """
     now = Instant(of, motion_at, time, like, None if near is None else near.turned)
     none = np.zeros(int(of.bodies.at[-1]))

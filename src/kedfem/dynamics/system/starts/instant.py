@@ -95,7 +95,7 @@ class Instant:
         return out
 
     def internal_states(self, u: Flat, v: Flat) -> list[InternalState]:
-        """All bodies at a displacement and rate; loads that turn with them are taken from their internal forces."""
+        """All bodies at a displacement and rate; follower loads are subtracted from their internal forces."""
         of, spins = self.of, cross_matrix(self.omega)
         static = self.always.static
         out = [internal_state(static, k, self.R[k], spins[k], u[own(of, k)], v[own(of, k)]) for k in range(len(self.R))]

@@ -21,7 +21,7 @@ from kedfem.motion.rigid import RigidMotion
 
 Flat = Float[np.ndarray, " N"]
 Frames = tuple[Float[np.ndarray, "L 3 3"], Float[np.ndarray, " L"]]
-"""Rotations of bodies' frames against the rigid-body motion; of planar ones the angles, which count turns."""
+"""Rotations of bodies' frames against the rigid-body motion; of planar ones angles, counted beyond a revolution."""
 
 
 class StaticForces:
@@ -51,7 +51,7 @@ class StaticForces:
         Parameters
         ----------
         R : of all bodies of the linkage in the rigid-body motion
-        amounts : of loads that turn with bodies
+        amounts : of follower loads
         """
         bodies, trial = self.of.bodies, self._trial
         trial.u[:] = u

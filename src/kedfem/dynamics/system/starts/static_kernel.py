@@ -16,7 +16,7 @@ def static_forces(c, bodies, R, amounts, state, trial, work):  # type: ignore[no
     Parameters
     ----------
     c : with Newmark's numbers and damping zero
-    R : (M, 3, 3) of the rigid-body motion; amounts : (w,) of loads that turn with bodies
+    R : (M, 3, 3) of the rigid-body motion; amounts : (w,) of follower loads
     state : in the reference position
     """
     begun(newmark(c), bodies.beams, R, state.strain, state.direction, trial.base, trial.resisted)
