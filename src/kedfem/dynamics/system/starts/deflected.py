@@ -102,8 +102,8 @@ def static(
     Parameters
     ----------
     forces : per body (n, d), world components, beside its loads [N]; the march goes on without: a plucked start
-    near : a state whose deflection the search begins with, and again rotated with the links if it finds nothing;
-        revolutions are counted on from there; none if not given
+    near : a state whose deflection, rotated with the links, the search begins with, and from which revolutions are
+        counted on; none if not given
     like : another instant, with what does not depend on time
 
     Raises
@@ -114,14 +114,9 @@ def static(
     now = Instant(of, motion_at, time, like, None if near is None else near.turned)
     none = np.zeros(int(of.bodies.at[-1]))
     pull = none if forces is None else as_work(of, forces)
-    frames = now.always.static.frames()
-    try:
-        return begun(now, _balance(now, none if near is None else near.u, pull, None), none)
-    except NoBalanceError:
-        if near is None:
-            raise
-    now.always.static.seek_from(frames)
-    before = Instant(of, motion_at, float(near.time[0]), now)  # rotated with its links a deflection strains none
+    if near is None:
+        return begun(now, _balance(now, none, pull, None), none)
+    before = Instant(of, motion_at, float(near.time[0]), now)
     return begun(now, _balance(now, _with_links(before, now, near.u), pull, None), none)
 
 

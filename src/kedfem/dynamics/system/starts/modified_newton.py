@@ -11,7 +11,7 @@ from kedfem.dynamics.anderson import AndersonAcceleration
 from kedfem.dynamics.matrices.bordered import ConstraintTerms
 from kedfem.dynamics.system.starts.instant import Flat, Instant
 from kedfem.dynamics.system.starts.linear_equations import LinearEquations
-from kedfem.dynamics.system.starts.newton_krylov import Equilibrium, solution, stands_off
+from kedfem.dynamics.system.starts.newton_krylov import Equilibrium, closed, solution, stands_off
 from kedfem.dynamics.system.starts.rotating_bodies import CONVERGED, RotatingBodies, Spins
 from kedfem.dynamics.system.starts.temporary_springs import has_stops, with_temporary_springs
 from kedfem.errors import SolveError
@@ -88,6 +88,7 @@ def iterated(
     z1 : rates of the interface unknowns
     rounding : of the deflection, below which changes that do not fall are taken for rounding
     """
+    u = closed(now, u)  # changes leave joints as far open as they are
     of, anderson, bodies, settled, last = now.of, AndersonAcceleration(), RotatingBodies(now, spins), False, np.inf
     linear, slow, shaken, start, first = of.c.single, 0, 0, u, 0.0
     exact = now.slow or (linear and any(bodies.sparse))

@@ -37,6 +37,7 @@ SHORTEST, IN_A_ROW = 1 / 64, 4  # of a step; so many of them end a search
 FALLS = 0.25  # of a step's length: share by which what is left has to fall
 KRYLOV = 40
 OPEN = 1e-4  # of the largest link: what joints may be open in a balance; found ones are at 1e-9
+CLOSED = 1e-9  # of displacements at interface points: open by less is closed but for rounding
 FAR = 1e4  # of the largest link: displacements of unconstrained links
 LEFT = 1e-3  # of a residual by GMRES: an iteration leaves about as much of the error
 ROUNDING = 1e-8  # of the deflection: changes below it that do not fall
@@ -227,6 +228,16 @@ def gaps(now: Instant, u: Flat, z: Flat) -> list[Flat]:
     """How far the interface points of each body are from where the interface unknowns have them."""
     every = zip(now.of.parts, now.of.system.model.joints, strict=True)
     return [part.W @ u[own(now.of, k)] - joint.B @ z[joint.columns] for k, (part, joint) in enumerate(every)]
+
+
+def closed(now: Instant, u: Flat) -> Flat:
+    """The deflection with closed joints that is nearest to another."""
+    out = u.copy()
+    for k, open_ in enumerate(gaps(now, u, now.interface(u)) if u.any() else ()):
+        W, here = now.of.parts[k].W, own(now.of, k)
+        if np.abs(open_).max(initial=0.0) > CLOSED * np.abs(W @ u[here]).max(initial=0.0):
+            out[here] -= np.linalg.lstsq(W, open_)[0]
+    return out
 
 
 def stands_off(now: Instant, u: Flat, z1: Flat | None) -> str:
