@@ -245,10 +245,10 @@ def test_a_spring_hangs_on_points_of_links_sliders_and_the_ground() -> None:
     motion = resting(3, np.zeros(1))
     motion.p[0, 1] = [0.0, 0.5, 0.0]  # shorter than free, it pushes down; and never by a moment on ψ
     loads = on_arm(scene, model).loads(motion)
-    motor, push, tip, shoe = ((k, f[0].sum(axis=0)) for k, f in loads)
-    assert [k for k, _ in (motor, push, tip, shoe)] == [0, 2, 2, 2]  # segments
-    np.testing.assert_allclose([x for _, x in (motor, push, tip, shoe)],
-                               [[0, 0, 2.5 * -1], [4, 0, 0], [0, -5, 0], [20, 0, 0]], atol=1e-12)  # fmt: skip
+    motor, push, tip, shoe = ((k, model.links[k].one @ f[0]) for k, f in loads)
+    assert [k for k, _ in (motor, push, tip, shoe)] == [0, 3, 2, 3]  # segments of the arm, and the shoe
+    for (_, found), wanted in zip((motor, push, tip, shoe), ([0, 0, -2.5], [4, 0], [0, -5, 0], [20, 0]), strict=True):
+        np.testing.assert_allclose(found, wanted, atol=1e-12)
 
 
 @pytest.mark.parametrize("kind", ["beam", "spatial", "solid", "plane"])
