@@ -36,7 +36,7 @@ def arm_with(kind: str, drawn: float, order: tuple[str, str], **asked: Any) -> d
         },
         "drive": {
             "joint": "A",
-            "motion": {"kind": "table", "time": times.tolist(), "angle": (BEGUN - drawn + RATE * times).tolist()},
+            "motion": {"kind": "curve", "time": times.tolist(), "value": (BEGUN - drawn + RATE * times).tolist()},
         },
         "analysis": {"end_time": 0.01, "step": 0.001, "frames": "co-rotational", "accuracy": "quick", **asked},
     }

@@ -73,7 +73,7 @@ class Moving(NamedTuple):
 def history(run: Run, steps: int) -> Iterator[Moving]:
     """All states from t = 0, by the march of a system of one body."""
     link, joint = run.link, run.joint
-    model = Model((link,), (0,), (joint,), ((),), (), run.damping)
+    model = Model((link,), (0,), (joint,), ((),), run.damping)
     of = ready(System(("link",), (), (), joint.unknowns, model), run.scheme)
     u, v, g1 = run.start or [np.zeros((link.n, 3))] * 3
     now = Instant(of, lambda t: motion_of(run, t), 0.0)
