@@ -16,6 +16,8 @@ ASIDE = Path(__file__).with_name("aside.txt")
 """Tests that the default run leaves out, and no other."""
 STUDIES = Path(__file__).with_name("studies.txt")
 """Tests that .ci/run leaves out too: dear kinds of what cheaper kinds show as well."""
+KEPT = "tests/laws/test_mechanisms.py::test_twenty_random_mechanisms_keep_all_laws"
+"""Two hundred random mechanisms: by default, whatever they take."""
 LINE = re.compile(r"(\d+\.\d+)s (?:call|setup|teardown) +(\S.*)")
 HEAD = "# Tests that the default run leaves out; written by `python -m tests.slow`\n"
 
@@ -34,6 +36,8 @@ def slowest(log: str, most: float = MOST) -> list[str]:
     for name, taken in sorted(seconds.items(), key=lambda item: -item[1]):
         if left <= most:
             break
+        if name.startswith(KEPT):
+            continue
         left -= taken
         out.append(name)
     return sorted(out)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.slow import ASIDE, LIST, STUDIES, listed, slowest
+from tests.slow import ASIDE, KEPT, LIST, STUDIES, listed, slowest
 
 LOG = """
 3.00s call     tests/a.py::test_one[some, thing]
@@ -21,6 +21,15 @@ def test_the_slowest_are_left_out_until_the_rest_is_quick() -> None:
     assert slowest(LOG, 9.0) == []
     assert slowest(LOG, 6.0) == ["tests/a.py::test_one[some, thing]"]
     assert slowest(LOG, 2.5) == ["tests/a.py::test_one[some, thing]", "tests/b.py::test_two"]
+
+
+def test_random_mechanisms_stay() -> None:
+    dear = f"9.00s call     {KEPT}[0]\n"
+    assert slowest(LOG + dear, 9.0) == [
+        "tests/a.py::test_one[some, thing]",
+        "tests/b.py::test_three",
+        "tests/b.py::test_two",
+    ]
 
 
 @pytest.mark.long
