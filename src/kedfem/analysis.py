@@ -1,67 +1,63 @@
 """The whole analysis of a scene: from its record to time series, animation, plots and a picture."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from math import inf
 from pathlib import Path as FilePath
 
 from kedfem.accuracy.choices import open_step
-from kedfem.accuracy.error_budget import Budget, attributes, budget_warning, kind_of_name, meaningless
-from kedfem.accuracy.estimates import PeakStrainStates, budget
-from kedfem.accuracy.histories import Histories, steady_state
+from kedfem.accuracy.error_budget import Budget, attributes, budget_warning, meaningless
+from kedfem.accuracy.estimates import budget
+from kedfem.accuracy.histories import run_histories, steady_state
 from kedfem.accuracy.mass_damping import mass_damping_warning
 from kedfem.accuracy.meshes import stubby_warning
 from kedfem.accuracy.plan import Plan, ready_to_step
 from kedfem.accuracy.prepared import ALONE, Neighbours, Prepared
 from kedfem.accuracy.reduction import Reduction
-from kedfem.accuracy.resolution import resolution, resolution_warnings, stability_warning
+from kedfem.accuracy.resolution import Resolution, resolution, resolution_warnings, stability_warning
 from kedfem.accuracy.rigid_link_compliance import compliance_warning
 from kedfem.accuracy.rounding import IDLE, unstressed
 from kedfem.accuracy.singular import SingularPasses
 from kedfem.accuracy.sizes import Sizes, size_warnings, sizes
-from kedfem.accuracy.steady import Steady, steady_of, steady_warning, unstable
+from kedfem.accuracy.steady import Steady, growing, steady_warning, unstable
 from kedfem.accuracy.step_estimate import StepEstimate
 from kedfem.dynamics.loads import coarse_steps
 from kedfem.dynamics.stepping.cost import factor_words
 from kedfem.dynamics.stepping.levels import level_steps
 from kedfem.dynamics.stepping.solvers import eased_warning, unstable_balance, unstable_balance_warning
-from kedfem.dynamics.stepping.start import period_map
 from kedfem.dynamics.system.period.map import StateArrays
 from kedfem.dynamics.system.steps import Steps
-from kedfem.dynamics.vibration import Vibration, vibration
 from kedfem.links.recovery import stress_recovery
 from kedfem.motion.assembly import assembled, assembly_warning
 from kedfem.motion.counted_revolutions import require_counted
 from kedfem.output.derived import (
-    MESH,
     WORST,
     fatigue_warning,
-    fields,
     peak_warning,
     refuse_foreign,
+    write_damage,
     write_derived,
+    write_mesh_errors,
+    write_stresses,
     write_vibration,
 )
-from kedfem.output.stress_files import Extremes, write_envelope, write_fatigue, write_top
-from kedfem.output.vtu import write_cells, write_frame
-from kedfem.results import Channel, Fatigue, Peak, Results, add_notes, claimed, read_results
-from kedfem.results.additions import add_account, add_fatigue, add_peaks, mark_unreliable
+from kedfem.results import Peak, Results, add_notes, claimed, read_results
+from kedfem.results.additions import add_account, add_peaks, mark_unreliable
 from kedfem.results.audit import Account, balance_warning
 from kedfem.results.balance import Balance, balance_notes
 from kedfem.results.cross_checks import CrossChecks
-from kedfem.results.fatigue.damage import fatigue_of, kept_since, stress_period
+from kedfem.results.fatigue.damage import kept_since, stress_period
 from kedfem.results.fatigue.strength import require_fatigue
 from kedfem.results.forces.force_elements import element_forces
 from kedfem.results.forces.indeterminate import indeterminate_channels, indeterminate_warning
-from kedfem.results.on_demand import ChannelSelection
 from kedfem.results.recording import recording
-from kedfem.results.stresses.envelope import Envelope
-from kedfem.results.stresses.peaks import highest, hot_spots, peaks
+from kedfem.results.stresses.peaks import highest, peaks
 from kedfem.results.stresses.singular_stress import singular_places
 from kedfem.results.table import drive_heading, require_parquet
 from kedfem.resume import EVERY, Keeper, remove_state
 from kedfem.scene import Scene, refuse_few_rows, without_vibration
-from kedfem.stepping import Clock, Watch, Watched, stepped
+from kedfem.stepping import Clock, Marched, Watch, Watched, stepped
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +119,20 @@ def analyse(
     KedfemError
         With a message for the user; rows and frames up to there are kept and marked as interrupted.
     """
+    _require_packages(scene)
+    with claimed(scene.results_folder) as folder:
+        refuse_foreign(folder)
+        keeper, clock = Keeper.of(scene, folder, resumes, every), Clock(watch)
+        begun = _begun(scene, clock, beside, stresses_since)
+        marched = clock.timed("steps", lambda: stepped(begun.ready, begun.solvers, begun.watched, folder, watch, keeper))
+        judged = _judged(begun, marched, keeper, folder, clock)
+        run = _completed(begun, judged, marched, folder, clock)
+        remove_state(folder)
+        return _reported(run, watch) if scene.output.report else run
+
+
+def _require_packages(scene: Scene) -> None:
+    """OutputError unless the packages are there that the scene's files need."""
     if scene.output.parquet:
         require_parquet("output.parquet")
     if scene.output.report:
@@ -131,12 +141,131 @@ def analyse(
         require_report("output.report")
     if scene.fatigue is not None:
         require_fatigue("fatigue")
-    with claimed(scene.results_folder) as folder:
-        refuse_foreign(folder)
-        keeper = Keeper.of(scene, folder, resumes, every)
-        run = _analysed(scene, folder, watch, keeper, stresses_since, beside)
-        remove_state(folder)
-        return _reported(run, watch) if scene.output.report else run
+
+
+@dataclass(frozen=True, slots=True)
+class _Begun:
+    """A run before its first step.
+
+    asked : accuracy that the scene asks for, if any
+    chosen : whether its step is that of a plan
+    period : time after which stresses repeat, where damage is asked for, else 0 [s]
+    resolved : how its steps resolve vibration; None of an analysis without any
+    notices : what the user should know
+    """
+
+    plan: Plan | None
+    ready: Prepared
+    reduction: Reduction | None
+    solvers: list[Steps]
+    account: Account
+    watched: Watched
+    sizes: Sizes
+    asked: float | None
+    chosen: bool
+    period: float
+    resolved: Resolution | None
+    notices: tuple[str, ...]
+
+
+def _begun(scene: Scene, clock: Clock, beside: Neighbours, since: float) -> _Begun:
+    """Meshes, matrices and choices of a scene, its factors, and what is evaluated at each step."""
+    scene, assembly = assembled(scene)
+    accuracy, period, chosen = scene.analysis.accuracy, stress_period(scene), open_step(scene)
+    plan, ready, reduction = ready_to_step(scene, clock.stage, beside.ends)
+    scene, model = ready.scene, ready.model
+    refuse_few_rows(scene)
+    plain = sizes(scene, model)
+    solvers = clock.timed("factor", lambda: _solvers(ready, beside), factor_words(model))
+    account = Account(model, element_forces(scene, model), lambda: solvers[0].stiffening)
+    recorded = clock.timed("probes", lambda: recording(scene, model, account, ready.path, ready.linkage))
+    every = [*model.links, *(each.link for each in model.prescribed)]
+    recoveries = clock.timed("recovery", lambda: [stress_recovery(link) for link in every])
+    notices = *size_warnings(scene, plain), *assembly_warning(assembly), *stubby_warning(model), *_about_steps(ready)
+    resolved = None if without_vibration(scene) else clock.timed("frequencies", lambda: resolution(ready))
+    channels = [each.channel for each in recorded]
+    indeterminate = indeterminate_channels(scene, model, [each.name for each in channels])
+    efforts = CrossChecks(scene, ready.linkage, channels, account)
+    passes, kept = SingularPasses(ready), kept_since(scene, period)
+    watched = Watched(recorded, indeterminate, efforts, recoveries, passes, since, kept)
+    return _Begun(plan, ready, reduction, solvers, account, watched, plain, None if accuracy == "quick" else accuracy,
+                  chosen and plan is not None, period, resolved, notices)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class _Judged:
+    """Results of a run with what their errors are; notices as of `_Begun`, with its own."""
+
+    results: Results
+    balance: Balance | None
+    budget: Budget
+    step: StepEstimate
+    steady: Steady | None
+    singular: list[list[str]]
+    notices: tuple[str, ...]
+
+
+def _judged(begun: _Begun, marched: Marched, keeper: Keeper, folder: FilePath, clock: Clock) -> _Judged:
+    """Highest stresses, balance of energy and estimated errors, also in the file of results."""
+    ready, solvers, watched = begun.ready, begun.solvers, begun.watched
+    scene, file, (envelope, seen, step) = ready.scene, folder / "results.h5", marched
+    balance = None if without_vibration(scene) else begun.account.balance
+    notices = (
+        *begun.notices,
+        *(balance_warning(balance) if balance else ()),
+        *(mass_damping_warning(ready, balance.mass_damping) if balance else ()),
+        *watched.efforts.warnings(),
+        *indeterminate_warning(watched.indeterminate),
+        *watched.passes.warnings(),
+        *eased_warning(solvers),
+        *unstable_balance_warning(solvers),
+        *compliance_warning(seen.compliance, begun.asked),
+        *keeper.warnings(),
+    )
+    singular = singular_places(scene, ready.model, watched.recoveries)
+    add_peaks(file, peaks(envelope.links(), singular))
+    results = read_results(file)
+    errors = step.errors if step.levels > 1 else None
+    idle = unstressed(ready.model, highest(results.peaks))
+    found = clock.timed(
+        "estimates",
+        lambda: Budget(()) if idle else budget(ready, seen, begun.reduction, run_histories(results, solvers), errors),
+    )
+    step = replace(step, errors=found.step or step.errors)
+    steady, grows = growing(ready, solvers)
+    notices += (
+        *resolution_warnings(begun.resolved, found.error_of("step")),
+        *([IDLE] if idle else budget_warning(found, begun.asked, begun.chosen)),
+        *(write_vibration(scene, ready.model, watched.recoveries, grows, folder) if grows else ()),
+        *steady_warning(steady),
+    )
+    notes = {
+        **attributes(found), **step.notes,
+        **(balance_notes(balance) if balance else {}), **(steady.notes if steady else {}),
+    }  # fmt: skip
+    add_notes(file, notes)
+    results = replace(results, notes={**results.notes, **notes})
+    if why := unstable(steady) or unstable_balance(solvers) or meaningless(found, balance, watched.efforts.unworked):
+        mark_unreliable(file, why)
+        results = replace(results, status="unreliable", reason=why)
+    return _Judged(results, balance, found, step, steady, singular, notices)
+
+
+def _completed(begun: _Begun, judged: _Judged, marched: Marched, folder: FilePath, clock: Clock) -> Run:
+    """The run with all files that follow from its steps."""
+    ready, results, (envelope, seen, _) = begun.ready, judged.results, marched
+    peak = highest(results.peaks)
+    if begun.period:
+        damaged = partial(write_damage, ready.scene, ready.model, envelope, judged.singular, begun.period, folder)
+        results = replace(results, fatigue=clock.timed("fatigue", damaged))
+    notices = *judged.notices, *peak_warning(peak, begun.watched.stresses_since), *fatigue_warning(results.fatigue)
+    write_stresses(ready.scene, ready.model, envelope, judged.singular, drive_heading(results.drive), folder)
+    notices += tuple(clock.timed("pictures", lambda: write_derived(ready.scene, results, peak, folder)))
+    write_mesh_errors(seen.strained.model, seen.strained.indicators, folder)
+    add_account(folder / "results.h5", notices, clock.seconds)
+    results = replace(results, warnings=notices, seconds=dict(clock.seconds))
+    return Run(folder, results, peak, folder / WORST, clock.seconds, notices, begun.reduction, begun.plan, judged.balance,
+               judged.budget, begun.sizes, judged.step, judged.steady, steady_state(begun.solvers))  # fmt: skip
 
 
 def _reported(run: Run, watch: Watch) -> Run:
@@ -148,85 +277,6 @@ def _reported(run: Run, watch: Watch) -> Run:
     return replace(run, warnings=(*run.warnings, *(f"report: {text}" for text in missing)))
 
 
-def _analysed(
-    scene: Scene, folder: FilePath, watch: Watch, keeper: Keeper, since: float, beside: Neighbours = ALONE
-) -> Run:
-    """The stages of a run, in a folder of its own; each adds what the user should know to the notices."""
-    clock = Clock(watch)
-    scene, assembly = assembled(scene)
-    period = stress_period(scene)
-    asked, chosen = None if scene.analysis.accuracy == "quick" else scene.analysis.accuracy, open_step(scene)
-    plan, ready, reduction = ready_to_step(scene, clock.stage, beside.ends)
-    scene = ready.scene
-    refuse_few_rows(scene)
-    plain = sizes(scene, ready.model)
-    notices = [*size_warnings(scene, plain), *assembly_warning(assembly), *stubby_warning(ready.model)]
-    solvers = clock.timed("factor", lambda: _solvers(ready, beside), factor_words(ready.model))
-    account = Account(ready.model, element_forces(scene, ready.model), lambda: solvers[0].stiffening)
-    recorded = clock.timed("probes", lambda: recording(scene, ready.model, account, ready.path, ready.linkage))
-    every = [*ready.model.links, *(each.link for each in ready.model.prescribed)]
-    recoveries = clock.timed("recovery", lambda: [stress_recovery(link) for link in every])
-    notices += _about_steps(ready)
-    moving = None if without_vibration(scene) else clock.timed("frequencies", lambda: resolution(ready))
-    channels = [each.channel for each in recorded]
-    indeterminate = indeterminate_channels(scene, ready.model, [each.name for each in channels])
-    efforts = CrossChecks(scene, ready.linkage, channels, account)
-    watched = Watched(
-        recorded, indeterminate, efforts, recoveries, SingularPasses(ready), since, kept_since(scene, period)
-    )
-    envelope, seen, step = clock.timed("steps", lambda: stepped(ready, solvers, watched, folder, watch, keeper))
-    balance = None if without_vibration(scene) else account.balance
-    unbalanced = balance_warning(balance) if balance else ()
-    notices += [
-        *unbalanced,
-        *(mass_damping_warning(ready, balance.mass_damping) if balance else ()),
-        *efforts.warnings(),
-        *indeterminate_warning(indeterminate),
-        *watched.passes.warnings(),
-        *eased_warning(solvers),
-        *unstable_balance_warning(solvers),
-        *compliance_warning(seen.compliance, asked),
-        *keeper.warnings(),
-    ]
-    singular = singular_places(scene, ready.model, recoveries)
-    add_peaks(folder / "results.h5", peaks(envelope.links(), singular))
-    results = read_results(folder / "results.h5")
-    errors = step.errors if step.levels > 1 else None
-    idle = unstressed(ready.model, peak := highest(results.peaks))
-    found = clock.timed(
-        "estimates", lambda: Budget(()) if idle else budget(ready, seen, reduction, _in_memory(results, solvers), errors)
-    )
-    step = replace(step, errors=found.step or step.errors)
-    steady, grows = _growing(ready, solvers)
-    notices += [
-        *resolution_warnings(moving, found.error_of("step")),
-        *([IDLE] if idle else budget_warning(found, asked, chosen and plan is not None)),
-        *(write_vibration(scene, ready.model, recoveries, grows, folder) if grows else ()),
-        *steady_warning(steady),
-    ]
-    notes = {
-        **attributes(found), **step.notes,
-        **(balance_notes(balance) if balance else {}), **(steady.notes if steady else {}),
-    }  # fmt: skip
-    add_notes(folder / "results.h5", notes)
-    results = replace(results, notes={**results.notes, **notes})
-    why = meaningless(found, balance, efforts.unworked)
-    if why := unstable(steady) or unstable_balance(solvers) or why:
-        mark_unreliable(folder / "results.h5", why)
-        results = replace(results, status="unreliable", reason=why)
-    if period:
-        damaged = clock.timed("fatigue", lambda: _damaged(ready, folder, envelope, singular, period))
-        results = replace(results, fatigue=damaged)
-    notices += [*peak_warning(peak, since), *fatigue_warning(results.fatigue)]
-    _stress_files(ready, folder, results.drive, envelope, singular)
-    notices += clock.timed("pictures", lambda: write_derived(scene, results, peak, folder))
-    _mesh_field(seen.strained, folder / MESH)
-    add_account(folder / "results.h5", notices, clock.seconds)
-    results = replace(results, warnings=tuple(notices), seconds=dict(clock.seconds))
-    return Run(folder, results, peak, folder / WORST, clock.seconds, tuple(notices), reduction, plan,
-               balance, found, plain, step, steady, steady_state(solvers))  # fmt: skip
-
-
 def _solvers(ready: Prepared, beside: Neighbours) -> list[Steps]:
     """Those of all levels in time; the search for a steady motion starts from that of a neighbour."""
     solvers = level_steps(ready.scene, ready.model)
@@ -235,59 +285,9 @@ def _solvers(ready: Prepared, beside: Neighbours) -> list[Steps]:
     return solvers
 
 
-def _growing(ready: Prepared, solvers: Sequence[Steps]) -> tuple[Steady | None, Vibration | None]:
-    """What is known of a steady motion, and of one that is unstable the vibration that grows."""
-    steady, solver = steady_of(ready.scene, solvers), solvers[-1]
-    if steady is None or not steady.unstable or solver.steady is None:
-        return steady, None
-    over = period_map(ready.scene, ready.linkage, ready.path, ready.model, solver, solver.steady.state)
-    found = vibration(over, solver, solver.steady)
-    steady = steady.reported(found.frequency, found.words, solver.ready.c.h)
-    return steady, found if steady.unstable else None
-
-
 def _about_steps(ready: Prepared) -> list[str]:
     """Warnings of steps that are too long for what turns and for what loads do; refused if turns cannot be counted."""
     require_counted(ready.scene, ready.linkage, ready.path)
     if without_vibration(ready.scene):
         return []
     return [*stability_warning(ready.scene), *coarse_steps(ready.scene)]
-
-
-def _stress_files(
-    ready: Prepared, folder: FilePath, drive: Channel, envelope: Envelope, singular: list[list[str]]
-) -> None:
-    """The envelope of stresses, the top ten of each link, and the frame of the highest of all."""
-    scene, named = ready.scene, drive_heading(drive)
-    extremes = Extremes(envelope.links(), singular, named)
-    write_envelope(folder, extremes, scene.output.csv)
-    write_top(folder, hot_spots(extremes.found, singular), named)
-    if (worst := envelope.worst) is not None:
-        write_frame(folder / WORST, worst.t, fields(scene, ready.model, envelope.recoveries, worst))
-
-
-def _damaged(ready: Prepared, folder: FilePath, envelope: Envelope, singular: list[list[str]], period: float) -> Fatigue:
-    """Damage over the last period, in its files and in that of the results."""
-    found, fields = fatigue_of(ready.scene, ready.model, envelope, singular, period)
-    write_fatigue(folder, found, fields, ready.scene.output.csv)
-    add_fatigue(folder / "results.h5", found)
-    return found
-
-
-def _mesh_field(strained: PeakStrainStates, file: FilePath) -> None:
-    """The mesh's indicator in each element of solid and plane links, for ParaView."""
-    parts = [
-        ((link.full or link), each.elements)
-        for link, each in ((strained.model.links[k], each) for k, each in strained.indicators.items())
-    ]
-    if parts:
-        cells = [(link.X, (link.cell_type, link.cells)) for link, _ in parts]
-        write_cells(file, cells, "mesh_error", [values for _, values in parts])
-
-
-def _in_memory(results: Results, solvers: Sequence[Steps]) -> Histories:
-    """The channels of a run as its errors are judged; none where not all time points are rows."""
-    if results.every > 1:
-        return Histories(results.time[:0], {}, begun=steady_state(solvers))
-    names = tuple(name for name in results.channels if kind_of_name(name) is not None)
-    return Histories(results.time, ChannelSelection(results.channels, names), begun=steady_state(solvers))

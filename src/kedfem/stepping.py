@@ -76,9 +76,13 @@ class Watched:
     kept_since: float = np.inf
 
 
+Marched = tuple[Envelope, ErrorMonitor, StepEstimate]
+"""What the steps of a run leave: extremes of stress, and what they show of errors."""
+
+
 def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
              folder: FilePath, watch: Watch, keeper: Keeper | None = None,
-             ) -> tuple[Envelope, ErrorMonitor, StepEstimate]:  # fmt: skip
+             ) -> Marched:  # fmt: skip
     """All time steps: rows to the results file, frames to the animation; also what the steps show of errors.
 
     A keeper stores states on the disk, and may have one to go on from.

@@ -14,8 +14,9 @@ from kedfem.dynamics.stepping.levels import level_steps, leveled
 from kedfem.dynamics.system.period.map import StateArrays, state_arrays
 from kedfem.dynamics.system.period.search import Periodic, Search
 from kedfem.dynamics.system.steps import Steps
-from kedfem.results import Channel
+from kedfem.results import Channel, Results
 from kedfem.results.channels import largest_by_unit
+from kedfem.results.on_demand import ChannelSelection
 from kedfem.results.recording import recording, rows
 
 # of the largest force at the linkage's size: a torque below is what is left of others that cancel
@@ -146,3 +147,11 @@ def _at(
     from scipy.interpolate import CubicSpline
 
     return np.asarray(CubicSpline(given, values)(np.minimum(time, given[-1])))
+
+
+def run_histories(results: Results, solvers: Sequence[Steps]) -> Histories:
+    """The channels of a run as its errors are judged; none where not all time points are rows."""
+    if results.every > 1:
+        return Histories(results.time[:0], {}, begun=steady_state(solvers))
+    names = tuple(name for name in results.channels if kind_of_name(name) is not None)
+    return Histories(results.time, ChannelSelection(results.channels, names), begun=steady_state(solvers))

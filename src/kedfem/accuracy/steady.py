@@ -6,9 +6,12 @@ from math import ceil, log
 
 import numpy as np
 
+from kedfem.accuracy.prepared import Prepared
 from kedfem.dynamics.stepping.combined import level_weights
+from kedfem.dynamics.stepping.start import period_map
 from kedfem.dynamics.system.period.search import Periodic
 from kedfem.dynamics.system.steps import Steps
+from kedfem.dynamics.vibration import Vibration, vibration
 from kedfem.scene import Scene, revolution_steps, time_grid
 
 # oscillations in a step, five steps each: of faster ones a step does not determine whether they grow
@@ -154,3 +157,14 @@ def steady_warning(steady: Steady | None) -> tuple[str, ...]:
             f"(about {100 * steady.growth:.3g} % is left after a period): many are damped alike"
         )
     return tuple(out)
+
+
+def growing(ready: Prepared, solvers: Sequence[Steps]) -> tuple[Steady | None, Vibration | None]:
+    """What is known of a steady motion, and of one that is unstable the vibration that grows."""
+    steady, solver = steady_of(ready.scene, solvers), solvers[-1]
+    if steady is None or not steady.unstable or solver.steady is None:
+        return steady, None
+    over = period_map(ready.scene, ready.linkage, ready.path, ready.model, solver, solver.steady.state)
+    found = vibration(over, solver, solver.steady)
+    steady = steady.reported(found.frequency, found.words, solver.ready.c.h)
+    return steady, found if steady.unstable else None

@@ -1,6 +1,6 @@
 """Files that follow from a finished run: stress envelope, table, plots, and the picture of the highest stress."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -9,6 +9,7 @@ from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.vibration import Vibration
 from kedfem.errors import OutputError, PictureError
+from kedfem.links.indicator import Indicator
 from kedfem.links.recovery import StressRecovery
 from kedfem.output.animation import remove_animation
 from kedfem.output.fields import LinkField
@@ -17,10 +18,26 @@ from kedfem.output.paraview import STATE, write_state
 from kedfem.output.picture import write_picture
 from kedfem.output.plots import remove_plots, write_plots
 from kedfem.output.shapes import GROWING, write_growing
-from kedfem.output.stress_files import DAMAGE, DAMAGE_POINTS, ENVELOPE, POINTS, SPOTS, TOP
+from kedfem.output.stress_files import (
+    DAMAGE,
+    DAMAGE_POINTS,
+    ENVELOPE,
+    POINTS,
+    SPOTS,
+    TOP,
+    Extremes,
+    write_envelope,
+    write_fatigue,
+    write_top,
+)
+from kedfem.output.vtu import write_cells, write_frame
 from kedfem.output.words import clock, moment, place_of, stress_at
 from kedfem.results import Fatigue, Peak, Results, write_csv, write_parquet
+from kedfem.results.additions import add_fatigue
+from kedfem.results.fatigue.damage import fatigue_of
 from kedfem.results.reader import foreign
+from kedfem.results.stresses.envelope import Envelope
+from kedfem.results.stresses.peaks import hot_spots
 from kedfem.results.stresses.singular_stress import AWAY, reason
 from kedfem.scene import Scene
 
@@ -98,6 +115,41 @@ def remove_derived(folder: Path) -> None:
     remove_plots(folder / PLOTS)
     remove_animation(folder, STEM)
     remove_animation(folder, GROWING)
+
+
+def write_stresses(
+    scene: Scene, model: Model, envelope: Envelope, singular: Sequence[Sequence[str]], drive: str, folder: Path
+) -> None:
+    """The envelope of stresses, the top ten of each link, and the frame of the highest of all.
+
+    Parameters
+    ----------
+    singular : per link what each point is near to, in words; empty where stress is what it seems
+    drive : the drive's position with its unit
+    """
+    extremes = Extremes(envelope.links(), singular, drive)
+    write_envelope(folder, extremes, scene.output.csv)
+    write_top(folder, hot_spots(extremes.found, singular), drive)
+    if (worst := envelope.worst) is not None:
+        write_frame(folder / WORST, worst.t, fields(scene, model, envelope.recoveries, worst))
+
+
+def write_damage(
+    scene: Scene, model: Model, envelope: Envelope, singular: Sequence[Sequence[str]], period: float, folder: Path
+) -> Fatigue:
+    """Damage over the last period, in its files and in that of the results; parameters as of `write_stresses`."""
+    found, points = fatigue_of(scene, model, envelope, singular, period)
+    write_fatigue(folder, found, points, scene.output.csv)
+    add_fatigue(folder / "results.h5", found)
+    return found
+
+
+def write_mesh_errors(model: Model, indicators: Mapping[int, Indicator], folder: Path) -> None:
+    """The mesh's indicator in each element of solid and plane links, for ParaView."""
+    parts = [((link.full or link), each.elements) for link, each in ((model.links[k], x) for k, x in indicators.items())]
+    if parts:
+        cells = [(link.X, (link.cell_type, link.cells)) for link, _ in parts]
+        write_cells(folder / MESH, cells, "mesh_error", [values for _, values in parts])
 
 
 def write_vibration(
