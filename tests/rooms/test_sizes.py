@@ -9,6 +9,7 @@ import pytest
 from kedfem.accuracy.sizes import size_warnings, sizes
 from kedfem.errors import MeshError
 from kedfem.kinematics import rigid_links
+from kedfem.marching import begun_march
 from kedfem.scene import Cad, Scene, read_scene, scene_from
 from kedfem.scene.records.units import si_number
 from kedfem.tables import size_line
@@ -123,6 +124,19 @@ def test_sizes_are_in_one_line() -> None:
         "sizes: 301.6 mm overall; links 100 mm (crank) to 300 mm (coupler); masses 0.157 to 0.471 kg; "
         "E 210 GPa; drive 300 rpm"
     )
+
+
+def test_a_slider_has_no_size() -> None:
+    """Only points of its model, 173 mm apart for joints 2 m apart: one was listed as the shortest link."""
+    raw = four_bar()
+    del raw["joints"]["D"], raw["links"]["rocker"]
+    raw["links"]["block"] = {"model": "rigid", "mass": 0.01}
+    raw["joints"]["C"]["links"] = ["coupler", "block"]
+    raw["joints"]["guide"] = {"kind": "prismatic", "links": ["block", "ground"], "at": "C", "axis": "x"}
+    raw["drive"]["motion"] = {"kind": "harmonic", "frequency": 1, "angle": "1 deg"}
+    scene = scene_from(raw | {"analysis": {"end_time": 1, "step": 0.1, "accuracy": "quick"}})
+    line = size_line(sizes(scene, begun_march(scene).prepared.model))
+    assert "links 100 mm (crank) to 300 mm (coupler); masses 0.01 to 0.471 kg;" in line
 
 
 def test_points_drawn_apart_do_not_meet() -> None:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import Executor, Future
+from io import StringIO
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import h5py
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from rich.console import Console
 
 from kedfem.accuracy import reduction
 from kedfem.analysis import analyse
@@ -21,6 +23,7 @@ from kedfem.errors import SceneError
 from kedfem.scene import scene_from
 from kedfem.sweep import BaseScene, SweepOptions, SweepResult, axes_of, sweep
 from kedfem.sweep.points import GROWTH, Job, Row, SharedChoices, extremes, finished
+from kedfem.tables.several import sweep_tables
 from tests import scenes
 from tests.scenes import bar, constant_speed, material
 
@@ -84,6 +87,23 @@ def test_a_range_a_list_and_their_grid() -> None:
     assert all(isinstance(value, int) for value in steps.values)
     (words,) = axes_of(["analysis.initial=rest,quasi-static"], arm())
     assert words.numbers is None
+
+
+def test_the_table_has_prefixes_and_no_rounding(tmp_path: Path) -> None:
+    """As that of a run; zeros stood beside the point at which they were largest."""
+    raw = arm(kind="static", revolutions=1, steps_per_revolution=4)
+    raw["links"]["tip"] = {"model": "rigid", "mass": 1e-6, "centre": ["=L", 0], "inertia": [1e-9, 1e-9, 1e-9]}
+    raw["joints"]["B"] = {"kind": "weld", "links": ["arm", "tip"], "at": ["=L", 0]}
+    raw["gravity"] = [0, -G, 0]
+    done = sweep(BaseScene(raw, tmp_path, "arm"), axes_of(["L=0.4,0.5"], raw), QUICK, tmp_path / "out", executor=Inline())
+    (table,), _ = sweep_tables(done)
+    said = StringIO()
+    Console(file=said, width=200).print(table)
+    lines = [[cell.strip() for cell in line.split("│")[1:-1]] for line in said.getvalue().splitlines()]
+    rows = {line[0]: line[1:] for line in lines if line}
+    # under its weight, level: m g L/2 of the longer arm, 1.57 kg; at its end no moment
+    assert rows["drive/torque/torque"] == [f"{MASS * G * L / 2:.4g} N m", "parameters.L = 0.5"]
+    assert rows["joints/B/moment/magnitude"] == ["≈ 0", ""]
 
 
 @pytest.mark.parametrize(

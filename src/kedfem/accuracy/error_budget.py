@@ -13,6 +13,7 @@ WHOLE = 1.0  # an error as large as the result
 FACTOR = 3.0  # estimates are right within it: an estimate of three times the result means an error as large as the result
 UNACCOUNTED = 0.5  # of energy
 UNKNOWNS = 60_000  # of a model, beyond which no mesh is refined automatically
+ROUNDING = 1e-12  # error that is nothing but rounding
 LEAST = 0.005  # error below which no run warns
 OF_SOURCE, TOGETHER, UNKNOWN = "error of ", "error together, ", "no estimate "  # how notes of a budget begin
 
@@ -181,7 +182,13 @@ CHOSEN_STEP = (
 
 
 def percent(error: float) -> str:
-    """An error in percent, with two digits: an estimate has no more."""
+    """An error in percent, with two digits: an estimate has no more. What is less than rounding is none.
+
+    >>> percent(0.01234), percent(9.3e-43)
+    ('1.2 %', '≈ 0')
+    """
+    if 0 < error < ROUNDING:
+        return "≈ 0"
     return "over 100 %" if error > 1 else f"{float(f'{100 * error:.2g}'):g} %"
 
 

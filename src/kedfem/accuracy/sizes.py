@@ -37,7 +37,8 @@ class Sizes:
     """Sizes, masses and speeds of a scene, in SI.
 
     overall : largest extent of the linkage in the reference position [m]
-    lengths, masses : of each link by name [m, kg]
+    lengths : of each link by name, but for sliders, which have no shape [m]
+    masses : of each link by name [kg]
     moduli : Young's modulus of each material that elastic links are made of [Pa]
     turns, speeds : of drives at a constant (final) speed [rpm, m/s]
     """
@@ -55,7 +56,8 @@ def sizes(scene: Scene, model: Model) -> Sizes:
     nodes: dict[str, list[np.ndarray]] = {}
     masses: dict[str, float] = {}
     for link in [*model.links, *(prescribed.link for prescribed in model.prescribed)]:
-        nodes.setdefault(link.name, []).append((link.full or link).nodes)
+        if (of := scene.links[link.name]).shape or of.centre:  # else a slider, which has points of a model only
+            nodes.setdefault(link.name, []).append((link.full or link).nodes)
         masses[link.name] = masses.get(link.name, 0.0) + float(link.one @ link.m1[:, 0])
     every = {name: np.concatenate(parts) for name, parts in nodes.items()}
 

@@ -130,7 +130,7 @@ def _at_nodes(
     if len(found) < FEWEST:
         raise MeshError(
             f"{where}: its line must run along the axis of beam '{name}' over {FEWEST} nodes at least, got "
-            f"{len(found)} there: give a line along the beam, or the beam more elements"
+            f"{len(found)} there: give a line along the beam, or the beam more elements, links.{name}.mesh.elements"
         )
     s = np.array([x[0] for x in found])
     _check_travel(where, name, (s[0], s[-1]), travel, BESIDE * size)

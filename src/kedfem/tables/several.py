@@ -6,7 +6,7 @@ from rich.text import Text
 
 from kedfem.accuracy.study.measuring import MeasuredVariant, Study
 from kedfem.compare import Comparison
-from kedfem.output.words import percent, with_prefix
+from kedfem.output.words import NOTHING, percent, with_prefix
 from kedfem.sweep import SweepResult
 from kedfem.sweep.files import column_units, largest, plain_quantities
 from kedfem.tables.layout import facts, left, listed, right
@@ -104,14 +104,29 @@ def sweep_tables(done: SweepResult) -> tuple[list[Table], list[str]]:
     fresh = len(done.rows) - done.before
     title = f"Sweep: {len(done.rows)} points, {len(failed)} failed, {fresh} run now"
     how = done.planned is not None and f"steps and meshes of all as planned at {_place(done, done.planned)}"
-    columns = [*left("quantity"), *right("largest"), *left("unit", "at")]
+    columns = [*left("quantity"), *right("largest"), *left("at")]
     table = listed(Text(title), columns, caption=Text(how or ""))
     units = column_units(done.rows)
-    for name in plain_quantities(list(units)):
-        sizes = {k: largest(row, name) for k, row in enumerate(done.rows) if name in row.extremes}
-        at = max(sizes, key=sizes.__getitem__)
-        table.add_row(Text(name), f"{sizes[at]:.4g}", units[name], Text(_place(done, at)))
+    sizes = {name: _largest(done, name) for name in plain_quantities(list(units))}
+    least: dict[str, float] = {}
+    for name, (_, size) in sizes.items():
+        least[units[name]] = max(NOTHING * size, least.get(units[name], 0.0))
+    for name, (at, size) in sizes.items():
+        nothing = size <= least[units[name]]
+        words = "≈ 0" if nothing else _valued(size, units[name])
+        table.add_row(Text(name), words, Text("" if nothing else _place(done, at)))
     return [table], [*_failures(done, failed), *_warnings(done)]
+
+
+def _largest(done: SweepResult, name: str) -> tuple[int, float]:
+    """The point at which a quantity is largest, and how large."""
+    sizes = {k: largest(row, name) for k, row in enumerate(done.rows) if name in row.extremes}
+    at = max(sizes, key=sizes.__getitem__)
+    return at, sizes[at]
+
+
+def _valued(size: float, unit: str) -> str:
+    return f"{size:.4g}" if unit == "1" else with_prefix(size, unit)
 
 
 def _place(done: SweepResult, k: int) -> str:

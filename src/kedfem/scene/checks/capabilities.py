@@ -67,6 +67,7 @@ class Refusal:
         return Fault((*(where if self.where.startswith("{where}") else ()), *keys), text)
 
 
+MOTOR = ", or a motor on the joint whose angle or travel the force depends on"
 UNLIKE = Refusal("joints", {"joint": ("slot",), "bushing": ("unlike across the line",), "drive": ("none",)},
     "{where}.bushing", "be alike in all directions across the line of a slot in space that no drive moves",
     "its stations do not determine the rotation of the line about itself", "one that is not",
@@ -93,10 +94,10 @@ REFUSALS = (
         "{name!r}, a {kind} joint", "take a slide, or a ratio instead of the radius"),
     Refusal("motors", {"element": ("torque",), "joint": others(*TURNED)}, "{where}.joint",
         f"name a {ON_ANGLE} joint for a torque", NO_ANGLE,
-        "{name!r}, a {kind} joint", "take loads of kind torque on its links"),
+        "{name!r}, a {kind} joint", "take a force along a slide or slot, else loads of kind torque on its links"),
     Refusal("motors", {"element": ("force",), "joint": others(*SLID)}, "{where}.joint",
         f"name a {ON_TRAVEL} joint for a force", NO_TRAVEL,
-        "{name!r}, a {kind} joint", "take loads of kind force on its links"),
+        "{name!r}, a {kind} joint", "take a torque about a hinge, else loads of kind force on its links"),
     Refusal("springs", {"element": ("torsion",), "joint": others(*TURNED)}, "{where}.joint",
         f"name a {ON_ANGLE} joint", NO_ANGLE,
         "{name!r}, a {kind} joint", "take a bushing with rotational_stiffness"),
@@ -177,8 +178,8 @@ REFUSALS = (
     Refusal("loads", {"element": ("body",), "link": ("slider",)}, "{where}.link",
         "name a link with a shape for a body load", "a slider without a shape has no volume",
         "{name!r}, a slider", "take a load of kind force, or give it a shape"),
-    *(Refusal(section, {"factor": over, "driven": (driven,)}, f"{{where}}.{key}.over", must, why, got, take)
-        for section, key in (("loads", "factor"), ("springs", "stiffness_factor"))
+    *(Refusal(section, {"factor": over, "driven": (driven,)}, f"{{where}}.{key}.over", must, why, got, take + also)
+        for section, key, also in (("loads", "factor", MOTOR), ("springs", "stiffness_factor", ""))
         for over, driven, must, why, got, take in (
             (("angle", "travel"), "nothing", "be combined with a drive over whose angle or travel it is",
              "no other is prescribed", "a scene without one", "take a factor over time"),

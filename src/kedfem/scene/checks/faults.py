@@ -8,7 +8,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from kedfem.errors import Fault, Where
-from kedfem.scene.checks.hints import kind_of, known_keys, length_of, marks, models, options, walked
+from kedfem.scene.checks.hints import kind_of, kinds_with, known_keys, length_of, marks, models, options, walked
 from kedfem.scene.records.units import Quantity
 from kedfem.scene.records.wording import either, one_of, shown, unknown_key
 
@@ -44,7 +44,8 @@ def described(detail: ErrorDetails, hint: Any, raw: Any) -> Fault:
         if len(where) > 1 and where[-1] in known_keys(hint, raw) and where[-1] not in known:
             wanted = f"unknown key, {where[-1]!r} belongs to the scene itself, before its first table"
             return Fault(where, wanted)
-        return Fault(where, unknown_key(str(where[-1]), known))
+        key = str(where[-1])
+        return Fault(where, unknown_key(key, known, kinds_with(key, above)))
     return Fault(where, message(detail, here))
 
 

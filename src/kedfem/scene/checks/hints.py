@@ -152,3 +152,8 @@ def known_keys(hint: Any, raw: Any) -> list[str]:
     made = construction(hint, raw) if isinstance(raw, Mapping) else None
     hint = made or hint
     return [key for model in models(hint) if kind_of(model) in [None, kind] for key in keys(model)]
+
+
+def kinds_with(key: str, hint: Any) -> list[str]:
+    """The kinds, of several records that a type may be, that have a key."""
+    return [kind for model in models(hint) if (kind := kind_of(model)) and key in keys(model)]

@@ -46,7 +46,10 @@ def padded(value: object, what: str = "a point: a name, two or three coordinates
 def placed(value: object, coordinates: ValidatorFunctionWrapHandler) -> Any:
     """The coordinates of a point field: looked up if it holds a name, worked out if it holds a construction."""
     if isinstance(value, Mapping):
-        xyz = construction_of(value).model_validate(value).xyz()
+        construction = construction_of(value).model_validate(value)
+        if _unplaced(tuple(field for _, field in construction)):
+            return UNPLACED  # the fault is that of a point that it starts from
+        xyz = construction.xyz()
         if not all(math.isfinite(x) and abs(x) < FARTHEST for x in xyz):
             raise fault("must be constructed from points that are known and near, got one at no place")
         return xyz
@@ -59,6 +62,13 @@ def placed(value: object, coordinates: ValidatorFunctionWrapHandler) -> Any:
         alike = [name for name in points if ("." in name) == ("." in value)]
         raise fault(unknown_name("a point", value, alike))
     return points[value]
+
+
+def _unplaced(value: object) -> bool:
+    """Whether some of these fields is a point that could not be constructed."""
+    if isinstance(value, tuple):
+        return any(map(_unplaced, value))
+    return isinstance(value, float) and math.isnan(value)
 
 
 def unit_axis(value: object, components: ValidatorFunctionWrapHandler) -> Any:

@@ -59,7 +59,13 @@ def one_of(words: list[Any], got: Any) -> str:
     return f"must be {either(words)}, got {shown(got)}" + (f", did you mean {close!r}?" if close else "")
 
 
-def unknown_key(key: str, known: list[str]) -> str:
-    """The message about a key that a record does not have."""
+def unknown_key(key: str, known: list[str], kinds: list[str]) -> str:
+    """The message about a key that a record does not have; `kinds` are those of its alternatives that have it.
+
+    >>> unknown_key("section", ["kind", "width"], ["polyline"])
+    "unknown key, 'section' is one of kind polyline; known: kind, width"
+    """
+    if kinds:
+        return f"unknown key, {key!r} is one of kind {' or '.join(kinds)}; known: {', '.join(known)}"
     close = nearest(key, known)
     return f"unknown key, did you mean {close!r}?" if close else f"unknown key, known: {', '.join(known)}"
