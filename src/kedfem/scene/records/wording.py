@@ -65,7 +65,7 @@ def unknown_key(key: str, known: list[str], kinds: list[str]) -> str:
     >>> unknown_key("section", ["kind", "width"], ["polyline"])
     "unknown key, 'section' is one of kind polyline; known: kind, width"
     """
-    if kinds:
-        return f"unknown key, {key!r} is one of kind {' or '.join(kinds)}; known: {', '.join(known)}"
-    close = nearest(key, known)
-    return f"unknown key, did you mean {close!r}?" if close else f"unknown key, known: {', '.join(known)}"
+    if close := nearest(key, known):
+        return f"unknown key, did you mean {close!r}?"
+    of_kind = f"{key!r} is one of kind {' or '.join(kinds)}; " if kinds else ""
+    return f"unknown key, {of_kind}known: {', '.join(known)}"
