@@ -6,8 +6,12 @@ from typing import Any
 
 import pytest
 
+from kedfem.errors import MeshError
 from kedfem.mesh import mesh_quality
-from kedfem.mesh.methods import made_mesh
+from kedfem.mesh.cad.model import solid_model
+from kedfem.mesh.cad.solids import OtherMethodError
+from kedfem.mesh.elements.hexahedra import SolidMesh
+from kedfem.mesh.methods import healed, made_mesh
 from kedfem.scene import Cad, link_from
 from tests import bad_cad
 from tests.rooms.cad_files import FORMATS, KEYS, MM, parts_in, read, refused, written
@@ -131,3 +135,27 @@ class TestMended:
         mesh = made_mesh(KEYS, "rod", link, Cad(file=path.name), path)
         assert 3 * len(mesh.points) < 45_000
         assert mesh_quality(mesh).least > 0  # flat beside the step, not folded
+
+
+class TestHealing:
+    """Tiny edges and faces that are healed away where tetrahedra fail, on a part that cannot lose all of them."""
+
+    WISHBONE = Path(__file__).parents[2] / "geometry" / "wishbone.step"
+
+    def test_ends_where_a_face_cannot_be_closed_any_more(self):
+        with solid_model(KEYS, self.WISHBONE, "rod", Cad(file="wishbone.step")) as (gmsh, solid):
+            shares = [words for _, words in healed(gmsh, "rod", solid, 50 * MM)]
+        assert shares == ["edges and faces below 1.5 mm healed away"]
+
+    def test_says_why_the_part_itself_has_no_mesh(self, monkeypatch):
+        def fails(*_: object) -> SolidMesh:
+            raise MeshError("rod: must be a solid that can be meshed, got none: of overlapping facets")
+
+        def unfit(*_: object) -> SolidMesh:
+            raise OtherMethodError("healed no better")
+
+        monkeypatch.setattr("kedfem.mesh.methods.best_mesh", fails)
+        monkeypatch.setattr("kedfem.mesh.methods.filled_mesh", unfit)
+        link, shape = link_from({"shape": {"file": "wishbone.step"}}), Cad(file="wishbone.step")
+        with pytest.raises(MeshError, match="of overlapping facets"):
+            made_mesh(KEYS, "rod", link, shape, self.WISHBONE)

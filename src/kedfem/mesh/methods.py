@@ -97,14 +97,15 @@ def made_mesh(
 
 def _sized_or_healed(where: str, gmsh: ModuleType, solid: Solid, link: LinkScene, asked: Sizing) -> SolidMesh:
     """The mesh; where there is none, or flat tetrahedra, one with tiny edges and faces of the CAD model healed away."""
-    best: SolidMesh | None = None
+    best: SolidMesh | MeshError
     try:
         best = _sized(where, gmsh, solid, link, asked)
         if not best.tetrahedra or mesh_quality(best).least > FLAT:
             return best
-    except MeshError:
+    except MeshError as error:
         if link.mesh.kind is not None:
             raise
+        best = error
     for mended, words in healed(gmsh, where, solid, tetrahedron_size(solid, asked)):
         try:
             mesh = filled_mesh(gmsh, mended, asked)
@@ -112,7 +113,9 @@ def _sized_or_healed(where: str, gmsh: ModuleType, solid: Solid, link: LinkScene
             continue
         if mesh_quality(mesh).least > FLAT:
             return replace(mesh, method=f"{mesh.method}; {words}")
-    return best or _sized(where, gmsh, solid, link, asked)  # raises again
+    if isinstance(best, MeshError):
+        raise best
+    return best
 
 
 def file_axes(shape: Cad | MeshFile) -> Float[np.ndarray, "3 3"]:
@@ -207,12 +210,17 @@ def healed(gmsh: ModuleType, where: str, solid: Solid, size: float) -> Iterator[
 
     Yields
     ------
-    Solid and words, as long as the volume stays what it was.
+    Solid and words, as long as it is a solid and the volume stays what it was.
     """
     tag = solid.tag
     for share in _HEALED:
-        made = gmsh.model.occ.healShapes([(3, tag)], tolerance=share * size)
-        gmsh.model.occ.synchronize()
+        try:
+            made = gmsh.model.occ.healShapes([(3, tag)], tolerance=share * size)
+            gmsh.model.occ.synchronize()
+        except Exception as error:
+            if type(error) is not Exception:  # gmsh raises nothing more special
+                raise
+            return  # OpenCASCADE cannot close a face without what was healed away
         solids = {tag for dim, tag in made if dim == 3}
         if len(solids) != 1:
             return
