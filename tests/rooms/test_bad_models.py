@@ -68,7 +68,7 @@ def test_hinge_across_a_flat_face() -> None:
     )
 
 
-MATERIAL = ": take a point of its material"
+MATERIAL = ": take a point of its material, "
 
 
 @pytest.mark.parametrize("quantity", ["stress", "displacement"])
@@ -78,13 +78,19 @@ def test_probe_outside_its_link(model: str, quantity: str) -> None:
     raw["output"] = {"probes": {"tip": {"link": "arm", "at": [0.5, 0.05], "quantity": quantity}}}
     at = "output.probes.tip.at: must lie in link 'arm', got (0.5, 0.05, 0), 0.04 m outside it"
     bore = ", or for a motion the centre of a bore with a joint" * (model == "solid")
-    assert fault(raw) == at + MATERIAL + bore
+    near = "(0.5, 0.01, 0) is the nearest" if model == "solid" else "its axis is nearest at (0.5, 0, 0)"
+    assert fault(raw) == at + MATERIAL + near + bore
 
 
 def test_force_outside_its_link() -> None:
     raw = arm()
     raw["loads"] = {"push": {"kind": "force", "link": "arm", "at": [0.6, 0], "vector": [0, 1]}}
-    assert fault(raw) == "loads.push.at: must lie in link 'arm', got (0.6, 0, 0), 0.1 m outside it" + MATERIAL
+    assert (
+        fault(raw)
+        == "loads.push.at: must lie in link 'arm', got (0.6, 0, 0), 0.1 m outside it"
+        + MATERIAL
+        + "(0.5, 0, 0) is the nearest"
+    )
 
 
 def test_force_beside_a_beams_axis() -> None:
@@ -109,7 +115,7 @@ def test_body_on_no_coupling_surface() -> None:
     raw = arm()
     raw["bodies"] = {"lump": {"kind": "point_mass", "link": "arm", "at": [0.25, 0.5], "mass": 1}}
     outside = "bodies.lump.at: must lie in link 'arm', got (0.25, 0.5, 0), 0.49 m outside it"
-    assert fault(raw) == outside + MATERIAL
+    assert fault(raw) == outside + MATERIAL + "(0.25, 0.01, 0) is the nearest"
 
 
 def body() -> dict[str, Any]:

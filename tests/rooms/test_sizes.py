@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.sizes import size_warnings, sizes
 from kedfem.errors import MeshError
 from kedfem.kinematics import rigid_links
@@ -40,6 +41,31 @@ def test_a_rigid_link_without_a_shape_has_no_material_to_doubt() -> None:
     line, warnings = seen(scene_from(raw))
     assert "E 210 GPa;" in line
     assert warnings == ()
+
+
+def test_sliders_and_moving_parts_of_the_ground_have_no_size() -> None:
+    """A body of any size stands for them in the equations."""
+    shape = {"kind": "bar", "between": [[0, 0], [0.4, 0]], "width": 0.03, "thickness": 0.02}
+    slide = {"kind": "prismatic", "axis": "x"}
+    raw = {
+        "links": {
+            "arm": {"model": "beam", "material": "steel", "shape": shape},
+            "block": {"model": "rigid", "mass": 0.5}, "table": {"model": "rigid"},
+        },
+        "joints": {
+            "table": slide | {"links": ["table", "ground"], "at": [0, 0]},
+            "root": {"kind": "weld", "links": ["arm", "table"], "at": [0, 0]},
+            "guide": slide | {"links": ["block", "arm"], "at": [0.2, 0]},
+        },
+        "springs": {"hold": {"kind": "spring", "joint": "guide", "stiffness": 2000}},
+        "drive": {"joint": "table", "motion": {"kind": "harmonic", "travel": 0.01, "frequency": 5}},
+        "analysis": {"end_time": 0.1, "step": 0.001, "frames": "co-rotational", "accuracy": "quick"},
+    }  # fmt: skip
+    scene = scene_from(raw)
+    found = sizes(scene, meshed(scene).model)
+    assert found.lengths == pytest.approx({"arm": 0.4})
+    assert found.overall == pytest.approx(0.4)
+    assert found.masses["block"] == pytest.approx(0.5)
 
 
 def four_bar(factor: float = 1.0, **change: Any) -> dict[str, Any]:

@@ -281,7 +281,7 @@ def test_a_probe_outside_a_spatial_beam(quantity: str) -> None:
     raw = simple(link={"beam": "spatial"})
     raw["output"] = {"probes": {"tip": {"link": "arm", "at": [0.5, 0.0, 0.05], "quantity": quantity}}}
     outside = "output.probes.tip.at: must lie in link 'arm', got (0.5, 0, 0.05), 0.04 m outside it"
-    assert fault(raw) == f"{outside}: take a point of its material"
+    assert fault(raw) == f"{outside}: take a point of its material, its axis is nearest at (0.5, 0, 0)"
 
 
 # -- axes, stresses, drawing --------------------------------------------------------------------------------

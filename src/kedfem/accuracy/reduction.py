@@ -135,7 +135,7 @@ def reduced(
     """
     if full.linkage.mobility:
         raise SceneError(
-            f"links.{next(iter(chosen))}.reduced: must be left out where motions are free (modes are found for a "
+            f"links.{next(iter(chosen))}.reduction: must be left out where motions are free (modes are found for a "
             f"motion that the drive prescribes), got {full.linkage.mobility} free"
         )
     stage("modes")

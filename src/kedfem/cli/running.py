@@ -100,7 +100,9 @@ def check(scene: ScenePath, quick: Quick = False, within: Within = False) -> Non
     found = sizes(loaded, ready.model)
     say(size_line(found))
     warnings = (*size_warnings(loaded, found), *mass_damping_warning(ready))
-    tried = forecast(ready)
+    with stages() as stage:
+        stage("trial steps")
+        tried = forecast(ready)
     show([assembly_table(assembly), *check_tables(ready, reduction, plan, tried)], warnings)
     if tried[1] is not None:
         raise tried[1]

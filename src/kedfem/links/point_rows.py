@@ -9,7 +9,13 @@ from kedfem.arrays import Float
 from kedfem.errors import SceneError
 from kedfem.links.beams.beam import shape_functions
 from kedfem.links.beams.beam_recovery import fibre_row, nearest_on_beam
-from kedfem.links.beams.spatial_recovery import beam_strains, nearest_on_axis, section_stress, section_value
+from kedfem.links.beams.spatial_recovery import (
+    beam_strains,
+    element_frame,
+    nearest_on_axis,
+    section_stress,
+    section_value,
+)
 from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_gradients, stress_of_gradient
 from kedfem.links.surfaces.coupling_surfaces import rigid_link_surface
@@ -144,7 +150,8 @@ def _element_at(link: Link, where: str, point: Float[np.ndarray, "3"]) -> tuple[
         if distance < gap - 1e-12 * size:
             best, gap, at = int(element), distance, local
     if gap > POINT_TOLERANCE * size:
-        raise SceneError(_outside(link, where, whole, gap))
+        nearest = _shapes(link, at)[0] @ link.X[link.basis.element_dofs[:, best]]
+        raise SceneError(_outside(link, where, whole, gap, nearest))
     return best, at
 
 
@@ -178,7 +185,8 @@ def _beam_rows(
         raise SceneError(f"{where}: link '{link.name}' has no section")
     beyond, e, r, offset = nearest_on_beam(link, point)
     if beyond > POINT_TOLERANCE * np.ptp(link.X, axis=0).max():
-        raise SceneError(_outside(link, where, point, beyond))
+        nearest = shape_functions(r, link.cells.shape[1])[0] @ link.X[link.cells[e]]
+        raise SceneError(_outside(link, where, point, beyond, nearest))
     value = np.zeros(link.n)
     value[link.cells[e]] = shape_functions(r, link.cells.shape[1])[0]
     row = fibre_row(link, e, r, offset, kinks)
@@ -189,16 +197,21 @@ def _beam_rows(
 def _section_rows(link: Link, where: str, point: Float[np.ndarray, "3"]) -> PointRows:
     beyond, e, r, (y, z) = nearest_on_axis(link, point)
     if beyond > POINT_TOLERANCE * link.size:
-        raise SceneError(_outside(link, where, point, beyond))
+        nearest = shape_functions(r, link.cells.shape[1])[0] @ element_frame(link, e)[:, 0]
+        raise SceneError(_outside(link, where, point, beyond, nearest))
     value = section_value(link, e, r, y, z)
     stress = np.zeros((6, 3 * link.n))
     stress[[0, 3, 5]] = section_stress(link, beam_strains(link, e, r), y, z)
     return PointRows(value, sp.csr_array(stress), value @ link.X)
 
 
-def _outside(link: Link, where: str, point: Float[np.ndarray, "3"], gap: float) -> str:
-    shown = ", ".join(f"{v:.6g}" for v in point)
-    advice = "take a point of its material"
+def _outside(
+    link: Link, where: str, point: Float[np.ndarray, "3"], gap: float, nearest: Float[np.ndarray, "3"]
+) -> str:  # fmt: skip
+    """The message for a point beside a link, with a place of the link near to it: of a beam one of its axis."""
+    shown, instead = (", ".join(f"{v + 0.0:.6g}" for v in np.round(x, 9)) for x in (point, nearest))
+    near = f"its axis is nearest at ({instead})" if link.section is not None else f"({instead}) is the nearest"
+    advice = f"take a point of its material, {near}"
     if link.meshed and where.startswith("output"):
         advice += ", or for a motion the centre of a bore with a joint"
     return f"{where}: must lie in link '{link.name}', got ({shown}), {gap:.3g} m outside it: {advice}"
