@@ -160,8 +160,10 @@ MotionLaw = Annotated[ConstantSpeed | Ramp | MotionCurve | Cycloidal | Polynomia
 
 
 class Drive(Record):
-    """A joint that turns or slides in a given way: its first link that is not the ground against the other, of a slot the
-    pin along the line. Several may move one joint, each another coordinate."""
+    """A joint that turns or slides in a given way, its first link that is not the ground against the other.
+
+    Of a slot the pin slides along the line. Several may move one joint, each another coordinate.
+    """
 
     only_with = (("shaft_damping", "shaft_stiffness"),)
     joint: JointName

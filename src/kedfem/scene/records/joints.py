@@ -126,7 +126,7 @@ class Bushing(Record):
     """of displacements"""
     rotational_stiffness: RotationalSprings | None = None
     """against rotations; rigid if not given. A universal joint constrains one rotation, about the normal of its cross:
-    the third"""
+    the third. About the axis of a hinge nothing resists but a torsion spring of that joint"""
     rotational_damping: RotationalDampers = (0.0, 0.0, 0.0)
     """of rotations"""
 

@@ -78,7 +78,7 @@ class Bar(Record):
     """across line and width: along z for a bar in an xy plane, else as near to `up` as can be"""
     up: Axis | None = None
     """`"x"`, `"y"`, `"z"`, a vector or `{ from = point, to = point }`: the thickness is as near to it as can be; z if not
-    given, x for a bar that is steeper than 64°"""
+    given, x for a bar that is steeper than 64°; required of such a bar in a pattern that rotates"""
 
     @model_validator(mode="after")
     def _not_along_up(self) -> Self:
@@ -162,7 +162,8 @@ class Polyline(Record):
     """another section, instead of width and thickness"""
     up: Axis | None = None
     """`"x"`, `"y"`, `"z"`, a vector or `{ from = point, to = point }`: the thickness is as near to it as can be (on a
-    smooth curve: at its first point); z if not given, x for a segment that is steeper than 64°"""
+    smooth curve: at its first point); z if not given, x for a segment that is steeper than 64°; required of such a
+    line in a pattern that rotates, whatever its section"""
 
     @model_validator(mode="after")
     def _one_section(self) -> Self:
