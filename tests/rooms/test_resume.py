@@ -117,6 +117,29 @@ def test_a_resumed_run_leaves_what_an_undisturbed_one_does_bit_by_bit(tmp_path: 
     assert not (ended.results_folder / STATE).exists()
 
 
+def test_resumed_static_positions_of_a_beam_that_bends_in_space_are_the_same_bit_by_bit(tmp_path: Path) -> None:
+    """Its frames are sought from those of the position before, also where a resumed run has found none yet."""
+
+    def arm(folder: Path) -> Scene:
+        shape = {"kind": "bar", "between": [[0, 0], [0.2, 0]], "width": 0.02, "thickness": 0.02}
+        load = {"kind": "line", "link": "arm", "vector": [0, 0, -300], "factor": {"time": [0, 0.1], "value": [0, 1]}}
+        raw = {
+            "links": {"arm": {"material": "steel", "model": "beam", "shape": shape, "mesh": {"elements": 2}}},
+            "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
+            "drive": {"joint": "A", "motion": constant_speed("60 rpm")},
+            "loads": {"across": load},
+            "analysis": {
+                "kind": "static", "end_time": 0.1, "step": 0.005, "frames": "co-rotational", "accuracy": "quick"
+            },
+            "output": {"plots": False, "picture": False},
+        }  # fmt: skip
+        return scene_from(raw, folder)
+
+    whole, ended = content(analyse(arm(tmp_path / "whole"))), arm(tmp_path / "ended")
+    ended_early(ended, 0.5)
+    assert_same(whole, content(analyse(ended, resumes=True)))
+
+
 KERNELS = {"OPENBLAS_CORETYPE", "NUMBA_CPU_NAME"}
 ELSEWHERE = """
 import sys

@@ -16,7 +16,7 @@ from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.system.ready import Ready
 from kedfem.dynamics.system.starts.accelerations import accelerations, own_spin
 from kedfem.dynamics.system.starts.initial_states import as_coordinates, begun
-from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, term_angles
+from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, instant_near, term_angles
 from kedfem.dynamics.system.starts.internal_forces import drawn, own, rotated_rate, rows
 from kedfem.dynamics.system.starts.laws import feels_rates
 from kedfem.dynamics.system.starts.modified_newton import FREE, ROUNDING, NoBalanceError, direct_balance, equilibrium
@@ -88,7 +88,7 @@ def quasi_static_position(
     NoBalanceError
         If no deflection is found.
     """
-    now = Instant(of, motion_at, time, like, None if near is None else near.turned)
+    now = instant_near(of, motion_at, time, like, near)
     found = _moving(now, motion_at, WIDER if _feels_rates(of) else 0)
     return begun(now, found.u, found.v, strained=found.strained)
 
@@ -111,7 +111,7 @@ def static(
     NoBalanceError
         If no balance is found, as of an unconstrained link.
     """
-    now = Instant(of, motion_at, time, like, None if near is None else near.turned)
+    now = instant_near(of, motion_at, time, like, near)
     none = np.zeros(int(of.bodies.at[-1]))
     pull = none if forces is None else as_work(of, forces)
     if near is None:

@@ -23,6 +23,7 @@ from kedfem.dynamics.system.starts.coordinate_rates import angles, coordinates, 
 from kedfem.dynamics.system.starts.internal_forces import InternalState, StaticForces, internal_state, own, rows
 from kedfem.dynamics.system.starts.laws import TemporarySprings, exerted, feels_rates
 from kedfem.dynamics.system.starts.linear_equations import HeldBody, mass_body, sparse_body
+from kedfem.dynamics.system.state import State
 from kedfem.errors import SolveError
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.rigid import RigidMotion
@@ -190,6 +191,15 @@ class Instant:
         """Which are constraints that say something of z."""
         fixed = [isinstance(each.law, Held | Driven) for each in self.of.system.constraints]
         return np.asarray(np.array(fixed, bool) & (sizes(C) > NOTHING))
+
+
+def instant_near(of: Ready, motion_at: Motion, time: float, like: Instant | None, near: State | None) -> Instant:
+    """An instant whose revolutions and frames are sought from those of a state, if given, whatever was sought last."""
+    if near is None:
+        return Instant(of, motion_at, time, like)
+    now = Instant(of, motion_at, time, like, near.turned)
+    now.always.static.seek_from((near.Q, near.angle))
+    return now
 
 
 def sizes(C: sp.csr_array) -> Float[np.ndarray, " r"]:
