@@ -99,8 +99,12 @@ def spline(motion: MotionCurve, t: Times) -> Law:
     if motion.smoothing is None:
         curve = CubicSpline(at, value, bc_type="periodic" if period else "not-a-knot")
         return curve(t), curve(t, 1), curve(t, 2)
-    bound = len(at) * motion.smoothing**2
-    smooth = BSpline(*splrep(at, value, k=min(5, len(at) - 1), s=bound, per=period is not None))
+    repeats = period is not None  # its last value is its first again, and counts once
+    bound, k = (len(at) - repeats) * motion.smoothing**2, min(5, len(at) - 1)
+    knots, *_ = splrep(
+        at, value, k=k, s=bound, per=repeats, full_output=True, quiet=True
+    )  # as near to the bound as it comes
+    smooth = BSpline(*knots)
     return smooth(t), smooth(t, 1), smooth(t, 2)
 
 
