@@ -17,6 +17,7 @@ from kedfem.results.audit import Account, balance_warning
 from kedfem.results.balance import Balance
 from kedfem.scene import read_scene, scene_from
 from kedfem.tables import run_tables
+from kedfem.tables.run import balance_table
 from tests import scenes
 from tests.momentum import Momentum, momentum
 from tests.runs import quick
@@ -208,3 +209,8 @@ def test_a_run_says_what_is_left_over_and_warns_when_that_is_much(tmp_path: Path
     assert done.results.channels["energy/residual"][1].shape == (121, 1)
     assert balance_warning(Balance(energy=0.003)) == ()
     assert balance_warning(Balance(energy=0.03)) != ()
+
+
+@pytest.mark.parametrize(("neglected", "rows"), [(0.0, 1), (5e-59, 1), (2e-3, 2)])
+def test_the_table_of_the_balance_leaves_rounding_out(neglected: float, rows: int) -> None:
+    assert balance_table(Balance(1e-4, neglected)).row_count == rows

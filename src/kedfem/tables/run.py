@@ -7,7 +7,7 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from kedfem.accuracy.error_budget import Budget, percent
+from kedfem.accuracy.error_budget import ROUNDING, Budget, percent
 from kedfem.accuracy.plan import Plan
 from kedfem.accuracy.reduction import Reduction
 from kedfem.accuracy.steady import Steady
@@ -178,6 +178,6 @@ def _cell(error: float | None) -> str:
 def balance_table(found: Balance) -> Table:
     """The residual of energy over the steps, and what energy rigid-body frames make."""
     shares = {"energy, residual of the steps": f"{100 * found.energy:.2g} %"}
-    if found.neglected:
+    if found.neglected > ROUNDING:
         shares["energy made by rigid-body frames"] = f"{100 * found.neglected:.3g} %"
     return facts("Balance", ((what, f"{share} of the largest exchanged") for what, share in shares.items()))
