@@ -52,8 +52,13 @@ class Derivative:
 
 
 def scale_of(of: PeriodMap, y: Flat) -> float:
-    """√ of the largest energy in a period; where nothing moves, of what is less than any motion that counts."""
-    return float(np.sqrt(of.largest)) + of.size(y) + of.of.c.floor * 2 * np.pi / of.period
+    """√ of the largest energy in a period; where nothing moves, of what is less than any motion that counts.
+
+    Iterations of a step leave open as much as the floor, which must be no more of that than their tolerance.
+    """
+    c = of.of.c
+    least = c.floor * 2 * np.pi / of.period if of.linear else c.floor / (c.tolerance * c.h)
+    return float(np.sqrt(of.largest)) + of.size(y) + least
 
 
 def combined(c: Flat, basis: Sequence[Flat]) -> Flat:
