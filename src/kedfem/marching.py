@@ -79,14 +79,21 @@ class March:
 def begun_march(scene: Scene) -> March:
     """The system of a scene at the start that the scene asks for; models, meshes and step are chosen as in `analyse`.
 
+    Its steps are those of the condensed solver, a single march without extrapolation levels.
+
     Raises
     ------
     KedfemError
-        With a message for the user, as by `analyse`; SolveError too for an analysis that takes no steps.
+        With a message for the user, as by `analyse`; SolveError too for an analysis that takes no steps or those of
+        the monolithic solver, and for extrapolation levels.
     """
     if without_vibration(scene):
         got = f"got {scene.analysis.kind!r}; take 'transient'"
         raise SolveError(f"analysis.kind: must be one that takes time steps, {got}")
+    if scene.analysis.solver == "monolithic":
+        raise SolveError("analysis.solver: must be 'condensed' for a march by hand, got 'monolithic'; leave it out")
+    if (levels := scene.analysis.extrapolation_levels or 1) > 1:
+        raise SolveError(f"analysis.extrapolation_levels: must be 1 for a march by hand, got {levels}; leave it out")
     scene, _ = assembled(scene)
     _, prepared, _ = ready_to_step(scene)
     scene = with_analysis(prepared.scene, extrapolation_levels=1)

@@ -1,6 +1,7 @@
 """Steps by hand: the system of a scene, marched by a script."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from kedfem.marching import State, begun_march
 from kedfem.scene import scene_from
 from tests.moving import bar
 
-FALLING = {
+FALLING: dict[str, Any] = {
     "links": {"arm": bar("beam", (0, 0), (0.5, 0), 2)},
     "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
     "gravity": [0, -9.81],
@@ -55,6 +56,13 @@ def test_what_takes_no_steps_is_refused() -> None:
     joints = {"A": {"kind": "weld", "links": ["ground", "arm"], "at": [0, 0]}}
     scene = scene_from({**FALLING, "joints": joints, "analysis": {"kind": "static", "accuracy": "quick"}})
     with pytest.raises(SolveError, match=r"analysis\.kind: .*got 'static'"):
+        begun_march(scene)
+
+
+@pytest.mark.parametrize(("key", "value"), [("solver", "monolithic"), ("extrapolation_levels", 2)])
+def test_what_a_march_by_hand_does_not_do_is_refused(key: str, value: object) -> None:
+    scene = scene_from({**FALLING, "analysis": {**FALLING["analysis"], key: value}})
+    with pytest.raises(SolveError, match=rf"analysis\.{key}: .*by hand, got .*{value}"):
         begun_march(scene)
 
 
