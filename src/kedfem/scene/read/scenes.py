@@ -28,7 +28,7 @@ from kedfem.scene.records.base import Record, plain
 from kedfem.scene.records.joints import ChosenFace
 from kedfem.scene.records.links import LinkScene
 from kedfem.scene.records.materials import BUILT_IN, Material
-from kedfem.scene.records.points import UNPLACED, XYZ, known_points
+from kedfem.scene.records.points import NO_PLACE, UNPLACED, XYZ, known_points
 from kedfem.scene.records.scene import Scene
 from kedfem.scene.records.shapes import with_kind
 from kedfem.scene.records.wording import one_of
@@ -131,6 +131,8 @@ def validated(given: Any, folder: Path, *, sketch: bool = False) -> Scene:
     if scene is None or wrong + faults:
         places = echoes.union(each.where for each in wrong)
         rest = [each for each in faults if each.where not in places]
+        if any(each.where[0] == "points" for each in rest):  # whose faults those that start from it would repeat
+            rest = [each for each in rest if each.message != NO_PLACE]
         raise SceneError(in_pattern(each, origins) for each in [*wrong, *rest])
     if (steps := time_grid(scene).steps) > MOST_STEPS:
         raise SceneError([Fault(("analysis",), f"must end within {MOST_STEPS:.0e} steps, got {steps:.3g}")])

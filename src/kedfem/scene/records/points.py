@@ -20,6 +20,7 @@ MARKS = {"from", "between", "along", "distances"}
 """Keys that distinguish one construction of a point from others."""
 FARTHEST = 1e100  # m: squares of distances can still be formed
 UNIT = 1e-15  # a vector of a length so near one is a unit vector, and stays as it is when it is read again
+NO_PLACE = "must be constructed from points that are known and near, got one at no place"
 UNPLACED: XYZ = (math.nan, math.nan, math.nan)  # a point that is named but could not be constructed
 
 _known_points: ContextVar[Mapping[str, XYZ] | None] = ContextVar("known_points", default=None)
@@ -46,12 +47,9 @@ def padded(value: object, what: str = "a point: a name, two or three coordinates
 def placed(value: object, coordinates: ValidatorFunctionWrapHandler) -> Any:
     """The coordinates of a point field: looked up if it holds a name, worked out if it holds a construction."""
     if isinstance(value, Mapping):
-        construction = construction_of(value).model_validate(value)
-        if _unplaced(tuple(field for _, field in construction)):
-            return UNPLACED  # the fault is that of a point that it starts from
-        xyz = construction.xyz()
+        xyz = construction_of(value).model_validate(value).xyz()
         if not all(math.isfinite(x) and abs(x) < FARTHEST for x in xyz):
-            raise fault("must be constructed from points that are known and near, got one at no place")
+            raise fault(NO_PLACE)
         return xyz
     if not isinstance(value, str):
         return coordinates(padded(value))
@@ -62,13 +60,6 @@ def placed(value: object, coordinates: ValidatorFunctionWrapHandler) -> Any:
         alike = [name for name in points if ("." in name) == ("." in value)]
         raise fault(unknown_name("a point", value, alike))
     return points[value]
-
-
-def _unplaced(value: object) -> bool:
-    """Whether some of these fields is a point that could not be constructed."""
-    if isinstance(value, tuple):
-        return any(map(_unplaced, value))
-    return isinstance(value, float) and math.isnan(value)
 
 
 def unit_axis(value: object, components: ValidatorFunctionWrapHandler) -> Any:
