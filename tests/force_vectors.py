@@ -18,10 +18,11 @@ from kedfem.dynamics.system.record import Law, Times
 from kedfem.links.point_rows import point_rows, require_on_axis
 from kedfem.links.record import Link
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, determines_gradient, face_normal, port_weights
-from kedfem.motion.constraints import cross, perpendiculars
+from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.joint_equations import joint_axis, ordered
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import GROUND, Limit, LineSpring, Motor, Scene, Spring
+from kedfem.vectors import cross
 
 TURN, SLIDE, DISTANCE = 0, 1, 2
 POINT, PAIR, SINGLE, ANGLE = 0, 1, 2, 3

@@ -4,8 +4,8 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.inertias import Inertias, load_wrench
-from kedfem.motion.constraints import cross
 from kedfem.motion.rigid import RigidMotion
+from kedfem.vectors import cross
 
 
 def kinetic_energy(inertias: Inertias, motion: RigidMotion) -> Float[np.ndarray, " T"]:

@@ -14,7 +14,6 @@ from kedfem.dynamics.loads import Pattern, Times, patterns, shares
 from kedfem.dynamics.model import Model
 from kedfem.links.bodies import euler_tensor
 from kedfem.links.record import Link, in_space
-from kedfem.motion.constraints import cross
 from kedfem.motion.joint_equations import joint_axis
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
@@ -32,6 +31,7 @@ from kedfem.scene import (
     masses_alone,
     moving_grounds,
 )
+from kedfem.vectors import cross
 
 Vector = Float[np.ndarray, "3"]
 Wrenches = tuple[Float[np.ndarray, "T B 3"], Float[np.ndarray, "T B 3"]]

@@ -21,12 +21,12 @@ from kedfem.dynamics.system.forces.supports import Pushed, exerted
 from kedfem.dynamics.system.record import ANGLE, Curve, End, Law, Spring, Stop, Term, Times, stiffness_factors
 from kedfem.links.record import Link
 from kedfem.links.stations import Stations
-from kedfem.motion.constraints import cross
 from kedfem.motion.counted_revolutions import angle_along
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, resting
 from kedfem.scene import Scene
+from kedfem.vectors import cross
 
 Vectors = Float[np.ndarray, "T 3"]
 

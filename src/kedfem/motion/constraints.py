@@ -16,6 +16,7 @@ from itertools import combinations
 import numpy as np
 
 from kedfem.arrays import Float, Int
+from kedfem.vectors import cross
 
 GAP, TURN, ANGLE = 0, 1, 2
 Vector = Float[np.ndarray, "3"]
@@ -193,11 +194,3 @@ def stacked(rows: list[ConstraintEquation]) -> Rows:
         plus=tuple((k, len(rows) + n, c) for n, (k, c, _) in enumerate(terms)),
         drive=np.array([-1 if r.drive is None else r.drive for r in rows], int),
     )  # fmt: skip
-
-
-def cross(a: Float[np.ndarray, "... 3"], b: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 3"]:
-    """a × b, several times as fast as numpy's own on stacks of vectors."""
-    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
-        np.subtract(a[..., i] * b[..., j], a[..., j] * b[..., i], out=out[..., k])
-    return out

@@ -8,7 +8,7 @@ import scipy.linalg
 
 from kedfem.arrays import Float
 from kedfem.errors import MotionError
-from kedfem.motion.constraints import GAP, cross, stacked
+from kedfem.motion.constraints import GAP, stacked
 from kedfem.motion.joint_equations import coordinate_row, joint_free_rows
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import cross_matrix
@@ -17,6 +17,7 @@ from kedfem.motion.released_motions import RANK_TOLERANCE
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.motion.values import Poses, features, jacobian
 from kedfem.scene import Scene, path_parameter
+from kedfem.vectors import cross
 
 TURNING = {"revolute", "screw"}  # joints whose speed is a rotation, of the others it is along the axis
 REACHED = 1e-6  # of the fastest speed: velocities that far off are not what was asked for

@@ -11,7 +11,6 @@ from kedfem.motion.constraints import (
     TURN,
     ConstraintEquation,
     coupled,
-    cross,
     free_rows,
     joint_rows,
     travel_row,
@@ -19,6 +18,7 @@ from kedfem.motion.constraints import (
 )
 from kedfem.scene import Joint, Scene, driven_travel
 from kedfem.scene.records.points import XYZ
+from kedfem.vectors import cross
 
 GROUND = "ground"
 PLANE = "the plane"

@@ -11,10 +11,10 @@ import numpy as np
 
 from kedfem.arrays import Bool, Float, Int
 from kedfem.motion.blocks import Blocks
-from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.motion.values import features, jacobian
+from kedfem.vectors import cross
 
 
 @dataclass(frozen=True, slots=True)

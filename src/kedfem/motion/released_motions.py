@@ -8,9 +8,9 @@ import numpy as np
 import scipy.linalg
 
 from kedfem.arrays import Bool, Float
-from kedfem.motion.constraints import cross
 from kedfem.motion.joint_equations import PLANE
 from kedfem.scene import Joint
+from kedfem.vectors import cross
 
 RANK_TOLERANCE = 1e-6  # of the largest singular value: axes that far out of true count as parallel
 STILL = 1e-6  # of a motion: what counts as none

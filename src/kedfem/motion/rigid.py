@@ -8,11 +8,11 @@ import numpy as np
 from kedfem.arrays import Float, Int
 from kedfem.errors import MotionError
 from kedfem.motion.batch import Moving, moving
-from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.messages import place
 from kedfem.motion.newton import OPEN, cross_matrix
 from kedfem.motion.path import Path, aimed, predicted
+from kedfem.vectors import cross
 
 
 @dataclass(frozen=True, slots=True)

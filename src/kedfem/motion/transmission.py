@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.motion.constraints import cross
 from kedfem.motion.joint_equations import GROUND, unit
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import Scene
+from kedfem.vectors import cross
 
 ENDS = ("revolute", "spherical", "universal")
 LEAST = np.radians(40.0)  # the usual limit: below it, and above 180° less it, a linkage tends to jam

@@ -11,13 +11,13 @@ from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.model import Model
 from kedfem.links.record import Link
 from kedfem.mesh.elements.shape_functions import HEX27
-from kedfem.motion.constraints import cross
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.output.fields import LinkField, RigidField
 from kedfem.output.joint_springs import hinge_springs, line_springs
 from kedfem.output.springs import stretched
 from kedfem.scene import GROUND, Body, Flywheel, Scene
+from kedfem.vectors import cross
 
 STEEL = 7850.0  # kg/m³
 BALL = 0.01, 0.03  # least and largest radius of a mass that a link carries, of what is drawn

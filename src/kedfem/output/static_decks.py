@@ -13,12 +13,12 @@ import scipy.linalg
 
 from kedfem.arrays import Float
 from kedfem.links.record import Link
-from kedfem.motion.constraints import cross
 from kedfem.output.vtu import complete, write_vtu
 from kedfem.results.files import replacing
 from kedfem.results.forces.load_cases import LoadCase
 from kedfem.results.table import text_file, write_rows
 from kedfem.scene import Material
+from kedfem.vectors import cross
 
 Forces = Float[np.ndarray, "n 3"]
 # by meshio's names, nodes in the same order; CalculiX has no 27-node hexahedra

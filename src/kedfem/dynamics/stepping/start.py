@@ -13,12 +13,12 @@ from kedfem.dynamics.system.ready import Motion
 from kedfem.dynamics.system.state import State
 from kedfem.dynamics.system.steps import Steps
 from kedfem.links.record import Link
-from kedfem.motion.constraints import cross
 from kedfem.motion.initial import initial_twists
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import rigid_motion
 from kedfem.scene import Scene, path_parameter, time_grid
+from kedfem.vectors import cross
 
 
 def motion_of(scene: Scene, linkage: Linkage, along: Path) -> Motion:

@@ -9,11 +9,11 @@ from kedfem.dynamics.model import Model, PrescribedBody
 from kedfem.dynamics.system.forces.exerted import effort
 from kedfem.dynamics.system.forces.supports import supports
 from kedfem.links.record import in_space
-from kedfem.motion.constraints import cross
 from kedfem.motion.joint_equations import ordered
 from kedfem.results.forces.port_forces import Forces, Wrench, holder, port_wrench, resultant
 from kedfem.results.recorded import Rows
 from kedfem.scene import Scene
+from kedfem.vectors import cross
 
 
 def partner(scene: Scene, prescribed: PrescribedBody) -> str:

@@ -17,12 +17,12 @@ from kedfem.dynamics.system.forces.exerted import at_ends
 from kedfem.dynamics.system.forces.poses import value
 from kedfem.dynamics.system.forces.supports import supports
 from kedfem.dynamics.system.record import Term
-from kedfem.motion.constraints import cross
 from kedfem.motion.coordinates import counted_on
 from kedfem.motion.joint_equations import body_names, moving_pair
 from kedfem.results.channels import Channel
 from kedfem.results.recorded import Recorded, Rows
 from kedfem.scene import LineSpring, Scene
+from kedfem.vectors import cross
 
 POSITION, SPEED, EFFORT = "e", "rate", "multiplier"  # of `Multipliers`
 

@@ -24,7 +24,7 @@ from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.errors import SolveError
 from kedfem.links.record import Link, mass_times
 from kedfem.links.recovery import nodal_state, nodal_stress, rotated_stress, stress_recovery, von_mises
-from kedfem.motion.constraints import cross
+from kedfem.vectors import cross
 
 Forces = Float[np.ndarray, "n 3"]
 LOADS, RIGID, ELASTIC, DAMPING, ELEMENTS = (

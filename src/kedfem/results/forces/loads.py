@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from kedfem.arrays import Bool, Float
-from kedfem.motion.constraints import cross
 from kedfem.motion.joint_equations import coordinate_axis, joint_axis, ordered
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.recorded import drive_effort
 from kedfem.results.records import Results
 from kedfem.scene import Joint, Scene, driven_travel
+from kedfem.vectors import cross
 
 BALL, ROLLER = 3.0, 10.0 / 3.0  # exponents of bearing lives, ISO 281: point and line contact
 HINGES = ("revolute", "cylindrical", "screw")

@@ -14,8 +14,8 @@ from kedfem.arrays import Float, Int
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.links.record import Link, Matrix
-from kedfem.motion.constraints import cross
 from kedfem.motion.rigid import RigidMotion
+from kedfem.vectors import cross
 
 DENSE = 400  # unknowns of a link: up to here a dense product beats a sparse one
 ACROSS = ((1, 2), (2, 0), (0, 1))  # components of a cross product; in a plane the last

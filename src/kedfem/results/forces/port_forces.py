@@ -14,10 +14,10 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.system.forces.exerted import on_ports
 from kedfem.dynamics.system.forces.supports import supports
 from kedfem.links.record import Link, in_space
-from kedfem.motion.constraints import cross
 from kedfem.results.forces.constraint_forces import ConstraintForces
 from kedfem.results.forces.force_elements import ElementForces
 from kedfem.results.recorded import Rows, once
+from kedfem.vectors import cross
 
 INDETERMINATE = 1e-6  # [-, m] share of a loose port force of one that a joint would carry
 

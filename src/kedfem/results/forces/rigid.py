@@ -9,7 +9,6 @@ from kedfem.arrays import Float
 from kedfem.dynamics.inertias import Inertias, acting
 from kedfem.dynamics.rigid_body import drive_range
 from kedfem.dynamics.rigid_elements import RigidElements, rigid_elements
-from kedfem.motion.constraints import cross
 from kedfem.motion.joint_equations import ordered
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path, path
@@ -19,6 +18,7 @@ from kedfem.motion.rigid import RigidMotion
 from kedfem.results.channels import XYZ, Channel
 from kedfem.results.recorded import Rows, effort_channel
 from kedfem.scene import GROUND, ConstantSpeed, Joint, Scene, revolution_steps
+from kedfem.vectors import cross
 
 Responses = Float[np.ndarray, "T c k"]
 OPEN = 1e-9  # of squares: a smaller share of a joint's force is rounding

@@ -14,7 +14,7 @@ from kedfem.dynamics.system.ends import end_of
 from kedfem.dynamics.system.forces.poses import Vectors
 from kedfem.dynamics.system.forces.supports import Supports
 from kedfem.dynamics.system.record import Spring
-from kedfem.motion.constraints import cross
+from kedfem.vectors import cross
 
 ELEMENTS = ("motors.", "springs.", "limits.")
 Rows = Float[np.ndarray, "T _ _"]

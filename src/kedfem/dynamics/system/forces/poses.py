@@ -8,8 +8,8 @@ from kedfem.dynamics.system.ends import line_weights
 from kedfem.dynamics.system.forces.follower_loads import rotations
 from kedfem.dynamics.system.forces.rotations import rotation_moment, tilt_moment
 from kedfem.dynamics.system.record import End, Term
-from kedfem.motion.constraints import cross
 from kedfem.motion.rigid import RigidMotion
+from kedfem.vectors import cross
 
 Vectors = Float[np.ndarray, "T 3"]
 

@@ -7,7 +7,7 @@ The formulas are those of `measures_kernel`. arccos(c) / √(1 − c²), which i
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.motion.constraints import cross
+from kedfem.vectors import cross
 
 NEAR = 0.5  # c from which on the series is taken: what 32 of its terms leave is rounding
 SERIES = np.polynomial.Polynomial(np.cumprod([1.0, *((2 * n + 2) / (2 * n + 3) for n in range(31))]))

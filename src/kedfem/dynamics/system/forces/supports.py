@@ -15,8 +15,8 @@ from kedfem.dynamics.system.ends import corners, end_of, same_end
 from kedfem.dynamics.system.forces.lines import on_line
 from kedfem.dynamics.system.forces.poses import Vectors, point_forces, poses, unit_moment
 from kedfem.dynamics.system.record import DISTANCE, GAP, ON_LINES, Constraint, End, Term
-from kedfem.motion.constraints import cross
 from kedfem.motion.rigid import RigidMotion
+from kedfem.vectors import cross
 
 Pushed = tuple[End, Vectors, Vectors, Vectors]
 """An end with its place, and the force and the moment on it there."""
