@@ -7,10 +7,10 @@ from math import inf
 from pathlib import Path as FilePath
 
 from kedfem.accuracy.choices import open_step
+from kedfem.accuracy.damping import mass_damping_warning
 from kedfem.accuracy.error_budget import Budget, attributes, budget_warning, meaningless
 from kedfem.accuracy.estimates import budget
 from kedfem.accuracy.histories import run_histories, steady_state
-from kedfem.accuracy.mass_damping import mass_damping_warning
 from kedfem.accuracy.meshes import stubby_warning
 from kedfem.accuracy.plan import Plan, ready_to_step
 from kedfem.accuracy.prepared import ALONE, Neighbours, Prepared

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import trapezoid
 from scipy.interpolate import CubicSpline
 
-from kedfem.accuracy.mass_damping import mass_damping_warning
+from kedfem.accuracy.damping import mass_damping_warning
 from kedfem.accuracy.prepared import meshed
 from kedfem.analysis import Run, analyse
 from kedfem.errors import KedfemError

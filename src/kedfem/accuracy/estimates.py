@@ -3,7 +3,8 @@
 Small models are run again as they are; of large links a companion on a few modes is run instead, on which a step
 takes a fraction. Their channels are compared as `histories` does: what two steps, two meshes differ by, in every channel.
 
-* **Step**: of a single level, the run's step against twice that one, as levels in time are (`accuracy.step_estimate`).
+* **Step**: of a single level, the run's step against twice that one, as levels in time are (`accuracy.step_estimate`);
+  strong numerical damping against little (`accuracy.damping`).
 * **Positions** that the scene leaves open: what may be missed between them (`accuracy.positions`).
 * **Mesh of beams**: twice the elements, in the same step.
 * **Rounding**: what a link's matrices leave of its rigid motion (`accuracy.rounding`).
@@ -18,6 +19,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from kedfem.accuracy.damping import damped_errors, damping_remedy
 from kedfem.accuracy.error_budget import Budget, Share, by_kind, joined
 from kedfem.accuracy.geometric import GeometricError, bent, geometric_warning
 from kedfem.accuracy.histories import Histories, counted, extent, histories
@@ -152,7 +154,8 @@ def budget(
         if seen.steps:
             if not known:
                 known, longer = step_errors(small, base)
-            shares.append(Share("step", by_kind({n: error for n, error in known.items() if n in sizes})))
+            step_share, known = _step_share(small, base, known)
+            shares.append(step_share)
         elif not states_step(ready.scene):  # stated positions are wanted there
             shares.append(positions_share(base, sizes))
         if longer is not None and differs_alike(small):
@@ -205,6 +208,14 @@ def step_errors(ready: Prepared, base: Histories) -> tuple[dict[str, float], His
     other = histories(replace(ready, scene=doubled(ready.scene) if longer else finer), near=base.begun)
     fine, coarse = (base, other) if longer else (other, base)
     return single_errors(fine, coarse, bool(ready.scene.limits))[0 if longer else 1], other if longer else None
+
+
+def _step_share(ready: Prepared, base: Histories, marched: Mapping[str, float]) -> tuple[Share, dict[str, float]]:
+    """The share of the step, and channel → its error, from what levels or marches show and from numerical damping."""
+    sizes, damped = counted(base), damped_errors(ready, base)
+    every = {name: max(error, damped.get(name, 0.0)) for name, error in (damped | dict(marched)).items()}
+    shown = {name: error for name, error in every.items() if name in sizes}
+    return Share("step", by_kind(shown), damping_remedy(ready.scene, marched, damped)), every
 
 
 def _limits(ready: Prepared, found: Mapping[int, Indicator]) -> list[str]:

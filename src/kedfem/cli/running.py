@@ -86,7 +86,7 @@ def _version(file: Path) -> tuple[int, int] | None:
 
 def check(scene: ScenePath, quick: Quick = False, within: Within = False) -> None:
     """Show what would be modelled and its cost; of the solution a few steps are tried."""
-    from kedfem.accuracy.mass_damping import mass_damping_warning
+    from kedfem.accuracy.damping import mass_damping_warning
     from kedfem.accuracy.plan import ready_to_step
     from kedfem.accuracy.sizes import size_warnings, sizes
     from kedfem.motion.assembly import assembled
