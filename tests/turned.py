@@ -8,7 +8,7 @@ import numpy as np
 
 from kedfem.mesh import SolidMesh
 from kedfem.mesh.cad.sides import boundary_sides, side_corners
-from kedfem.mesh.elements.hexahedra import Face, linear, quadratic, serendipity, without_spare_nodes
+from kedfem.mesh.elements.hexahedra import Face, linear, quadratic, serendipity, without_unused_nodes
 from kedfem.mesh.elements.shape_functions import HEX8, HEX27
 from kedfem.mesh.elements.tetrahedra import tetrahedral
 
@@ -54,7 +54,7 @@ def turned(parts: Sequence[tuple[float, float, float, float]], nodes: int = 20, 
         q = quads_[used] + level * len(plane)
         cells.append(np.column_stack([q, q + len(plane)]))
     swept = np.column_stack([np.tile(plane, (len(heights), 1)), np.repeat(heights, len(plane))])
-    mesh = without_spare_nodes(SolidMesh(swept, np.concatenate(cells)))
+    mesh = without_unused_nodes(SolidMesh(swept, np.concatenate(cells)))
     distance = np.linalg.norm(mesh.points[:, :2], axis=1)
     return curved(mesh, nodes, distance * (distance > 0.9 * core), lambda x: x * [1, 1, 0])
 
@@ -117,7 +117,7 @@ def ball_seat(radius: float, nodes: int = 20) -> SolidMesh:
                 flipped = np.linalg.det(corner[[1, 3, 4]] - corner[0]) < 0
                 cells.append([cell[k] for k in (0, 3, 2, 1, 4, 7, 6, 5)] if flipped else cell)
     mesh = SolidMesh(radius * points, np.array(cells))
-    mesh = without_spare_nodes(mesh)
+    mesh = without_unused_nodes(mesh)
     distance = np.linalg.norm(mesh.points, axis=1)
     del shell
     return curved(mesh, nodes, np.where(np.abs(distance - radius) < 1e-9, radius, 0.0), lambda x: x)

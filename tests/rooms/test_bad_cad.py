@@ -98,7 +98,7 @@ class TestBadSolid:
         written(tmp_path, "cut", prism(*corners), ("step",))
         message = refused(tmp_path / "cut.step")
         assert message.startswith(
-            "links.rod.shape.file: must be a closed solid that does not cut itself, got a plane face facing "
+            "links.rod.shape.file: must be a closed solid that does not intersect itself, got a plane face facing "
         )
         assert message.endswith(" mm; mend the part in CAD")
 
@@ -155,7 +155,7 @@ class TestHealing:
             raise OtherMethodError("healed no better")
 
         monkeypatch.setattr("kedfem.mesh.methods.best_mesh", fails)
-        monkeypatch.setattr("kedfem.mesh.methods.filled_mesh", unfit)
+        monkeypatch.setattr("kedfem.mesh.methods.tetrahedral_mesh", unfit)
         link, shape = link_from({"shape": {"file": "wishbone.step"}}), Cad(file="wishbone.step")
         with pytest.raises(MeshError, match="of overlapping facets"):
             made_mesh(KEYS, "rod", link, shape, self.WISHBONE)

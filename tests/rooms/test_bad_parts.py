@@ -28,7 +28,7 @@ REFUSED = [
     (bad_cad.overlapping, r"links.arm.shape.solid: is required, .* first, second"),
     (
         bad_cad.self_crossing,
-        r"links.arm.shape.file: must be a closed solid that does not cut itself, "
+        r"links.arm.shape.file: must be a closed solid that does not intersect itself, "
         r"got a plane face facing .* \(face \d+\) with",
     ),
     (bad_cad.wrong_ending, r"links.arm.shape.file: must hold STEP, as its ending says, got another text"),

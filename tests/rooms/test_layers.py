@@ -397,7 +397,7 @@ class TestSizing:
         assert len(heights) == 2 * 10 + 1
 
     def test_turn_bounds_the_angle_of_an_element(self):
-        mesh = meshed(pocketed_plate, Sizing(turn=math.pi / 16))
+        mesh = meshed(pocketed_plate, Sizing(angle=math.pi / 16))
         arm = mesh.points[:, :2] - [25 * MM, 30 * MM]
         on_bore = np.isclose(np.linalg.norm(arm, axis=1), 12 * MM, rtol=1e-9) & (mesh.points[:, 2] == 0)
         assert on_bore.sum() >= 2 * 32  # corners and middles

@@ -14,7 +14,7 @@ from kedfem.errors import MeshError, SolveError
 from kedfem.links import build
 from kedfem.mesh import link
 from kedfem.mesh import memory_forecast as room
-from kedfem.mesh.memory_forecast import FACTOR_BYTES, LINK_BYTES, check_room
+from kedfem.mesh.memory_forecast import FACTOR_BYTES, LINK_BYTES, check_memory
 from kedfem.scene import scene_from
 
 
@@ -64,7 +64,7 @@ def test_the_forecast_is_below_the_count_that_is_made(monkeypatch: pytest.Monkey
     """Nobody is refused whose mesh would have fitted; the count is near for large meshes."""
     for element in ("hex8", "hex20", "hex27", "tet10"):
         said: list[float] = []
-        monkeypatch.setattr(link, "check_room", lambda where, count, *_, said=said: said.append(count))
+        monkeypatch.setattr(link, "check_memory", lambda where, count, *_, said=said: said.append(count))
         made = link.link_mesh("arm", arm(element=element, mesh={"elements": [20, 12, 10]}).links["arm"], Path())
         assert said[1] == 3 * len(made.points)
         assert 0.75 * said[1] < said[0] <= said[1]
@@ -79,10 +79,10 @@ def test_what_is_not_factored_or_flat_takes_less(
     N = 1e6
     monkeypatch.setattr(room, "free_memory", lambda: LINK_BYTES * N + 0.5 * FACTOR_BYTES * N**1.5)
     if fits:
-        check_room("links.arm", N, kind != "rigid", plane)
+        check_memory("links.arm", N, kind != "rigid", plane)
     else:
         with pytest.raises(MeshError, match="must fit in the free memory"):
-            check_room("links.arm", N, kind != "rigid", plane)
+            check_memory("links.arm", N, kind != "rigid", plane)
 
 
 def test_links_that_fit_alone_but_not_together_are_refused_before_they_are_factored(

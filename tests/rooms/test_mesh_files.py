@@ -164,7 +164,7 @@ def test_a_side_that_tetrahedra_divide_the_other_way_is_refused(tmp_path: Path) 
     # five tetrahedra whose diagonal of the common side a d h e is d e: a is the least of the four, which says a h
     five = [[a, b, d, e], [b, c, d, g], [b, d, e, g], [b, e, f, g], [d, e, g, h]]
     meshio.Mesh(raw.points, [("hexahedron", first[None]), ("tetra", np.array(five))]).write(tmp_path / "x.vtu")
-    with pytest.raises(MeshError, match=r"mesh: hexahedra, .* got 1 four-sided sides .* put pyramids .* in .*x.vtu"):
+    with pytest.raises(MeshError, match=r"mesh: hexahedra, .* got 1 quadrilateral sides .* put pyramids .* in .*x.vtu"):
         mesh_from_file("mesh", tmp_path / "x.vtu", 1.0)
 
 

@@ -165,7 +165,7 @@ def ball(r: float, at: float, inward: bool) -> CadFace:
     return CadFace(0, "", "sphere", np.array([at, 0.0, 0.0]), np.full(3, np.nan), r, inward, np.nan, np.nan)
 
 
-def found(*rounds: tuple[CadFace, ...]) -> list[Any]:
+def found(*round_faces: tuple[CadFace, ...]) -> list[Any]:
     return assembly_joints([AssemblySolid(f"s{i}", 0.1, each) for i, each in enumerate(rounds)])
 
 
@@ -182,9 +182,9 @@ def cushion(occ: Any) -> None:
 def test_blends_and_halves_of_bores_are_no_coupling_surfaces(tmp_path: Path) -> None:
     written(tmp_path, "cushion", cushion, ("step",))
     (solid,) = assembly_solids(tmp_path / "cushion.step", None)
-    seen = sorted((each.kind, each.inward, round(each.radius / MM, 6)) for each in solid.rounds)
+    seen = sorted((each.kind, each.inward, round(each.radius / MM, 6)) for each in solid.round_faces)
     assert seen == [("cylinder", False, 3), ("cylinder", True, 5), ("sphere", False, 5)]
-    (bore,) = (each for each in solid.rounds if each.inward)
+    (bore,) = (each for each in solid.round_faces if each.inward)
     np.testing.assert_allclose(bore.centre, [20 * MM, 20 * MM, 10 * MM], atol=1e-9)  # [m]
     assert bore.length == pytest.approx(20 * MM, rel=1e-6)
 
@@ -224,9 +224,9 @@ def test_a_fork_on_its_pin_is_one_joint_between_its_eyes() -> None:
     eye = (cylinder(5 * MM, 5 * MM, 15 * MM, True),)
     both = found(fork, shaft, eye)  # fork and eye are joined by the pin, not by each other
     assert sorted(each.solids for each in both) == [(0, 1), (2, 1)]
-    (pinless,) = found(fork, eye)
-    assert pinless.pinless
-    np.testing.assert_allclose(pinless.at, [0, 0, 10 * MM], atol=1e-12)
+    (two_bores,) = found(fork, eye)
+    assert two_bores.two_bores
+    np.testing.assert_allclose(two_bores.at, [0, 0, 10 * MM], atol=1e-12)
 
 
 def test_a_hollow_pin_is_named_by_its_face() -> None:
@@ -251,10 +251,10 @@ def test_a_frame_is_suggested_where_there_is_reason_to() -> None:
              AssemblySolid("c", 0.2, (pins(2),))]  # fmt: skip
     assert grounds(chain) == (False, [["a", "b"], ["b", "c"]])
     assert grounds([replace(chain[0], name="machine bed"), *chain[1:]]) == (True, [["ground", "b"], ["b", "c"]])
-    loop = [replace(chain[0], rounds=(*chain[0].rounds, holes(3))), chain[1],
-            replace(chain[2], rounds=(*chain[2].rounds, pins(3)))]  # fmt: skip
+    loop = [replace(chain[0], round_faces=(*chain[0].round_faces, holes(3))), chain[1],
+            replace(chain[2], round_faces=(*chain[2].round_faces, pins(3)))]  # fmt: skip
     tail = AssemblySolid("tail", 0.9, (pins(4),))
-    tailed = [replace(loop[0], rounds=(*loop[0].rounds, holes(4))), *loop[1:], tail]
+    tailed = [replace(loop[0], round_faces=(*loop[0].round_faces, holes(4))), *loop[1:], tail]
     suggested, joints = grounds(tailed)
     assert suggested
     assert [links for links in joints if GROUND in links] == [["a", GROUND], [GROUND, "c"]]

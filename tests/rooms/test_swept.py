@@ -19,11 +19,11 @@ from kedfem.mesh.cad.model import CadKeys, solid_model
 from kedfem.mesh.cad.solids import OtherMethodError, Sizing, Solid
 from kedfem.mesh.elements.bounds import valid_everywhere
 from kedfem.mesh.elements.quality import scaled_jacobian
-from kedfem.mesh.filling import filled_mesh
 from kedfem.mesh.session import gmsh_model
 from kedfem.mesh.swept.core import disc
 from kedfem.mesh.swept.path import path_mesh
 from kedfem.mesh.swept.revolved import revolved_mesh
+from kedfem.mesh.tetrahedral import tetrahedral_mesh
 from kedfem.mesh.unknowns import nearest
 from kedfem.scene import Material, link_from
 from kedfem.scene.records.shapes import Cad
@@ -198,7 +198,7 @@ def test_frequencies_are_those_of_fine_tetrahedra(name: str, size: float, tmp_pa
     file, _ = drawn(tmp_path, PARTS[name][0])
     with solid_model(CadKeys("part", "solid"), file, "part", Cad(file=file.name)) as (gmsh, solid):
         method = path_mesh if name in ALONG_PATHS else revolved_mesh
-        meshes = method(gmsh, solid, Sizing()), filled_mesh(gmsh, solid, Sizing(size=size))
+        meshes = method(gmsh, solid, Sizing()), tetrahedral_mesh(gmsh, solid, Sizing(size=size))
     links = [solid_link("part", mesh, STEEL, np.eye(3)) for mesh in meshes]
     found, fine = (frequencies(link, sp.eye_array(3 * link.n, format="csr"), 12, 5e3)[6:] for link in links)
     assert_allclose(found, fine, rtol=5e-3)

@@ -22,7 +22,7 @@ from kedfem.mesh.cad.model import CadKeys, solid_model
 from kedfem.mesh.cad.sides import owned_sides
 from kedfem.mesh.cad.solids import OtherMethodError, Sizing
 from kedfem.mesh.elements.bounds import valid_everywhere
-from kedfem.mesh.elements.hexahedra import extruded, quadratic, rectangle_quads, without_spare_nodes
+from kedfem.mesh.elements.hexahedra import extruded, quadratic, rectangle_quads, without_unused_nodes
 from kedfem.mesh.elements.shape_functions import TET10
 from kedfem.mesh.elements.tetrahedra import FORMS, tetrahedral, unfolded
 from kedfem.mesh.files.read import mesh_from_file
@@ -67,7 +67,7 @@ class TestDivided:
 
     def test_tetrahedra_stay_in_every_form(self) -> None:
         mesh = tetrahedral(extruded(*rectangle_quads(1.0, 1.0, 1, 1), 1.0, 1))
-        straight = without_spare_nodes(replace(mesh, cells=mesh.cells[:, :4]))
+        straight = without_unused_nodes(replace(mesh, cells=mesh.cells[:, :4]))
         for form in FORMS.values():
             assert form(mesh) is mesh
             assert_allclose(form(straight).points[: len(mesh.points)].sum(), mesh.points.sum())
@@ -131,7 +131,7 @@ class TestBlends:
     def made(self, name: str, folder: Path, ignore: float | None = None, **sizing: Any) -> SolidMesh:
         file, _ = written(name, folder)
         with solid_model(CadKeys("file", "solid"), file, name, Cad(file=file.name)) as (gmsh, solid):
-            mesh = swept_without_blends(gmsh, solid, Sizing(ignore=ignore, **sizing))
+            mesh = swept_without_blends(gmsh, solid, Sizing(defeature_size=ignore, **sizing))
             off = volume(mesh) / solid.volume - 1
         told = float(mesh.method.partition("), ")[2].partition(" % of the volume")[0])
         assert told == pytest.approx(100 * off, abs=0.01)  # parabolas for arcs
@@ -145,9 +145,9 @@ class TestBlends:
         bores = [face for face in mesh.faces if face.kind == "cylinder"]
         assert_allclose([face.radius for face in bores], [6e-3, 6e-3], rtol=1e-6)
         with pytest.raises(OtherMethodError, match="more than small blends"):
-            self.made("plate_with_chamfered_bores", tmp_path, kept=((0.02 + 0.0065, 0.015, 0.0005),))
+            self.made("plate_with_chamfered_bores", tmp_path, kept_points=((0.02 + 0.0065, 0.015, 0.0005),))
         with pytest.raises(OtherMethodError, match="more than small blends"):
-            self.made("plate_with_chamfered_bores", tmp_path, named=("face 7",))
+            self.made("plate_with_chamfered_bores", tmp_path, kept_faces=("face 7",))
         with pytest.raises(OtherMethodError, match="more than small blends"):
             self.made("plate_with_chamfered_bores", tmp_path, ignore=0.5e-3)
 

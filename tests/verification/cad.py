@@ -9,8 +9,8 @@ from kedfem.links.record import Link
 from kedfem.links.solid import solid_link
 from kedfem.mesh.cad.model import CadKeys, solid_model
 from kedfem.mesh.cad.solids import Sizing
-from kedfem.mesh.filling import filled_mesh
 from kedfem.mesh.layered.layers import layered_mesh
+from kedfem.mesh.tetrahedral import tetrahedral_mesh
 from kedfem.scene import Cad, Material
 
 from .cases import Row, case
@@ -18,7 +18,7 @@ from .linear import free_map, frequencies, held
 
 GEOMETRY = Path(__file__).parents[2] / "geometry"
 STEEL = Material(density=7850, youngs_modulus=2.1e11, poisson_ratio=0.3)
-WAYS = {"layers": layered_mesh, "tetrahedra": filled_mesh}
+WAYS = {"layers": layered_mesh, "tetrahedra": tetrahedral_mesh}
 PART, FIRST = "crank", 4000.0  # Hz, of the order of its first free frequency
 REFERENCE = ("layers", 0.003)
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> Any:
-    """What makes meshes is loaded where one is made: beams have none, others are kept."""
+    """Load the meshing code only when a mesh is made: beams need none, and meshes are kept between runs."""
     if name not in {"link_mesh", "part_mesh", "plane_mesh"}:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from kedfem.mesh import link

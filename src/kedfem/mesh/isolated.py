@@ -1,4 +1,4 @@
-"""Calls of libraries in processes of their own: their output is suppressed, and crashes or hangs become errors."""
+"""Calls of libraries in separate processes: their output is suppressed, and crashes and hangs become errors."""
 
 import atexit
 import os
@@ -15,13 +15,13 @@ from kedfem.mesh.cad.file import silent
 from kedfem.mesh.memory_forecast import memory
 from kedfem.processes import LATE, bounded, end_with_parent, threads
 
-LONGEST = 180  # seconds of processor time after which a part is given up
-READING = 60  # seconds of processor time after which a mesh file is given up
-TRIES = 3  # processes that are tried with a part that cannot be read in time
-IDLE = 180  # seconds after which a process that has no work is ended
-AGAIN = 0.05  # seconds between two tries to end what is not wanted any more
-MOST_MEMORY = 6e9  # bytes that the process may hold
-PATIENCE = 3600  # seconds after which either is given up though it takes no processor time
+LONGEST = 180  # seconds of processor time for a part
+READING = 60  # seconds of processor time for a mesh file
+TRIES = 3  # processes that try a part which cannot be read in time
+IDLE = 180  # seconds after which a process without work is ended
+AGAIN = 0.05  # seconds between two attempts to end processes that are no longer needed
+MOST_MEMORY = 6e9  # bytes that a process may hold
+PATIENCE = 3600  # seconds after which work is given up, even if it takes no processor time
 PART = (
     "must be a part that gmsh and OpenCASCADE can work on",
     "mend or simplify it in CAD (fillets that are thinner than an element first), or take another mesh.size",
@@ -33,7 +33,7 @@ T = TypeVar("T")
 
 @dataclass(eq=False, slots=True)
 class _Worker:
-    """A process that does one piece of work after the other; `used` once it had some, `ended` at its end."""
+    """A process that does one task after the other; `used` after its first task, `ended` once it was ended."""
 
     executor: Any
     used: bool = False
@@ -41,7 +41,7 @@ class _Worker:
 
     @classmethod
     def waiting(cls) -> "_Worker":
-        """One that waits for work, or a new one."""
+        """A process that waits for work, or a new one."""
         from joblib.externals.loky import ProcessPoolExecutor
 
         with suppress(IndexError):
@@ -49,9 +49,9 @@ class _Worker:
         return cls(ProcessPoolExecutor(max_workers=1))
 
     def rest(self) -> None:
-        """Wait for more work, for IDLE seconds.
+        """Wait for more work for IDLE seconds.
 
-        By loky's own `timeout` the next process would begin while loky looks at none, and its end would not be seen.
+        With loky's own `timeout` the next process would start while loky monitors none, and its end would not be seen.
         """
         IDLE_WORKERS.append(self)
         timer = Timer(IDLE, self._left)
@@ -70,26 +70,28 @@ class _Worker:
 
 
 IDLE_WORKERS: list[_Worker] = []
-atexit.register(IDLE_WORKERS.clear)  # while loky still reports their end: later, it would write of an error
+atexit.register(IDLE_WORKERS.clear)  # while loky still manages them; later it would print an error
 _busy: list[_Worker] = []
 
 
 def in_own_process(where: str, words: tuple[str, str], seconds: float, work: Callable[..., T], *given: Any) -> T:
-    """What a function returns in a process of its own: libraries break down or hang on some files.
+    """What a function returns in a process of its own, because libraries crash or hang on some files.
 
-    Nothing that they write reaches the terminal. The process is ended after work that raises: what a damaged file leaves
-    in a library's memory is not known. OpenCASCADE refuses some files in one process and hangs or breaks down at them in
-    another: where a process breaks down, or a used one hangs, a new one tries once; where one hangs as it reads, two.
+    Nothing that they write reaches the terminal. The process is ended after work that raises, since a damaged file may
+    leave a library's memory in any state. OpenCASCADE refuses some files in one process and hangs or crashes at them in
+    another: if a process crashes, or a used one hangs, a new one tries once more; if it hangs while reading, two do.
 
     Parameters
     ----------
-    words : what is wanted, and what to do where it is not so
+    where : the file or key, for messages
+    words : what is required, and advice where it fails
     seconds : of processor time that it may take
+    work, given : the function and its arguments
 
     Raises
     ------
     MeshError
-        The process broke down, took longer or more than MOST_MEMORY; or what the function raises.
+        The process crashed, took longer, or took more than MOST_MEMORY; also what the function raises.
     """
     from joblib.externals.loky import TimeoutError as LateError
     from joblib.externals.loky.process_executor import TerminatedWorkerError
@@ -132,23 +134,23 @@ def in_own_process(where: str, words: tuple[str, str], seconds: float, work: Cal
 
 
 def limited(folder: str, seconds: float, work: Callable[..., T], *given: Any) -> T:
-    """What a function returns, in silence, in a folder; the process is ended after so much processor time.
+    """What a function returns in a folder, without output; the process is ended after `seconds` of processor time.
 
-    A MemoryError says that it would hold more than MOST_MEMORY.
+    A MemoryError is raised if it needs more than MOST_MEMORY.
     """
     end_with_parent()
-    os.chdir(folder)  # the process may have begun in another
+    os.chdir(folder)  # the process may have started in another one
     with bounded(seconds, MOST_MEMORY), silent():
         return work(*given)
 
 
 def side_by_side(works: Mapping[str, Callable[[], T]]) -> dict[str, T]:
-    """What functions return that have their work done `in_own_process`: as many at once as there are threads, and memory.
+    """What functions that work `in_own_process` return, as many at once as threads and memory allow.
 
     Raises
     ------
     MeshError
-        What the first of them raises, in their order; those that go on are ended.
+        That of the first function, in their order, that raises one; the others are ended.
     """
     at_once = min(threads(), max(int(memory() / MOST_MEMORY), 1))
     if at_once == 1 or len(works) < 2:

@@ -1,4 +1,4 @@
-"""Memory that a link takes, forecast from its number of unknowns, before anything of that size is made."""
+"""Forecast of a link's memory from its number of unknowns, before anything of that size is made."""
 
 import os
 import re
@@ -6,22 +6,22 @@ from pathlib import Path
 
 from kedfem.errors import MeshError
 
-#: Of a link of N unknowns, `benchmarks.growth` and slender bars (27-node hexahedra, CHOLMOD): bytes of the factor
-#: over N^1.5, of what is kept over N, and of what is there while one link is assembled.
+#: For a link of N unknowns, from `benchmarks.growth` and slender bars (27-node hexahedra, CHOLMOD): bytes of the
+#: factor over N^1.5, of the matrices over N, and of all during the assembly over N.
 FACTOR_BYTES, LINK_BYTES, ASSEMBLY_BYTES = 22.0, 5e3, 1.5e4
-PLANE_FILL = 0.1  # of the factor that a plane mesh has, from 18,000 to 240,000 unknowns
-#: New nodes to each element of a large mesh of hexahedra, and of tetrahedra that divide them.
+PLANE_FILL = 0.1  # share of these bytes for a plane mesh, from 18,000 to 240,000 unknowns
 MOST_ELEMENTS = 2_000_000
+#: New nodes for each element of a large mesh of hexahedra, and of tetrahedra that divide them.
 NODES_EACH = {"hex8": 1, "hex20": 4, "hex27": 8, "tet10": 8}
 
 
 def memory() -> float:
-    """Bytes of this machine."""
+    """Memory of this machine [bytes]."""
     return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")) if hasattr(os, "sysconf") else 8e9
 
 
 def free_memory() -> float:
-    """Bytes of it that can be had now; all where the system does not say."""
+    """Memory that is available now [bytes]; all of it where the system does not say."""
     try:
         said = re.search(r"^MemAvailable: +(\d+) kB$", Path("/proc/meminfo").read_text(encoding="ascii"), re.MULTILINE)
     except OSError:
@@ -30,27 +30,32 @@ def free_memory() -> float:
 
 
 def least_bytes(unknowns: float, factored: bool = True, plane: bool = False) -> tuple[float, float]:
-    """Bytes of a link's matrices, and of their factor; parameters as of `check_room`."""
+    """Memory of a link's matrices and of their factor [bytes]; parameters as of `check_memory`."""
     return LINK_BYTES * unknowns, FACTOR_BYTES * unknowns**1.5 * (PLANE_FILL if plane else 1.0) * factored
 
 
 def unknowns_that_fit(unknowns: float, factor: float, free: float) -> float:
-    """Unknowns, to two digits, of the mesh whose factor takes the free memory, where `unknowns` take `factor` [bytes].
+    """Unknowns, to two digits, of the mesh whose factor takes `free` bytes, if that of `unknowns` takes `factor`.
 
-    The factor grows by the power 1.5 at most.
+    The factor grows with at most the power 1.5 of the unknowns.
     """
     return float(f"{unknowns * (free / factor) ** (1 / 1.5):.2g}")
 
 
-def check_room(where: str, unknowns: float, factored: bool = True, plane: bool = False) -> None:
-    """Refuse a link that the free memory cannot hold: the least that its matrices and their factor take.
+def check_memory(where: str, unknowns: float, factored: bool = True, plane: bool = False) -> None:
+    """Refuse a link whose matrices and factor do not fit in the free memory.
 
     Parameters
     ----------
     where : the link, for messages
-    unknowns : of its mesh, or at least so many
-    factored : whether its effective matrix is; that of a rigid link is not
+    unknowns : number in its mesh, or a lower bound of it
+    factored : whether its effective matrix is factored, which that of a rigid link is not
     plane : whether it is a plane mesh
+
+    Raises
+    ------
+    MeshError
+        More than the free memory is needed.
     """
     kept, factor = least_bytes(unknowns, factored, plane)
     free = free_memory()
@@ -67,19 +72,19 @@ def check_room(where: str, unknowns: float, factored: bool = True, plane: bool =
 
 
 def size_key(where: str, given: float | None) -> str:
-    """The key that the length of a link's elements comes from: `mesh.size` as given, or `mesh.elements_across`."""
+    """The key that determines the length of a link's elements: `mesh.size` if given, else `mesh.elements_across`."""
     return f"{where}.mesh.{'elements_across' if given is None else 'size'}"
 
 
 def check_size(where: str, given: float | None, size: float, extent: float) -> None:
-    """Refuse elements that are longer than the whole link [m]."""
+    """Refuse an element size above the size of the whole link [m]."""
     if size > extent:
         wanted = f"must be below the link's own size {extent:.6g} [m]"
         raise MeshError(f"{size_key(where, given)}: {wanted}, got {size:.6g}")
 
 
 def check_count(key: str, count: float) -> None:
-    """Refuse meshes that no computer here could solve, before they are made."""
+    """Refuse, before it is made, a mesh of more than MOST_ELEMENTS elements."""
     if count > MOST_ELEMENTS:
         got = f"got about {count:,.0f}; take a coarser mesh"
         raise MeshError(f"{key}: must give at most {MOST_ELEMENTS:,} elements, {got}")

@@ -1,10 +1,10 @@
-"""Places in messages about meshes and parts: in millimetres, as in CAD and in the tables of `kedfem mesh`."""
+"""Points in messages about meshes and parts, in millimetres, as in CAD and in the tables of `kedfem mesh`."""
 
 from collections.abc import Iterable
 
 
 def in_mm(X: Iterable[float]) -> str:
-    """A point in words.
+    """A point [m] as text in millimetres.
 
     >>> in_mm((0.0127, -0.005, 0.0))
     '(12.7, -5, 0) mm'

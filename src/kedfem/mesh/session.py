@@ -1,4 +1,4 @@
-"""gmsh, opened and closed in one place."""
+"""The session with gmsh: models, options, and what is read from them."""
 
 import tempfile
 import threading
@@ -22,21 +22,21 @@ SYSTEM_PACKAGES = {
     "libXft.so.2": "libxft2", "libfontconfig.so.1": "libfontconfig1", "libXinerama.so.1": "libxinerama1",
     "libX11.so.6": "libx11-6", "libgomp.so.1": "libgomp1",
 }  # fmt: skip
-QUAD4 = 3  # gmsh's number of the 4-node quadrilateral
+QUAD4, GMSH_HEX27 = 3, 12  # gmsh's numbers of the 4-node quadrilateral and of the 27-node hexahedron
 _one_at_a_time = threading.RLock()
 
 
 @contextmanager
 def gmsh_model() -> Iterator[ModuleType]:
-    """gmsh with an empty model, silent, deterministic, on one thread, deaf to the user's gmsh settings.
+    """gmsh with an empty model: silent, deterministic, on one thread, independent of the user's gmsh settings.
 
-    The model is removed at the end; gmsh is closed if it was opened here. Ctrl-C stays with Python, any
-    thread may call, one at a time.
+    The model is removed at the end; gmsh is closed if it was opened here. Python handles Ctrl-C; any thread may call,
+    one at a time.
 
     Raises
     ------
     MeshError
-        gmsh or a system library of it is missing, or gmsh gave up (its own words are in the message).
+        gmsh or one of its system libraries is missing.
     """
     gmsh = _gmsh()
     with _one_at_a_time:
@@ -56,7 +56,7 @@ def gmsh_model() -> Iterator[ModuleType]:
 
 @contextmanager
 def gmsh_copy(gmsh: ModuleType, factor: float) -> Iterator[ModuleType]:
-    """gmsh with a copy of the current model's shapes in a model of its own, all lengths multiplied.
+    """gmsh with a copy of the current model's shapes in another model, all lengths times a factor.
 
     Planes stay planes and circles circles; OpenCASCADE's tolerances are absolute, so shapes should be of size 1.
     """
@@ -72,7 +72,7 @@ def gmsh_copy(gmsh: ModuleType, factor: float) -> Iterator[ModuleType]:
 
 @contextmanager
 def gmsh_options(gmsh: ModuleType, options: dict[str, float]) -> Iterator[None]:
-    """Options of gmsh set for a while: they belong to all models of a session."""
+    """Set options of gmsh within the context; they apply to all models of a session."""
     before = {name: gmsh.option.getNumber(name) for name in options}
     try:
         for name, value in options.items():
@@ -84,13 +84,15 @@ def gmsh_options(gmsh: ModuleType, options: dict[str, float]) -> Iterator[None]:
 
 
 def boundary(gmsh: ModuleType, dimension: int, *tags: int) -> set[int]:
-    """What bounds some entities: the tags of faces of solids, edges of faces, ends of edges."""
+    """Tags of the entities that bound some others: faces of solids, edges of faces, ends of edges."""
     entities = [(dimension, tag) for tag in tags]
     return {abs(int(tag)) for _, tag in gmsh.model.getBoundary(entities, combined=False, oriented=False)}
 
 
-def touching(bounds: Sequence[set[int]], alike: Callable[[int, int], bool] = lambda one, other: True) -> list[list[int]]:
-    """Entities in groups that hang together: those that share some of what bounds them, and are alike."""
+def connected_groups(
+    bounds: Sequence[set[int]], alike: Callable[[int, int], bool] = lambda one, other: True
+) -> list[list[int]]:
+    """Connected groups of entities: neighbours share a part of their boundaries and are `alike`."""
     owners: dict[int, list[int]] = {}
     for i, own in enumerate(bounds):
         for tag in own:
@@ -103,7 +105,7 @@ def touching(bounds: Sequence[set[int]], alike: Callable[[int, int], bool] = lam
 
 
 def quadrilaterals(gmsh: ModuleType) -> tuple[Float[np.ndarray, "n 2"], Int[np.ndarray, "e 4"]] | None:
-    """Nodes and cells of the plane mesh in gmsh's model; None if triangles are left."""
+    """Nodes and cells of the plane mesh in gmsh's model; None if it has triangles."""
     kinds, _, nodes = gmsh.model.mesh.getElements(2)
     if list(kinds) != [QUAD4]:
         return None
@@ -113,14 +115,14 @@ def quadrilaterals(gmsh: ModuleType) -> tuple[Float[np.ndarray, "n 2"], Int[np.n
 
 
 def numbered_nodes(gmsh: ModuleType) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, " n"]]:
-    """Nodes of the mesh in gmsh's model, by gmsh's numbers, and these in rising order."""
+    """Nodes of the mesh in gmsh's model in the order of gmsh's numbers [m], and these numbers."""
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
     order = np.argsort(tags)
     return coordinates.reshape(-1, 3)[order], tags[order].astype(np.int64)
 
 
 def _gmsh() -> ModuleType:
-    """The module gmsh, or a MeshError that says what to install."""
+    """The module gmsh; a MeshError that says what to install if it does not load."""
     try:
         import gmsh
     except ModuleNotFoundError as error:
@@ -131,7 +133,7 @@ def _gmsh() -> ModuleType:
 
 
 def _missing_library(message: str) -> str:
-    """What to install when gmsh's shared library does not load."""
+    """The message if gmsh's shared library does not load: what to install."""
     missing = [package for library, package in SYSTEM_PACKAGES.items() if library in message]
     others = sorted(set(SYSTEM_PACKAGES.values()) - set(missing))
     return (

@@ -1,28 +1,28 @@
-"""Meshes of about as many unknowns as asked for."""
+"""The search for a mesh of about a number of unknowns."""
 
 from collections.abc import Callable
 from typing import TypeVar
 
 import numpy as np
 
-NEAR = 1.3  # ratio of unknowns got and asked for that is near enough
-APART = 1.02  # ratio of sizes between which no other number of unknowns is sought
-TRIES = 6  # meshes made in search of a number of unknowns
+NEAR = 1.3  # ratio of the unknowns found to those asked for, within which the search ends
+APART = 1.02  # ratio of sizes below which no size between them is tried
+TRIES = 6  # most meshes
 
 T = TypeVar("T")
 
 
-def nearest(
+def nearest_mesh(
     wanted: int, size: float, most: float, power: float, mesh_of: Callable[[float], tuple[T, int]]
 ) -> tuple[T, str]:
-    """The mesh whose number of unknowns is nearest to that asked for, of at most TRIES; in words if it is not near.
+    """Of at most TRIES meshes the one nearest to the unknowns asked for, and a note if it is not within NEAR.
 
     Parameters
     ----------
-    wanted : unknowns
-    size, most : of elements: where the search begins, and the largest [m]
-    power : by which of the size the number of unknowns falls
-    mesh_of : the mesh with elements of a size, and its unknowns
+    wanted : number of unknowns
+    size, most : first and largest size of elements [m]
+    power : the number of unknowns falls with this power of the size
+    mesh_of : function from a size to the mesh and its number of unknowns
     """
     found: list[tuple[float, T]] = []
     low, high = 0.0, np.inf  # sizes known as too small and too large

@@ -173,7 +173,7 @@ def _in_words(found: AssemblyJoint, links: Sequence[str]) -> str:
     phrase = ", ".join(f"{face} of {link}" for face, link in zip(faces, links, strict=True))
     if found.ball:
         return phrase
-    where = ": their pin is not drawn" if found.pinless else f", together along {_mm(found.share)}"
+    where = ": their pin is not drawn" if found.two_bores else f", together along {_mm(found.overlap)}"
     return phrase + where
 
 

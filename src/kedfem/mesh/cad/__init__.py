@@ -1,1 +1,1 @@
-"""Parts from CAD: files, the one solid in them, what its faces are."""
+"""Parts from CAD: reading files, choosing a solid, describing its faces."""

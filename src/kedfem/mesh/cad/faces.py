@@ -1,4 +1,4 @@
-"""Which face of a solid each side of an element lies on."""
+"""The faces of a mesh: the face of the CAD solid on which each element side of the surface lies."""
 
 from dataclasses import dataclass, replace
 from types import ModuleType
@@ -10,25 +10,25 @@ from kedfem.mesh.cad.sides import boundary_sides, side_normals
 from kedfem.mesh.cad.solids import CadFace, Solid
 from kedfem.mesh.cad.words import face_form
 from kedfem.mesh.elements.hexahedra import Face, SolidMesh
-from kedfem.mesh.session import boundary, touching
+from kedfem.mesh.session import boundary, connected_groups
 
-_FLAT = 1e-7  # of the solid's size: sides as near as that to a plane are in it
-_ALIKE = 1e-5  # of the radius: cylinders and spheres that are one
-# of a side's size: faces this much farther away than the nearest may be the one, if it ends before
+_FLAT = 1e-7  # distance, in sizes of the solid, within which a side lies in a plane
+_ALIKE = 1e-5  # difference, in radii, within which two cylinders or spheres are the same
+# in sizes of the side: a face farther away than the nearest by less may be the right one, if the nearest ends before
 _NEARLY = 0.1
 
 
 def with_faces(gmsh: ModuleType, solid: Solid, mesh: SolidMesh) -> SolidMesh:
-    """The mesh with the faces of its solid, if it has none yet: each side on the outside belongs to exactly one.
+    """The mesh with the faces of its solid, unless it has faces already.
 
-    With `faces`; parts of one cylinder or sphere that meet in a seam are one face. A face that no side is on, since it
-    is narrower than an element, is left out.
+    Each side on the surface belongs to exactly one face. Parts of one cylinder or sphere that meet in a seam are one
+    face. A face without a side, because it is narrower than an element, is left out.
 
     Parameters
     ----------
     gmsh : with the solid in its model
     solid : its faces, in metres
-    mesh : in the solid's own frame; nodes on the outside may be off the faces by what curvature makes of a size
+    mesh : in the solid's own frame; nodes of the surface may be off the faces by the sag of a curved element
     """
     if mesh.faces:
         return mesh
@@ -39,30 +39,35 @@ def with_faces(gmsh: ModuleType, solid: Solid, mesh: SolidMesh) -> SolidMesh:
 
 
 def joined_faces(gmsh: ModuleType, solid: Solid, sides: dict[int, Int[np.ndarray, "_ c"]]) -> tuple[Face, ...]:
-    """The faces of a mesh from the corners of the sides on each face of its solid; those of one surface are one."""
+    """The faces of a mesh, from the corners of the sides on each face of its solid; faces of one surface are joined."""
     found = []
-    for group in one_surface(gmsh, solid):
+    for group in faces_by_surface(gmsh, solid):
         found.append(_face(solid, group, np.concatenate([sides[solid.faces[i].tag] for i in group])))
     return tuple(face for face in found if len(face.sides))
 
 
 def _face(solid: Solid, group: list[int], sides: Int[np.ndarray, "f c"]) -> Face:
-    """The face that some of a solid's faces, of one surface, are together."""
+    """The face that joins some of a solid's faces, which are parts of one surface."""
     parts = [solid.faces[i] for i in group]
     first = parts[0]
     centre = first.centre
     if first.kind == "cylinder":
-        along = np.array([(face.centre - centre) @ first.direction for face in parts])
-        half = np.array([face.length / 2 for face in parts])
-        centre = centre + ((along - half).min() + (along + half).max()) / 2 * first.direction
+        centre = centre + sum(axial_bounds(parts)) / 2 * first.direction
     form = first.kind, centre, first.direction, first.radius, first.inward
     return Face(first.name, *form, sides, words=face_form(first))
 
 
-def one_surface(gmsh: ModuleType, solid: Solid) -> list[list[int]]:
-    """Faces in groups: those of one cylinder or sphere that share an edge, without names or with the same one."""
+def axial_bounds(parts: list[CadFace]) -> tuple[float, float]:
+    """Least and greatest place along the axis of faces on one cylinder [m], from the centre of the first."""
+    along = np.array([(face.centre - parts[0].centre) @ parts[0].direction for face in parts])
+    half = np.array([face.length for face in parts]) / 2
+    return float((along - half).min()), float((along + half).max())
+
+
+def faces_by_surface(gmsh: ModuleType, solid: Solid) -> list[list[int]]:
+    """Indices of faces in groups: those that lie on one cylinder or sphere, share an edge and have one name or none."""
     edges = [boundary(gmsh, 2, face.tag) for face in solid.faces]
-    return touching(edges, lambda i, j: _same_surface(solid.faces[i], solid.faces[j]))
+    return connected_groups(edges, lambda i, j: _same_surface(solid.faces[i], solid.faces[j]))
 
 
 def _same_surface(a: CadFace, b: CadFace) -> bool:
@@ -91,14 +96,14 @@ class _Sides:
     sizes: Float[np.ndarray, "f"]
 
     def chosen(self, which: Bool[np.ndarray, "f"] | Int[np.ndarray, "g"]) -> "_Sides":
-        """Some of them."""
+        """The sides that a mask or indices select."""
         return _Sides(self.nodes[which], self.middles[which], self.normals[which], self.sizes[which])
 
 
 def _nearest_faces(
     gmsh: ModuleType, solid: Solid, points: Float[np.ndarray, "n 3"], sides: Int[np.ndarray, "f m"]
 ) -> Int[np.ndarray, "f"]:
-    """For each side the index of the face that its nodes are nearest to; of equally near ones that it is within."""
+    """For each side the index of the nearest face; of equally near faces the one whose edges it lies within."""
     middles, normals, areas = side_normals(points, sides)
     all_sides = _Sides(points[sides], middles, normals, np.sqrt(areas))
     far = np.full((len(sides), len(solid.faces)), np.inf)
@@ -117,15 +122,15 @@ def _nearest_faces(
 
 
 def _in_box(gmsh: ModuleType, face: CadFace, sides: _Sides) -> Bool[np.ndarray, "f"]:
-    """Whether all nodes of a side are in the box of a face, made larger by a part of the side's size."""
+    """Whether all nodes of a side are in the bounding box of a face, widened by a part of the side's size."""
     box = np.array(gmsh.model.getBoundingBox(2, face.tag))
-    room = 0.2 * sides.sizes[:, None]
+    margin = 0.2 * sides.sizes[:, None]
     low, high = sides.nodes.min(axis=1), sides.nodes.max(axis=1)
-    return np.asarray(((low >= box[:3] - room) & (high <= box[3:] + room)).all(axis=1))
+    return np.asarray(((low >= box[:3] - margin) & (high <= box[3:] + margin)).all(axis=1))
 
 
 def _distances(gmsh: ModuleType, face: CadFace, sides: _Sides) -> Float[np.ndarray, "f"]:
-    """How far the farthest of a side's nodes is from a face's surface [m]; a side that looks away is far."""
+    """Largest distance of a side's nodes from a face's surface [m], plus the side's size if it faces the other way."""
     X = sides.nodes
     match face.kind:
         case "plane":
@@ -144,7 +149,7 @@ def _distances(gmsh: ModuleType, face: CadFace, sides: _Sides) -> Float[np.ndarr
 
 
 def _projected(gmsh: ModuleType, tag: int, X: Float[np.ndarray, "f m 3"]) -> Float[np.ndarray, "f m"]:
-    """Distances of points from a free surface [m]; those that sides share are projected once."""
+    """Distances of points from a free-form surface [m]; points that sides share are projected once."""
     if not len(X):
         return np.zeros(X.shape[:2])
     places, back = np.unique(X.reshape(-1, 3), axis=0, return_inverse=True)
@@ -159,7 +164,7 @@ def _closest(
     middle: Float[np.ndarray, "3"],
     normal: Float[np.ndarray, "3"],
 ) -> int:
-    """Of faces that are about equally near to a side the one that its middle, projected, is within and looks as."""
+    """Of some equally near faces the one within which the projected middle of a side lies and whose normal fits."""
     best, least = int(rivals[0]), np.inf
     for i in rivals:
         tag = solid.faces[i].tag
@@ -167,14 +172,14 @@ def _closest(
         within = gmsh.model.isInside(2, tag, at, parametric=True) > 0
         away = float(np.linalg.norm(np.array(on) - middle))
         if not within:
-            away += beyond(gmsh, tag, middle)
+            away += edge_distance(gmsh, tag, middle)
         away += (1 - abs(np.array(gmsh.model.getNormal(tag, at)) @ normal)) * 1e-3 * solid.extent
         if away < least:
             best, least = int(i), away
     return best
 
 
-def beyond(gmsh: ModuleType, tag: int, place: Float[np.ndarray, "3"]) -> float:
-    """How far a place is from the edges of a face [m]."""
+def edge_distance(gmsh: ModuleType, tag: int, place: Float[np.ndarray, "3"]) -> float:
+    """Distance of a point from the edges of a face [m]."""
     on = [gmsh.model.getClosestPoint(1, edge, place)[0] for edge in boundary(gmsh, 2, tag)]
     return min((float(np.linalg.norm(np.array(X) - place)) for X in on), default=0.0)

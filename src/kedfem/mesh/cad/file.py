@@ -1,4 +1,4 @@
-"""CAD files, read into gmsh's model as solids in metres; nothing is printed, whatever fails becomes a MeshError."""
+"""CAD files, read into gmsh's model as solids in metres; nothing is printed, and every failure is a MeshError."""
 
 import os
 import re
@@ -14,7 +14,7 @@ import numpy as np
 from kedfem.errors import MeshError
 from kedfem.mesh.cad.text import iges_unit, step_text, step_unit
 from kedfem.mesh.places import in_mm
-from kedfem.mesh.session import boundary, gmsh_options, touching
+from kedfem.mesh.session import boundary, connected_groups, gmsh_options
 from kedfem.processes import at_most
 
 Format = Literal["STEP", "IGES", "BREP"]
@@ -22,22 +22,22 @@ ENDINGS: dict[str, Format] = {
     ".step": "STEP", ".stp": "STEP", ".iges": "IGES", ".igs": "IGES", ".brep": "BREP", ".brp": "BREP",
 }  # fmt: skip
 
-#: OpenCASCADE turns STEP and IGES into millimetres, and there its tolerances of 1e-7 are small against any part.
-#: Only then is the model made smaller, tolerances with it: exactly, a cylinder stays one. Read at once in metres
-#: (Geometry.OCCTargetUnit), all tolerances were 0.1 µm, and the unit cannot be set for IGES in a new session.
+#: OpenCASCADE reads STEP and IGES in millimetres, where its tolerances of 1e-7 are small against any part. The model
+#: is scaled to metres afterwards, tolerances with it; cylinders stay exact. If it were read in metres at once
+#: (Geometry.OCCTargetUnit), all tolerances would be 0.1 µm, and IGES does not take the unit in a new session.
 _MILLIMETRE = 1e-3
 _BREP_UNIT = 1e-3
-SMALLEST, LARGEST = 1e-5, 1e3  # [m], of a part's box: beyond them the unit must be wrong
-# seconds of processor time that reading may take, and more per megabyte of the file
+SMALLEST, LARGEST = 1e-5, 1e3  # [m], diagonal of a part's bounding box; beyond these the unit must be wrong
+# seconds of processor time that reading may take, and seconds more per megabyte of the file
 _READING, _READING_MB = 20.0, 10.0
-_ENDLESS = 1e50  # OpenCASCADE's box of a face without an edge
-_GAPS = (1e-4, 3e-4, 1e-3)  # of the part's size: wider ones, closed by mending, which is reported
-_SEWING = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5)  # [m], gaps between faces that are closed, the least that will do
+_ENDLESS = 1e50  # size of the bounding box that OpenCASCADE gives a face without edges
+_GAPS = (1e-4, 3e-4, 1e-3)  # of the part's size: wider gaps that mending closes, which is reported
+_SEWING = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5)  # [m], gaps between faces that sewing closes, tried in turn
 
 
 @dataclass(frozen=True, slots=True)
 class CadFile:
-    """A file to be read: for messages `where`; `scale` [m] is the length of its unit, None for what it says."""
+    """A file to be read: `where` for messages; `scale` is the length of its unit [m], None for the stated one."""
 
     where: str
     path: Path
@@ -46,7 +46,7 @@ class CadFile:
 
 
 def cad_file(where: str, path: Path, scale: float | None) -> CadFile:
-    """A file that can be opened and looks like what its ending says.
+    """A file that can be opened and has the format that its ending says.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def cad_file(where: str, path: Path, scale: float | None) -> CadFile:
 
 
 def _check_form(where: str, path: Path, form: Format, text: bytes) -> None:
-    """Refuse a text that is not of a form, or breaks off: OpenCASCADE takes what is there and is silent."""
+    """Refuse a text of another format, or a truncated one: OpenCASCADE would read what is there without a warning."""
     begins, whole = {
         "STEP": (b"ISO-10303-21" in text[:2000], b"END-ISO-10303-21" in text[-2000:]),
         "IGES": (text[72:73] in (b"S", b"F", b"C"), text.rstrip().splitlines()[-1][72:73] == b"T"),
@@ -83,16 +83,17 @@ def _check_form(where: str, path: Path, form: Format, text: bytes) -> None:
 
 
 def _whole_brep(text: bytes) -> bool:
-    """Whether a BREP file has all shapes that it announces: OpenCASCADE would wait for the missing ones for ever."""
+    """Whether a BREP file has all shapes that it announces: OpenCASCADE would wait for missing ones for ever."""
     count = re.search(rb"^TShapes (\d+)", text, re.MULTILINE)
     shapes = re.findall(rb"^(?:Ve|Ed|Wi|Fa|Sh|So|CS|Co)\s*$", text, re.MULTILINE)
     return count is not None and int(count[1]) == len(shapes) and text.split()[-1] == b"0"
 
 
 def read_solids(gmsh: ModuleType, file: CadFile) -> tuple[list[int], str]:
-    """The tags of a file's solids, now in gmsh's model in metres, and what was mended; closed faces are made one.
+    """The tags of a file's solids, now in gmsh's model in metres, and what was mended, in words.
 
-    A worker that takes too long for it is ended: at some damaged files OpenCASCADE hangs in one process, not in the next.
+    Faces that enclose a volume are made a solid. A worker that takes too long is ended: OpenCASCADE hangs at some
+    damaged files in one process and not in the next.
 
     Raises
     ------
@@ -133,10 +134,9 @@ def _solids(gmsh: ModuleType, file: CadFile) -> tuple[list[int], str]:
 
 
 def _healed(gmsh: ModuleType, tolerance: float) -> bool:
-    """Whether there are solids once OpenCASCADE has mended all shapes of the model: wires, tiny edges, gaps [m].
+    """Whether there are solids once OpenCASCADE has mended wires, tiny edges and gaps of all shapes in the model [m].
 
-    Called with growing tolerances on one import: OpenCASCADE may never come back from a damaged file that it reads
-    again and again.
+    It is called with growing tolerances on one import, because OpenCASCADE may hang when it reads a damaged file again.
     """
     try:
         with silent():
@@ -148,7 +148,7 @@ def _healed(gmsh: ModuleType, tolerance: float) -> bool:
 
 
 def check_size(file: CadFile, what: str, extent: float) -> None:
-    """Refuse a size [m] that no part has."""
+    """Refuse a size [m] outside of SMALLEST to LARGEST."""
     if not SMALLEST <= extent <= LARGEST:
         raise MeshError(
             f"{file.where}: must hold a part between {SMALLEST:g} and {LARGEST:g} [m] across, got {extent:.3g} "
@@ -157,7 +157,7 @@ def check_size(file: CadFile, what: str, extent: float) -> None:
 
 
 def _scaling(file: CadFile) -> float:
-    """By what OpenCASCADE's numbers are multiplied."""
+    """The factor on OpenCASCADE's coordinates."""
     if file.format == "BREP":
         return _BREP_UNIT if file.scale is None else file.scale
     if file.scale is None:
@@ -172,7 +172,7 @@ def _scaling(file: CadFile) -> float:
 
 
 def imported(gmsh: ModuleType, file: CadFile, scaling: float, sewing: float | None) -> None:
-    """The file's shapes, added to the model, all numbers times `scaling`; faces sewn if they are `sewing` apart."""
+    """Add the file's shapes to the model, coordinates times `scaling`; sew faces that are at most `sewing` [m] apart."""
     try:
         with _options(gmsh, scaling, sewing), silent():
             gmsh.model.occ.importShapes(str(file.path), highestDimOnly=False)
@@ -186,7 +186,7 @@ def imported(gmsh: ModuleType, file: CadFile, scaling: float, sewing: float | No
 
 @contextmanager
 def _options(gmsh: ModuleType, scaling: float, sewing: float | None) -> Iterator[None]:
-    """gmsh's settings for one import, afterwards as they were."""
+    """gmsh's options for one import; they are restored afterwards."""
     wanted = {"Geometry.OCCScaling": scaling, "Geometry.OCCSewFaces": float(sewing is not None)}
     if sewing is not None:
         wanted["Geometry.Tolerance"] = sewing
@@ -201,7 +201,7 @@ def _options(gmsh: ModuleType, scaling: float, sewing: float | None) -> Iterator
 
 @contextmanager
 def silent() -> Iterator[None]:
-    """What OpenCASCADE itself writes to the terminal is dropped: gmsh's settings do not reach it."""
+    """Discard what OpenCASCADE itself writes to the terminal: gmsh's options do not control it."""
     kept = [os.dup(stream) for stream in (1, 2)]
     try:
         with Path(os.devnull).open("w") as nowhere:
@@ -220,14 +220,14 @@ def _faces(gmsh: ModuleType) -> list[int]:
 
 
 def _free_edges(gmsh: ModuleType, faces: list[int]) -> list[int]:
-    """The edges that only one of the faces has."""
+    """The edges that belong to only one of the faces."""
     return [tag for _, tag in gmsh.model.getBoundary([(2, face) for face in faces], oriented=False)]
 
 
 def _closed_solids(gmsh: ModuleType) -> list[int]:
-    """Solids made of the groups of faces that hang together and are closed."""
+    """Solids made of the connected groups of faces that are closed."""
     occ, faces, solids = gmsh.model.occ, _faces(gmsh), []
-    for shell in touching([boundary(gmsh, 2, face) for face in faces]):
+    for shell in connected_groups([boundary(gmsh, 2, face) for face in faces]):
         group = [faces[i] for i in shell]
         if not _free_edges(gmsh, group):
             solids.append(occ.addVolume([occ.addSurfaceLoop(group, sewing=False)]))
@@ -236,7 +236,7 @@ def _closed_solids(gmsh: ModuleType) -> list[int]:
 
 
 def _refusal(gmsh: ModuleType, file: CadFile) -> MeshError:
-    """Why a file without a solid is refused: what is in it instead."""
+    """The error for a file without a solid: what is in it instead."""
     faces = _faces(gmsh)
     if not faces:
         curves = len(gmsh.model.getEntities(1))

@@ -1,4 +1,4 @@
-"""The form of a face, fitted to points and normals on it: a plane, a cylinder, a sphere or another."""
+"""The geometry of a face, fitted to points and normals on it: a plane, a cylinder, a sphere or another form."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -13,7 +13,7 @@ _NAN = np.full(3, np.nan)
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """The geometry of a piece of surface, as in `Face`; of a cylinder `length` is that along the axis."""
+    """The geometry of a piece of surface, as in `Face`; `length` is that of a cylinder along its axis [m]."""
 
     kind: Kind
     centre: Float[np.ndarray, "3"]
@@ -25,10 +25,10 @@ class Form:
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """Places on a surface, and outward unit normals there or elsewhere on it.
+    """Points of a surface, and outward unit normals there or elsewhere on it.
 
-    points : (n, 3) [m], on the surface, to its edges
-    places, normals : (q, 3) [m], [-], where normals are known; places may be off the surface by a little
+    points : (n, 3) points on the surface, up to its edges [m]
+    places, normals : (q, 3) [m], [-] unit normals and where they are; these places may be slightly off the surface
     """
 
     points: Float[np.ndarray, "n 3"]
@@ -37,20 +37,20 @@ class Sample:
 
     @property
     def size(self) -> float:
-        """Length of the box's diagonal [m]."""
+        """Diagonal of the bounding box [m]."""
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
 
 def fitted_form(sample: Sample, accuracy: float, skew: float) -> Form:
-    """The simplest form that a sample lies on.
+    """The simplest form that fits a sample.
 
-    The centre of a plane and of "other" is the mean of the points: whoever knows the centroid replaces it.
+    The centre of a plane and of "other" is the mean of the points; a caller that knows the centroid replaces it.
 
     Parameters
     ----------
     sample : at least three points
-    accuracy : how far points may be off, in sizes of the sample [-]
-    skew : how far normals may be off: a sine [-]
+    accuracy : most distance of points from the form, in sizes of the sample [-]
+    skew : sine of the most angle between normals and those of the form [-]
     """
     other = Form("other", sample.points.mean(axis=0), _NAN)
     for fit in (_plane, _cylinder, _sphere):
@@ -61,7 +61,7 @@ def fitted_form(sample: Sample, accuracy: float, skew: float) -> Form:
 
 
 def _plane(sample: Sample, slack: float, skew: float) -> Form | None:
-    """A plane, if the normals are one and the points in it."""
+    """The plane of the points, if all normals agree and the points are in it."""
     mean = sample.normals.mean(axis=0)
     length = np.linalg.norm(mean)
     if length < 0.5 or np.linalg.norm(np.cross(sample.normals, mean / length), axis=1).max() > skew:
@@ -74,7 +74,7 @@ def _plane(sample: Sample, slack: float, skew: float) -> Form | None:
 
 
 def _cylinder(sample: Sample, slack: float, skew: float) -> Form | None:
-    """A cylinder, if the normals are square to an axis and the points as far from it as each other."""
+    """The cylinder of the points, if the normals are perpendicular to an axis and all points equally far from it."""
     axis = np.linalg.svd(sample.normals)[2][2]
     if _only_two(sample.normals) or np.abs(sample.normals @ axis).max() > skew:
         return None
@@ -91,12 +91,12 @@ def _cylinder(sample: Sample, slack: float, skew: float) -> Form | None:
 
 
 def _only_two(normals: Float[np.ndarray, "q 3"]) -> bool:
-    """Whether normals have no more than two directions, as opposite or adjacent planes have."""
+    """Whether the normals have at most two directions, as those of opposite or adjacent planes."""
     return len(np.unique(np.round(normals, 4), axis=0)) < 3
 
 
 def _sphere(sample: Sample, slack: float, skew: float) -> Form | None:
-    """A sphere, if the points are as far from a centre as each other and the normals point away from it or to it."""
+    """The sphere of the points, if all are equally far from a centre and the normals are radial."""
     found = _round(sample.points, slack)
     if found is None or _only_two(sample.normals):
         return None
@@ -125,5 +125,5 @@ def _round(points: Float[np.ndarray, "n d"], slack: float) -> tuple[Float[np.nda
 
 
 def _inward(radial: Float[np.ndarray, "q d"], normals: Float[np.ndarray, "q d"]) -> bool:
-    """Whether the outward normals point to the centre: the material is outside."""
+    """Whether the outward normals point to the centre: the material surrounds the surface."""
     return bool((radial * normals).sum() < 0)

@@ -1,4 +1,4 @@
-"""Parts from CAD: one solid of a STEP, IGES or BREP file, alone in gmsh's model, in metres."""
+"""Parts from CAD: one solid of a STEP, IGES or BREP file in gmsh's model, in metres, everything else removed."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -20,12 +20,12 @@ from kedfem.scene.records.shapes import Cad
 from kedfem.scene.records.wording import nearest
 
 MOST_FACES = 3000  # each takes some 10 ms, and pairs of them are compared
-_SAME = 1e-5  # of the solid's size: how far corners may be off where the file's text says
+_SAME = 1e-5  # of the solid's size: most difference between corners in gmsh and in the file's text
 
 
 @dataclass(frozen=True, slots=True)
 class CadKeys:
-    """What a user calls the file and the choice of a solid in it: keys of the scene, or options of a command."""
+    """Names for messages of the file and of the choice of a solid: keys of the scene, or options of a command."""
 
     file: str
     solid: str
@@ -37,13 +37,13 @@ def solid_model(keys: CadKeys, path: Path, name: str, shape: Cad) -> Iterator[tu
 
     Parameters
     ----------
-    name : the link's name: of an assembly the solid of that name is taken, if `shape.solid` says no other
-    shape : its `solid` and `scale`; where it is placed is for the caller
+    name : the link's name, which selects the solid of an assembly unless `shape.solid` does
+    shape : its `solid` and `scale` are used; the caller places the mesh
 
     Raises
     ------
     MeshError
-        The file cannot be read, has no solid or none of the name asked for, or the solid is not one to mesh.
+        The file cannot be read, has no solid or none of the name asked for, or the solid cannot be meshed.
     """
     file = cad_file(keys.file, path, shape.scale)
     with gmsh_model() as gmsh:
@@ -51,7 +51,7 @@ def solid_model(keys: CadKeys, path: Path, name: str, shape: Cad) -> Iterator[tu
 
 
 def chosen_solid(gmsh: ModuleType, file: CadFile, key: str, link: str, wanted: str | None) -> Solid:
-    """One solid of a file, which is read into gmsh's empty model and left alone there."""
+    """One solid of a file, which is read into gmsh's empty model; everything else is removed from it."""
     tags, names, bodies, mended = _named_solids(gmsh, file)
     tag = tags[_choice(key, file, names, link, wanted)]
     leave_only(gmsh, tag)
@@ -60,7 +60,7 @@ def chosen_solid(gmsh: ModuleType, file: CadFile, key: str, link: str, wanted: s
 
 
 def all_solids(gmsh: ModuleType, file: CadFile) -> list[Solid]:
-    """Every solid of a file, which is read into gmsh's empty model and stays there, where the file has it.
+    """Every solid of a file, which is read into gmsh's empty model and stays at its place.
 
     Errors are those of `solid_model`.
     """
@@ -69,7 +69,7 @@ def all_solids(gmsh: ModuleType, file: CadFile) -> list[Solid]:
 
 
 def _named_solids(gmsh: ModuleType, file: CadFile) -> tuple[list[int], list[str], dict[int, Body | None], str]:
-    """The tags of a file's solids, now in gmsh's model, names, bodies in the file's text, and what was mended."""
+    """Tags, names and bodies (in the file's text) of a file's solids, now in gmsh's model, and what was mended."""
     tags, mended = read_solids(gmsh, file)
     most = max(len(boundary(gmsh, 3, tag)) for tag in tags)
     if most > MOST_FACES:
@@ -83,7 +83,7 @@ def _named_solids(gmsh: ModuleType, file: CadFile) -> tuple[list[int], list[str]
 
 
 def _solid(gmsh: ModuleType, file: CadFile, tag: int, name: str, body: Body | None) -> Solid:
-    """The record of the solid in the model, if it can be one."""
+    """The record of a solid in the model; a MeshError if it is not a closed solid of positive volume."""
     box = np.array(gmsh.model.getBoundingBox(3, tag))
     extent = float(np.linalg.norm(box[3:] - box[:3]))
     volume = float(gmsh.model.occ.getMass(3, tag))
@@ -107,7 +107,7 @@ def _solid(gmsh: ModuleType, file: CadFile, tag: int, name: str, body: Body | No
 
 
 def _choice(key: str, file: CadFile, names: list[str], link: str, wanted: str | None) -> int:
-    """Which of the solids is meant: the one of the name given, the only one, or that of the link's name."""
+    """Index of the solid asked for: that of the name given, the only one, or that of the link's name."""
     if wanted is None and len(names) == 1:
         return 0
     asked = link if wanted is None else wanted
@@ -124,7 +124,7 @@ def _choice(key: str, file: CadFile, names: list[str], link: str, wanted: str | 
 
 
 def leave_only(gmsh: ModuleType, solid: int) -> None:
-    """Everything else out of the model."""
+    """Remove everything else from the model."""
     kept = {(3, solid), *((2, tag) for tag in boundary(gmsh, 3, solid))}
     for dimension in (1, 0):
         above = [tag for at, tag in kept if at == dimension + 1]
@@ -136,7 +136,7 @@ def leave_only(gmsh: ModuleType, solid: int) -> None:
 
 
 def _solid_names(gmsh: ModuleType, file: CadFile, tags: list[int], bodies: dict[int, Body | None]) -> list[str]:
-    """A name of its own for each solid: of its product, else of its body; those of one name are numbered."""
+    """A unique name for each solid: that of its product, else of its body; equal names are numbered."""
     names = _product_names(gmsh, file, len(tags))
     often = Counter(names)
     own = [(body.name if body else "") for body in bodies.values()]
@@ -151,7 +151,7 @@ def _solid_names(gmsh: ModuleType, file: CadFile, tags: list[int], bodies: dict[
 
 
 def _product_names(gmsh: ModuleType, file: CadFile, count: int) -> list[str]:
-    """The names of the products that the solids are, from the labels gmsh gives, which it loses where it scales."""
+    """The product names of the solids, from gmsh's labels of an import without scaling, which would lose them."""
     if file.format != "STEP":
         return [file.path.stem] if count == 1 else [""] * count
     if count == 1:
@@ -168,15 +168,15 @@ def _product_names(gmsh: ModuleType, file: CadFile, count: int) -> list[str]:
 
 
 def _bodies(gmsh: ModuleType, file: CadFile, tags: list[int]) -> dict[int, Body | None]:
-    """For each solid the body in a STEP file's text that it is, as far as that is sure."""
+    """For each solid its body in a STEP file's text, None where that is not certain."""
     texts = list(step_bodies(step_text(file.path))) if file.format == "STEP" else []
     return {tag: _body(gmsh, tag, texts) for tag in tags}
 
 
 def _body(gmsh: ModuleType, tag: int, texts: list[Body]) -> Body | None:
-    """The body whose faces have their corners where the solid's faces, in order, have theirs.
+    """The body whose faces have the same corners as the solid's faces, in order.
 
-    Compared by distances of the faces' corners from each other, which a place in an assembly does not change.
+    Distances between the faces' mean corners are compared, because they do not depend on the place in an assembly.
     """
     faces = sorted(boundary(gmsh, 3, tag))
     likely = [body for body in texts if len(body.faces) == len(faces)]
@@ -189,14 +189,14 @@ def _body(gmsh: ModuleType, tag: int, texts: list[Body]) -> Body | None:
 
 
 def _corner_mean(gmsh: ModuleType, face: int) -> Float[np.ndarray, "3"]:
-    """The mean of a face's vertices; nan without any."""
+    """The mean of a face's vertices; nan for a face without vertices."""
     vertices = {tag for _, tag in gmsh.model.getBoundary([(2, face)], combined=False, recursive=True)}
     points = [gmsh.model.getValue(0, tag, []) for tag in sorted(vertices)]
     return np.mean(points, axis=0) if points else np.full(3, np.nan)
 
 
 def same_shape(corners: Float[np.ndarray, "f 3"], text: Float[np.ndarray, "f 3"]) -> bool:
-    """Whether two sets of points are the same but for place and unit; at most one may have no corners."""
+    """Whether two sets of points are congruent up to a scale factor; at most one point may be unknown (nan)."""
     known = np.isfinite(corners).all(axis=1) & np.isfinite(text).all(axis=1)
     if known.sum() < max(len(known) - 1, 1):
         return False

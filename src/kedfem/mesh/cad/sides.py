@@ -1,4 +1,4 @@
-"""The sides of elements on the outside of a mesh."""
+"""The element sides that form the surface of a mesh, with their normals and areas."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from kedfem.mesh.elements.shape_functions import (
 
 
 def _side_nodes() -> Int[np.ndarray, "6 9"]:
-    """Of each side the nodes at the places of a quad9, turned so that its normal is the outward one."""
+    """The nodes of each side in the order of a quad9, oriented so that its normal points outwards."""
     rows = []
     for axis in range(3):
         for end in (-1, 1):
@@ -26,7 +26,7 @@ def _side_nodes() -> Int[np.ndarray, "6 9"]:
     return np.array(rows)
 
 
-#: Nodes of each side of a hexahedron in VTK order, at the places of a quad9: corners, counter-clockwise seen from
+#: Nodes of each side of a hexahedron in VTK order, in the order of a quad9: corners, counter-clockwise seen from
 #: outside, middles of the edges between them, centre.
 SIDE_NODES = _side_nodes()
 
@@ -37,7 +37,7 @@ def boundary_sides(cells: Int[np.ndarray, "e k"]) -> Int[np.ndarray, "f m"]:
 
 
 def owned_sides(cells: Int[np.ndarray, "e k"]) -> tuple[Int[np.ndarray, "f m"], Int[np.ndarray, " f"]]:
-    """The sides that one element alone has, with their nodes in the order of quad9 or tri6 as far as they have them.
+    """The sides that belong to one element only, their nodes in the order of quad9 or tri6 as far as they have them.
 
     Parameters
     ----------
@@ -45,9 +45,10 @@ def owned_sides(cells: Int[np.ndarray, "e k"]) -> tuple[Int[np.ndarray, "f m"], 
 
     Returns
     -------
-    (f, 4), (f, 8) or (f, 9); of tetrahedra (f, 3) or (f, 6): corners counter-clockwise seen from outside, middles of
-        edges, centre
-    (f,): the element of each
+    (f, 4), (f, 8) or (f, 9), for tetrahedra (f, 3) or (f, 6)
+        Nodes: corners counter-clockwise seen from outside, middles of edges, centre.
+    (f,)
+        The element of each side.
     """
     nodes = cells.shape[1]
     of_element = TET_SIDES if nodes in {4, 10} else SIDE_NODES
@@ -60,14 +61,14 @@ def owned_sides(cells: Int[np.ndarray, "e k"]) -> tuple[Int[np.ndarray, "f m"], 
 
 
 def side_corners(nodes: int) -> int:
-    """How many of the nodes of a side are corners."""
+    """Number of corners of a side with so many nodes."""
     return 3 if nodes in {3, 6} else 4
 
 
 def side_normals(
     points: Float[np.ndarray, "n 3"], sides: Int[np.ndarray, "f m"]
 ) -> tuple[Float[np.ndarray, "f 3"], Float[np.ndarray, "f 3"], Float[np.ndarray, "f"]]:
-    """Of each side the place at its middle [m], the outward unit normal there, and its area [m²], about."""
+    """Middle [m], outward unit normal at the middle and approximate area [m²] of each side."""
     X = points[sides]
     if sides.shape[1] == 3:
         X = np.concatenate([X, (X + np.roll(X, -1, axis=1)) / 2], axis=1)

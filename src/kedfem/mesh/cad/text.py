@@ -1,4 +1,4 @@
-"""Facts in the text of a CAD file that gmsh does not return: the unit, names of bodies and of faces."""
+"""What gmsh does not return of a CAD file, read from its text: the unit, names of bodies and of faces."""
 
 import re
 from collections.abc import Iterator
@@ -24,12 +24,12 @@ _REFERENCE = re.compile(r"#(\d+)")
 _STRING = re.compile(r"'((?:[^']|'')*)'")
 _NUMBER = re.compile(r"[-+]?\d+\.?\d*(?:[Ee][-+]?\d+)?")
 _NO_NAME = {"", "none", "$", "unnamed"}
-_TRANSLATOR = "Open CASCADE STEP translator"  # its own name for a product without one
+_TRANSLATOR = "Open CASCADE STEP translator"  # OpenCASCADE's name for a product without one
 
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """A solid in a STEP file: its name, and of each face, in the file's order, name and mean of its corners.
+    """A solid in a STEP file: its name, and the name and mean corner of each face, in the file's order.
 
     Corners are in the file's unit and the body's own frame; nan for a face without corners.
     """
@@ -41,12 +41,12 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class StepText:
-    """The instances of a STEP file, #number to the text after the equals sign."""
+    """The instances of a STEP file: the text after the equals sign by #number."""
 
     instances: dict[int, str]
 
     def refers(self, number: int) -> list[int]:
-        """The instances that one names, in order."""
+        """The numbers of the instances to which one refers, in order."""
         text = _STRING.sub("''", self.instances.get(number, ""))
         return [int(found) for found in _REFERENCE.findall(text)]
 
@@ -55,20 +55,20 @@ class StepText:
         return self.instances.get(number, "").partition("(")[0].strip()
 
     def name(self, number: int) -> str:
-        """An instance's first string, its name; empty for one that says nothing."""
+        """An instance's first string, which is its name; empty without one."""
         found = _STRING.search(self.instances.get(number, ""))
         return _decoded(found[1]) if found else ""
 
 
 def step_text(path: Path) -> StepText:
-    """The instances of a STEP file; none if it is no such file."""
+    """The instances of a STEP file; none if the file is not STEP."""
     text = path.read_text(encoding="latin-1")
     text = re.sub(r"/\*.*?\*/", " ", text, flags=re.DOTALL)
     return StepText({int(number): body for number, body in _INSTANCE.findall(text)})
 
 
 def step_unit(step: StepText) -> float | None:
-    """Metres per unit of a STEP file; None if it does not say or says several."""
+    """Metres per unit of a STEP file; None if it states no unit or several."""
     contexts = [body for body in step.instances.values() if "GLOBAL_UNIT_ASSIGNED_CONTEXT" in body]
     given = re.compile(r"GLOBAL_UNIT_ASSIGNED_CONTEXT\s*\(\s*\((.*?)\)", re.DOTALL)
     parts = (part for body in contexts for part in given.findall(body))
@@ -78,7 +78,7 @@ def step_unit(step: StepText) -> float | None:
 
 
 def _length(step: StepText, number: int) -> float | None:
-    """Metres of a length unit: metres with a prefix, or so many of another unit."""
+    """Metres of a length unit: metres with a prefix, or a multiple of another unit."""
     text = step.instances[number]
     metres = re.search(r"SI_UNIT\s*\(\s*(?:\.(\w+)\.|\$)\s*,\s*\.METRE\.", text)
     if metres:
@@ -94,7 +94,7 @@ def _length(step: StepText, number: int) -> float | None:
 
 
 def step_products(step: StepText) -> list[str]:
-    """The names of the products in a STEP file, those of no name left out."""
+    """The names of the products in a STEP file, without nameless ones."""
     names = [own_name(step.name(number)) for number in step.instances if step.kind(number) == "PRODUCT"]
     return [name for name in names if name]
 
@@ -110,7 +110,7 @@ def step_bodies(step: StepText) -> Iterator[Body]:
 
 
 def _faces(step: StepText, shell: int) -> list[int]:
-    """The faces of a shell, or of the shell that an oriented one turns."""
+    """The faces of a shell, or of the shell to which an oriented shell refers."""
     if step.kind(shell) == "ORIENTED_CLOSED_SHELL":
         return [face for inner in step.refers(shell) for face in _faces(step, inner)]
     return [face for face in step.refers(shell) if step.kind(face) in ("ADVANCED_FACE", "FACE_SURFACE")]
@@ -137,20 +137,20 @@ def _point(step: StepText, number: int) -> Float[np.ndarray, "3"]:
 
 
 def own_name(name: str) -> str:
-    """A name that somebody gave; empty for those that stand for none."""
+    """A name that a user gave; empty for placeholders."""
     name = name.strip()
     return "" if name.lower() in _NO_NAME or name.startswith(_TRANSLATOR) else name
 
 
 def _decoded(text: str) -> str:
-    r"""A string of a STEP file with its signs for other letters, \X2\00E4\X0\ for ä, read."""
+    r"""A string of a STEP file with its escapes decoded, such as \X2\00E4\X0\ for ä."""
     text = re.sub(r"\\X2\\((?:[0-9A-Fa-f]{4})+)\\X0\\", lambda found: bytes.fromhex(found[1]).decode("utf-16-be"), text)
     text = re.sub(r"\\X\\([0-9A-Fa-f]{2})", lambda found: chr(int(found[1], 16)), text)
     return text.replace("''", "'").replace("\\\\", "\\")
 
 
 def iges_unit(path: Path) -> float | None:
-    """Metres per unit of an IGES file; None if it does not say."""
+    """Metres per unit of an IGES file; None if it states none."""
     lines = path.read_text(encoding="latin-1").splitlines()
     fields = _iges_fields("".join(line[:72].ljust(72) for line in lines if line[72:73] == "G"))
     if len(fields) < 15:
@@ -161,7 +161,7 @@ def iges_unit(path: Path) -> float | None:
 
 
 def _iges_fields(text: str) -> list[str]:
-    """The fields of an IGES file's global section; strings are counted: 4HUNIT."""
+    """The fields of an IGES file's global section; strings carry their length, as 4HUNIT."""
     separator, start, fields = ",", 0, list[str]()
     if text.startswith("1H"):
         separator, start, fields = text[2], 4, [text[2]]

@@ -1,4 +1,4 @@
-"""Descriptions of faces in a designer's words: a bore, a fillet, a drafted or conical face, and where it is."""
+"""Descriptions of faces in a designer's terms, such as bore, fillet or conical face, with their places."""
 
 import re
 from collections.abc import Iterable
@@ -9,15 +9,15 @@ from kedfem.arrays import Float
 from kedfem.mesh.cad.solids import CadFace
 from kedfem.mesh.places import in_mm
 
-_CLOSED = 0.9  # of a full revolution: cylinders with keyways are bores and journals still
-_QUARTER = 100.0  # [deg] that a fillet between two walls turns, at the most
-_EIGHTH = 0.02  # of a ball's area: how far the rounded corner between three walls may be off an eighth of it
-_PART = 0.3  # of a ball's area: less is called a part of it
+_CLOSED = 0.9  # of a full cylinder: with a keyway it is still a bore or a journal
+_QUARTER = 100.0  # [deg], largest angle of a fillet between two walls
+_EIGHTH = 0.02  # of a ball's area: tolerance of the eighth that the rounded corner between three walls has
+_PART = 0.3  # of a ball's area, below which a face is called a part of it
 _AXES = ("x", "y", "z")
 
 
 def face_form(face: CadFace) -> str:
-    """What a designer calls a face: ``fillet of radius 2 mm``, ``bore of radius 6 mm along z``."""
+    """A designer's term for a face: ``fillet of radius 2 mm``, ``bore of radius 6 mm along z``."""
     radius = f"of radius {1e3 * face.radius:.4g} mm"
     match face.kind:
         case "plane":
@@ -34,26 +34,26 @@ def face_form(face: CadFace) -> str:
 
 
 def _free_form(face: CadFace) -> str:
-    """What is neither plane nor cylinder nor sphere."""
+    """The description of a face that is neither plane nor cylinder nor sphere."""
     if face.surface == "Cone":
         return "conical face (chamfer, draft or countersink)"
-    if not np.isfinite(face.bend):
+    if not np.isfinite(face.least_radius):
         return "free-form face"
-    bend = f"radius {1e3 * face.bend:.4g} mm"
+    bend = f"radius {1e3 * face.least_radius:.4g} mm"
     return f"fillet of {bend}" if face.surface == "Torus" else f"free-form face bent to {bend}"
 
 
 def face_in_words(face: CadFace) -> str:
-    """A face, where it is and its name: ``fillet of radius 2 mm near (10, 0, 3) mm (face 7)``."""
+    """The description, place and name of a face: ``fillet of radius 2 mm near (10, 0, 3) mm (face 7)``."""
     return f"{face_form(face)} near {in_mm(face.centre)} ({face.name})"
 
 
 def with_faces_in_words(text: str, faces: Iterable[CadFace], failed: Iterable[int] = ()) -> str:
-    """What gmsh reported, its numbers of surfaces in words; else with those that it failed on.
+    """A report of gmsh with descriptions in place of its surface numbers; without numbers, with the faces that failed.
 
     Parameters
     ----------
-    failed : tags of faces that gmsh notes as those where it failed
+    failed : tags of the faces at which gmsh failed, by its own record
     """
     known = {face.tag: face for face in faces}
 
@@ -67,7 +67,7 @@ def with_faces_in_words(text: str, faces: Iterable[CadFace], failed: Iterable[in
 
 
 def direction_in_words(direction: Float[np.ndarray, "3"]) -> str:
-    """x, −y or z, or the direction's components."""
+    """``x``, ``-y``, ``z``, or the direction's components."""
     for axis, name in zip(np.eye(3), _AXES, strict=True):
         if abs(direction @ axis) > 1 - 1e-9:
             return name if direction @ axis > 0 else f"-{name}"
@@ -75,8 +75,8 @@ def direction_in_words(direction: Float[np.ndarray, "3"]) -> str:
 
 
 def _cylinder(face: CadFace) -> str:
-    """A bore or journal, a part of one, or the rounding between two walls."""
-    around = 2 * np.pi * face.radius * face.length  # zero of what a damaged file makes of one
+    """The term for a cylinder: a bore or journal, a part of one, or the rounding between two walls."""
+    around = 2 * np.pi * face.radius * face.length  # may be zero in a damaged file
     if face.area > _CLOSED * around:
         return "bore" if face.inward else "journal"
     if face.area > _QUARTER / 360 * around:

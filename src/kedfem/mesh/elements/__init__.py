@@ -1,1 +1,1 @@
-"""Elements of meshes: the record, shape functions of hexahedra and tetrahedra, bounds of det J and quality."""
+"""Elements of meshes: records, shape functions of hexahedra and tetrahedra, bounds of det J, quality."""

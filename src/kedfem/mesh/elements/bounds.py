@@ -1,9 +1,9 @@
-"""Bounds of det J over whole elements, between the nodes and Gauss points too.
+"""Bounds of det J over whole elements, not only at the nodes and Gauss points.
 
-det J of a hex27 is a polynomial of degree 5 in each reference coordinate (hex8: 2; quad9: 3), of a tet10 one of degree
-3 in all together. Its Bernstein
-coefficients bound it from both sides, and halving the element brings them as near to it as need be: A. Johnen,
-J.-F. Remacle, C. Geuzaine, Geometrical validity of curvilinear finite elements, J. Comput. Phys. 233 (2013) 359-372.
+det J of a hex27 is a polynomial of degree 5 in each reference coordinate (hex8: 2; quad9: 3); that of a tet10 has the
+total degree 3. Its Bernstein coefficients bound it from both sides, and halving the element tightens the bounds:
+A. Johnen, J.-F. Remacle, C. Geuzaine, Geometrical validity of curvilinear finite elements, J. Comput. Phys. 233 (2013)
+359-372.
 """
 
 from functools import cache, reduce
@@ -15,17 +15,17 @@ from kedfem.arrays import Bool, Float, Int
 from kedfem.mesh.elements.shape_functions import EDGES, HEX8, HEX20, NODES, QUAD9, TET10, shape_gradients
 
 _CHUNK = 512  # elements at a time: their coefficients fit in a processor's cache
-# halvings after which an element is not proven valid: least det J within about 1e-3 of 0, or below
+# most halvings; an element not proven valid then has a least det J within about 1e-3 of 0, or below
 _DEPTH = 6
 
 
 def determinant_bounds(
     points: Float[np.ndarray, "n d"], cells: Int[np.ndarray, "e k"], depth: int = _DEPTH
 ) -> tuple[Float[np.ndarray, " e"], Float[np.ndarray, " e"]]:
-    """Lower and upper bound of the least det J in each element, over the mean of its absolute value.
+    """Lower and upper bound of the least det J in each element, divided by the mean of its absolute value.
 
-    Elements are halved, `depth` times at most, only where the bounds have different signs: where both are positive the
-    element is valid all over, where the upper is not, it is inverted or folded somewhere.
+    An element is valid if both bounds are positive, and inverted or folded somewhere if the upper one is not. Elements
+    are halved only where the bounds have different signs.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def determinant_bounds(
 
 
 def valid_everywhere(points: Float[np.ndarray, "n d"], cells: Int[np.ndarray, "e k"]) -> Bool[np.ndarray, " e"]:
-    """Which elements are proven to have det J > 0 all over: by a cheap test if it suffices, else by the bounds.
+    """Whether each element is proven to have det J > 0 everywhere: by a cheap test if it suffices, else by the bounds.
 
     Shapes are those of :func:`determinant_bounds`.
     """
@@ -58,9 +58,9 @@ def valid_everywhere(points: Float[np.ndarray, "n d"], cells: Int[np.ndarray, "e
 
 
 def _nearly_affine(corners: Float[np.ndarray, "e k d"]) -> Bool[np.ndarray, " e"]:
-    """Elements whose J differs so little from its mean Jm that det J > 0: det Jm > 0 and |Jm⁻¹ J − 1| < 1 all over.
+    """Whether J of each element differs so little from its mean Jm that det J > 0: det Jm > 0 and |Jm⁻¹ J − 1| < 1.
 
-    Each column of J is a polynomial too: it is within the hull of its Bernstein coefficients.
+    Each column of J is a polynomial and lies within the convex hull of its Bernstein coefficients.
     """
     matrices = _column_coefficients(corners.shape[1])
     columns = [np.tensordot(corners, matrix, axes=(1, 1)) for matrix in matrices]
@@ -78,7 +78,7 @@ def _nearly_affine(corners: Float[np.ndarray, "e k d"]) -> Bool[np.ndarray, " e"
 def _chunk_bounds(
     corners: Float[np.ndarray, "e k d"], depth: int
 ) -> tuple[Float[np.ndarray, " e"], Float[np.ndarray, " e"]]:
-    """The bounds of :func:`determinant_bounds` for a few elements."""
+    """The bounds of :func:`determinant_bounds` for one chunk of elements."""
     e, k, d = corners.shape
     gradients, transform, halves = _tables(k)
     J = np.swapaxes(np.tensordot(corners, gradients, axes=(1, 1)), 1, 2)
@@ -98,7 +98,7 @@ def _chunk_bounds(
 
 
 def _determinant(J: Float[np.ndarray, "e q d d"]) -> Float[np.ndarray, "e q"]:
-    """det J, written out: faster than a factorisation of each."""
+    """det J, written out: faster than one factorisation for each matrix."""
     if J.shape[-1] == 2:
         return np.asarray(J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0])
     a, b, c = (J[..., 0], J[..., 1], J[..., 2])
@@ -110,13 +110,13 @@ def _determinant(J: Float[np.ndarray, "e q d d"]) -> Float[np.ndarray, "e q"]:
 
 
 def _degree(k: int) -> int:
-    """Degree of det J in each coordinate, of an element with k nodes."""
+    """Degree of det J in each coordinate for an element with k nodes."""
     return {len(HEX8): 2, len(QUAD9): 3}.get(k, 5)
 
 
 @cache
 def _tables(k: int) -> tuple[Float[np.ndarray, "q k d"], Float[np.ndarray, "c q"], Float[np.ndarray, "c m"]]:
-    """Gradients at the places where det J is sampled; from its values its coefficients; from those the halves'."""
+    """Gradients where det J is sampled; the matrix from values to coefficients; that to those of the halves."""
     if k == len(TET10):
         return _tetrahedron_tables()
     nodes, p = NODES[k], _degree(k)
@@ -128,18 +128,18 @@ def _tables(k: int) -> tuple[Float[np.ndarray, "q k d"], Float[np.ndarray, "c q"
 
 
 def _grid(line: np.ndarray, d: int) -> np.ndarray:
-    """All places (q, d) with coordinates among some (p,)."""
+    """All points (q, d) whose coordinates are among some values (p,)."""
     return np.stack(np.meshgrid(*[line] * d, indexing="ij"), axis=-1).reshape(-1, d)
 
 
 def _sampled(p: int, line: Float[np.ndarray, " p"], d: int) -> tuple[Float[np.ndarray, "q d"], Float[np.ndarray, "c q"]]:
-    """Places where a polynomial of degree p in each of d coordinates is sampled, and its coefficients from values."""
+    """Points at which a polynomial of degree p in each coordinate is sampled; the matrix from values to coefficients."""
     return _grid(line, d), reduce(np.kron, [np.linalg.inv(_bernstein(p, line))] * d)
 
 
 @cache
 def _ends(k: int) -> Int[np.ndarray, " v"]:
-    """The coefficients that are values: those at the corners."""
+    """Indices of the coefficients that are values of the polynomial: those at the corners."""
     if k == len(TET10):
         return np.flatnonzero((_LATTICE == _CUBIC).any(axis=1))
     p, d = _degree(k), NODES[k].shape[1]
@@ -155,7 +155,7 @@ _LATTICE = np.array(
 
 @cache
 def _tetrahedron_tables() -> tuple[Float[np.ndarray, "q k d"], Float[np.ndarray, "c q"], Float[np.ndarray, "c m"]]:
-    """`_tables` of a tet10: its halves are the eight tetrahedra between its corners and the middles of its edges."""
+    """`_tables` of a tet10, which is divided into eight tetrahedra between its corners and the middles of its edges."""
     samples = _LATTICE / _CUBIC
     inverse = np.linalg.inv(_simplex_bernstein(samples))
     corners = np.concatenate([np.eye(4), np.eye(4)[EDGES].mean(axis=1)])
@@ -166,21 +166,21 @@ def _tetrahedron_tables() -> tuple[Float[np.ndarray, "q k d"], Float[np.ndarray,
 
 
 def _simplex_bernstein(b: Float[np.ndarray, "q 4"]) -> Float[np.ndarray, "q c"]:
-    """The Bernstein polynomials of degree 3 of a tetrahedron at barycentric coordinates."""
+    """Values of a tetrahedron's Bernstein polynomials of degree 3 at barycentric coordinates."""
     often = [factorial(_CUBIC) // prod(map(factorial, exponents)) for exponents in _LATTICE.tolist()]
     return np.asarray(often * np.prod(b[:, None] ** _LATTICE, axis=2))
 
 
 @cache
 def _column_coefficients(k: int) -> list[Float[np.ndarray, "c k"]]:
-    """From the nodes the Bernstein coefficients, of degree 2 in each coordinate, of each column of J."""
+    """Matrices from the nodes to the Bernstein coefficients, of degree 2 in each coordinate, of each column of J."""
     nodes, p = NODES[k], 2
     places, transform = _sampled(p, np.linspace(-1, 1, p + 1), nodes.shape[1])
     return [transform @ gradient for gradient in np.moveaxis(shape_gradients(nodes, places), 2, 0)]
 
 
 def _bernstein(p: int, x: Float[np.ndarray, " q"]) -> Float[np.ndarray, "q b"]:
-    """The Bernstein polynomials of degree p on [-1, 1]."""
+    """Values of the Bernstein polynomials of degree p on [-1, 1]."""
     t = (x[:, None] + 1) / 2
     i = np.arange(p + 1)
     return np.asarray(np.array([comb(p, j) for j in i]) * t**i * (1 - t) ** (p - i))

@@ -1,4 +1,4 @@
-"""Meshes of solids: the record, the elements' shape functions; hexahedra by extrusion of plane quadrilaterals."""
+"""Meshes of solids: their records, extrusion of plane quadrilaterals, hexahedra of 8, 20 or 27 nodes, placing."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -15,20 +15,19 @@ CELL_TYPES = {  # meshio's names
 
 @dataclass(frozen=True, slots=True)
 class Face:
-    """A face of a part that has a name: what its geometry is, and the sides of elements on it.
+    """A named face of a part: its geometry, and the element sides on it.
 
     name : from the CAD file, the physical group of a mesh file, or "face 7"
-    kind : what its geometry is; "other" for a cone, a free form or several faces in one group
-    centre : (3,) centroid of its area [m]; of a cylinder a point on the axis, half way along; of a sphere the sphere's
-        centre
-    direction : (3,) unit vector: of a plane its outward normal, of a cylinder its axis [-]; else nan
+    kind : its geometry; "other" for a cone, a free form or several faces in one group
+    centre : (3,) centroid of its area [m]; for a cylinder the middle of its axis, for a sphere the sphere's centre
+    direction : (3,) unit vector, the outward normal of a plane or the axis of a cylinder [-]; else nan
     radius : of a cylinder or sphere [m]; else nan
     inward : whether the material is outside of a cylinder or sphere: a bore or a ball seat, not a journal or a
         ball
-    sides : (f, 4), of tetrahedra (f, 3)
-        Corner nodes of the sides of elements on the face, in any order.
-    chosen : whether a joint chose it by what it is: then its name is what was said of it
-    words : what a designer calls it, of a face from CAD: ``fillet of radius 2 mm``
+    sides : (f, 4), for tetrahedra (f, 3)
+        Corner nodes of the element sides on the face, in any order.
+    chosen : whether a joint selected it by its geometry; then `name` describes the selection
+    words : a designer's term for a face from CAD: ``fillet of radius 2 mm``
     """
 
     name: str
@@ -42,8 +41,8 @@ class Face:
     words: str = ""
 
 
-def keep_copies(mesh: object) -> None:
-    """Make points and cells of a mesh read-only copies."""
+def freeze_arrays(mesh: object) -> None:
+    """Replace points and cells of a mesh by read-only copies."""
     for name, kind in (("points", np.float64), ("cells", np.int64)):
         array = np.array(getattr(mesh, name), dtype=kind, order="C")
         array.setflags(write=False)
@@ -57,8 +56,8 @@ class SolidMesh:
     points : (n, 3) nodes in the global reference position [m]
     cells : (e, 8), (e, 20), (e, 27), (e, 10) or (e, 4) node numbers in VTK order (meshio: hexahedron, hexahedron20,
         hexahedron27, tetra10, tetra)
-    faces : faces that have a name, as far as they are known
-    method : how the mesh was made and why so, in words; empty where there is no choice
+    faces : the named faces, where they are known
+    method : how the mesh was made and why, in words; empty where there is no choice
     """
 
     points: Float[np.ndarray, "n 3"]
@@ -67,7 +66,7 @@ class SolidMesh:
     method: str = ""
 
     def __post_init__(self) -> None:
-        keep_copies(self)
+        freeze_arrays(self)
 
     @property
     def cell_type(self) -> str:
@@ -83,7 +82,7 @@ class SolidMesh:
 def rectangle_quads(
     length: float, width: float, along: int, across: int
 ) -> tuple[Float[np.ndarray, "n 2"], Int[np.ndarray, "e 9"]]:
-    """Nodes and quad9 cells of the rectangle 0 ≤ x ≤ length, |y| ≤ width/2 [m], in so many equal elements each way."""
+    """Nodes and quad9 cells of the rectangle 0 ≤ x ≤ length, |y| ≤ width/2 [m], `along` × `across` equal elements."""
     x, y = np.linspace(0, length, 2 * along + 1), np.linspace(-width / 2, width / 2, 2 * across + 1)
     points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     i, j = np.meshgrid(2 * np.arange(along) + 1, 2 * np.arange(across) + 1, indexing="ij")
@@ -94,7 +93,7 @@ def rectangle_quads(
 def extruded(points: Float[np.ndarray, "n 2"], quads: Int[np.ndarray, "e 9"], thickness: float, layers: int) -> SolidMesh:
     """hex27 mesh of a plate: plane quad9 cells, counter-clockwise, swept over -thickness/2 ≤ z ≤ thickness/2 [m].
 
-    Nodes level by level from below.
+    Nodes are numbered level by level from below.
     """
     return in_layers(points, np.linspace(-thickness / 2, thickness / 2, 2 * layers + 1), quads)
 
@@ -111,14 +110,14 @@ def stacked(
     points: Float[np.ndarray, "n 2"], heights: Float[np.ndarray, " v"], quads: Int[np.ndarray, "e 9"],
     layer: Int[np.ndarray, " e"],
 ) -> SolidMesh:  # fmt: skip
-    """hex27 elements on plane quad9 cells, each in a layer between heights; nodes level by level, maybe unused ones.
+    """hex27 elements on plane quad9 cells, each in one layer; nodes level by level, some perhaps unused.
 
     Parameters
     ----------
     points : (n, 2) plane nodes [m]
-    heights : (v,) of all nodes, two to a layer and one more [m]
-    quads : (e, 9) the cell that each element stands on, in VTK order, counter-clockwise
-    layer : (e,) the layer that each is in
+    heights : (v,) of the levels of nodes, two for each layer and one more [m]
+    quads : (e, 9) the plane cell of each element, in VTK order, counter-clockwise
+    layer : (e,) the layer of each element, from 0
     """
     nodes = np.column_stack([np.tile(points, (len(heights), 1)), np.repeat(heights, len(points))])
     levels = 2 * layer[:, None] + 1 + HEX27[:, 2]
@@ -126,7 +125,7 @@ def stacked(
 
 
 def quadratic(mesh: SolidMesh) -> SolidMesh:
-    """The 27-node hexahedra of the same form, where the element's own functions put the nodes that it has not."""
+    """The 27-node hexahedra of the same geometry; the element's shape functions place the nodes that are added."""
     e, k = mesh.cells.shape
     if k == len(HEX27):
         return mesh
@@ -140,27 +139,27 @@ def quadratic(mesh: SolidMesh) -> SolidMesh:
 
 
 def serendipity(mesh: SolidMesh) -> SolidMesh:
-    """The 20-node hexahedra with the same corners and edges, nodes within faces and cells dropped."""
+    """The 20-node hexahedra with the same corners and edges, without the nodes within faces and cells."""
     if mesh.cells.shape[1] == len(HEX20):
         return mesh
     full = quadratic(mesh)
-    return without_spare_nodes(replace(full, cells=full.cells[:, : len(HEX20)]))
+    return without_unused_nodes(replace(full, cells=full.cells[:, : len(HEX20)]))
 
 
 def linear(mesh: SolidMesh) -> SolidMesh:
-    """The 8-node hexahedra with the same corners, other nodes dropped."""
-    return without_spare_nodes(replace(mesh, cells=mesh.cells[:, : len(HEX8)]))
+    """The 8-node hexahedra with the same corners, without all other nodes."""
+    return without_unused_nodes(replace(mesh, cells=mesh.cells[:, : len(HEX8)]))
 
 
-def without_spare_nodes(mesh: SolidMesh) -> SolidMesh:
-    """The mesh with nodes that no cell uses left out, the others kept in their order."""
+def without_unused_nodes(mesh: SolidMesh) -> SolidMesh:
+    """The mesh without the nodes that no cell uses; the others keep their order."""
     used, renumbered = np.unique(mesh.cells, return_inverse=True)
     faces = tuple(replace(face, sides=np.searchsorted(used, face.sides)) for face in mesh.faces)
     return replace(mesh, points=mesh.points[used], cells=renumbered.reshape(mesh.cells.shape), faces=faces)
 
 
 def placed(mesh: SolidMesh, origin: Float[np.ndarray, "3"], axes: Float[np.ndarray, "3 3"]) -> SolidMesh:
-    """The mesh moved rigidly: its x, y, z run along the rows of `axes` from `origin` [m]."""
+    """The mesh moved rigidly: its x, y, z axes become the rows of `axes`, its origin `origin` [m]."""
     faces = tuple(
         replace(face, centre=origin + face.centre @ axes, direction=face.direction @ axes) for face in mesh.faces
     )
@@ -168,9 +167,10 @@ def placed(mesh: SolidMesh, origin: Float[np.ndarray, "3"], axes: Float[np.ndarr
 
 
 def frame_along(line: Float[np.ndarray, "3"], up: Float[np.ndarray, "3"] | None = None) -> Float[np.ndarray, "3 3"]:
-    """Rows x, y, z of the frame of a link drawn along `line`: x along it, z as near to `up`, global z, as can be.
+    """Axes (3, 3), as rows, of the frame of a link along `line`: x along it, z as near to `up` as possible.
 
-    A line along `up` has the frame's z along global x; one along x too, along global z.
+    Without `up`, z is as near as possible to global z. For a line along `up` z is nearest to global x, or, if the line
+    is along that too, along global z.
     """
     x = line / np.linalg.norm(line)
     global_x, _, global_z = np.eye(3)

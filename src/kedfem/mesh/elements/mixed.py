@@ -1,7 +1,7 @@
-"""Meshes of several kinds of cells as one kind: tetrahedra of 10 nodes, or hexahedra of 20 where all are hexahedra.
+"""Meshes of mixed cells converted to one kind: 20-node hexahedra if all are hexahedra, else 10-node tetrahedra.
 
-Hexahedra, wedges and pyramids are divided from their corner of least number, their four-sided sides likewise, so that
-neighbours agree: J. Dompierre, P. Labbé, M.-G. Vallet, R. Camarero, How to subdivide pyramids, prisms and hexahedra
+Hexahedra, wedges and pyramids are divided from their corner of least number, their quadrilateral sides likewise, so
+that neighbours agree: J. Dompierre, P. Labbé, M.-G. Vallet, R. Camarero, How to subdivide pyramids, prisms and hexahedra
 into tetrahedra, Proc. 8th Int. Meshing Roundtable (1999) 195-204.
 """
 
@@ -14,14 +14,14 @@ from kedfem.arrays import Float, Int
 from kedfem.errors import MeshError
 from kedfem.mesh.elements.shape_functions import EDGES, HEX20, HEX27, node_numbers, shape_functions
 
-#: Sides of each kind by the number of its corners, in VTK's order.
+#: Sides of each kind of cell, by its number of corners, in VTK's order.
 _SIDES: dict[int, tuple[tuple[int, ...], ...]] = {
     4: ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)),
     5: ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
     6: ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
     8: ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
 }
-#: Edges of each kind in the order of the nodes in their middles.
+#: Edges of each kind of cell in the order of the nodes in their middles.
 EDGES_OF: dict[int, tuple[tuple[int, int], ...]] = {
     4: tuple((int(i), int(j)) for i, j in EDGES),
     5: ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4)),
@@ -41,17 +41,19 @@ def one_kind(
 
     Parameters
     ----------
-    blocks : cells in VTK's order by their number of corners
+    blocks : cells in VTK's order, by their number of corners
 
     Returns
     -------
-    (m, 3) and (e, 20) or (e, 10): the same nodes and new ones after them; an edge's middle is that of its quadratic
-        elements where there are any
+    (m, 3) [m]
+        The given nodes, then new ones in the middles of edges, taken from quadratic cells where there are any.
+    (e, 20) or (e, 10)
+        The cells.
 
     Raises
     ------
     MeshError
-        A side of a hexahedron, wedge or pyramid lies on two triangles of tetrahedra that divide it the other way.
+        A quadrilateral side lies on two triangles of tetrahedra that divide it along the other diagonal.
     """
     if set(blocks) == {8}:
         corners = np.concatenate([cells[:, :8] for cells in blocks[8]])
@@ -71,7 +73,7 @@ def tetrahedra(
 
 
 def triangles(quads: Int[np.ndarray, "q 4"]) -> Int[np.ndarray, "t 3"]:
-    """Two triangles of each four-sided side, from its corner of least number."""
+    """Two triangles of each quadrilateral side, divided from its corner of least number."""
     turned = _from_least(quads)
     return np.concatenate([turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]])
 
@@ -81,7 +83,7 @@ def _from_least(quads: Int[np.ndarray, "q 4"]) -> Int[np.ndarray, "q 4"]:
 
 
 def _tetrahedra(corners: Cells, count: int) -> Int[np.ndarray, "t 4"]:
-    """From the corner of least number of each cell to the triangles of the sides that it is not on."""
+    """Tetrahedra from each cell's corner of least number to the triangles of the sides that do not contain it."""
     if count == 4:
         return corners
     first = corners.argmin(axis=1)
@@ -98,7 +100,7 @@ def _tetrahedra(corners: Cells, count: int) -> Int[np.ndarray, "t 4"]:
 def _middles(
     points: Float[np.ndarray, "n 3"], blocks: Mapping[int, list[Cells]]
 ) -> tuple[Int[np.ndarray, "p 2"], Float[np.ndarray, "p 3"]]:
-    """Pairs of corners that an edge, or a diagonal, is between, and the place of its middle: of quadratic cells first."""
+    """Pairs of corners with an edge or diagonal between them, and its middle, that of quadratic cells first."""
     pairs, places = [], []
     each = [(count, cells) for count, several in blocks.items() for cells in several]
     for count, cells in sorted(each, key=lambda one: one[1].shape[1] == one[0]):
@@ -139,7 +141,7 @@ def _with_middles(
 
 
 def _check_fit(fours: Int[np.ndarray, "t 4"], blocks: Mapping[int, list[Cells]]) -> None:
-    """Refuse sides that the tetrahedra beside them divide the other way: the parts would not hold together there."""
+    """Refuse sides that neighbouring tetrahedra divide along the other diagonal: the mesh would be open there."""
     sides = np.sort(np.concatenate([fours[:, list(side)] for side in _SIDES[4]]), axis=1)
     alone, often = np.unique(sides, axis=0, return_counts=True)
     outer = {tuple(side) for side in alone[often == 1].tolist()}
@@ -151,6 +153,7 @@ def _check_fit(fours: Int[np.ndarray, "t 4"], blocks: Mapping[int, list[Cells]])
             wrong += sum(tuple(three) in outer for three in other)
     if wrong:
         raise MeshError(
-            f"hexahedra, wedges and pyramids must share whole sides with their neighbours, got {wrong} four-sided sides "
-            "that tetrahedra beside them divide the other way; put pyramids between them"
+            "hexahedra, wedges and pyramids must share whole sides with their neighbours, "
+            f"got {wrong} quadrilateral sides that neighbouring tetrahedra divide along the other diagonal; "
+            "put pyramids between them"
         )

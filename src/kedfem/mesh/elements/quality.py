@@ -1,4 +1,4 @@
-"""Quality of meshes: the scaled Jacobian, and the gate that a link's mesh must pass."""
+"""Quality of meshes: the scaled Jacobian, and the check that every link's mesh must pass."""
 
 from dataclasses import dataclass
 from typing import TypeVar
@@ -14,7 +14,7 @@ from kedfem.mesh.places import in_mm
 from kedfem.mesh.planar.flat import QuadMesh
 
 Mesh = TypeVar("Mesh", SolidMesh, QuadMesh)
-LEAST = 0.1  # scaled Jacobian of hexahedra and quadrilaterals where nothing is asked for
+LEAST = 0.1  # default of the least scaled Jacobian of hexahedra and quadrilaterals
 _CHUNK = 2048  # elements at a time: the Jacobians of one chunk fit in a processor's cache
 
 
@@ -49,7 +49,7 @@ class Quality:
         return np.argsort(self.scaled_jacobian, kind="stable")[:count]
 
     def histogram(self, bins: int = 10) -> tuple[Float[np.ndarray, " b"], Int[np.ndarray, " c"]]:
-        """Ends of equal bins from 0 to 1, and how many elements are in each; first one more bin, of those below 0."""
+        """Edges of equal bins from 0 to 1, after one of all below 0, and the number of elements in each bin."""
         edges = np.concatenate([[-1.0], np.linspace(0, 1, bins + 1)])
         inside = np.clip(self.scaled_jacobian, -1.0, 1.0)  # rounding may pass 1
         return edges, np.histogram(inside, edges)[0].astype(np.int64)
@@ -58,7 +58,7 @@ class Quality:
 def scaled_jacobian(points: Float[np.ndarray, "n d"], cells: Int[np.ndarray, "e k"]) -> Float[np.ndarray, " e"]:
     """Least of det J / (|J_1| ··· |J_d|) over the nodes and the Gauss points of each element, J_j = ∂X/∂ξ_j.
 
-    Of a tetrahedron √2 det J over the largest product of the three edges that meet in a corner, edges as J makes them.
+    For a tetrahedron it is √2 det J over the largest product of three edges that meet in a corner, edges from J.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def scaled_jacobian(points: Float[np.ndarray, "n d"], cells: Int[np.ndarray, "e 
 
     Returns
     -------
-    (e,) [-]: between -1 and 1; 0 where an element has no extent
+    (e,) [-]: between -1 and 1; 0 for an element without extent
     """
     nodes = NODES[cells.shape[1]]
     if len(nodes) == len(TET10):
@@ -85,12 +85,12 @@ def scaled_jacobian(points: Float[np.ndarray, "n d"], cells: Int[np.ndarray, "e 
 
 
 def _columns(J: Float[np.ndarray, "e q d d"]) -> Float[np.ndarray, "e q"]:
-    """The product of the lengths of J's columns."""
+    """Product of the lengths of J's columns."""
     return np.asarray(np.linalg.norm(J, axis=2).prod(axis=-1))
 
 
 def _largest_corner(J: Float[np.ndarray, "e q 3 3"]) -> Float[np.ndarray, "e q"]:
-    """The largest product of the three edges that meet in a corner of a tetrahedron."""
+    """Largest product of the three edges that meet in a corner of a tetrahedron."""
     a, b, c = (J[..., j] for j in range(3))
     edge = [np.linalg.norm(v, axis=-1) for v in (a, b - a, b, c, c - a, c - b)]
     corners = [edge[i] * edge[j] * edge[k] for i, j, k in ((0, 2, 3), (0, 1, 4), (1, 2, 5), (3, 4, 5))]
@@ -98,7 +98,7 @@ def _largest_corner(J: Float[np.ndarray, "e q 3 3"]) -> Float[np.ndarray, "e q"]
 
 
 def mesh_quality(mesh: SolidMesh | QuadMesh) -> Quality:
-    """The scaled Jacobians of a mesh and where its elements are."""
+    """The scaled Jacobians and centres of a mesh's elements."""
     values = scaled_jacobian(mesh.points[:, : _dimension(mesh)], mesh.cells)
     return Quality(values, mesh.points[mesh.cells].mean(axis=1))
 
@@ -109,12 +109,17 @@ def _dimension(mesh: SolidMesh | QuadMesh) -> int:
 
 
 def checked_mesh(where: str, mesh: Mesh, min_quality: float | None) -> Mesh:
-    """The mesh itself, if it is good enough: scaled Jacobian at the nodes and Gauss points, det J > 0 everywhere.
+    """The mesh itself, checked: scaled Jacobian at the nodes and Gauss points, det J > 0 everywhere.
 
     Parameters
     ----------
     where : the mesh's link, for messages: ``links.rod``
-    min_quality : None for LEAST, of tetrahedra 0
+    min_quality : least scaled Jacobian [-]; None for LEAST, or 0 for tetrahedra
+
+    Raises
+    ------
+    MeshError
+        An element is inverted, folded or of less quality.
     """
     quality = mesh_quality(mesh)
     if min_quality is None:
@@ -144,7 +149,7 @@ def checked_mesh(where: str, mesh: Mesh, min_quality: float | None) -> Mesh:
 
 
 def _place(mesh: SolidMesh | QuadMesh, quality: Quality, element: int, limit: float) -> str:
-    """Where an element is, near which face, and how many others are below the limit."""
+    """Place of an element, the nearest face, and how many other elements are below the limit."""
     words = f"in element {element} at {in_mm(quality.centres[element])}"
     if isinstance(mesh, SolidMesh) and mesh.faces:
         words += f" near {_described(_nearest_face(mesh, quality.centres[element]))}"
@@ -158,7 +163,7 @@ def _place(mesh: SolidMesh | QuadMesh, quality: Quality, element: int, limit: fl
 
 
 def _nearest_face(mesh: SolidMesh, place: Float[np.ndarray, "3"]) -> Face:
-    """The named face with a node nearest to a place."""
+    """The named face with the node nearest to a place."""
     squares = [((mesh.points[face.sides] - place) ** 2).sum(axis=2) for face in mesh.faces]
     return mesh.faces[int(np.argmin([square.min(initial=np.inf) for square in squares]))]
 
@@ -173,6 +178,6 @@ def _described(face: Face) -> str:
 
 
 def _change(mesh: SolidMesh | QuadMesh) -> str:
-    """What to do about the shape where elements are bad."""
+    """Advice for the shape where elements are bad."""
     named = isinstance(mesh, SolidMesh) and mesh.faces
     return "suppress a fillet or small feature there" if named else "change the shape there"

@@ -1,10 +1,10 @@
-"""Shape functions of quadrilaterals, hexahedra and quadratic simplices, and where their nodes are."""
+"""Shape functions and node coordinates of quadrilaterals, hexahedra and quadratic simplices."""
 
 import numpy as np
 
 from kedfem.arrays import Float, Int
 
-#: Edges of a tetrahedron in VTK's order of its nodes 4 to 9, their middles; the first three are those of a triangle.
+#: Edges of a tetrahedron in VTK's order of the nodes 4 to 9 in their middles; the first three are a triangle's.
 EDGES: Int[np.ndarray, "6 2"] = np.array([(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)])
 _CORNERS = np.concatenate([np.zeros((1, 3)), np.eye(3)])
 
@@ -12,7 +12,7 @@ _CORNERS = np.concatenate([np.zeros((1, 3)), np.eye(3)])
 TET10: Float[np.ndarray, "10 3"] = np.concatenate([_CORNERS, _CORNERS[EDGES].mean(axis=1)])
 TRI6: Float[np.ndarray, "6 2"] = TET10[[0, 1, 2, 4, 5, 6], :2]
 
-#: Nodes of each side of a tet10 at the places of a tri6: corners counter-clockwise seen from outside, middles.
+#: Nodes of each side of a tet10 in the order of a tri6: corners counter-clockwise seen from outside, middles.
 TET_SIDES: Int[np.ndarray, "4 6"] = np.array(
     [(0, 2, 1, 6, 5, 4), (0, 1, 3, 4, 8, 7), (1, 2, 3, 5, 9, 8), (0, 3, 2, 7, 9, 6)]
 )
@@ -36,7 +36,7 @@ HEX8: Int[np.ndarray, "8 3"] = HEX27[:8]
 
 Places = Float[np.ndarray, "_ d"] | Int[np.ndarray, "_ d"]
 
-#: Reference coordinates of the nodes of an element that has so many.
+#: Reference coordinates of an element's nodes, by their number.
 NODES: dict[int, Places] = {len(nodes): nodes for nodes in (QUAD9, HEX8, TET10, HEX20, HEX27)}
 
 
@@ -65,7 +65,7 @@ def _edges(at: Float[np.ndarray, "q d"]) -> Int[np.ndarray, "m 2"]:
 
 
 def node_numbers(nodes: Places, at: Places) -> list[int]:
-    """Which of an element's nodes are at some reference coordinates."""
+    """Numbers of the nodes of an element at some reference coordinates."""
     return [int(np.flatnonzero((nodes == place).all(axis=1))[0]) for place in at]
 
 
@@ -75,7 +75,7 @@ def shape_functions(nodes: Places, at: Float[np.ndarray, "q d"]) -> Float[np.nda
     Parameters
     ----------
     nodes : (k, d) reference coordinates of the element's nodes (HEX27, HEX20, HEX8, QUAD9, TET10, TRI6)
-    at : (q, d) where the values are wanted, reference coordinates [-]
+    at : (q, d) reference coordinates of the points [-]
     """
     x = np.asarray(at, dtype=float)
     if len(nodes) in {len(TET10), len(TRI6)}:
@@ -100,7 +100,7 @@ def shape_gradients(nodes: Places, at: Float[np.ndarray, "q d"]) -> Float[np.nda
 def _factors(
     nodes: Places, x: Float[np.ndarray, "q d"]
 ) -> list[tuple[Float[np.ndarray, "q k"], Float[np.ndarray, "q k"]]]:
-    """Of each direction the factor of every N_a, and its derivative."""
+    """The factor of every N_a in each direction, and its derivative."""
     linear_ends = (1 - x) / 2, (1 + x) / 2
     if len(nodes) == len(HEX20) or not (nodes == 0).any():
         line = np.stack([linear_ends[0], 1 - x**2, linear_ends[1]])
@@ -112,7 +112,7 @@ def _factors(
 
 
 def _brackets(nodes: Places, x: Float[np.ndarray, "q d"]) -> tuple[Float[np.ndarray, "q k"], Float[np.ndarray, "q k d"]]:
-    """What makes a serendipity corner vanish at the middles of its edges, (Σ ξ_j ξ_aj − 2), and its gradient."""
+    """The factor (Σ ξ_j ξ_aj − 2) by which a serendipity corner vanishes at the middles of its edges; its gradient."""
     corner = (nodes != 0).all(axis=1) & (len(nodes) == len(HEX20))
     bracket = np.where(corner, x @ nodes.T - 2.0, 1.0)
     slope = 1.0 * nodes * corner[:, None]

@@ -1,1 +1,1 @@
-"""Mesh files: each form read as it is, then as a mesh of one kind of elements with its named faces."""
+"""Mesh files: their contents in each format, then a mesh of one kind of elements with named faces."""

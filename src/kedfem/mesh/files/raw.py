@@ -1,4 +1,4 @@
-"""Mesh files as they are: nodes, cells, sets of sides and of nodes, through gmsh or meshio; each form has one reader."""
+"""Contents of mesh files: nodes, cells, sets of sides and of nodes, read by gmsh or meshio."""
 
 import io
 import re
@@ -18,15 +18,15 @@ from kedfem.scene.records.shapes import MESH_ENDINGS
 THROUGH_MESHIO = (".inp", ".vtu", ".vtk", ".xdmf", ".xmf", ".e", ".exo")
 THROUGH_GMSH = tuple(each for each in MESH_ENDINGS if each not in THROUGH_MESHIO)
 _NUMBERED = (".bdf", ".nas")  # surfaces by numbers of properties
-#: Corners of the solid cells that files may hold, by meshio's names.
+#: Number of corners of the solid cells that files may hold, by meshio's names.
 CORNERS = {"tetra": 4, "hexahedron": 8, "wedge": 6, "pyramid": 5}
 _FLAT = {"triangle": 3, "quad": 4}
-#: Abaqus' elements of plane strain and stress that programs write surfaces as, and which meshio has not.
+#: Abaqus' elements of plane strain and stress with which programs write surfaces, and which meshio lacks.
 _PLANE = {
     "CPS6": "triangle6", "CPS8": "quad8", "CPE3": "triangle", "CPE4": "quad", "CPE8": "quad8",
     "S6": "triangle6",
 }  # fmt: skip
-#: Kinds that some of meshio's readers give and its record of a mesh does not know, with their dimension.
+#: Kinds that some of meshio's readers return and its record of a mesh does not know, with their dimension.
 _QUADRATIC = {"wedge15": 3, "wedge18": 3, "pyramid13": 3, "pyramid14": 3, "quad8": 2, "quad9": 2}
 #: Corners of the sides S1, S2 … of Abaqus' hexahedra and tetrahedra.
 _ABAQUS_SIDES = {
@@ -42,14 +42,14 @@ _NAME = r"(?i)\bNAME\s*=\s*\"?([^,\"\s]+)"
 
 @dataclass(frozen=True, slots=True)
 class RawMesh:
-    """What a file holds.
+    """The contents of a mesh file.
 
     points : (n, k) [the file's unit]
-    cells : solid ones in VTK's order by meshio's names
-    others : how many solid cells there are of kinds that are not known
-    sides : by the name of a set ("surface 3" where files have numbers) corners of its triangles (t, 3) and
-        quadrilaterals (q, 4)
-    nodes : by the name of a set its nodes
+    cells : solid cells in VTK's order, by meshio's names
+    others : number of solid cells of each unknown kind
+    sides : corners of the triangles (t, 3) and quadrilaterals (q, 4) of each set, by its name ("surface 3" where files
+        have numbers)
+    nodes : nodes of each set, by its name
     """
 
     points: Float[np.ndarray, "n k"]
@@ -60,7 +60,13 @@ class RawMesh:
 
 
 def read_mesh(path: Path) -> RawMesh:
-    """What a mesh file holds; to be called where a library may hang or break down."""
+    """The contents of a mesh file; to be called where a library may hang or crash.
+
+    Raises
+    ------
+    MeshError
+        The library cannot read the file; the message is its own.
+    """
     ending = path.suffix.lower()
     try:
         return _through_gmsh(path) if ending in THROUGH_GMSH else _through_meshio(path)
@@ -71,7 +77,7 @@ def read_mesh(path: Path) -> RawMesh:
 
 
 def _through_gmsh(path: Path) -> RawMesh:
-    """gmsh's own readers."""
+    """The contents of a file that gmsh reads."""
     with gmsh_model() as gmsh:
         gmsh.merge(str(path))
         points, tags = numbered_nodes(gmsh)
@@ -95,7 +101,7 @@ def _through_gmsh(path: Path) -> RawMesh:
 
 
 def _groups(gmsh: ModuleType, numbered: bool) -> dict[str, list[int]]:
-    """Surfaces in gmsh's model by the names of their physical groups, in forms without names by their numbers."""
+    """Surfaces in gmsh's model by the names of their physical groups, or by numbers in formats without names."""
     found: dict[str, list[int]] = {}
     for _, tag in gmsh.model.getPhysicalGroups(2):
         on = [int(each) for each in gmsh.model.getEntitiesForPhysicalGroup(2, tag)]
@@ -110,7 +116,7 @@ def _name(gmsh: ModuleType, dimension: int, tag: int) -> str:
 
 
 def _elements(gmsh: ModuleType, dimension: int, entity: int) -> list[tuple[str, np.ndarray]]:
-    """Kinds and gmsh's node numbers, in VTK's order, of the elements of a surface, or of all of a dimension."""
+    """Kinds and gmsh's node numbers, in VTK's order, of the elements of one entity, or of all (-1) of a dimension."""
     from meshio.gmsh.common import _gmsh_to_meshio_order, _gmsh_to_meshio_type
 
     kinds, _, nodes = gmsh.model.mesh.getElements(dimension, entity)
@@ -123,7 +129,7 @@ def _elements(gmsh: ModuleType, dimension: int, entity: int) -> list[tuple[str, 
 
 
 def _through_meshio(path: Path) -> RawMesh:
-    """meshio's readers; it prints, warns and ends programs, which is for the caller."""
+    """The contents of a file that meshio reads; the caller must expect it to print, warn and end the program."""
     import meshio
     from meshio import _mesh
     from meshio.abaqus import _abaqus
@@ -139,14 +145,14 @@ def _through_meshio(path: Path) -> RawMesh:
 
 
 def _named(text: str, path: Path) -> io.StringIO:
-    """A text to read as the file that it is from, beside which others may be included."""
+    """A text with the name of its file, relative to which it may include others."""
     buffer = io.StringIO(text)
     buffer.name = str(path)
     return buffer
 
 
 def _with_sets(text: str) -> str:
-    """An Abaqus file whose *SURFACE blocks name single elements by number, with sets of elements in their place."""
+    """An Abaqus text with sets of elements in place of the single elements that its *SURFACE blocks number."""
     sets: dict[str, list[str]] = {}
 
     def of_sets(block: re.Match[str]) -> str:
@@ -168,7 +174,7 @@ def _with_sets(text: str) -> str:
 
 
 def from_meshio(raw: Any, abaqus: str = "") -> RawMesh:
-    """A mesh of meshio's; `abaqus` is the text that it comes from, whose surfaces meshio passes over."""
+    """The contents of a meshio mesh; `abaqus` is the text of its file, whose surfaces meshio ignores."""
     blocks: dict[str, list[np.ndarray]] = {}
     others: dict[str, int] = {}
     for block in raw.cells:
@@ -219,12 +225,12 @@ def _abaqus_surfaces(text: str) -> list[tuple[str, str, int]]:
 
 
 def _family(kind: str) -> str:
-    """``tetra`` of ``tetra10``."""
+    """A kind without its number of nodes: ``tetra`` for ``tetra10``."""
     return kind.rstrip("0123456789")
 
 
 def _whole(numbers: Any) -> Int[np.ndarray, "..."]:
-    """Whole numbers of nodes or cells."""
+    """Numbers of nodes or cells as 64-bit integers."""
     try:
         return np.asarray(numbers).astype(np.int64)
     except (OverflowError, ValueError, TypeError):

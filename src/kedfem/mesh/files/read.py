@@ -1,4 +1,4 @@
-"""Meshes of tetrahedra and hexahedra from files, their named sets of sides and nodes as faces."""
+"""Meshes of tetrahedra and hexahedra from files, with their named sets of sides and nodes as faces."""
 
 from collections.abc import Iterator
 from hashlib import sha256
@@ -12,31 +12,31 @@ from kedfem.arrays import Float, Int
 from kedfem.errors import MeshError
 from kedfem.mesh.cad.forms import Sample, fitted_form
 from kedfem.mesh.cad.sides import boundary_sides, side_corners, side_normals
-from kedfem.mesh.elements.hexahedra import CELL_TYPES, Face, SolidMesh, without_spare_nodes
+from kedfem.mesh.elements.hexahedra import CELL_TYPES, Face, SolidMesh, without_unused_nodes
 from kedfem.mesh.elements.mixed import one_kind, triangles
 from kedfem.mesh.files.raw import CORNERS, RawMesh, read_mesh
 from kedfem.mesh.isolated import MESH_FILE, READING, in_own_process
 from kedfem.scene.records.shapes import MESH_ENDINGS
 from kedfem.store import contents, itself, kept
 
-#: Nodes of the solid cells that are taken.
+#: Number of nodes of the solid cells that are accepted.
 _ACCEPTED = {name: nodes for nodes, name in CELL_TYPES.items()} | {
     "wedge": 6, "wedge15": 15, "wedge18": 18, "pyramid": 5, "pyramid13": 13, "pyramid14": 14,
 }  # fmt: skip
-# of nodes, in sizes of the group: numbers in a file may be few, a circle of chords is not round
+# of nodes, in sizes of the group: files may have few digits, and chords are not a circle
 _ACCURACY = 2e-3
 _SKEW = 0.05  # of the sides' normals: a sine
 
 
 def mesh_from_file(where: str, path: Path, scale: float) -> SolidMesh:
-    """The tetrahedra or hexahedra of a mesh file, nodes that none of them uses left out.
+    """The tetrahedra or hexahedra of a mesh file, without nodes that none of them uses.
 
     Parameters
     ----------
-    where : what the file is for, for messages
-    path : of one of MESH_ENDINGS. Points and lines in it are passed over; sets of sides on the outside (physical
-        groups, sets of elements and surfaces) and sets of nodes become the mesh's `faces`. Cells of several kinds
-        become tetrahedra of 10 nodes, hexahedra of several orders those of 20.
+    where : the key that names the file, for messages
+    path : of one of MESH_ENDINGS. Points and lines in it are ignored; sets of sides on the surface (physical groups,
+        sets of elements and surfaces) and sets of nodes become the mesh's `faces`. Cells of several kinds become
+        10-node tetrahedra, hexahedra of several orders 20-node ones.
     scale : length of the file's unit [m]
 
     Raises
@@ -51,7 +51,7 @@ def mesh_from_file(where: str, path: Path, scale: float) -> SolidMesh:
         raise MeshError(f"{where}: must have nodes of three coordinates, got shape {points.shape} in {path}")
     _check_cells(where, path, raw, points)
     points, cells = _cells(where, path, raw, scale * points)
-    mesh = without_spare_nodes(SolidMesh(points, cells, named_faces(raw, points, cells)))
+    mesh = without_unused_nodes(SolidMesh(points, cells, named_faces(raw, points, cells)))
     pieces = _pieces(mesh)
     if pieces > 1:
         raise MeshError(
@@ -62,7 +62,7 @@ def mesh_from_file(where: str, path: Path, scale: float) -> SolidMesh:
 
 
 def raw_of_file(where: str, path: Path) -> RawMesh:
-    """What the file holds, read in a process of its own and kept between runs."""
+    """The contents of a file, read in a process of its own and kept between runs."""
     wanted = f"must be a mesh file ({', '.join(MESH_ENDINGS)})"
     if not path.is_file():
         raise MeshError(f"{where}: {wanted}, got {'a folder' if path.is_dir() else 'nothing'} at {path}")
@@ -83,7 +83,7 @@ def raw_of_file(where: str, path: Path) -> RawMesh:
 
 
 def _check_cells(where: str, path: Path, raw: RawMesh, points: np.ndarray) -> None:
-    """Refuse what is no solid element, nodes that are not there, coordinates that are no numbers."""
+    """Refuse cells that are not solid, nodes that do not exist, and coordinates that are not finite."""
     found = {kind: len(cells) for kind, cells in raw.cells.items() if len(cells)} | raw.others
     wrong = [kind for kind in found if kind not in _ACCEPTED or raw.cells[kind].shape[1] != _ACCEPTED[kind]]
     if wrong or not found:
@@ -102,7 +102,7 @@ def _check_cells(where: str, path: Path, raw: RawMesh, points: np.ndarray) -> No
 
 
 def _cells(where: str, path: Path, raw: RawMesh, points: np.ndarray) -> tuple[np.ndarray, Int[np.ndarray, "e k"]]:
-    """The cells, all of one kind, and the nodes."""
+    """The nodes, and the cells converted to one kind."""
     blocks = {kind: cells for kind, cells in raw.cells.items() if len(cells)}
     if len(blocks) == 1 and (kind := next(iter(blocks))) in CELL_TYPES.values():
         return points, blocks[kind]
@@ -124,13 +124,13 @@ def _pieces(mesh: SolidMesh) -> int:
 
 
 def named_faces(raw: RawMesh, points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e k"]) -> tuple[Face, ...]:
-    """The sets of sides and nodes in a mesh file that lie on the outside of its elements, in the order of their names.
+    """The sets of sides and nodes of a mesh file as faces on the surface of its elements, in the order of their names.
 
-    Sets without a side on the outside are left out; of a set of nodes the sides all of whose corners are in it.
+    A set of nodes has the sides all of whose corners are in it. Sets without a side on the surface are left out.
 
     Parameters
     ----------
-    points : (n, 3) all nodes, the file's first [m]
+    points : (n, 3) all nodes, those of the file first [m]
     cells : (e, 8), (e, 20), (e, 27), (e, 4) or (e, 10) the elements; their corners have the file's numbers
     """
     sides = boundary_sides(cells)
@@ -145,7 +145,7 @@ def named_faces(raw: RawMesh, points: Float[np.ndarray, "n 3"], cells: Int[np.nd
 
 
 def group_face(name: str, points: Float[np.ndarray, "n 3"], sides: Int[np.ndarray, "f m"]) -> Face:
-    """The face that some sides of elements are, its form fitted to their nodes and normals.
+    """The face that some element sides form; its geometry is fitted to their nodes and normals.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def group_face(name: str, points: Float[np.ndarray, "n 3"], sides: Int[np.ndarra
 
 
 def _sets(raw: RawMesh, corners: Int[np.ndarray, "f c"]) -> Iterator[tuple[str, Int[np.ndarray, "q c"]]]:
-    """Each set's name and corners of its sides, divided into triangles where the elements' are."""
+    """Name of each set and corners of its sides, as triangles where the elements are tetrahedra."""
     count = corners.shape[1]
     for name in sorted(raw.sides.keys() | raw.nodes.keys()):
         if name in raw.sides:

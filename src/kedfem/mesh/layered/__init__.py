@@ -1,1 +1,1 @@
-"""Solids made of layers: one plan of all sections, meshed and swept."""
+"""Solids made of layers: the plan of all their sections, its mesh, and the sweep."""

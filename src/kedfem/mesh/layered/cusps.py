@@ -1,4 +1,4 @@
-"""Cusps of a plan, where curves meet without an angle: no element fits in, so their tips go to the neighbours."""
+"""Cusps of a plan, where curves touch at no angle: no element fits there, so their tips are given to neighbours."""
 
 from dataclasses import dataclass, replace
 
@@ -7,17 +7,16 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.mesh.layered.partition import Curve, Loop, Plan, Region, corner_angles
 
-CUSP = np.radians(6)  # an angle in which no element of quality can be
-_WIDE = 0.15  # of the size: how wide a cusp is where its tip ends
-_LOST = 2e-4  # of the volume: what all tips together may be
-# the tip's end is turned so much, that the neighbour's corners are less sharp
-_SLANT = np.tan(np.radians(30))
-_STEPS = np.linspace(0.0, 0.4, 401)[1:]  # shares of the shorter curve where a tip may end
+CUSP = np.radians(6)  # angle below which no good element fits into a corner
+_WIDE = 0.15  # width of a cusp where its tip ends, in element sizes
+_LOST = 2e-4  # largest volume of all tips, of the solid's
+_SLANT = np.tan(np.radians(30))  # slope of the tip's end, which makes the neighbour's corners less sharp
+_STEPS = np.linspace(0.0, 0.4, 401)[1:]  # shares of the shorter curve at which a tip may end
 
 
 @dataclass(frozen=True, slots=True)
 class Cusp:
-    """A corner of a region without an angle: the region, the loop and the place in it of the curve that starts there."""
+    """A corner of a region without an angle: the region, the loop, and in it the index of the curve that starts there."""
 
     region: int
     loop: int
@@ -26,7 +25,7 @@ class Cusp:
 
 @dataclass(frozen=True, slots=True)
 class _Tip:
-    """What is taken off: where the curves before and after the cusp are cut, how far from it, and the area."""
+    """A tip to cut off: the distances from the cusp at which the curves before and after it are cut; its area."""
 
     before: float
     after: float
@@ -34,22 +33,26 @@ class _Tip:
 
 
 def cusps(plan: Plan) -> list[Cusp]:
-    """All corners of regions without an angle."""
+    """All corners of regions that are cusps."""
     every = ((n, k, loop) for n, region in enumerate(plan.regions) for k, loop in enumerate(region.loops))
     sharp = ((n, k, np.flatnonzero(corner_angles(plan.curves, loop) < CUSP)) for n, k, loop in every)
     return [Cusp(n, k, int(place)) for n, k, places in sharp for place in places]
 
 
 def without_cusps(plan: Plan, size: float) -> tuple[Plan, float]:
-    """The plan with the tips of cusps given to the neighbours where that changes the solid least; their share of it.
+    """The plan whose cusps have given their tips to the neighbour that changes the solid least; the volume changed.
 
-    A boss whose circle touches the sides of the web gains a sliver beside each point of contact. Cusps are left whose
-    tips are too large for the volume.
+    A boss whose circle touches the sides of a web gains a sliver beside each point of contact. Cusps with too large
+    tips stay.
 
     Parameters
     ----------
     plan : within its context
     size : length of the elements, by the solid's extent [-]
+
+    Returns
+    -------
+    The plan, and the volume of the tips as a share of the solid's [-].
     """
     lost, left = 0.0, len(cusps(plan))
     share = _LOST / max(left, 1)
@@ -62,11 +65,11 @@ def without_cusps(plan: Plan, size: float) -> tuple[Plan, float]:
         if done is None:
             break
         plan, lost = done[0], lost + done[1]
-    return without_spare_curves(plan), lost
+    return without_unused_curves(plan), lost
 
 
-def without_spare_curves(plan: Plan) -> Plan:
-    """The plan with curves left out that no region has."""
+def without_unused_curves(plan: Plan) -> Plan:
+    """The plan without the curves that no region uses."""
     used = sorted({i for region in plan.regions for loop in region.loops for i, _ in loop})
     regions = tuple(
         replace(region, loops=tuple(tuple((used.index(i), way) for i, way in loop) for loop in region.loops))
@@ -76,7 +79,7 @@ def without_spare_curves(plan: Plan) -> Plan:
 
 
 def _filled(plan: Plan, cusp: Cusp, width: float, share: float) -> tuple[Plan, float] | None:
-    """The plan without the tip of one cusp, and the share of the volume that this changes; None: too much."""
+    """The plan without the tip of one cusp, and the share of the volume that this changes; None if it is too large."""
     thicknesses = np.diff(plan.heights)
     loop = plan.regions[cusp.region].loops[cusp.loop]
     (before, _), (after, _) = loop[cusp.place - 1], loop[cusp.place]
@@ -104,7 +107,7 @@ def _neighbour(plan: Plan, region: int, curve: int) -> int | None:
 
 
 def _tip(plan: Plan, loop: Loop, place: int, width: float, most: float, to_before: bool) -> _Tip | None:
-    """Where the tip ends: as wide as wanted, or less, so that its area is not more than `most`."""
+    """The tip, which ends at a width of at most `width` and has an area of at most `most`; None if it has none."""
     (i, came), (j, goes) = loop[place - 1], loop[place]
     before, after = plan.curves[i], plan.curves[j]
     along = _STEPS * min(before.length, after.length)
@@ -116,12 +119,12 @@ def _tip(plan: Plan, loop: Loop, place: int, width: float, most: float, to_befor
     if len(fit) == 0 or widths[fit[-1]] < 1e-6:
         return None
     end = int(fit[-1])
-    ahead = along[end] + _SLANT * widths[end]  # on the curve that the tip is kept on
+    ahead = along[end] + _SLANT * widths[end]  # on the curve that keeps the tip
     return _Tip(along[end] if to_before else ahead, ahead if to_before else along[end], float(areas[end]))
 
 
 def _without_tip(plan: Plan, cusp: Cusp, tip: _Tip, to_before: bool) -> Plan:
-    """The plan with two curves cut, their ends joined by a line, and the tip in the region beyond one of them."""
+    """The plan with two curves cut and joined by a line, the tip in the region beyond one of them."""
     loop = plan.regions[cusp.region].loops[cusp.loop]
     (i, came), (j, goes) = loop[cusp.place - 1], loop[cusp.place]
     vertex = 1 + max(end for curve in plan.curves for end in curve.ends)
@@ -151,7 +154,7 @@ def _without_tip(plan: Plan, cusp: Cusp, tip: _Tip, to_before: bool) -> Plan:
 
 
 def _cut(curve: Curve, distance: float, at_end: bool, vertex: int) -> tuple[Curve, Curve]:
-    """The parts of a curve beyond and within a distance from its end, or from its start."""
+    """The parts of a curve beyond and within a distance from its end or its start."""
     at = curve.length - distance if at_end else distance
     lower = _part(curve, 0.0, at, (curve.ends[0], vertex))
     upper = _part(curve, at, curve.length, (vertex, curve.ends[1]))
@@ -159,18 +162,18 @@ def _cut(curve: Curve, distance: float, at_end: bool, vertex: int) -> tuple[Curv
 
 
 def _part(curve: Curve, low: float, high: float, ends: tuple[int, int]) -> Curve:
-    """The part of a curve between two lengths of arc."""
+    """The part of a curve between two arc lengths."""
     lengths = np.linspace(0.0, high - low, len(curve.lengths))
-    bends = np.interp(low + lengths, curve.lengths, curve.bends)
+    curvatures = np.interp(low + lengths, curve.lengths, curve.curvatures)
 
     def places(wanted: Float[np.ndarray, " s"]) -> Float[np.ndarray, "s 2"]:
         return curve.places(low + wanted)
 
-    return Curve(ends, False, lengths, places(lengths), bends, places)
+    return Curve(ends, False, lengths, places(lengths), curvatures, places)
 
 
 def _line(start: Float[np.ndarray, "2"], end: Float[np.ndarray, "2"], vertex: int) -> Curve:
-    """The straight curve between the vertices where two curves are cut."""
+    """The straight curve between the points at which two curves are cut."""
     lengths = np.linspace(0.0, float(np.linalg.norm(end - start)), 9)
 
     def places(wanted: Float[np.ndarray, " s"]) -> Float[np.ndarray, "s 2"]:

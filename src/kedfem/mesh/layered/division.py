@@ -1,4 +1,4 @@
-"""How the curves of a plan are divided: sizes along them, numbers that fit opposite sides, nodes."""
+"""Division of the curves of a plan: element sizes along them, equal numbers on opposite sides, nodes."""
 
 from dataclasses import dataclass
 
@@ -9,23 +9,23 @@ from kedfem.mesh.cad.solids import AROUND, Sizing
 from kedfem.mesh.layered.mapping import Mapping, mappings
 from kedfem.mesh.layered.partition import Curve, Loop, Plan, Region
 
-_MOST = 1500  # squares of the size in the plan: a finer default is not taken
-_GROWTH = 0.4  # of an element's length by the distance
-_SLENDER = 1.5  # an element's length along a rib by the rib's width
-_FINEST = 0.2  # of the size: no arc asks for less to be exact
-_THINNEST = 0.05  # of the size: no rib asks for less
-_LOST = 1e-5  # of the volume: what parabolas may lose of a whole circle
-_LOST_AT_45 = 2.44e-3  # of R²: area of a circle less that inside eight parabolas, θ = 45° each:
-# 8 ((θ − sin θ) / 2 − 4/3 sin(θ/2) (1 − cos(θ/2))); it goes with θ⁴
+_MOST = 1500  # squares of the default size in the plan
+_GROWTH = 0.4  # increase of an element's length with the distance [-]
+_SLENDER = 1.5  # length of an element along a rib, in widths of the rib
+_FINEST = 0.2  # least length due to the accuracy of an arc, in sizes
+_THINNEST = 0.05  # least length due to the width of a rib, in sizes
+_LOST = 1e-5  # volume by which parabolas may miss a whole circle, of the solid's
+_LOST_AT_45 = 2.44e-3  # of R²: area between a circle and eight parabolas of θ = 45° each,
+# 8 ((θ − sin θ) / 2 − 4/3 sin(θ/2) (1 − cos(θ/2))); it is proportional to θ⁴
 
 
 @dataclass(frozen=True, slots=True)
 class Division:
     """Nodes on the curves of a plan.
 
-    points : (n, 2) the nodes, those at vertices once [-]
-    nodes : of each curve the numbers of its nodes from start to end; a closed one ends where it starts
-    middles : tuple of (c, 2) [-]; the points of the curve half way along between them
+    points : (n, 2) the nodes, each vertex once [-]
+    nodes : node numbers of each curve from start to end; a closed curve ends at its first node
+    middles : (c, 2) points of each curve half way between its nodes [-]
     """
 
     points: Float[np.ndarray, "n 2"]
@@ -34,11 +34,11 @@ class Division:
 
 
 def plan_size(plan: Plan, sizing: Sizing) -> float:
-    """Edge length of the elements, by the solid's extent.
+    """Edge length of the elements, by the solid's extent [-].
 
-    The size that is asked for; else the plan's mean width, 2 · area / perimeter of all sections over each
-    other, by `sizing.across`, but not smaller than gives some 1500 squares. Ribs and walls thinner than that do
-    not make it smaller: elements are merely shorter there, once and a half as long as the rib is thick.
+    It is the size asked for; else the plan's mean width, 2 · area / perimeter of all sections together, over
+    `sizing.across`, but large enough for at most 1500 squares. Ribs and walls that are thinner do not reduce it:
+    elements are only shorter there, one and a half times as long as the rib is thick.
     """
     if sizing.size is not None:
         return sizing.size / plan.extent
@@ -49,31 +49,32 @@ def plan_size(plan: Plan, sizing: Sizing) -> float:
 
 
 def divided(plan: Plan, size: float, sizing: Sizing) -> tuple[Division, tuple[Mapping | None, ...]]:
-    """Nodes on all curves, and of each region how it can be mapped with them.
+    """Nodes on all curves, and the mapping of each region that these allow.
 
-    Elements are `size` long, shorter along thin ribs and where a curve turns by the sizing's `turn` or `hollow` or by so
-    much that a parabola misses it; from there they grow with the distance. Their numbers are even on each curve, so that
-    quadrilaterals can fill any region, and those of opposite sides are made equal where that costs little.
+    Elements are `size` long, and shorter along thin ribs and where a curve would turn by more than the sizing's `angle`
+    or `concave_angle`, or be missed by a parabola; they grow with the distance from there. Each curve has an even
+    number of elements, so that quadrilaterals can fill any region; opposite sides get equal numbers where that costs
+    little.
 
     Parameters
     ----------
     plan : within its context
     size : by the solid's extent [-]
-    sizing : its `turn`, `hollow` and `kept` places
+    sizing : its angles and `kept_points` are used
     """
-    sizes = _sizes(plan, size, _rotations(plan, sizing))
+    sizes = _sizes(plan, size, _angles(plan, sizing))
     measures = [_measure(curve, local) for curve, local in zip(plan.curves, sizes, strict=True)]
     counts = [2 * max(1, int(np.ceil(measure[-1] / 2 - 0.25))) for measure in measures]
     fitting = mappings(plan, counts)
     return _nodes(plan, counts, measures, fitting), fitting
 
 
-def _rotations(plan: Plan, sizing: Sizing) -> list[Float[np.ndarray, " m"]]:
-    """Most that an element turns at the samples of each curve [rad]: less along walls that are hollow."""
-    out = [np.full(len(curve.samples), sizing.turn) for curve in plan.curves]
-    if sizing.hollow >= sizing.turn:
+def _angles(plan: Plan, sizing: Sizing) -> list[Float[np.ndarray, " m"]]:
+    """Largest angle of an element at the samples of each curve [rad]: smaller along concave walls."""
+    out = [np.full(len(curve.samples), sizing.angle) for curve in plan.curves]
+    if sizing.concave_angle >= sizing.angle:
         return out
-    held = ((np.array(sizing.kept).reshape(-1, 3) - plan.origin) @ plan.axes.T)[:, :2] / plan.extent
+    kept = ((np.array(sizing.kept_points).reshape(-1, 3) - plan.origin) @ plan.axes.T)[:, :2] / plan.extent
     sides: list[list[Bool[np.ndarray, " slabs"]]] = [[] for _ in plan.curves]
     runs = [(region, i, way) for region in plan.regions for loop in region.loops for i, way in loop]
     for region, i, _ in runs:
@@ -86,21 +87,21 @@ def _rotations(plan: Plan, sizing: Sizing) -> list[Float[np.ndarray, " m"]]:
             continue
         points, inwards = _points_and_normals(plan.curves[i], forward)
         along = np.stack([inwards[:, 1], -inwards[:, 0]], axis=1)
-        bends = plan.curves[i].bends if forward else plan.curves[i].bends[::-1]
-        radii = 1 / np.maximum(bends, 1e-9)
+        curvatures = plan.curves[i].curvatures if forward else plan.curves[i].curvatures[::-1]
+        radii = 1 / np.maximum(curvatures, 1e-9)
         centres = points - radii[:, None] * inwards
-        off = np.linalg.norm(centres[:, None] - held, axis=2).min(axis=1, initial=np.inf)
-        hollow = ((np.gradient(along, axis=0) * inwards).sum(axis=1) < 0) & (off > AROUND * radii)
-        turns = np.where(hollow & (bends > 0), sizing.hollow, sizing.turn)
+        off = np.linalg.norm(centres[:, None] - kept, axis=2).min(axis=1, initial=np.inf)
+        concave = ((np.gradient(along, axis=0) * inwards).sum(axis=1) < 0) & (off > AROUND * radii)
+        turns = np.where(concave & (curvatures > 0), sizing.concave_angle, sizing.angle)
         out[i] = np.minimum(out[i], turns if forward else turns[::-1])
     return out
 
 
 def _sizes(plan: Plan, size: float, turns: list[Float[np.ndarray, " m"]]) -> list[Float[np.ndarray, " m"]]:
-    """Wanted length of the elements at the samples of each curve."""
+    """Required length of the elements at the samples of each curve [-]."""
     wanted = []
     for curve, gap, height, turn in zip(plan.curves, _gaps(plan), plan.wall_heights, turns, strict=True):
-        radii = 1 / np.maximum(curve.bends, 1e-9)
+        radii = 1 / np.maximum(curve.curvatures, 1e-9)
         share = _LOST * plan.volume / (_LOST_AT_45 * radii**2 * max(height, 1e-9))
         exact = np.maximum(radii * np.pi / 4 * share**0.25, _FINEST * size)
         by_gap = np.maximum(_SLENDER * gap, _THINNEST * size)
@@ -114,7 +115,7 @@ def _sizes(plan: Plan, size: float, turns: list[Float[np.ndarray, " m"]]) -> lis
 
 
 def _gaps(plan: Plan) -> list[Float[np.ndarray, " m"]]:
-    """From each sample the least distance through a region to a side of it that faces the sample."""
+    """Least distance from each sample through a region to an opposite side [-]."""
     gaps = [np.full(len(curve.samples), np.inf) for curve in plan.curves]
     for region in plan.regions:
         sides = [(i, *_points_and_normals(plan.curves[i], way)) for loop in region.loops for i, way in loop]
@@ -131,7 +132,7 @@ def _gaps(plan: Plan) -> list[Float[np.ndarray, " m"]]:
 
 
 def _points_and_normals(curve: Curve, forward: bool) -> tuple[Float[np.ndarray, "m 2"], Float[np.ndarray, "m 2"]]:
-    """Samples in the direction of a loop and unit normals to its left."""
+    """Samples in the direction of a loop, and the unit normals to its left."""
     points = curve.samples if forward else curve.samples[::-1]
     along = np.gradient(points, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
@@ -139,7 +140,7 @@ def _points_and_normals(curve: Curve, forward: bool) -> tuple[Float[np.ndarray, 
 
 
 def _measure(curve: Curve, local: Float[np.ndarray, " m"]) -> Float[np.ndarray, " m"]:
-    """Number of elements from the start to each sample, ∫ ds / size."""
+    """Number of elements from the start to each sample, ∫ ds / size [-]."""
     density = 1 / local
     steps = np.diff(curve.lengths) * (density[1:] + density[:-1]) / 2
     return np.concatenate([[0.0], np.cumsum(steps)])
@@ -148,9 +149,9 @@ def _measure(curve: Curve, local: Float[np.ndarray, " m"]) -> Float[np.ndarray, 
 def _nodes(
     plan: Plan, counts: list[int], measures: list[Float[np.ndarray, " m"]], fitting: tuple[Mapping | None, ...]
 ) -> Division:
-    """The nodes; those of free closed curves inside a ring opposite the nodes of its outer loop."""
+    """The nodes; those of a free closed curve inside a ring lie opposite the nodes of the outer loop."""
     ends = sorted({end for curve in plan.curves for end in curve.ends})
-    places = {  # the same share of the measure between each two
+    places = {  # equal shares of the measure between neighbours
         i: np.interp(np.linspace(0, measure[-1], count + 1), measure, curve.lengths)
         for i, (curve, count, measure) in enumerate(zip(plan.curves, counts, measures, strict=True))
     }
@@ -171,12 +172,12 @@ def _nodes(
 
 
 def _wrapped(curve: Curve, lengths: Float[np.ndarray, " s"]) -> Float[np.ndarray, "s 2"]:
-    """Points of a curve, which may be run through beyond its end if it is closed."""
+    """Points of a curve at arc lengths, which may exceed the length of a closed one."""
     return curve.places(lengths % curve.length if curve.free else lengths)
 
 
 def _from_outside(plan: Plan, fitting: tuple[Mapping | None, ...]) -> list[tuple[Region, Mapping]]:
-    """The mapped rings, those around others first."""
+    """The mapped rings, outer ones first."""
     rings = [(region, mapping) for region, mapping in zip(plan.regions, fitting, strict=True) if mapping]
     rings = [(region, mapping) for region, mapping in rings if len(region.loops) == 2]
 
@@ -188,7 +189,7 @@ def _from_outside(plan: Plan, fitting: tuple[Mapping | None, ...]) -> list[tuple
 
 
 def _opposite(plan: Plan, places: dict[int, Float[np.ndarray, " n"]], region: Region) -> Float[np.ndarray, " n"]:
-    """Lengths of arc along the inner curve of a ring, evenly, turned to face the nodes of the outer loop."""
+    """Arc lengths of nodes along the inner curve of a ring, nearly even, opposite the nodes of the outer loop."""
     (number, _), *_ = region.loops[1]
     curve, outer = plan.curves[number], _loop_nodes(plan, places, region.loops[0])
     count = len(outer)
@@ -199,7 +200,7 @@ def _opposite(plan: Plan, places: dict[int, Float[np.ndarray, " n"]], region: Re
     turned = np.sign(around[-1] - around[0])
     if turned != np.sign(towards[-1] - towards[0]):
         towards = towards[::-1]
-    # a mean between facing each node and an even division keeps both the angles and the lengths fair
+    # the mean of the opposite places and an even division keeps both angles and lengths good
     facing = np.interp(
         np.maximum.accumulate(turned * (towards - around[0])), turned * (around - around[0]), finer, period=2 * np.pi
     )
@@ -208,7 +209,7 @@ def _opposite(plan: Plan, places: dict[int, Float[np.ndarray, " n"]], region: Re
     shift = float((facing - even).mean())
     lengths = (facing + even + shift) / 2
     steps = np.diff(np.append(lengths, lengths[0] + curve.length))
-    if steps.min() < even[1] / 3:  # the outer loop goes back somewhere, seen from the centre
+    if steps.min() < even[1] / 3:  # the outer loop reverses somewhere, seen from the centre
         lengths = even + shift
     return np.append(lengths, lengths[0] + curve.length)
 

@@ -1,4 +1,4 @@
-"""Solids that consist of layers along one direction: the direction found, the section meshed, the mesh swept."""
+"""Solids that consist of layers along one direction: the direction, the mesh of the sections, and its sweep."""
 
 from dataclasses import replace
 from types import ModuleType
@@ -10,34 +10,39 @@ from kedfem.errors import KedfemError
 from kedfem.mesh.cad.solid_faces import places_on
 from kedfem.mesh.cad.solids import CadFace, OtherMethodError, Sizing, Solid
 from kedfem.mesh.cad.words import direction_in_words, face_in_words
-from kedfem.mesh.elements.hexahedra import SolidMesh, stacked, without_spare_nodes
+from kedfem.mesh.elements.hexahedra import SolidMesh, stacked, without_unused_nodes
 from kedfem.mesh.elements.quality import mesh_quality
 from kedfem.mesh.layered.cusps import without_cusps
 from kedfem.mesh.layered.division import plan_size
 from kedfem.mesh.layered.partition import Plan
 from kedfem.mesh.layered.plan_mesh import PlanMesh, plan_mesh
 from kedfem.mesh.layered.sections import plan_of_slabs
-from kedfem.mesh.layered.size_trials import GOOD, SHARES, not_too_bad
+from kedfem.mesh.layered.size_trials import GOOD, SHARES, good_enough
 
-_GAIN = 0.03  # of scaled Jacobian that more elements must bring
-_ALONG = 1e-5  # sine of the angle that a face may be off the direction, or off being at right angles to it
-# unknowns, ten times those above which tetrahedra are taken: not worth meshing to see it
+_GAIN = 0.03  # least improvement of the scaled Jacobian by more elements
+_ALONG = 1e-5  # sine of the largest angle between a face and the direction, or its normal plane
+# unknowns above which no mesh is made: ten times those above which tetrahedra are used instead
 FAR_TOO_MANY = 1_500_000
-_UNKNOWNS_EACH = 24  # of a 27-node hexahedron in a large mesh
+_UNKNOWNS_EACH = 24  # unknowns for each 27-node hexahedron of a large mesh
 _SAMPLES = np.linspace(0.0, 1.0, 7)
 
 
 class TooManyError(OtherMethodError):
-    """Sweeping along a direction gives far too many elements: smaller ones give more."""
+    """Sweeping along a direction gives far too many elements, and smaller ones would give more."""
 
 
 def layered_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
-    """A solid whose faces lie along one direction or across it, a `Method`: its section swept through its slabs.
+    """hex27 mesh of a solid whose faces are all parallel or perpendicular to one direction, a `Method`.
 
-    The plane faces across the direction cut the solid into slabs of constant section. All sections together
-    divide the plane into regions; these are meshed as mapped blocks where they can be, else with the best of
-    gmsh's quadrilaterals, and each is swept through the slabs in which it has material. The elements are as large as
-    :func:`~kedfem.mesh.layered.division.plan_size` says.
+    The plane faces perpendicular to the direction cut the solid into slabs of constant section. All sections together
+    divide the plane into regions. These are meshed as mapped blocks where possible, else with the best of gmsh's
+    quadrilaterals, and each is swept through the slabs in which it has material. Elements have the size of
+    :func:`~kedfem.mesh.layered.division.plan_size`.
+
+    Raises
+    ------
+    OtherMethodError
+        The solid has no such direction, the sections cannot be meshed, or the elements are too many or too bad.
     """
     best: tuple[float, SolidMesh] | None = None
     refusals: list[str] = []
@@ -62,13 +67,13 @@ def layered_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
             break
     if best is None:
         raise OtherMethodError(refusals[0])
-    return not_too_bad(solid, best[1])
+    return good_enough(solid, best[1])
 
 
 def layer_directions(gmsh: ModuleType, solid: Solid) -> tuple[Float[np.ndarray, "3"], ...]:
     """The directions along which a solid consists of layers, that with the largest area across it first.
 
-    An OtherMethodError says what is in the way.
+    An OtherMethodError names the obstacle if there is none.
     """
     found: list[Float[np.ndarray, "3"]] = []
     obstacles: list[tuple[float, str]] = []
@@ -86,13 +91,13 @@ def layer_directions(gmsh: ModuleType, solid: Solid) -> tuple[Float[np.ndarray, 
 
 
 def slanted_faces(gmsh: ModuleType, solid: Solid) -> list[list[CadFace]]:
-    """Of each direction with plane faces across it what is neither along nor across it, the least area first."""
+    """For each direction with plane faces across it the faces neither along nor across it, the least area first."""
     every = [slanted for _, slanted in _slanted(gmsh, solid) if slanted]
     return sorted(every, key=lambda faces: sum(face.area for face in faces))
 
 
 def _slanted(gmsh: ModuleType, solid: Solid) -> list[tuple[Float[np.ndarray, "3"], list[CadFace]]]:
-    """The directions with plane faces across them, the largest area first, and the faces in the way of each."""
+    """The directions with plane faces across them, the largest area first, and the faces that prevent each."""
     normals = {face.tag: places_on(gmsh, face.tag, _SAMPLES).normals for face in solid.faces}
     flat = [face for face in solid.faces if _fits(normals[face.tag], normals[face.tag][0])]
     directions = _directions([normals[face.tag][0] for face in flat], [face.area for face in flat])
@@ -102,7 +107,7 @@ def _slanted(gmsh: ModuleType, solid: Solid) -> list[tuple[Float[np.ndarray, "3"
 
 
 def _directions(normals: list[Float[np.ndarray, "3"]], areas: list[float]) -> list[Float[np.ndarray, "3"]]:
-    """The directions of normals, those with the same line taken together, the largest area first."""
+    """The different directions of normals, opposite ones counted as one, the largest area first."""
     groups: list[tuple[Float[np.ndarray, "3"], float]] = []
     for normal, area in zip(normals, areas, strict=True):
         direction = normal * np.sign(normal[np.argmax(abs(normal) > 0.999 * abs(normal).max())])
@@ -117,7 +122,7 @@ def _directions(normals: list[Float[np.ndarray, "3"]], areas: list[float]) -> li
 
 
 def _fits(normals: Float[np.ndarray, "_ 3"], direction: Float[np.ndarray, "3"]) -> bool:
-    """Whether a face is across the direction everywhere, a cap, or along it everywhere, a wall."""
+    """Whether a face is perpendicular to the direction everywhere (a cap) or parallel to it everywhere (a wall)."""
     across = np.linalg.norm(np.cross(normals, direction), axis=1).max() < _ALONG
     return bool(across or abs(normals @ direction).max() < _ALONG)
 
@@ -125,13 +130,13 @@ def _fits(normals: Float[np.ndarray, "_ 3"], direction: Float[np.ndarray, "3"]) 
 def _mesh_along(
     gmsh: ModuleType, solid: Solid, direction: Float[np.ndarray, "3"], sizing: Sizing, share: float
 ) -> SolidMesh:
-    """The mesh swept along one direction, in the solid's place."""
+    """The mesh swept along one direction, at the solid's place."""
     with plan_of_slabs(gmsh, solid, direction) as plan_with_cusps:
         size = share * plan_size(plan_with_cusps, sizing)
         plan, filled = without_cusps(plan_with_cusps, size)
         flat = plan_mesh(solid.name, plan, size, sizing)
     layers = np.maximum(np.rint(np.diff(plan.heights) / size).astype(int), max(1, sizing.layers))
-    words = _way_in_words(direction, flat, plan, int(layers.sum()))
+    words = _method_in_words(direction, flat, plan, int(layers.sum()))
     _check_count(solid, words, flat, plan, layers, sizing)
     mesh = swept(flat, plan, layers)
     if filled > 0:
@@ -142,7 +147,7 @@ def _mesh_along(
 def _check_count(
     solid: Solid, words: str, flat: PlanMesh, plan: Plan, layers: Int[np.ndarray, " s"], sizing: Sizing
 ) -> None:
-    """Refuse, before they are made, far more elements than anybody would take, unless a size is asked for."""
+    """Refuse far too many elements before they are made, unless a size is asked for."""
     material = np.stack([region.material for region in plan.regions])[flat.regions]
     unknowns = _UNKNOWNS_EACH * float((material @ layers).sum())
     if sizing.size is None and sizing.across <= 2 and unknowns > FAR_TOO_MANY:
@@ -152,8 +157,8 @@ def _check_count(
         )
 
 
-def _way_in_words(direction: Float[np.ndarray, "3"], flat: PlanMesh, plan: Plan, layers: int) -> str:
-    """How the mesh was made."""
+def _method_in_words(direction: Float[np.ndarray, "3"], flat: PlanMesh, plan: Plan, layers: int) -> str:
+    """Description of how the mesh was made."""
     slabs = len(plan.heights) - 1
     through = f"{layers} layer{'s' * (layers > 1)}"
     if slabs > 1:
@@ -162,9 +167,13 @@ def _way_in_words(direction: Float[np.ndarray, "3"], flat: PlanMesh, plan: Plan,
 
 
 def swept(flat: PlanMesh, plan: Plan, layers: Int[np.ndarray, " slabs"]) -> SolidMesh:
-    """hex27 mesh: each cell of the plan through the slabs where its region has material, so many elements through each.
+    """hex27 mesh: each cell of the plan is swept through the slabs in which its region has material.
 
-    A node's number is made of its place in the plan and of its level, so slabs share the nodes between them.
+    A node's number follows from its place in the plan and its level, so that slabs share the nodes between them.
+
+    Parameters
+    ----------
+    layers : (slabs,) number of elements through each slab
     """
     points, quads = flat.points, flat.cells
     heights = _levels(plan.heights, layers)
@@ -172,11 +181,11 @@ def swept(flat: PlanMesh, plan: Plan, layers: Int[np.ndarray, " slabs"]) -> Soli
     material = np.stack([region.material for region in plan.regions])[flat.regions]
     cell, layer = np.nonzero(material[:, slab])
     mesh = stacked(points, heights, quads[cell], layer)
-    return without_spare_nodes(replace(mesh, points=plan.extent * (mesh.points @ plan.axes)))
+    return without_unused_nodes(replace(mesh, points=plan.extent * (mesh.points @ plan.axes)))
 
 
 def _levels(bounds: Float[np.ndarray, " h"], layers: Int[np.ndarray, " s"]) -> Float[np.ndarray, " v"]:
-    """Heights of all nodes: two to a layer, those at the bounds once."""
+    """Heights of the levels of nodes: two for each layer, those at the bounds once."""
     parts = [
         np.linspace(low, high, 2 * count + 1)[1:]
         for low, high, count in zip(bounds[:-1], bounds[1:], layers, strict=True)

@@ -1,4 +1,4 @@
-"""Regions of a plan that are mapped, four sides, rings and discs: which, the numbers their sides need, their cells."""
+"""Mapped regions of a plan (blocks, rings and discs): their choice, the element numbers of their sides, their cells."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,17 +11,17 @@ from kedfem.arrays import Float, Int
 from kedfem.mesh.layered.partition import Loop, Plan, Region, corner_angles, loop_samples, signed_area
 from kedfem.mesh.planar.areas import PlaneQuads
 
-_CORNER = np.radians(150)  # an angle up to which a vertex is a corner of a four-sided region
-_DEAR = (1.6, 3.5)  # of regions with one loop and with two, the numbers on a side are not raised by more
-_UNEVEN = 4.0  # longest by shortest way across a ring
+_CORNER = np.radians(150)  # largest angle of a vertex that is a corner of a block
+_DEAR = (1.6, 3.5)  # largest factor on the elements of a side, for regions with one loop and with two
+_UNEVEN = 4.0  # largest ratio of the longest to the shortest distance across a ring
 
 
 @dataclass(frozen=True, slots=True)
 class Mapping:
-    """How a region is mapped.
+    """The mapping of a region.
 
-    kind : block: four sides; ring: between two loops; disc: inside a smooth loop
-    corners : of a block where its sides begin: places in the outer loop
+    kind : a block has four sides, a ring lies between two loops, a disc inside a smooth loop
+    corners : indices of the curves of the outer loop with which the sides of a block begin
     """
 
     kind: Literal["block", "ring", "disc"]
@@ -29,7 +29,7 @@ class Mapping:
 
 
 def mappings(plan: Plan, counts: list[int]) -> tuple[Mapping | None, ...]:
-    """Of each region how it is mapped, or None; raises the numbers of the curves so that opposite sides agree."""
+    """The mapping of each region, or None; `counts` of the curves are raised until opposite sides agree."""
     found = [_mapping(plan, region) for region in plan.regions]
     while True:
         raised, dear = _raised(plan, found, counts)
@@ -40,7 +40,7 @@ def mappings(plan: Plan, counts: list[int]) -> tuple[Mapping | None, ...]:
 
 
 def _raised(plan: Plan, found: list[Mapping | None], counts: list[int]) -> tuple[list[int], int | None]:
-    """Numbers that agree on opposite sides; or the region that asks for too many."""
+    """Counts that agree on opposite sides, and None; or a region that needs too many elements."""
     raised, number = list(counts), None
     for _ in range(200):
         uneven = _uneven_sides(plan, found, raised)
@@ -56,7 +56,7 @@ def _raised(plan: Plan, found: list[Mapping | None], counts: list[int]) -> tuple
 
 
 def _mapping(plan: Plan, region: Region) -> Mapping | None:
-    """How a region might be mapped by its form alone."""
+    """The mapping of a region that its shape allows."""
     if len(region.loops) == 2:
         return Mapping("ring") if _is_even_ring(plan, region) else None
     if len(region.loops) > 2:
@@ -72,7 +72,7 @@ def _mapping(plan: Plan, region: Region) -> Mapping | None:
 
 
 def _is_even_ring(plan: Plan, region: Region) -> bool:
-    """Whether a region between two loops is nearly as wide everywhere."""
+    """Whether the width of a region between two loops varies little."""
     outer, inner = (loop_samples(plan.curves, loop) for loop in region.loops)
     across = np.linalg.norm(outer[:, None] - inner, axis=2)
     widths = np.concatenate([across.min(axis=1), across.min(axis=0)])
@@ -81,14 +81,14 @@ def _is_even_ring(plan: Plan, region: Region) -> bool:
 
 
 def _is_round(plan: Plan, region: Region) -> bool:
-    """Whether a loop goes around an area nearly as large as a circle of its length does."""
+    """Whether the area of a loop is nearly that of a circle of the same length."""
     samples = loop_samples(plan.curves, region.loops[0])
     length = sum(plan.curves[i].length for i, _ in region.loops[0])
     return signed_area(samples) > 0.7 * length**2 / (4 * np.pi)
 
 
 def _sides_of(plan: Plan, mapping: Mapping, loops: tuple[Loop, ...]) -> list[tuple[list[int], list[int]]]:
-    """The pairs of sides, as curves, that must have equal numbers."""
+    """The pairs of sides, as curves, that must have equal numbers of elements."""
     if mapping.kind == "disc":
         return []
     curves = [[i for i, _ in loop] for loop in loops]
@@ -102,7 +102,7 @@ def _sides_of(plan: Plan, mapping: Mapping, loops: tuple[Loop, ...]) -> list[tup
 
 
 def _facing_curves(plan: Plan, loops: tuple[Loop, ...]) -> list[tuple[list[int], list[int]]]:
-    """The curves of two loops in pairs, if they are as many and none is free."""
+    """The curves of two loops in pairs, if both have the same number of curves, at least two."""
     outer, inner = loops[0], loops[1][::-1]
     if len(outer) != len(inner) or len(outer) < 2:
         return []
@@ -113,7 +113,7 @@ def _facing_curves(plan: Plan, loops: tuple[Loop, ...]) -> list[tuple[list[int],
 
 
 def _uneven_sides(plan: Plan, found: list[Mapping | None], counts: list[int]) -> tuple[int, list[int], int] | None:
-    """A region with opposite sides that do not agree: its number, the side with less, and what that must have."""
+    """A region whose opposite sides do not agree: its number, the side with fewer elements, and the number it needs."""
     for number, (mapping, region) in enumerate(zip(found, plan.regions, strict=True)):
         for pair in _sides_of(plan, mapping, region.loops) if mapping else []:
             sums = [sum(counts[i] for i in side) for side in pair]
@@ -123,7 +123,7 @@ def _uneven_sides(plan: Plan, found: list[Mapping | None], counts: list[int]) ->
 
 
 def _raise(plan: Plan, counts: list[int], side: list[int], wanted: int) -> None:
-    """Raises the numbers on a side two by two, each time where the elements are longest."""
+    """Raise the counts of a side by two at a time, on the curve whose elements are longest."""
     while sum(counts[i] for i in side) < wanted:
         longest = max(side, key=lambda i: plan.curves[i].length / counts[i])
         counts[longest] += 2
@@ -133,10 +133,9 @@ def _raise(plan: Plan, counts: list[int], side: list[int], wanted: int) -> None:
 class Rim:
     """The divided boundary of a region.
 
-    points : (n, 2) its nodes
-    loops : numbers of the nodes along each curve of each loop, the region on the left, the outer loop first
-    middles : (n, 2) the boundary's point half way between each node and the next one of its loop, in the order of
-        `sides`
+    points : (n, 2) its nodes [-]
+    loops : node numbers along each curve of each loop, the region on the left, the outer loop first
+    middles : (n, 2) points of the boundary half way along each side, in the order of `sides` [-]
     """
 
     points: Float[np.ndarray, "n 2"]
@@ -162,7 +161,7 @@ def mapped(rim: Rim, mapping: Mapping) -> PlaneQuads:
 
 
 def _block(rim: Rim, mapping: Mapping) -> tuple[Float[np.ndarray, "_ 2"], Int[np.ndarray, "_ 4"]]:
-    """Four sides: transfinite interpolation between them."""
+    """Inner nodes and cells of a block, by transfinite interpolation between its sides."""
     curves = rim.loops[0]
     starts = np.cumsum([0, *(len(curve) - 1 for curve in curves)])
     turned = np.roll(rim.nodes(0), -starts[mapping.corners[0]])
@@ -173,7 +172,7 @@ def _block(rim: Rim, mapping: Mapping) -> tuple[Float[np.ndarray, "_ 2"], Int[np
 def _transfinite(
     points: Float[np.ndarray, "n 2"], around: Int[np.ndarray, " m"], bounds: Sequence[int]
 ) -> tuple[Float[np.ndarray, "_ 2"], Int[np.ndarray, "_ 4"]]:
-    """Coons' patch: nodes inside four sides, of nodes around it between bounds, and its cells."""
+    """Inner nodes and cells of a Coons patch; `bounds` divide the nodes around it into four sides."""
     sides = [np.append(around, around[0])[start : end + 1] for start, end in pairwise(bounds)]
     south, east, north, west = sides[0], sides[1], sides[2][::-1], sides[3][::-1]
     i, j = len(south), len(west)
@@ -189,13 +188,13 @@ def _transfinite(
 
 
 def _cells(grid: Int[np.ndarray, "i j"]) -> Int[np.ndarray, "_ 4"]:
-    """Quadrilaterals between the nodes of a grid, anticlockwise if i to j is."""
+    """Quadrilaterals between the nodes of a grid, anticlockwise if the turn from i to j is."""
     corners = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
     return np.stack(corners, axis=-1).reshape(-1, 4)
 
 
 def _ring(rim: Rim, _: Mapping) -> tuple[Float[np.ndarray, "_ 2"], Int[np.ndarray, "_ 4"]]:
-    """Between two loops of as many nodes: straight lines across, divided as the sides' lengths ask for."""
+    """Inner nodes and cells of a ring: straight lines between loops of equal numbers of nodes, in nearly square cells."""
     outer, inner = rim.nodes(0), rim.nodes(1)[::-1]
     facing = np.roll(inner, -_offset(rim.points[outer], rim.points[inner]))
     across = np.linalg.norm(rim.points[outer] - rim.points[facing], axis=1).mean()
@@ -205,7 +204,7 @@ def _ring(rim: Rim, _: Mapping) -> tuple[Float[np.ndarray, "_ 2"], Int[np.ndarra
 
 
 def _offset(outer: Float[np.ndarray, "n 2"], inner: Float[np.ndarray, "n 2"]) -> int:
-    """How far to turn the nodes of an inner loop so that they face those of the outer one."""
+    """Shift of the nodes of an inner loop that places them nearest to those of the outer one."""
     turned = [((outer - np.roll(inner, -k, axis=0)) ** 2).sum() for k in range(len(inner))]
     return int(np.argmin(turned))
 
@@ -222,7 +221,7 @@ def _between(
 
 
 def _disc(rim: Rim, _: Mapping) -> tuple[Float[np.ndarray, "_ 2"], Int[np.ndarray, "_ 4"]]:
-    """A rectangle of cells inside a ring of them."""
+    """Inner nodes and cells of a disc: a rectangle of cells inside a ring of cells."""
     outer = rim.nodes(0)
     count = len(outer)
     i = count // 4

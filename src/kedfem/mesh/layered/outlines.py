@@ -1,4 +1,4 @@
-"""Outlines of a scene, straight and circular edges around an area with round holes, meshed as sections of parts are."""
+"""Meshes of plane outlines with straight and circular edges and round holes, made as sections of parts are."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,20 +15,20 @@ from kedfem.mesh.layered.cusps import without_cusps
 from kedfem.mesh.layered.division import plan_size
 from kedfem.mesh.layered.partition import Plan
 from kedfem.mesh.layered.plan_mesh import PlanMesh, plan_mesh
-from kedfem.mesh.layered.sections import laid_over
+from kedfem.mesh.layered.sections import plan_of_sections
 from kedfem.mesh.layered.size_trials import first_good
 from kedfem.mesh.memory_forecast import check_count, check_size, size_key
 from kedfem.mesh.planar.areas import Quads
 from kedfem.mesh.session import gmsh_model
 from kedfem.scene.records.outlines import Arc, Profile
 
-_FLAT = np.array([0.0, 1.0])  # where its only slab begins and ends: sizes do not depend on it
+_FLAT = np.array([0.0, 1.0])  # bounds of the plan's only slab, on which sizes do not depend
 _STRAIGHT = (np.nan, np.nan)
 
 
 @dataclass(frozen=True, slots=True)
 class Outline:
-    """A closed plane outline and round holes inside it; checked by the scene, taken on trust here.
+    """A closed plane outline and round holes inside it; the scene has checked it.
 
     corners : (k, 2) ends of the edges in order [m]; edge i runs from corner i to corner i+1, the last one back to the
         first
@@ -44,7 +44,7 @@ class Outline:
 
 
 def profile_outline(profile: Profile) -> Outline:
-    """The outline that a profile of the scene draws, in its own x and y."""
+    """The outline of a profile of the scene, in its own x and y."""
     ends = [item.to if isinstance(item, Arc) else item for item in profile.outline]
     via = [item.via[:2] if isinstance(item, Arc) else _STRAIGHT for item in profile.outline]
     corners = np.array([end[:2] for end in ends])
@@ -73,14 +73,16 @@ def outline_quads(where: str, outline: Outline, sizing: Sizing) -> tuple[Quads, 
 
     Returns
     -------
-    (n, 2) [m] and (e, 9): plane nodes; cells in VTK order, anticlockwise
-    For the report: which share of the area the cusps are that were cut off
+    (n, 2) [m] and (e, 9)
+        Plane nodes; cells in VTK order, anticlockwise.
+    str
+        A note on cusps that were cut off, empty without any.
 
     Raises
     ------
     MeshError
-        The size is larger than the outline or gives far too many elements, gmsh cannot be used, or quadrilaterals do not
-        fill the outline.
+        The size is larger than the outline or gives far too many elements, gmsh cannot be used, or the outline cannot be
+        filled with quadrilaterals.
     """
     with _plan(where, outline) as plan:
         size = plan_size(plan, sizing)
@@ -98,18 +100,18 @@ def outline_quads(where: str, outline: Outline, sizing: Sizing) -> tuple[Quads, 
 
 
 def _meshed(where: str, plan: Plan, size: float, sizing: Sizing) -> tuple[PlanMesh, float]:
-    """The mesh of a plan without its cusps, and the share of the area that these are."""
+    """The mesh of a plan without its cusps, and their share of the area."""
     whole, lost = without_cusps(plan, size)
     return plan_mesh(where, whole, size, sizing), lost
 
 
 @contextmanager
 def _plan(where: str, outline: Outline) -> Iterator[Plan]:
-    """An outline as a plan of one region; its curves can be asked for places within the context."""
+    """An outline as a plan of one region; its curves give points only within the context."""
     extent = float(np.linalg.norm(np.ptp(outline.corners, axis=0)))
     with gmsh_model() as gmsh:
         try:
-            plan = laid_over(gmsh, [[(2, surface_of(gmsh, outline, 1 / extent))]], np.eye(3), extent, _FLAT)
+            plan = plan_of_sections(gmsh, [[(2, surface_of(gmsh, outline, 1 / extent))]], np.eye(3), extent, _FLAT)
         except Exception as error:  # gmsh raises nothing more special
             raise MeshError(
                 f"{where}.shape: must be an area, got none from OpenCASCADE: {error}; change the outline"
@@ -118,7 +120,7 @@ def _plan(where: str, outline: Outline) -> Iterator[Plan]:
 
 
 def surface_of(gmsh: ModuleType, outline: Outline, factor: float) -> int:
-    """The area inside an outline as a face of gmsh's model, all lengths multiplied: tolerances are absolute."""
+    """The area inside an outline as a face of gmsh's model, lengths times a factor because tolerances are absolute."""
     occ = gmsh.model.occ
     corners = [occ.addPoint(x, y, 0) for x, y in factor * outline.corners]
     edges = zip(corners, corners[1:] + corners[:1], factor * outline.via, strict=True)

@@ -1,4 +1,4 @@
-"""The plan of a solid made of layers: a partition of the plane, each region with the slabs that it has material in."""
+"""The plan of a solid made of layers: a partition of the plane into regions, with the slabs in which each is filled."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -12,24 +12,24 @@ from kedfem.arrays import Bool, Float
 class Curve:
     """A curve between two regions, or between one and the outside.
 
-    ends : numbers of the vertices where it starts and ends; the same one if it is closed
-    free : whether it is closed and its vertex may be anywhere on it: no other curve meets it
-    lengths : (m,) length of arc from the start to each sample [-]
+    ends : numbers of the vertices where it starts and ends, equal if it is closed
+    free : whether it is closed and meets no other curve, so that its vertex may be anywhere on it
+    lengths : (m,) arc length from the start to each sample [-]
     samples : (m, 2) points along the curve, from end to end [-]
-    bends : (m,) curvature there, positive or 0 [-]
-    places : the points at lengths of arc, exactly on the curve
+    curvatures : (m,) curvature at the samples, at least 0 [-]
+    places : function from arc lengths to points exactly on the curve
     """
 
     ends: tuple[int, int]
     free: bool
     lengths: Float[np.ndarray, " m"]
     samples: Float[np.ndarray, "m 2"]
-    bends: Float[np.ndarray, " m"]
+    curvatures: Float[np.ndarray, " m"]
     places: Callable[[Float[np.ndarray, " s"]], Float[np.ndarray, "s 2"]]
 
     @property
     def length(self) -> float:
-        """Length of arc."""
+        """Arc length."""
         return float(self.lengths[-1])
 
     @property
@@ -41,7 +41,7 @@ class Curve:
         return np.asarray(along / np.linalg.norm(along, axis=1, keepdims=True))
 
 
-#: Curves one after the other: the number of each, and whether it is run through from its start to its end.
+#: A sequence of curves: the number of each, and whether it runs from its start to its end.
 Loop = tuple[tuple[int, bool], ...]
 
 
@@ -49,8 +49,8 @@ Loop = tuple[tuple[int, bool], ...]
 class Region:
     """A part of the plane inside which no section has an edge.
 
-    loops : its boundary with the region on the left: the outer loop first, then those around holes
-    material : (slabs,) in which slabs there is material
+    loops : its boundary, the region on the left: the outer loop, then those around holes
+    material : (slabs,) whether each slab has material here
     area : [-]
     """
 
@@ -65,10 +65,10 @@ class Plan:
 
     axes : (3, 3) rows: the plan's x and y and the direction of the layers, in the solid's components [-]
     extent : the unit of all lengths here [m]
-    heights : (slabs + 1,) where the slabs begin and end along the direction [-]
+    heights : (slabs + 1,) bounds of the slabs along the direction [-]
     curves : tuple of Curve
     regions : tuple of Region
-    origin : (3,) where the plan's lengths begin, in the solid's components [m]
+    origin : (3,) origin of the plan, in the solid's components [m]
     """
 
     axes: Float[np.ndarray, "3 3"]
@@ -86,7 +86,7 @@ class Plan:
 
     @property
     def wall_heights(self) -> Float[np.ndarray, " c"]:
-        """Of each curve the height over which it is a wall: with material on one side alone."""
+        """Total height over which each curve is a wall, with material on one side only [-]."""
         odd = np.zeros((len(self.curves), len(self.heights) - 1), dtype=bool)
         for region in self.regions:
             for loop in region.loops:
@@ -95,12 +95,12 @@ class Plan:
         return np.asarray(odd @ np.diff(self.heights))
 
     def in_space(self, point: Float[np.ndarray, "2"], height: float) -> Float[np.ndarray, "3"]:
-        """A point of the plan at a height, where it is in the solid [m]."""
+        """A point of the plan at a height, in the solid's components [m]."""
         return np.asarray(self.origin + self.extent * (np.array([*point, height]) @ self.axes))
 
 
 def loop_samples(curves: tuple[Curve, ...], loop: Loop) -> Float[np.ndarray, "_ 2"]:
-    """Points along a loop, in its order."""
+    """Points along a loop, in order."""
     parts = [curves[i].samples if forward else curves[i].samples[::-1] for i, forward in loop]
     return np.concatenate([part[:-1] for part in parts])
 

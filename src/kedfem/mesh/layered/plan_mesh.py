@@ -1,4 +1,4 @@
-"""The mesh of a plan: its regions filled one by one, mapped or by gmsh, between nodes that they share; as quad9 cells."""
+"""The mesh of a plan as quad9 cells: each region is mapped or filled by gmsh, between nodes that neighbours share."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,21 +17,20 @@ from kedfem.mesh.planar.areas import PlaneQuads, directed_sides, quadratic_quads
 from kedfem.mesh.planar.choice import GOOD, SETTINGS, Setting, best_quads
 from kedfem.mesh.session import gmsh_model, gmsh_options, quadrilaterals
 
-_BETTER = 0.05  # by which gmsh's quadrilaterals must be better than mapped ones
-_LINE, _POINT = 1, 15  # gmsh's numbers of elements
-# of a region's rim: a sliver of micrometres asks for more; all are compared with each other
-_MOST_SIDES = 4000
-_ROUNDING = 1e-24  # square of the area between sides that are on one line
+_BETTER = 0.05  # least improvement of the scaled Jacobian by gmsh's quadrilaterals over mapped ones
+_LINE, _POINT = 1, 15  # gmsh's numbers of element types
+_MOST_SIDES = 4000  # of a rim, whose sides are all compared; slivers of micrometres would have more
+_ROUNDING = 1e-24  # square of the area between sides on one line
 
 
 @dataclass(frozen=True, slots=True)
 class PlanMesh:
     """quad9 cells of a plan.
 
-    points : (n, 2) by the solid's extent [-]
+    points : (n, 2) nodes, by the solid's extent [-]
     cells : (e, 9) VTK order, anticlockwise
-    regions : (e,) the region that each cell is in
-    settings : gmsh's algorithms that made cells; empty: all regions are mapped
+    regions : (e,) the region of each cell
+    settings : gmsh's algorithms that made cells; empty if all regions are mapped
     """
 
     points: Float[np.ndarray, "n 2"]
@@ -41,22 +40,22 @@ class PlanMesh:
 
     @property
     def kind(self) -> str:
-        """What is swept, in words."""
+        """Description of the cells."""
         return "quadrilaterals" if self.settings else "mapped blocks,"
 
     @property
     def made_by(self) -> str:
-        """gmsh's algorithms in words, after a semicolon; empty without any."""
+        """gmsh's algorithms, after a semicolon; empty without any."""
         return f"; gmsh algorithm {', '.join(map(str, self.settings))}" if self.settings else ""
 
 
 def plan_mesh(where: str, plan: Plan, size: float, sizing: Sizing) -> PlanMesh:
-    """The mesh of a plan, the nodes and middles of sides on its curves exactly there.
+    """The mesh of a plan; nodes on its curves, also those in the middles of sides, lie exactly on them.
 
     Raises
     ------
     OtherMethodError
-        A region has a cusp, or quadrilaterals do not fill it; with its place.
+        A region has a cusp or cannot be filled with quadrilaterals; the message has its place.
     """
     _check_cusps(where, plan)
     division, fitting = divided(plan, size, sizing)
@@ -79,7 +78,7 @@ def plan_mesh(where: str, plan: Plan, size: float, sizing: Sizing) -> PlanMesh:
 
 
 def _check_cusps(where: str, plan: Plan) -> None:
-    """Refuses a plan where two curves meet at hardly any angle."""
+    """Refuse a plan with cusps."""
     for cusp in cusps(plan):
         region = plan.regions[cusp.region]
         i, forward = region.loops[cusp.loop][cusp.place]
@@ -92,7 +91,7 @@ def _check_cusps(where: str, plan: Plan) -> None:
 
 
 def _rim(division: Division, region: Region) -> tuple[Int[np.ndarray, " n"], Rim]:
-    """The boundary of a region: the division's numbers of its nodes, and the same with numbers of its own."""
+    """The node numbers of a region's boundary, and the boundary with node numbers of its own."""
     loops, middles = [], []
     for loop in region.loops:
         loops.append([division.nodes[i] if forward else division.nodes[i][::-1] for i, forward in loop])
@@ -103,7 +102,7 @@ def _rim(division: Division, region: Region) -> tuple[Int[np.ndarray, " n"], Rim
 
 
 def _filled(where: str, plan: Plan, region: Region, rim: Rim, mapping: Mapping | None) -> tuple[PlaneQuads, int]:
-    """The cells of one region and gmsh's algorithm that made them, 0 if it is mapped."""
+    """The cells of one region, and gmsh's algorithm that made them, 0 if it is mapped."""
     best = best_quads([mapped(rim, mapping)]) if mapping else None
     algorithm = 0
     if best is None or best.quality < GOOD:
@@ -120,9 +119,9 @@ def _filled(where: str, plan: Plan, region: Region, rim: Rim, mapping: Mapping |
 
 
 def polygon_quads(rim: Rim) -> Iterator[PlaneQuads | None]:
-    """What gmsh makes of a region under each setting, on the rim's own nodes; None if not quadrilaterals alone."""
+    """gmsh's mesh of a region under each setting, on the nodes of the rim; None if it has other cells or none."""
     if len(rim.sides) > _MOST_SIDES or crosses_itself(rim.points, rim.sides):
-        return  # gmsh might never come back
+        return  # gmsh might hang
     for setting in SETTINGS:
         with gmsh_model() as gmsh:
             try:
@@ -133,9 +132,9 @@ def polygon_quads(rim: Rim) -> Iterator[PlaneQuads | None]:
 
 
 def _meshed(gmsh: ModuleType, rim: Rim, setting: Setting) -> PlaneQuads | None:
-    """The mesh under one setting; where that halves all sides, gmsh is given every other node."""
+    """The mesh under one setting; if that halves all sides, gmsh is given every other node."""
     step = 1 + setting.subdivision
-    surface = _drawn(gmsh, rim, step)
+    surface = _surface(gmsh, rim, step)
     sides = np.linalg.norm(np.diff(rim.points[rim.sides], axis=1)[:, 0], axis=1)
     options = {
         "Mesh.ElementOrder": 1,
@@ -154,8 +153,8 @@ def _meshed(gmsh: ModuleType, rim: Rim, setting: Setting) -> PlaneQuads | None:
     return _on_rim(rim, step, points, cells)
 
 
-def _drawn(gmsh: ModuleType, rim: Rim, step: int) -> int:
-    """The region as a plane surface between divided curves of gmsh's model."""
+def _surface(gmsh: ModuleType, rim: Rim, step: int) -> int:
+    """The region as a plane surface between divided curves in gmsh's model."""
     model, loops = gmsh.model, []
     for node in np.unique([curve[[0, -1]] for loop in rim.loops for curve in loop]):
         place = [*rim.points[node], 0.0]
@@ -180,7 +179,7 @@ def _drawn(gmsh: ModuleType, rim: Rim, step: int) -> int:
 
 
 def _on_rim(rim: Rim, step: int, points: Float[np.ndarray, "n 2"], cells: Int[np.ndarray, "e 4"]) -> PlaneQuads | None:
-    """The mesh with the rim's nodes first, at their places; None if its boundary is another one."""
+    """The mesh with the rim's nodes first and at their places; None if its boundary differs from the rim."""
     diagonals = points[cells[:, 2:]] - points[cells[:, :2]]
     if np.linalg.det(diagonals).sum() < 0:
         cells = cells[:, ::-1]
@@ -203,7 +202,7 @@ def _on_rim(rim: Rim, step: int, points: Float[np.ndarray, "n 2"], cells: Int[np
 
 
 def _given_places(rim: Rim, step: int) -> Float[np.ndarray, "n 2"]:
-    """Where gmsh has the rim's nodes: those that it makes by halving are half way along straight sides."""
+    """The rim's nodes in gmsh's mesh, where those made by halving are half way along straight sides."""
     where = rim.points.copy()
     if step == 2:
         for curve in (curve for loop in rim.loops for curve in loop):

@@ -1,4 +1,4 @@
-"""The plan of a solid made of layers, by gmsh's OpenCASCADE: sections of its slabs, laid over each other."""
+"""The plan of a solid made of layers: sections of its slabs, cut and combined by OpenCASCADE through gmsh."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -15,39 +15,38 @@ from kedfem.mesh.layered.partition import Curve, Loop, Plan, Region, loop_sample
 from kedfem.mesh.session import gmsh_copy
 
 _SAMPLES = 33  # along each curve
-_SAME = 1e-6  # heights and points nearer to each other than so much of the extent are one
-
-_LOST = 5e-5  # of the volume: sections of free forms are approximate
+_SAME = 1e-6  # difference, in extents, within which heights are the same
+_LOST = 5e-5  # most difference of volumes: sections of free forms are approximate
 
 
 @dataclass(frozen=True, slots=True)
 class _Piece:
-    """A curve of gmsh's model as it is run through: parameters, lengths of arc and points of its samples."""
+    """A curve of gmsh's model in one direction: its tag, end vertices and samples, and the tangents at its ends."""
 
     tag: int
     ends: tuple[int, int]
     parameters: Float[np.ndarray, " m"]
     lengths: Float[np.ndarray, " m"]
     samples: Float[np.ndarray, "m 2"]
-    bends: Float[np.ndarray, " m"]
+    curvatures: Float[np.ndarray, " m"]
     tangents: Float[np.ndarray, "2 2"]
 
     def reversed(self) -> "_Piece":
-        """The curve run through from its end."""
+        """The curve in the opposite direction."""
         return _Piece(
             self.tag, self.ends[::-1], self.parameters[::-1], self.lengths[-1] - self.lengths[::-1],
-            self.samples[::-1], self.bends[::-1], -self.tangents[::-1],
+            self.samples[::-1], self.curvatures[::-1], -self.tangents[::-1],
         )  # fmt: skip
 
 
 @contextmanager
 def plan_of_slabs(gmsh: ModuleType, solid: Solid, direction: Float[np.ndarray, "3"]) -> Iterator[Plan]:
-    """The plan of a solid along a direction; its curves can be asked for places within the context.
+    """The plan of a solid along a direction; its curves give points only within the context.
 
     Raises
     ------
     OtherMethodError
-        The sections do not fill the solid's volume: its faces are not what they seem.
+        OpenCASCADE cannot cut the sections, or they do not fill the solid's volume.
     """
     axes, extent = plan_axes(direction), solid.extent
     heights = _slab_heights(gmsh, solid, axes[2])
@@ -56,13 +55,13 @@ def plan_of_slabs(gmsh: ModuleType, solid: Solid, direction: Float[np.ndarray, "
             [(_, tag)] = other.model.getEntities(3)
             middles = (heights[1:] + heights[:-1]) / 2
             faces = [_slab_section(other, int(tag), axes, height) for height in middles]
-            plan = laid_over(other, faces, axes, extent, heights)
+            plan = plan_of_sections(other, faces, axes, extent, heights)
         check_volume(solid, plan)
         yield plan
 
 
 def plan_axes(direction: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
-    """Rows x, y, z of a right-handed frame with z along the direction; global axes where that can be."""
+    """Axes x, y, z as rows of a right-handed frame with z along the direction; global axes where possible."""
     z = direction / np.linalg.norm(direction)
     first = np.roll(np.eye(3), 2 - int(np.argmax(abs(z))), axis=0)[0]
     x = first - (first @ z) * z
@@ -97,7 +96,7 @@ def _slab_section(gmsh: ModuleType, solid: int, axes: Float[np.ndarray, "3 3"], 
 
 @contextmanager
 def reporting(solid: Solid, must: str) -> Iterator[None]:
-    """What OpenCASCADE cannot cut is reported with what must be."""
+    """Turn a failure of OpenCASCADE into an OtherMethodError that says what is required."""
     try:
         yield
     except KedfemError:
@@ -116,14 +115,20 @@ def section(gmsh: ModuleType, solid: int, corners: Float[np.ndarray, "4 3"]) -> 
     return [(dim, tag) for dim, tag in cut if dim == 2]
 
 
-def laid_over(
+def plan_of_sections(
     gmsh: ModuleType,
     sections: list[list[tuple[int, int]]],
     axes: Float[np.ndarray, "3 3"],
     extent: float,
     heights: Float[np.ndarray, " h"],
 ) -> Plan:
-    """The partition of the plane that all sections make together."""
+    """The partition of the plane that all sections make together.
+
+    Parameters
+    ----------
+    sections : the faces of each slab's section, in gmsh's model
+    axes, extent, heights : as of `Plan`
+    """
     faces = [face for section in sections for face in section]
     pieces = gmsh.model.occ.fragment(faces, [])[1] if len(faces) > 1 else [[face] for face in faces]
     gmsh.model.occ.synchronize()
@@ -161,10 +166,10 @@ def _piece(gmsh: ModuleType, tag: int, axes: Float[np.ndarray, "3 3"]) -> _Piece
     ends = [int(end) for _, end in gmsh.model.getBoundary([(1, tag)], oriented=False, combined=False)]
     if len(ends) == 2 and _is_reversed(gmsh, ends, samples, axes):
         ends.reverse()
-    bends = abs(np.asarray(gmsh.model.getCurvature(1, tag, parameters)))
+    curvatures = abs(np.asarray(gmsh.model.getCurvature(1, tag, parameters)))
     return _Piece(
         tag, (ends[0], ends[-1]), parameters, np.concatenate([[0.0], np.cumsum(steps)]), samples,
-        np.where(np.isfinite(bends), bends, 0.0), (slopes / speeds[:, None])[[0, -1]],
+        np.where(np.isfinite(curvatures), curvatures, 0.0), (slopes / speeds[:, None])[[0, -1]],
     )  # fmt: skip
 
 
@@ -184,7 +189,7 @@ def _places(
 
 
 def _chains(pieces: dict[int, _Piece]) -> list[list[_Piece]]:
-    """Pieces that go on as one curve, joined: where just two meet, tangent and of one curvature."""
+    """Pieces joined to smooth curves, where exactly two meet with equal tangents and curvatures."""
     at: dict[int, list[int]] = {}
     for tag, piece in pieces.items():
         for end in piece.ends:
@@ -202,7 +207,7 @@ def _chains(pieces: dict[int, _Piece]) -> list[list[_Piece]]:
 
 
 def _follower(chain: list[_Piece], at: dict[int, list[int]], left: dict[int, _Piece]) -> _Piece | None:
-    """The piece that goes on where a chain ends, if there is one and it does so smoothly."""
+    """The piece that continues a chain smoothly, if there is one."""
     last, end = chain[-1], chain[-1].ends[1]
     others = [tag for tag in at[end] if tag in left]
     if len(at[end]) != 2 or len(others) != 1:
@@ -210,12 +215,12 @@ def _follower(chain: list[_Piece], at: dict[int, list[int]], left: dict[int, _Pi
     piece = left[others[0]]
     piece = piece if piece.ends[0] == end else piece.reversed()
     tangent = last.tangents[1] @ piece.tangents[0] > 1 - 1e-8
-    same_bend = abs(last.bends[-1] - piece.bends[0]) < 1e-4 * (1 + last.bends[-1])
+    same_bend = abs(last.curvatures[-1] - piece.curvatures[0]) < 1e-4 * (1 + last.curvatures[-1])
     return piece if tangent and same_bend else None
 
 
 def _curve(gmsh: ModuleType, chain: list[_Piece], axes: Float[np.ndarray, "3 3"], met: Counter[int]) -> Curve:
-    """The curve that a chain of pieces makes; `met`: how many ends of curves are at each vertex."""
+    """The curve that a chain of pieces makes; `met` counts the ends of curves at each vertex."""
     starts = np.concatenate([[0.0], np.cumsum([piece.lengths[-1] for piece in chain])])
 
     def places(lengths: Float[np.ndarray, " s"]) -> Float[np.ndarray, "s 2"]:
@@ -234,12 +239,12 @@ def _curve(gmsh: ModuleType, chain: list[_Piece], axes: Float[np.ndarray, "3 3"]
     samples = np.concatenate([chain[0].samples[:1], *(piece.samples[1:] for piece in chain)])
     begun = zip(starts[:-1], chain, strict=True)
     lengths = np.concatenate([[0.0], *(start + piece.lengths[1:] for start, piece in begun)])
-    bends = np.concatenate([chain[0].bends[:1], *(piece.bends[1:] for piece in chain)])
-    return Curve(ends, ends[0] == ends[1] and met[ends[0]] == 2, lengths, samples, bends, places)
+    curvatures = np.concatenate([chain[0].curvatures[:1], *(piece.curvatures[1:] for piece in chain)])
+    return Curve(ends, ends[0] == ends[1] and met[ends[0]] == 2, lengths, samples, curvatures, places)
 
 
 def _loops(curves: tuple[Curve, ...], numbers: list[int]) -> list[Loop]:
-    """Closed loops of curves, each run through in one direction or the other."""
+    """Closed loops of curves, each in one of its directions."""
     left, loops = set(numbers), []
     while left:
         first = min(left)
@@ -256,7 +261,7 @@ def _loops(curves: tuple[Curve, ...], numbers: list[int]) -> list[Loop]:
 
 
 def _oriented(curves: tuple[Curve, ...], loops: list[Loop]) -> tuple[Loop, ...]:
-    """The loops with the region on the left, the outer one, that around the largest area, first."""
+    """The loops with the region on the left, the outer one, which has the largest area, first."""
     areas = [signed_area(loop_samples(curves, loop)) for loop in loops]
     order = sorted(range(len(loops)), key=lambda i: -abs(areas[i]))
     return tuple(
@@ -265,7 +270,7 @@ def _oriented(curves: tuple[Curve, ...], loops: list[Loop]) -> tuple[Loop, ...]:
 
 
 def check_volume(solid: Solid, plan: Plan) -> None:
-    """Refuses sections that do not make up the solid."""
+    """Refuse sections that do not fill the solid's volume."""
     share = plan.volume * plan.extent**3 / solid.volume
     if abs(share - 1) > _LOST:
         raise OtherMethodError(f"{solid.name}: swept sections must fill its volume, got {share:.6g} of it")

@@ -1,32 +1,31 @@
-"""The element size of a swept mesh: as asked for, smaller where elements are poor, larger where they are too many."""
+"""The element size of a swept mesh: as asked for, smaller if elements are bad, larger if they are too many."""
 
 from collections.abc import Callable
 from typing import TypeVar
 
 from kedfem.errors import KedfemError
-from kedfem.mesh.cad.solids import OtherMethodError, Sizing, Solid
+from kedfem.mesh.cad.solids import MANY_UNKNOWNS, OtherMethodError, Sizing, Solid
 from kedfem.mesh.elements.hexahedra import SolidMesh
 from kedfem.mesh.elements.quality import mesh_quality
 from kedfem.mesh.places import in_mm
 
 GOOD = 0.3  # scaled Jacobian from which no smaller size is tried
-SHARES = (1.0, 0.75, 0.5)  # of the size that is asked for
-_LEAST = 0.1  # scaled Jacobian below which another method may do better
-_PLENTY = 45_000  # unknowns above which a part whose size nobody gave is meshed coarser, as with tetrahedra
-_COARSER = (1.4, 2.0)  # times the size
+SHARES = (1.0, 0.75, 0.5)  # of the size asked for, tried in turn
+_LEAST = 0.1  # scaled Jacobian below which another method may be better
+_COARSER = (1.4, 2.0)  # factors on the size
 
 T = TypeVar("T")
 
 
 def first_good(mesh_of: Callable[[float], T], quality: Callable[[T], float]) -> tuple[float, T]:
-    """The first good mesh of some shares of the size, else the best, after its quality.
+    """Quality and mesh: the first good mesh at some shares of the size, else the best one.
 
-    An OtherMethodError says why none is made of the whole size.
+    An OtherMethodError says why the whole size fails if every share does.
 
     Parameters
     ----------
-    mesh_of : the mesh with elements of a share of the size
-    quality : its least scaled Jacobian
+    mesh_of : function from a share of the size to the mesh
+    quality : function from a mesh to its least scaled Jacobian [-]
     """
     found: list[tuple[float, T]] = []
     refusals: list[str] = []
@@ -45,20 +44,22 @@ def first_good(mesh_of: Callable[[float], T], quality: Callable[[T], float]) -> 
 
 
 def sized(solid: Solid, sizing: Sizing, mesh_of: Callable[[float], SolidMesh]) -> SolidMesh:
-    """The first good mesh of some shares of the size, or a cheaper one; else the best; OtherMethodError if all are poor.
+    """The first good mesh at some shares of the size, or a coarser good one if it has many unknowns; else the best.
+
+    An OtherMethodError is raised if all are bad.
 
     Parameters
     ----------
-    mesh_of : the mesh with elements of a share of that size
+    mesh_of : function from a share of the size to the mesh
     """
     least, mesh = first_good(mesh_of, lambda each: mesh_quality(each).least)
-    return _cheaper(sizing, mesh, mesh_of) if least >= GOOD else not_too_bad(solid, mesh)
+    return _cheaper(sizing, mesh, mesh_of) if least >= GOOD else good_enough(solid, mesh)
 
 
 def _cheaper(sizing: Sizing, mesh: SolidMesh, mesh_of: Callable[[float], SolidMesh]) -> SolidMesh:
-    """The mesh, or a good one of larger elements where nobody asked for so many."""
+    """The mesh, or a good one with larger elements if it has many unknowns that nobody asked for."""
     for share in _COARSER if sizing.size is None and sizing.across <= 2 else ():
-        if 3 * len(mesh.points) <= _PLENTY:
+        if 3 * len(mesh.points) <= MANY_UNKNOWNS:
             break
         try:
             other = mesh_of(share)
@@ -69,8 +70,8 @@ def _cheaper(sizing: Sizing, mesh: SolidMesh, mesh_of: Callable[[float], SolidMe
     return mesh
 
 
-def not_too_bad(solid: Solid, mesh: SolidMesh, what: str = "a sweep") -> SolidMesh:
-    """The mesh itself, unless another method may do better."""
+def good_enough(solid: Solid, mesh: SolidMesh, what: str = "a sweep") -> SolidMesh:
+    """The mesh itself; an OtherMethodError if its quality is too low."""
     quality = mesh_quality(mesh)
     if quality.least < _LEAST:
         raise OtherMethodError(

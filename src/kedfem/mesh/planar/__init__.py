@@ -1,1 +1,1 @@
-"""Plane meshes: outlines and areas of quadrilaterals, plate links in blocks."""
+"""Plane meshes of quadrilaterals: areas within a boundary, plate links in blocks."""

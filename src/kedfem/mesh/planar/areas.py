@@ -1,4 +1,4 @@
-"""Plane quadrilaterals inside a boundary that may be curved: straight-sided, then quadratic."""
+"""Plane quadrilaterals inside a boundary that may be curved: with straight sides, and quadratic."""
 
 from dataclasses import dataclass
 
@@ -17,8 +17,8 @@ class PlaneQuads:
 
     points : (n, 2) corners of the cells [m]
     cells : (e, 4) quadrilaterals, anticlockwise
-    rim : (b, 2) sides on the boundary, each once, from start to end as in its cell
-    middles : (b, 2) the point of the boundary half way along each of these sides [m]
+    rim : (b, 2) sides on the boundary, each once, in the direction of its cell
+    middles : (b, 2) point of the boundary half way along each of these sides [m]
     """
 
     points: Float[np.ndarray, "n 2"]
@@ -29,12 +29,12 @@ class PlaneQuads:
 
 @dataclass(frozen=True, slots=True)
 class QuadraticQuads:
-    """quad9 nodes and cells, and how the nodes follow when the free ones move.
+    """quad9 nodes and cells, and the movement of all nodes with the free ones.
 
-    points : (m, 2) corners, then middles of sides (on the boundary where there), then centres of cells [m]
+    points : (m, 2) corners, then middles of sides (those on the boundary exactly), then centres of cells [m]
     cells : (e, 9) VTK order
     free : (f,) corners inside the boundary
-    follow : (m, f) movement of each node for a movement of each free one: sides and centres stay in the middle [-]
+    follow : (m, f) movement of each node per movement of each free one; nodes of sides and centres stay in the middle [-]
     """
 
     points: Float[np.ndarray, "m 2"]
@@ -49,9 +49,9 @@ def directed_sides(cells: Int[np.ndarray, "e 4"]) -> Int[np.ndarray, "s 2"]:
 
 
 def pillowed(mesh: PlaneQuads) -> PlaneQuads:
-    """The mesh with a layer of cells put in along the whole boundary; the layer wants relaxing.
+    """The mesh with a layer of cells inserted along the whole boundary, to be relaxed afterwards.
 
-    Then no cell has two sides on a smooth boundary: an angle of 180° that no moving of inner nodes mends.
+    No cell then has two sides on a smooth boundary, an angle of 180° that no movement of inner nodes mends.
     """
     n, centres = len(mesh.points), np.repeat(mesh.points[mesh.cells].mean(axis=1), 4, axis=0)
     nodes, outer = mesh.cells.ravel(), np.unique(mesh.rim)
@@ -65,7 +65,7 @@ def pillowed(mesh: PlaneQuads) -> PlaneQuads:
 
 
 def quadratic_quads(mesh: PlaneQuads) -> QuadraticQuads:
-    """The quad9 cells with the same corners: straight inside, through the true middles on the boundary."""
+    """The quad9 cells with the same corners: straight sides inside, sides through the given middles on the boundary."""
     n, e = len(mesh.points), len(mesh.cells)
     sides, side = np.unique(np.sort(directed_sides(mesh.cells), axis=1), axis=0, return_inverse=True)
     cells = np.column_stack([mesh.cells, n + side.reshape(e, 4), n + len(sides) + np.arange(e)])

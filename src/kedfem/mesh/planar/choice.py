@@ -1,4 +1,4 @@
-"""Plane meshes of one area: each relaxed until its elements are as square as can be, the first good one taken."""
+"""The best of several plane meshes of one area, each relaxed until its elements are nearly square."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -11,30 +11,30 @@ from kedfem.mesh.elements.shape_functions import QUAD9, shape_gradients
 from kedfem.mesh.planar.areas import PlaneQuads, Quads, pillowed, quadratic_quads
 
 _GRADIENTS = shape_gradients(QUAD9, QUAD9.astype(float))
-_POWER = 4  # the higher, the more the worst element counts
-_FLOOR = 0.01  # of the median det J: below it the distortion is bent over, so that inverted elements unfold
-GOOD = 0.5  # scaled Jacobian that is good enough: no more are tried
-LARGE = 2000  # quadrilaterals from which time matters more than the last of quality
-ITERATIONS = 150, 40  # of a relaxation at most, and of a large one
-FAIR = 0.3  # scaled Jacobian below which subdivision, at four times the elements, is tried too
+_POWER = 4  # of the distortion in its sum: a higher one gives the worst element more weight
+_FLOOR = 0.01  # of the median det J: below it the distortion is finite, so that inverted elements unfold
+GOOD = 0.5  # scaled Jacobian from which no other mesh is tried
+LARGE = 2000  # quadrilaterals from which time is more important than quality
+ITERATIONS = 150, 40  # most of a relaxation, and of a large one
+FAIR = 0.3  # scaled Jacobian below which subdivision, with four times the elements, is tried too
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """One way to let gmsh make quadrilaterals: its 2-D algorithm, recombination and subdivision."""
+    """gmsh's settings for quadrilaterals: its 2-D algorithm, recombination and subdivision."""
 
     algorithm: int
     recombination: int
     subdivision: int
 
 
-#: All tried; the last, which leaves no triangles, if no other is fair. Not algorithm 11: it can hang.
+#: Tried in turn; the last, which leaves no triangles, only if no other is fair. Algorithm 11 can hang.
 SETTINGS = (*(Setting(plane, blossom, 0) for blossom in (3, 1) for plane in (6, 5, 8)), Setting(6, 1, 1))
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A relaxed mesh, the same before it was made quadratic, its worst scaled Jacobian and where it came from."""
+    """A relaxed mesh with its worst scaled Jacobian, the mesh from which it started, and the index of its setting."""
 
     quality: float
     quads: Quads
@@ -43,20 +43,20 @@ class Candidate:
 
     @property
     def corners(self) -> PlaneQuads:
-        """The relaxed mesh by its corners."""
+        """The relaxed mesh with straight sides."""
         points, cells = self.quads
         count = len(self.start.points)
         return PlaneQuads(points[:count], cells[:, :4], self.start.rim, self.start.middles)
 
 
 def best_quads(meshes: Iterable[PlaneQuads | None]) -> Candidate | None:
-    """The mesh to take of those made under each of the settings, which may be None; None if all are.
+    """The first good mesh; without one, of those within a tenth of the best quality the one with the fewest elements.
 
-    The first that is good; if none is, of those within a tenth of the best the one with the fewest elements.
+    None if there is no mesh at all.
 
     Parameters
     ----------
-    meshes : in the order of SETTINGS; no more are asked for than needed
+    meshes : in the order of SETTINGS, None where a setting fails; consumed only as far as needed
     """
     found: list[Candidate] = []
     for tried, mesh in enumerate(meshes):
@@ -71,7 +71,7 @@ def best_quads(meshes: Iterable[PlaneQuads | None]) -> Candidate | None:
 
 
 def _relaxed_meshes(mesh: PlaneQuads, tried: int) -> list[Candidate]:
-    """The mesh relaxed and, unless that is good, pillowed and relaxed."""
+    """The mesh relaxed and, unless that is good, the mesh with a boundary layer relaxed."""
     found: list[Candidate] = []
     for start in (mesh, pillowed(mesh)):
         points, cells = relaxed(start, ITERATIONS[len(mesh.cells) > LARGE])
@@ -83,12 +83,12 @@ def _relaxed_meshes(mesh: PlaneQuads, tried: int) -> list[Candidate]:
 
 
 def relaxed(mesh: PlaneQuads, iterations: int) -> Quads:
-    """quad9 mesh with the same boundary and its inner corners where the distortion is least.
+    """quad9 mesh with the same boundary, its inner corners moved to where the distortion is least.
 
     Parameters
     ----------
-    mesh : may hold inverted cells
-    iterations : at most so many steps of the minimiser (L-BFGS)
+    mesh : may have inverted cells
+    iterations : most iterations of the minimiser (L-BFGS)
     """
     start = quadratic_quads(mesh)
     if len(start.free) == 0:
@@ -110,16 +110,16 @@ def relaxed(mesh: PlaneQuads, iterations: int) -> Quads:
 def distortion(
     points: Float[np.ndarray, "m 2"], cells: Int[np.ndarray, "e 9"], floor: float
 ) -> tuple[float, Float[np.ndarray, "m 2"]]:
-    """Sum of f⁴ over the nodes of all cells, f = |J|² / (2 h), and its gradient by the nodes.
+    """Sum of f⁴ over the nodes of all cells, f = |J|² / (2 h), and its gradient with respect to the nodes.
 
     f is the inverse mean ratio: 1 for a square, infinite for an element without area. h = det J where that is
-    well above `floor`, and positive where it is not.
+    well above `floor`, and positive elsewhere.
 
     Parameters
     ----------
     points : (m, 2) nodes [m]
     cells : (e, 9) quad9 cells in VTK order
-    floor : scale of det J below which h departs from it [m²]
+    floor : det J below which h departs from it [m²]
 
     Returns
     -------

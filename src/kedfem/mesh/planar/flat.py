@@ -1,22 +1,22 @@
-"""Plates as plane meshes of quadrilaterals with a thickness, and their place in the scene."""
+"""Plates: plane meshes of quadrilaterals with a thickness and a place in the scene."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kedfem.arrays import Float, Int
-from kedfem.mesh.elements.hexahedra import SolidMesh, extruded, keep_copies, placed
+from kedfem.mesh.elements.hexahedra import SolidMesh, extruded, freeze_arrays, placed
 from kedfem.mesh.planar.areas import Quads
 
 
 @dataclass(frozen=True, slots=True)
 class QuadMesh:
-    """A mesh of quadrilaterals alone in a plane z = constant, every node used; the arrays are read-only copies.
+    """A mesh of quadrilaterals in a plane z = constant, every node used; the arrays are read-only copies.
 
     points : (n, 3) nodes in the global reference position [m]
     cells : (e, 9) node numbers in VTK order, anticlockwise (meshio: quad9)
     thickness : extent along z, half of it to either side [m]
-    method : how it was made, in the words of the report
+    method : how it was made, for reports
     """
 
     points: Float[np.ndarray, "n 3"]
@@ -25,7 +25,7 @@ class QuadMesh:
     method: str = ""
 
     def __post_init__(self) -> None:
-        keep_copies(self)
+        freeze_arrays(self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +34,8 @@ class Plate:
 
     quads : (n, 2) [m] and (e, 9): nodes and cells of the middle plane, all nodes used
     thickness : extent along z [m]
-    origin, axes : (3,), (3, 3) where the frame's origin goes, and its x, y, z as rows [m]
-    method : how its mesh was made, in the words of the report
+    origin, axes : (3,) [m], (3, 3) [-] place of the frame in the scene, and its x, y, z axes as rows
+    method : how its mesh was made, for reports
     """
 
     quads: Quads
@@ -46,7 +46,7 @@ class Plate:
 
 
 def swept_mesh(plate: Plate, layers: int) -> SolidMesh:
-    """hex27 mesh of a plate, with that many elements through its thickness."""
+    """hex27 mesh of a plate with `layers` elements through its thickness."""
     mesh = replace(extruded(*plate.quads, plate.thickness, layers), method=plate.method)
     return placed(mesh, plate.origin, plate.axes)
 

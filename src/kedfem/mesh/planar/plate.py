@@ -1,4 +1,4 @@
-"""Plate links in blocks of quadrilaterals: a ring round each bore, the waist between the rings."""
+"""Meshes of plate links in blocks of quadrilaterals: a ring round each bore, and the waist between the rings."""
 
 from dataclasses import dataclass
 
@@ -9,17 +9,17 @@ from kedfem.mesh.elements.hexahedra import rectangle_quads
 from kedfem.mesh.elements.shape_functions import QUAD9
 from kedfem.mesh.planar.areas import Quads
 
-_STEEPEST = np.pi / 8  # most that an element turns along an arc
-_STEEPEST_WAY_IN = np.pi / 6  # and along the bore where that faces the waist
-_SLENDER = 1.5  # length of the waist's elements in terms of their width
+_STEEPEST = np.pi / 8  # largest angle of an element along an arc
+_STEEPEST_WAY_IN = np.pi / 6  # the same along the bore where it faces the waist
+_SLENDER = 1.5  # length of the waist's elements in widths
 
 
 @dataclass(frozen=True, slots=True)
 class PlateSizes:
     """Plane dimensions of a plate link [m]: distance of its bores, waist, eyes outside and inside.
 
-    Eyes as wide as the waist give a stadium. Wider ones meet the waist in fillets, tangent to both, that end
-    on its sides 1.5 eye radii from the bore's centre, or before the middle of the waist.
+    Eyes as wide as the waist give a stadium. Wider ones meet the waist in fillets that are tangent to both and end on
+    its sides 1.5 eye radii from the bore's centre, or before the middle of the waist.
     """
 
     length: float
@@ -34,7 +34,7 @@ class PlateSizes:
 
     @property
     def reach(self) -> float:
-        """How far from the bore's centre the straight sides begin [m]: where the fillet or the eye ends."""
+        """Distance from the bore's centre to the straight sides, where the fillet or the eye ends [m]."""
         if not self.waisted:
             return 0.0
         R, half = self.eye_diameter / 2, self.width / 2
@@ -50,17 +50,17 @@ class PlateSizes:
 
     @property
     def shoulder(self) -> float:
-        """Half the angle that the eye's arc leaves open towards the waist, seen from its centre [rad]."""
+        """Half the opening of the eye's arc towards the waist, seen from its centre [rad]."""
         return float(np.arctan2(self.width / 2 + self.fillet_radius, self.reach))
 
 
 def plate_quads(sizes: PlateSizes, size: float) -> Quads:
-    """quad9 mesh of a plate link with its bores at (0, 0) and (length, 0), nodes of round sides on their circles.
+    """quad9 mesh of a plate link with bores at (0, 0) and (length, 0); nodes of round sides lie on their circles.
 
     Parameters
     ----------
-    sizes : the eyes at least as wide as the waist; wider ones do not meet
-    size : edge length of the elements [m]; those of the waist may be half as long again
+    sizes : eyes must be at least as wide as the waist; wider ones must not meet
+    size : edge length of the elements [m]; in the waist they may be half as long again
     """
     across = max(1, round(sizes.width / size))
     slope = _section_slope(sizes)
@@ -74,7 +74,7 @@ def _section_slope(sizes: PlateSizes) -> float:
     """Slope [rad] of the fillet where the ring round the bore ends and the waist begins.
 
     Three elements meet there; with the ray from the bore at an angle β to the waist, their angles are
-    β + slope, π/2 - β and π/2 - slope. The slope that makes the sharpest of them bluntest, not closer to the
+    β + slope, π/2 - β and π/2 - slope. The slope maximises the sharpest of them, at places not closer to the
     bore than the eye's outside.
     """
     slopes = np.linspace(0, 0.6 * (np.pi / 2 - sizes.shoulder), 25)
@@ -85,19 +85,19 @@ def _section_slope(sizes: PlateSizes) -> float:
 
 
 def _fillet(sizes: PlateSizes, slopes: Float[np.ndarray, " m"]) -> Float[np.ndarray, "m 2"]:
-    """Points of the upper fillet at (0, 0) by their slopes [rad]; 0 where it meets the waist."""
+    """Points of the upper fillet of the eye at (0, 0) by their slopes [rad], 0 where it meets the waist."""
     r = sizes.fillet_radius
     return np.stack([sizes.reach - r * np.sin(slopes), sizes.width / 2 + r * (1 - np.cos(slopes))], axis=1)
 
 
 def _stadium_section(sizes: PlateSizes, size: float) -> float:
-    """Where the waist of a stadium begins [m]: as far from the bore's centre as the eye's outside."""
+    """Distance from the bore's centre at which the waist of a stadium begins [m]: the eye's radius if there is room."""
     R = sizes.eye_diameter / 2
     return R if sizes.length > 2 * R + size / 2 else sizes.length / 2
 
 
 def _eye(sizes: PlateSizes, size: float, across: int, slope: float) -> Quads:
-    """The ring round the bore at (0, 0), out to the eye's outside and the section before the waist."""
+    """The ring between the bore at (0, 0) and the eye's outside, closed by the section before the waist."""
     side = _side(sizes, size, across, slope)
     turn, R = 2 * (np.pi - sizes.shoulder), sizes.eye_diameter / 2
     front = side[0] * np.stack([np.ones(2 * across + 1), np.linspace(-1, 1, 2 * across + 1)], axis=1)
@@ -130,7 +130,7 @@ def _waist(sizes: PlateSizes, size: float, across: int, slope: float) -> Quads:
 
 
 def _columns(sizes: PlateSizes, size: float, slope: float) -> Float[np.ndarray, "c 2"]:
-    """Place and half height of the waist's columns of nodes, ends and middles of elements in turn."""
+    """Place and half height of the waist's columns of nodes, at ends and middles of elements alternately."""
     start = sizes.reach if sizes.waisted else _stadium_section(sizes, size)
     straight = sizes.length - 2 * start
     steps = 2 * int(np.ceil(straight / (_SLENDER * size) - 1e-9))
@@ -148,11 +148,11 @@ def _count(length: float, turn: float, size: float) -> int:
 
 
 def ring_quads(inside: Float[np.ndarray, "m 2"], outside: Float[np.ndarray, "m 2"], layers: int) -> Quads:
-    """quad9 mesh between two closed curves of as many nodes, ring by ring from inside, along straight rays.
+    """quad9 mesh along straight rays between two closed curves with equal numbers of nodes, ring by ring from inside.
 
     Parameters
     ----------
-    inside, outside : nodes round the curves, anticlockwise, corners and middles of elements in turn [m]
+    inside, outside : (m, 2) nodes round the curves, anticlockwise, corners and middles of elements alternately [m]
     layers : elements along each ray
     """
     rays = np.linspace(inside, outside, 2 * layers + 1)

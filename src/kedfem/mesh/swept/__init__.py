@@ -1,1 +1,1 @@
-"""Solids that are swept: bars along a path, solids of revolution, single blocks, and what their blends leave out."""
+"""Swept solids: bars along a path, solids of revolution, single blocks, and solids without their small blends."""

@@ -1,4 +1,4 @@
-"""The core of a solid of revolution about its own axis: a disc of quadrilaterals, extruded along it, without wedges."""
+"""The core of a solid of revolution: a disc of quadrilaterals extruded along the axis, so that no wedges are needed."""
 
 from collections.abc import Callable
 
@@ -11,15 +11,15 @@ from kedfem.mesh.layered.partition import Curve, Plan, Region
 from kedfem.mesh.planar.areas import quadratic_quads
 from kedfem.mesh.planar.choice import best_quads
 
-NEAR = 1e-7  # of the solid's size: that near to the axis is on it, that near to each other is one
-_SHARE = 0.6  # of the least radius of anything off the axis: the core's own
+NEAR = 1e-7  # distance, in sizes of the solid, within which points are on the axis or the same
+_SHARE = 0.6  # the core's radius over the least radius of anything off the axis
 _HALVINGS = 50
 
 Ending = Callable[[Float[np.ndarray, " n"]], Float[np.ndarray, " n"]]
 
 
 def core_radius(plan: Plan) -> float:
-    """Radius of a core in which each end is one smooth face across the axis; 0 where nothing touches the axis.
+    """Radius of a core whose ends are smooth faces across the axis [-]; 0 if nothing touches the axis.
 
     Parameters
     ----------
@@ -39,11 +39,11 @@ def core_radius(plan: Plan) -> float:
 
 
 def disc(around: int) -> tuple[Float[np.ndarray, "n 2"], Int[np.ndarray, "e 9"]]:
-    """quad9 cells of the unit disc, so many sides around it, the first corner at angle 0.
+    """Nodes and quad9 cells of the unit disc, the first corner at angle 0: a square of cells inside rings of cells.
 
     Parameters
     ----------
-    around : a multiple of 4: a square of cells inside rings of them
+    around : number of sides around it, a multiple of 4
     """
     angles = np.arange(2 * around) * np.pi / around
     circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
@@ -56,17 +56,17 @@ def disc(around: int) -> tuple[Float[np.ndarray, "n 2"], Int[np.ndarray, "e 9"]]
 
 
 def core_mesh(plan: Plan, region: Region, radius: float, stations: Float[np.ndarray, " s"], around: int) -> SolidMesh:
-    """hex27 mesh of what a region about the axis becomes when it turns: x along the axis, y and z across it.
+    """hex27 mesh of the solid that a region about the axis sweeps, by the solid's extent; x runs along the axis.
 
-    By the solid's extent. Each layer is a disc that changes from the form of one end to that of the other.
+    Each layer is a disc; their shapes change gradually from one end to the other.
 
     Parameters
     ----------
     plan : the meridian section, within its context
     region : the part between the axis and the core's radius, from one end to the other
-    radius : the core's, by the solid's extent [-]
-    stations : (s,) places along x of the nodes on the core's surface, two to an element and one more, rising [-]
-    around : elements around it
+    radius : the core's radius [-]
+    stations : (s,) rising x of the nodes on the core's surface, two for each element and one more [-]
+    around : number of elements around the axis
     """
     points, quads = disc(around)
     low, high = _ends(plan, region)
@@ -80,7 +80,7 @@ def core_mesh(plan: Plan, region: Region, radius: float, stations: Float[np.ndar
 
 
 def _ends(plan: Plan, region: Region) -> list[Ending]:
-    """Where along x both ends of a core are, over the radius, that with the least x first."""
+    """Functions from radii to x of both ends of a core, that with the least x first."""
     (loop,) = region.loops
     ends = []
     for i, _ in loop:
@@ -94,7 +94,7 @@ def _ends(plan: Plan, region: Region) -> list[Ending]:
 
 
 def _along(curve: Curve) -> Ending:
-    """x of a curve that rises from the axis, at radii: halved between its two ends."""
+    """The function from radii to x of a curve that rises from the axis, by bisection."""
     rises = curve.samples[0, 1] < curve.samples[-1, 1]
 
     def at(radii: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:

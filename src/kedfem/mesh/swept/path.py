@@ -1,4 +1,4 @@
-"""Meshes of bent bars, pipes and ring segments: one section is meshed and swept along a path of lines and arcs."""
+"""Meshes of bent bars, pipes and ring segments: one section, meshed and swept along a path of lines and arcs."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,27 +10,27 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.mesh.cad.face_samples import OFF, FaceSamples, Frame, common_axes, face_samples
 from kedfem.mesh.cad.solids import CadFace, OtherMethodError, Sizing, Solid
-from kedfem.mesh.elements.hexahedra import SolidMesh, in_layers, without_spare_nodes
+from kedfem.mesh.elements.hexahedra import SolidMesh, in_layers, without_unused_nodes
 from kedfem.mesh.layered.division import plan_size
 from kedfem.mesh.layered.partition import Plan
 from kedfem.mesh.layered.plan_mesh import plan_mesh
-from kedfem.mesh.layered.sections import check_volume, laid_over, plan_axes, reporting, section
+from kedfem.mesh.layered.sections import check_volume, plan_axes, plan_of_sections, reporting, section
 from kedfem.mesh.layered.size_trials import sized
 from kedfem.mesh.session import boundary, gmsh_copy
 
 _SAMPLES = np.linspace(0, 1, 9)  # along each edge
 _ENDS = 12  # plane faces that are tried as the first end
-_TURN = np.radians(18)  # of an arc per element where no size is asked for, as about an axis
-_LONG = 2.5  # an element's length along the path by its size in the section, where no size is asked for
+_TURN = np.radians(18)  # angle of an arc per element where no size is asked for, as for solids of revolution
+_LONG = 2.5  # length of an element along the path over its size in the section, where no size is asked for
 
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """A line, or an arc about an axis, of a path.
+    """A line or an arc of a path.
 
-    start : of the section: its centre, two directions in it and that along the path
-    arm : (3,) of an arc from its axis to where it starts [m]; of a line 0
-    travel : length of a line [m], angle of an arc [rad]
+    start : frame of the section: its centre, two directions in it, and that along the path
+    arm : (3,) vector from the axis of an arc to its start [m]; 0 for a line
+    travel : length of a line [m] or angle of an arc [rad]
     """
 
     start: Frame
@@ -39,27 +39,27 @@ class Leg:
 
     @property
     def radius(self) -> float:
-        """Of an arc; 0 of a line [m]."""
+        """Radius of an arc [m]; 0 for a line."""
         return float(np.linalg.norm(self.arm))
 
     @property
     def length(self) -> float:
-        """Of the path of the section's centre [m]."""
+        """Length of the path of the section's centre [m]."""
         return self.travel * (self.radius or 1.0)
 
     def at(self, share: float) -> Frame:
-        """The frame where a share of the leg is done."""
+        """The frame at a share of the leg."""
         done, (x, y, ahead) = share * self.travel, self.start.axes
         if self.radius == 0:
             return Frame(self.start.origin + done * ahead, self.start.axes)
         out = self.arm / self.radius
         plane = np.stack([out, ahead])
         turned = np.array([[np.cos(done), np.sin(done)], [-np.sin(done), np.cos(done)]]) @ plane
-        R = np.eye(3) + (turned - plane).T @ plane  # takes out and ahead to where they are then
+        R = np.eye(3) + (turned - plane).T @ plane  # turns the directions out and ahead
         return Frame(self.start.origin - self.arm + R @ self.arm, np.stack([R @ x, R @ y, R @ ahead]))
 
     def passed(self, x: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, " n"]:
-        """At what travel places are passed."""
+        """The travel at which the section passes points."""
         off, ahead = x - self.start.origin, self.start.axes[2]
         if self.radius == 0:
             return np.asarray(off @ ahead)
@@ -68,10 +68,15 @@ class Leg:
 
 
 def path_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
-    """A solid that one section sweeps from end to end, a `Method`: bent bars and pipes, elbows, ring segments.
+    """hex27 mesh of a solid that one section sweeps from end to end, a `Method`: bent bars and pipes, ring segments.
 
-    The section is meshed as the plan of a layer is; along the path elements are as long, or two and a half times as
-    long where no size is asked for, and 20 to a revolution.
+    The section is meshed as the plan of a layer is. Along the path elements have the same length, or without a size
+    asked for two and a half times that length and 20 to a revolution.
+
+    Raises
+    ------
+    OtherMethodError
+        The solid has no such path, or only one of lines, or its elements are bad.
     """
     legs = path(gmsh, solid)
     if not any(leg.radius for leg in legs):
@@ -89,41 +94,41 @@ def path_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
         placed = [frame.origin + solid.extent * flat.points @ frame.axes[:2] for frame in frames]
         points = np.concatenate(placed)
         words = f"{flat.kind} swept along {_in_words(legs)} in {layers} elements"
-        return without_spare_nodes(SolidMesh(points, mesh.cells, method=words))
+        return without_unused_nodes(SolidMesh(points, mesh.cells, method=words))
 
     return sized(solid, sizing, mesh_of)
 
 
 def _in_words(legs: tuple[Leg, ...]) -> str:
-    """How many lines and arcs there are."""
+    """The number of lines and arcs, in words."""
     arcs = sum(leg.radius > 0 for leg in legs)
     counts = {"arc": arcs, "line": len(legs) - arcs}
     return " and ".join(f"{n} {kind}{'s' * (n > 1)}" for kind, n in counts.items() if n)
 
 
 def _count(leg: Leg, size: float, sizing: Sizing) -> int:
-    """Elements along a leg."""
+    """Number of elements along a leg."""
     asked = sizing.size is not None
-    longest, turn = (size, sizing.turn) if asked else (_LONG * size, min(_TURN, sizing.turn))
+    longest, turn = (size, sizing.angle) if asked else (_LONG * size, min(_TURN, sizing.angle))
     bent = int(np.ceil(leg.travel / turn * (leg.radius > 0)))
     return max(1, sizing.layers, round(leg.length / longest), bent)
 
 
 @contextmanager
 def _section_plan(gmsh: ModuleType, solid: Solid, legs: tuple[Leg, ...]) -> Iterator[Plan]:
-    """The plan of the section half way along the first leg, about its centre, as thick as the path is long."""
+    """The plan of the section half way along the first leg, as thick as the path is long."""
     frame = legs[0].at(0.5)
     with gmsh_copy(gmsh, 1 / solid.extent) as copy:
         with reporting(solid, "it must have a section across its path"):
             faces = _section(copy, solid, frame)
             length = sum(leg.length for leg in legs) / solid.extent
-            plan = laid_over(copy, [faces], frame.axes, solid.extent, np.array([0.0, length]))
+            plan = plan_of_sections(copy, [faces], frame.axes, solid.extent, np.array([0.0, length]))
         check_volume(solid, plan)
         yield replace(plan, origin=frame.origin)
 
 
 def _section(gmsh: ModuleType, solid: Solid, frame: Frame) -> list[tuple[int, int]]:
-    """The face around a frame in which its plane cuts the solid, moved to the origin."""
+    """The face, around the origin of a frame, in which its plane cuts the solid; it is moved to the origin."""
     occ = gmsh.model.occ
     [(_, tag)] = gmsh.model.getEntities(3)
     origin = frame.origin / solid.extent
@@ -141,8 +146,8 @@ def _section(gmsh: ModuleType, solid: Solid, frame: Frame) -> list[tuple[int, in
 def path(gmsh: ModuleType, solid: Solid) -> tuple[Leg, ...]:
     """The path along which a plane end, moved rigidly, sweeps the whole solid; OtherMethodError if there is none.
 
-    From the end on, the faces that meet it must all run along a line square to it, or turn about an axis in its plane, up
-    to one more such plane; from there the faces behind go on, to the other end.
+    The faces that meet the end must all run along a line perpendicular to it, or turn about an axis in its plane, up to
+    another such plane, from which the next faces continue until the other end.
     """
     every = face_samples(gmsh, solid)
     planes = sorted((face for face in solid.faces if face.kind == "plane"), key=lambda face: face.area)
@@ -153,7 +158,7 @@ def path(gmsh: ModuleType, solid: Solid) -> tuple[Leg, ...]:
 
 
 def _walked(gmsh: ModuleType, solid: Solid, every: dict[int, FaceSamples], end: CadFace) -> tuple[Leg, ...]:
-    """The legs from one end on, if they lead past all faces to another end; else none."""
+    """The legs that start at one end, if they pass all faces up to another end; else none."""
     legs: tuple[Leg, ...] = ()
     frame, left = Frame(end.centre, plan_axes(-end.direction)), set(every) - {end.tag}
     walls = _behind(gmsh, boundary(gmsh, 2, end.tag), left)
@@ -169,18 +174,18 @@ def _walked(gmsh: ModuleType, solid: Solid, every: dict[int, FaceSamples], end: 
 
 
 def _behind(gmsh: ModuleType, edges: set[int], left: set[int]) -> set[int]:
-    """The faces at edges, of those that have not been passed."""
+    """The faces at edges that have not been passed."""
     return {int(face) for edge in edges for face in gmsh.model.getAdjacencies(1, edge)[0]} & left
 
 
-def _is_across(solid: Solid, look: FaceSamples, frame: Frame) -> bool:
-    """Whether a face is plane, and square to the path at a frame."""
-    off = abs((look.places - (frame.origin - solid.middle) / solid.extent) @ frame.axes[2]).max()
-    return look.face.kind == "plane" and bool(max(off, abs(look.normals @ frame.axes[:2].T).max()) < OFF)
+def _is_across(solid: Solid, sample: FaceSamples, frame: Frame) -> bool:
+    """Whether a face is plane and perpendicular to the path at a frame."""
+    off = abs((sample.places - (frame.origin - solid.middle) / solid.extent) @ frame.axes[2]).max()
+    return sample.face.kind == "plane" and bool(max(off, abs(sample.normals @ frame.axes[:2].T).max()) < OFF)
 
 
 def _leg(gmsh: ModuleType, solid: Solid, walls: list[FaceSamples], frame: Frame) -> tuple[Leg | None, set[int]]:
-    """The leg that walls make from a frame on, and the edges where it ends; None if they make none."""
+    """The leg along walls that starts at a frame, and the edges where it ends; None if there is none."""
     for leg in _motions(solid, walls, frame):
         slack = OFF * solid.extent / (leg.radius or 1.0)
         edges = (edge for wall in walls for edge in boundary(gmsh, 2, wall.face.tag))
@@ -195,7 +200,7 @@ def _leg(gmsh: ModuleType, solid: Solid, walls: list[FaceSamples], frame: Frame)
 
 
 def _motions(solid: Solid, walls: list[FaceSamples], frame: Frame) -> Iterator[Leg]:
-    """The line, or the arcs, on which all walls are swept by what they have in a frame's plane."""
+    """The line or the arcs along which all walls are swept from a frame's plane."""
     ahead, own = frame.axes[2], (frame.origin - solid.middle) / solid.extent
     if all(wall.runs_along(ahead) for wall in walls):
         yield Leg(frame, np.zeros(3))
@@ -207,6 +212,6 @@ def _motions(solid: Solid, walls: list[FaceSamples], frame: Frame) -> Iterator[L
 
 
 def _places(gmsh: ModuleType, edge: int) -> Float[np.ndarray, "n 3"]:
-    """Places along an edge."""
+    """Points along an edge [m]."""
     low, high = (bound[0] for bound in gmsh.model.getParametrizationBounds(1, edge))
     return np.reshape(gmsh.model.getValue(1, edge, low + _SAMPLES * (high - low)), (-1, 3))

@@ -1,4 +1,4 @@
-"""Solids of revolution: the axis about which all faces turn, the meridian section meshed and swept about it."""
+"""Solids of revolution: their axis, and the mesh of the meridian section swept about it."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,24 +11,24 @@ from kedfem.arrays import Float
 from kedfem.mesh.cad.face_samples import Axis, FaceSamples, Frame, common_axes, face_samples
 from kedfem.mesh.cad.solids import OtherMethodError, Sizing, Solid
 from kedfem.mesh.cad.words import direction_in_words, face_in_words
-from kedfem.mesh.elements.hexahedra import SolidMesh, in_layers, without_spare_nodes
-from kedfem.mesh.layered.cusps import without_spare_curves
+from kedfem.mesh.elements.hexahedra import SolidMesh, in_layers, without_unused_nodes
+from kedfem.mesh.layered.cusps import without_unused_curves
 from kedfem.mesh.layered.division import plan_size
 from kedfem.mesh.layered.partition import Plan, Region
 from kedfem.mesh.layered.plan_mesh import PlanMesh, plan_mesh
-from kedfem.mesh.layered.sections import check_volume, laid_over, reporting, section
+from kedfem.mesh.layered.sections import check_volume, plan_of_sections, reporting, section
 from kedfem.mesh.layered.size_trials import sized
 from kedfem.mesh.session import gmsh_copy
 from kedfem.mesh.swept.core import NEAR, core_mesh, core_radius
 
-_ASIDE = 0.7  # [rad] from the start of a full revolution to the section: seams of faces are at right angles, mostly
-_FEWEST, _MOST = 12, 20  # elements around a full revolution where no size is asked for
-_RING = 20  # that a ring needs: with 16 its first frequency is 0.6 % too high, with 20 0.2 %
+_ASIDE = 0.7  # [rad], angle of the section, away from right angles, where seams of faces usually are
+_FEWEST, _MOST = 12, 20  # elements to a revolution where no size is asked for
+_RING = 20  # the least for a ring: with 16 its first frequency is 0.6 % too high, with 20 0.2 %
 
 
 @dataclass(frozen=True, slots=True)
 class _Meridian:
-    """The plan of a meridian section: what is outside of the core, the parts inside, and the core's radius."""
+    """The plan of a meridian section, that outside of the core, the regions inside, the core's radius, the size."""
 
     outside: Plan
     whole: Plan
@@ -38,25 +38,30 @@ class _Meridian:
 
 
 def revolved_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
-    """A solid of revolution, a `Method`: pulleys, bushings, shafts, balls.
+    """hex27 mesh of a solid of revolution, a `Method`: pulleys, bushings, shafts, balls.
 
-    Its meridian section is meshed as the plan of a layer is, and swept about the axis through all angles: in elements of
-    the same size at the mean radius, or 12 to 24 to a revolution where none is asked for. Next to the axis is a core of
-    discs of quadrilaterals, extruded along it, as sections swept about a line in them would have no angle there.
+    The meridian section is meshed as the plan of a layer is, and swept about the axis: in elements of the same size at
+    the mean radius or, without a size asked for, 12 to 20 to a revolution for two elements across. Along the axis there
+    is a core of extruded discs, because elements swept about their own edge would be wedges.
+
+    Raises
+    ------
+    OtherMethodError
+        A face does not turn about the axis, OpenCASCADE cannot cut the section, or the elements are bad.
     """
     turn = revolution(gmsh, solid)
     return sized(solid, sizing, lambda share: _mesh_about(gmsh, solid, turn, sizing, share))
 
 
 def revolution(gmsh: ModuleType, solid: Solid) -> Frame:
-    """A frame on the axis of a solid whose faces all turn about it, which is its first direction.
+    """A frame whose origin and first axis are on the axis about which all faces of a solid turn.
 
-    An OtherMethodError says what is in the way.
+    An OtherMethodError names the obstacle if there is none.
     """
     every = list(face_samples(gmsh, solid).values())
     obstacles: list[tuple[float, str]] = []
     for axis in common_axes(solid, every):
-        others = [look.face for look in every if not look.revolves_about(axis)]
+        others = [sample.face for sample in every if not sample.revolves_about(axis)]
         if not others:
             return _framed(gmsh, solid, every, axis)
         words = face_in_words(max(others, key=lambda face: face.area))
@@ -67,9 +72,9 @@ def revolution(gmsh: ModuleType, solid: Solid) -> Frame:
 
 
 def _framed(gmsh: ModuleType, solid: Solid, every: list[FaceSamples], axis: Axis) -> Frame:
-    """The frame: its axis runs to where more of the volume is, so that it turns with the part."""
+    """The frame; its axis points to the heavier end, so that it turns with the part."""
     point, along = axis
-    reach = np.concatenate([look.places for look in every]) @ along
+    reach = np.concatenate([sample.places for sample in every]) @ along
     centre = (np.asarray(gmsh.model.occ.getCenterOfMass(3, solid.tag)) - solid.middle) / solid.extent
     along = along if centre @ along >= (reach.max() + reach.min()) / 2 - 1e-6 else -along
     first = np.eye(3)[int(np.argmin(abs(along)))]
@@ -79,7 +84,7 @@ def _framed(gmsh: ModuleType, solid: Solid, every: list[FaceSamples], axis: Axis
 
 
 def _mesh_about(gmsh: ModuleType, solid: Solid, turn: Frame, sizing: Sizing, share: float) -> SolidMesh:
-    """The mesh swept about the axis, in the solid's place."""
+    """The mesh swept about the axis, at the solid's place."""
     with _meridian(gmsh, solid, turn, sizing, share) as meridian:
         flat = plan_mesh(solid.name, meridian.outside, meridian.size, sizing)
         around = _elements_around(meridian, sizing)
@@ -93,7 +98,7 @@ def _mesh_about(gmsh: ModuleType, solid: Solid, turn: Frame, sizing: Sizing, sha
 
 @contextmanager
 def _meridian(gmsh: ModuleType, solid: Solid, turn: Frame, sizing: Sizing, share: float) -> Iterator[_Meridian]:
-    """The meridian section in a copy of the model: x along the axis, y from it, in sizes of the solid."""
+    """The meridian section in a copy of the model, by the solid's extent: x along the axis, y from it."""
     radial = np.array([0, np.cos(_ASIDE), np.sin(_ASIDE)]) @ turn.axes
     axes = np.stack([turn.axes[0], radial, np.cross(turn.axes[0], radial)])
     with gmsh_copy(gmsh, 1 / solid.extent) as copy:
@@ -107,11 +112,11 @@ def _meridian(gmsh: ModuleType, solid: Solid, turn: Frame, sizing: Sizing, share
                 whole = _plan(copy, solid, turn, axes, _cut(copy, faces, axes, radius))
         inside = tuple(region for region in whole.regions if _reach(whole, region) <= radius + NEAR)
         outside = tuple(region for region in whole.regions if _reach(whole, region) > radius + NEAR)
-        yield _Meridian(without_spare_curves(replace(whole, regions=outside)), whole, inside, radius, size)
+        yield _Meridian(without_unused_curves(replace(whole, regions=outside)), whole, inside, radius, size)
 
 
 def _section(gmsh: ModuleType, solid: Solid, turn: Frame, axes: Float[np.ndarray, "3 3"]) -> list[tuple[int, int]]:
-    """The faces in which half a plane through the axis cuts the solid, moved with the axis' point to the origin."""
+    """The faces in which a half-plane through the axis cuts the solid, moved so that the axis' point is the origin."""
     [(_, tag)] = gmsh.model.getEntities(3)
     middle = (solid.middle - turn.origin) @ turn.axes[0] / solid.extent
     corners = np.array([[middle + x, y, 0] for x, y in ((-1, 0), (1, 0), (1, 1.5), (-1, 1.5))])
@@ -136,12 +141,12 @@ def _cut(
 def _plan(
     gmsh: ModuleType, solid: Solid, turn: Frame, axes: Float[np.ndarray, "3 3"], faces: list[tuple[int, int]]
 ) -> Plan:
-    """The plan of half a section; it is as thick as its mean point goes (Pappus)."""
+    """The plan of half a section, as thick as the path of its centroid is long (Pappus)."""
     occ = gmsh.model.occ
     masses = np.array([occ.getMass(2, face) for _, face in faces])
     radii = np.array([occ.getCenterOfMass(2, face) for _, face in faces]) @ axes[1]
     path = 2 * np.pi * float(masses @ radii / masses.sum())
-    plan = laid_over(gmsh, [faces], axes, solid.extent, np.array([0.0, path]))
+    plan = plan_of_sections(gmsh, [faces], axes, solid.extent, np.array([0.0, path]))
     return replace(plan, origin=turn.origin)
 
 
@@ -151,28 +156,28 @@ def _reach(plan: Plan, region: Region) -> float:
 
 
 def _elements_around(meridian: _Meridian, sizing: Sizing) -> int:
-    """Elements around the axis, four by four; where no size is asked for as many as bending needs."""
+    """Number of elements around the axis, a multiple of four; without a size asked for as many as bending needs."""
     wanted = meridian.whole.heights[-1] / meridian.size
     if sizing.size is None:
         least = _FEWEST if meridian.inside else _RING
         wanted = float(np.clip(wanted, least, _MOST) * sizing.across / 2)
-    wanted = max(wanted, 2 * np.pi / sizing.turn, sizing.layers)
+    wanted = max(wanted, 2 * np.pi / sizing.angle, sizing.layers)
     return 4 * max(2, round(float(wanted) / 4))
 
 
 def _revolved(flat: PlanMesh, around: int) -> SolidMesh:
-    """The section's cells swept through a turn: x along the axis, y and z across it, by the solid's extent."""
+    """The section's cells swept through a revolution, by the solid's extent: x along the axis, y and z across it."""
     count = len(flat.points)
     mesh = in_layers(flat.points, np.arange(2 * around + 1.0), flat.cells)
     cells = mesh.cells % (2 * around * count)
     x, r, level = mesh.points.T
     angle = level * np.pi / around
     turned = SolidMesh(np.stack([x, r * np.cos(angle), r * np.sin(angle)], axis=1), cells)
-    return without_spare_nodes(turned)
+    return without_unused_nodes(turned)
 
 
 def _with_core(mesh: SolidMesh, flat: PlanMesh, meridian: _Meridian, region: Region, around: int) -> SolidMesh:
-    """The mesh with a core put in, the nodes between them taken once."""
+    """The mesh joined with a core, which shares the nodes between them."""
     loop = region.loops[0]
     samples = np.concatenate([meridian.whole.curves[i].samples for i, _ in loop])
     on = samples[samples[:, 1] > meridian.radius - NEAR, 0]

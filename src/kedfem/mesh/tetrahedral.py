@@ -1,4 +1,4 @@
-"""Tetrahedral meshes of any solid, with 10 nodes and on the CAD model's faces: for parts that cannot be swept."""
+"""Meshes of 10-node tetrahedra, curved onto the CAD model's faces, for solids that cannot be swept."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -9,119 +9,127 @@ import numpy as np
 
 from kedfem.arrays import Float, Int
 from kedfem.mesh.cad.faces import joined_faces
-from kedfem.mesh.cad.solids import USUAL, CadFace, OtherMethodError, Sizing, Solid
+from kedfem.mesh.cad.solids import MANY_UNKNOWNS, USUAL_ANGLE, CadFace, OtherMethodError, Sizing, Solid
 from kedfem.mesh.cad.words import with_faces_in_words
+from kedfem.mesh.concave_faces import finer_concave_faces, free_concave_faces
 from kedfem.mesh.elements.hexahedra import SolidMesh
 from kedfem.mesh.elements.quality import scaled_jacobian
 from kedfem.mesh.elements.shape_functions import TET10, node_numbers
 from kedfem.mesh.elements.tetrahedra import edge_middles, unfolded
-from kedfem.mesh.hollows import finer_hollows, free_hollows
-from kedfem.mesh.session import gmsh_options, numbered_nodes
+from kedfem.mesh.session import GMSH_HEX27, gmsh_options, numbered_nodes
 from kedfem.mesh.swept.blocks import gmsh_hexahedra
 
-_HEX27 = 12  # gmsh's number of the 27-node hexahedron
 _TET10 = 11  # gmsh's number of the 10-node tetrahedron
 _REGULAR = 1 / (6 * np.sqrt(2))  # volume of a regular tetrahedron over the cube of its edge
-# regular tetrahedra that fill a lump without small features, with two elements asked for across
+# number of regular tetrahedra that fill a compact part without small features, with two elements across
 _COUNT = 1200
-_TURN = np.pi / 6  # that an element's edge turns along a curved face, where the least size lets it
-_FINEST = 4.0  # the size over the least size that curvature asks for
-_PLENTY = 45_000  # unknowns above which a part whose size nobody gave is meshed coarser
-MOST_UNKNOWNS = 90_000  # unknowns to which finer fillets may bring it
-_STEPS = 5  # times that it is
-_COARSEST = 4.0  # the most by which it may be: curvature and the finest size follow
-_BAD = 0.03  # scaled Jacobian below which curved elements are optimised, else straightened, and other settings tried
-_FEW = 0.02  # share of bad elements that optimisation can help
-#: gmsh's optimisation of curved elements takes minutes where it finds no way.
+_TURN = np.pi / 6  # angle of an element along a curved face, unless that makes it smaller than the least size
+_FINEST = 4.0  # ratio of the size to the least size due to curvature
+MOST_UNKNOWNS = 90_000  # above them concave faces are meshed coarser than asked for
+_STEPS = 5  # most attempts with coarser elements
+_COARSEST = 4.0  # largest factor by which elements become coarser, also those at curved faces
+_BAD = 0.03  # scaled Jacobian below which curved elements are optimised or straightened, and other settings tried
+_FEW = 0.02  # largest share of bad elements that optimisation can mend
+#: gmsh's optimisation of curved elements takes minutes where it does not succeed.
 _BRIEF: dict[str, float] = {"Mesh.HighOrderIterMax": 25, "Mesh.HighOrderPassMax": 5}
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """One method by which to let gmsh make tetrahedra: its 2-D and 3-D algorithm."""
+    """gmsh's settings for tetrahedra: its 2-D and its 3-D algorithm."""
 
     plane: int
     solid: int
 
 
-#: The usual ones; others where gmsh gives up or leaves flat elements.
+#: Tried in turn: the usual setting, then others where gmsh fails or leaves flat elements.
 SETTINGS = (Setting(6, 1), Setting(6, 10), Setting(5, 1), Setting(1, 4))
 
 
-def filled_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
-    """A solid of any form, a `Method` of tet10: its faces known, proven to have det J > 0 everywhere.
+def tetrahedral_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
+    """tet10 mesh of any solid, a `Method`; it has the solid's faces, and det J > 0 is proven everywhere.
 
     Without a size there are `across` elements in twice the mean wall 2 V/A, which is the thickness of a plate, the
-    radius of a rod, the wall of a tube, but at least some thousand; 12 to a circle, as far as that is not finer than
-    a quarter of the size. A part of more than 45,000 unknowns is then meshed coarser, step by step. Hollow faces are
-    finer where `hollow` asks for it, in any case.
+    radius of a rod or the wall of a tube, but at least about a thousand elements, and 12 to a circle as long as they
+    are not finer than a quarter of the size. A part of more than 45,000 unknowns is then meshed coarser, step by step.
+    Concave faces always have the fineness that `concave_angle` asks for.
+
+    Raises
+    ------
+    OtherMethodError
+        gmsh makes no valid tetrahedra under any setting.
     """
-    complaints: list[str] = []
+    failures: list[str] = []
     found: SolidMesh | None = None
-    plain, taken, coarser = replace(sizing, hollow=USUAL), 1.0, 1.0
+    plain, taken, coarser = replace(sizing, concave_angle=USUAL_ANGLE), 1.0, 1.0
     for _ in range(_STEPS):
-        mesh = _best_of_settings(gmsh, solid, plain, coarser, complaints)
+        mesh = _best_of_settings(gmsh, solid, plain, coarser, failures)
         if mesh is not None and (found is None or len(mesh.points) < len(found.points)):
             found, taken = mesh, coarser
-        plenty = found is None or 3 * len(found.points) > _PLENTY
-        if sizing.size is not None or found is None or not plenty or coarser >= _COARSEST:
+        if sizing.size is not None or found is None or coarser >= _COARSEST:
             break
-        ratio = (3 * len(found.points) / _PLENTY) ** 0.5
+        ratio = (3 * len(found.points) / MANY_UNKNOWNS) ** 0.5
+        if ratio <= 1:
+            break
         coarser = min(coarser * np.clip(1.05 * ratio, 1.15, 2.0), _COARSEST)
     if found is not None:
-        found = _with_hollows(gmsh, solid, sizing, (taken, found), complaints)
+        found = _with_concave_faces(gmsh, solid, sizing, (taken, found), failures)
     gmsh.model.mesh.clear()
     if found is None:
-        reasons = "; ".join(dict.fromkeys(complaints)) or "none at all"
+        reasons = "; ".join(dict.fromkeys(failures)) or "none at all"
         raise OtherMethodError(f"{solid.name}: gmsh makes no tetrahedra of it: {reasons}")
     return found
 
 
-def _with_hollows(
-    gmsh: ModuleType, solid: Solid, sizing: Sizing, usual: tuple[float, SolidMesh], complaints: list[str]
+def _with_concave_faces(
+    gmsh: ModuleType, solid: Solid, sizing: Sizing, usual: tuple[float, SolidMesh], failures: list[str]
 ) -> SolidMesh:
-    """The mesh with hollow faces as fine as asked for, elsewhere as the usual one, which is so much coarser than asked.
+    """The mesh with concave faces as fine as asked for, and elsewhere as fine as the usual mesh.
 
-    They are coarser where elements would be bad, or, without a size, more than 90,000 unknowns; the mesh says so then.
+    They are coarser where elements would be bad or, without a size, unknowns more than 90,000; `method` says so then.
+
+    Parameters
+    ----------
+    usual : the factor by which the usual mesh is coarser than asked for, and that mesh
     """
     coarser, found = usual
-    if not free_hollows(solid, sizing):
+    if not free_concave_faces(solid, sizing):
         return found
-    least, angle = min(_BAD, _least_jacobian(found)), sizing.hollow
-    while angle < USUAL:
-        mesh = _best_of_settings(gmsh, solid, replace(sizing, hollow=angle), coarser, complaints, MOST_UNKNOWNS)
+    least, angle = min(_BAD, _least_jacobian(found)), sizing.concave_angle
+    while angle < USUAL_ANGLE:
+        mesh = _best_of_settings(gmsh, solid, replace(sizing, concave_angle=angle), coarser, failures, MOST_UNKNOWNS)
         ratio = 1.0 if mesh is None or sizing.size is not None else 3 * len(mesh.points) / MOST_UNKNOWNS
         if mesh is not None and ratio <= 1 and _least_jacobian(mesh) >= least:
             found = mesh
             break
         angle *= max(1.2, ratio**0.5)
-    if angle == sizing.hollow:
+    if angle == sizing.concave_angle:
         return found
-    words = "no finer" if angle >= USUAL else f"by {np.degrees(angle):.3g}° an element"
+    words = "no finer" if angle >= USUAL_ANGLE else f"by {np.degrees(angle):.3g}° an element"
     return replace(found, method=f"{found.method}; fillets and free bores {words}, as others would be bad or too many")
 
 
 def subdivided_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
-    """A solid of any form, a `Method`: gmsh's own subdivision, four hexahedra in each tetrahedron, of poor quality."""
-    complaints: list[str] = []
+    """hex27 mesh of any solid, a `Method`: gmsh divides each tetrahedron into four hexahedra of poor quality."""
+    failures: list[str] = []
     size = 2 * tetrahedron_size(solid, sizing)
     numbers = _options(size, min(2 * _TURN, np.pi / 3), size / _FINEST, SETTINGS[0])
-    with gmsh_options(gmsh, numbers | {"Mesh.SubdivisionAlgorithm": 2}), _listening(gmsh, complaints, solid.faces):
+    with gmsh_options(gmsh, numbers | {"Mesh.SubdivisionAlgorithm": 2}), _recording_failures(gmsh, failures, solid.faces):
         gmsh.model.mesh.clear()
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.setOrder(2)
         gmsh.model.mesh.optimize("HighOrder")
         kinds, _, nodes = gmsh.model.mesh.getElements(3, solid.tag)
-        if list(kinds) == [_HEX27]:
+        if list(kinds) == [GMSH_HEX27]:
             points, tags = numbered_nodes(gmsh)
             mesh = gmsh_hexahedra(gmsh, points, np.searchsorted(tags, nodes[0]).reshape(-1, 27))
             method = f"gmsh's subdivision of {len(mesh.cells) // 4:,} tetrahedra into four hexahedra each"
             return replace(mesh, method=method)
-    raise OtherMethodError(f"{solid.name}: gmsh's subdivision gives no hexahedra: {'; '.join(complaints)}")
+    raise OtherMethodError(f"{solid.name}: gmsh's subdivision gives no hexahedra: {'; '.join(failures)}")
 
 
 def tetrahedron_size(solid: Solid, sizing: Sizing) -> float:
-    """Edge length [m] of the tetrahedra; see :func:`filled_mesh`."""
+    """Edge length [m] of the tetrahedra; see :func:`tetrahedral_mesh`."""
     if sizing.size is not None:
         return sizing.size
     width = max(2 * solid.volume / solid.area, (solid.volume / (_COUNT * _REGULAR)) ** (1 / 3))
@@ -129,15 +137,15 @@ def tetrahedron_size(solid: Solid, sizing: Sizing) -> float:
 
 
 def _best_of_settings(
-    gmsh: ModuleType, solid: Solid, sizing: Sizing, coarser: float, complaints: list[str], plenty: int = _PLENTY
+    gmsh: ModuleType, solid: Solid, sizing: Sizing, coarser: float, failures: list[str], most: int = MANY_UNKNOWNS
 ) -> SolidMesh | None:
-    """The first mesh that is good enough, or has too many unknowns, else the best."""
+    """The first mesh that is good enough or has more than `most` unknowns, else the best one."""
     best: tuple[float, SolidMesh] | None = None
-    for mesh in _tried(gmsh, solid, sizing, coarser, complaints):
+    for mesh in _tried(gmsh, solid, sizing, coarser, failures):
         least = _least_jacobian(mesh)
         if best is None or least > best[0]:
             best = least, mesh
-        if best[0] >= _BAD or (sizing.size is None and 3 * len(mesh.points) > plenty):
+        if best[0] >= _BAD or (sizing.size is None and 3 * len(mesh.points) > most):
             break
     return best and best[1]
 
@@ -146,21 +154,21 @@ def _least_jacobian(mesh: SolidMesh) -> float:
     return float(scaled_jacobian(mesh.points, mesh.cells).min())
 
 
-def _tried(gmsh: ModuleType, solid: Solid, sizing: Sizing, coarser: float, complaints: list[str]) -> Iterator[SolidMesh]:
-    """gmsh's tetrahedra under one setting after the other, where it makes any that are valid."""
+def _tried(gmsh: ModuleType, solid: Solid, sizing: Sizing, coarser: float, failures: list[str]) -> Iterator[SolidMesh]:
+    """The valid meshes of gmsh's tetrahedra, under one setting after the other."""
     size = coarser * tetrahedron_size(solid, sizing)
-    turn = min(_TURN * coarser, np.pi / 3) * min(1.0, sizing.turn / USUAL)
+    turn = min(_TURN * coarser, np.pi / 3) * min(1.0, sizing.angle / USUAL_ANGLE)
     finest = size * min(1.0, coarser / _FINEST)
     for setting in SETTINGS:
         numbers = _options(size, turn, finest, setting)
-        with gmsh_options(gmsh, numbers), finer_hollows(gmsh, solid, sizing, turn, finest):
-            mesh = _generated(gmsh, solid, complaints)
+        with gmsh_options(gmsh, numbers), finer_concave_faces(gmsh, solid, sizing, turn, finest):
+            mesh = _generated(gmsh, solid, failures)
         if mesh is not None:
             yield mesh
 
 
 def _options(size: float, turn: float, finest: float, setting: Setting) -> dict[str, float]:
-    """gmsh's options for tetrahedra of a size, which turn by so much along a curved face unless finer than a least."""
+    """gmsh's options for tetrahedra of a size; `turn` is their angle along a curved face, `finest` their least size."""
     return {
         "Mesh.MeshSizeMax": size, "Mesh.MeshSizeMin": finest,
         "Mesh.MeshSizeFromCurvature": float(np.ceil(2 * np.pi / turn - 1e-9)), "Mesh.MeshSizeFromPoints": 0,
@@ -172,8 +180,8 @@ def _options(size: float, turn: float, finest: float, setting: Setting) -> dict[
 
 
 @contextmanager
-def _listening(gmsh: ModuleType, complaints: list[str], faces: Sequence[CadFace]) -> Iterator[None]:
-    """Whatever gmsh complains of goes to `complaints`, faces in words, and it goes on after the block."""
+def _recording_failures(gmsh: ModuleType, failures: list[str], faces: Sequence[CadFace]) -> Iterator[None]:
+    """Append gmsh's errors to `failures`, with descriptions of faces, and continue after the block."""
     gmsh.logger.start()
     try:
         yield
@@ -182,15 +190,15 @@ def _listening(gmsh: ModuleType, complaints: list[str], faces: Sequence[CadFace]
             raise
         lines = [line.partition(":")[2].strip() for line in gmsh.logger.get() if line.startswith("Error")]
         failed = [tag for dim, tag in gmsh.model.mesh.getLastEntityError() if dim == 2]
-        complaints += [with_faces_in_words(line, faces, failed) for line in lines or [str(error)]]
+        failures += [with_faces_in_words(line, faces, failed) for line in lines or [str(error)]]
     finally:
         gmsh.logger.stop()
 
 
-def _generated(gmsh: ModuleType, solid: Solid, complaints: list[str]) -> SolidMesh | None:
-    """A mesh under the settings that gmsh has now, or None; what it complains of goes to `complaints`."""
+def _generated(gmsh: ModuleType, solid: Solid, failures: list[str]) -> SolidMesh | None:
+    """A mesh under gmsh's present settings, or None; its errors are appended to `failures`."""
     points, cells, sides = np.zeros((0, 3)), np.zeros((0, 10), dtype=np.int64), {}
-    with _listening(gmsh, complaints, solid.faces):
+    with _recording_failures(gmsh, failures, solid.faces):
         gmsh.model.mesh.clear()
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.setOrder(2)
@@ -204,7 +212,7 @@ def _generated(gmsh: ModuleType, solid: Solid, complaints: list[str]) -> SolidMe
         return None
     straightened = unfolded(points, cells, _BAD)
     if straightened is None:
-        complaints.append("flat elements")
+        failures.append("flat elements")
         return None
     used, numbers = np.unique(cells, return_inverse=True)
     faces = joined_faces(gmsh, solid, {tag: np.searchsorted(used, each) for tag, each in sides.items()})
@@ -213,7 +221,7 @@ def _generated(gmsh: ModuleType, solid: Solid, complaints: list[str]) -> SolidMe
 
 
 def _worth_optimising(points: Float[np.ndarray, "n 3"], cells: Int[np.ndarray, "e 10"]) -> bool:
-    """Whether some elements, not too many, are bad by their curvature alone."""
+    """Whether a few elements are bad, and only because they are curved."""
     bad = cells[scaled_jacobian(points, cells) < _BAD]
     if not len(bad) or len(bad) > _FEW * len(cells):
         return False

@@ -8,10 +8,10 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from kedfem.mesh import SolidMesh, filling
+from kedfem.mesh import SolidMesh, tetrahedral
 from kedfem.mesh.cad.model import solid_model
 from kedfem.mesh.cad.solids import Sizing, Solid
-from kedfem.mesh.filling import filled_mesh
+from kedfem.mesh.tetrahedral import tetrahedral_mesh
 from kedfem.scene import Cad
 from tests.verification.concentrations import CROSS, LENGTH, bored_shaft, shaft
 
@@ -31,7 +31,7 @@ def read(draw: Draw, folder: Path) -> Iterator[tuple[ModuleType, Solid]]:
 
 def meshed(draw: Draw, folder: Path, asked: Sizing) -> SolidMesh:
     with read(draw, folder) as (gmsh, solid):
-        return filled_mesh(gmsh, solid, asked)
+        return tetrahedral_mesh(gmsh, solid, asked)
 
 
 def turns(mesh: SolidMesh) -> np.ndarray:
@@ -49,7 +49,7 @@ def far(mesh: SolidMesh) -> int:
 
 
 def test_a_bore_is_as_fine_as_asked_for_and_the_rest_as_usual(tmp_path: Path) -> None:
-    usual, fine = (meshed(bored_shaft, tmp_path, Sizing(hollow=x)) for x in (np.pi / 4, ASKED))
+    usual, fine = (meshed(bored_shaft, tmp_path, Sizing(concave_angle=x)) for x in (np.pi / 4, ASKED))
     assert np.median(turns(usual)) > 1.3 * ASKED
     assert np.median(turns(fine)) < 1.1 * ASKED
     assert far(fine) == pytest.approx(far(usual), rel=0.35)
@@ -57,13 +57,13 @@ def test_a_bore_is_as_fine_as_asked_for_and_the_rest_as_usual(tmp_path: Path) ->
 
 def test_a_bore_with_a_joint_is_as_usual(tmp_path: Path) -> None:
     usual = meshed(bored_shaft, tmp_path, Sizing())
-    held = meshed(bored_shaft, tmp_path, Sizing(hollow=ASKED, kept=((LENGTH / 2e3, 0.004, 0.0),)))
+    held = meshed(bored_shaft, tmp_path, Sizing(concave_angle=ASKED, kept_points=((LENGTH / 2e3, 0.004, 0.0),)))
     assert len(held.points) == len(usual.points)
 
 
 def test_where_finer_ones_are_too_many_the_mesh_is_the_usual_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(filling, "MOST_UNKNOWNS", 1000)
-    usual, mesh = (meshed(bored_shaft, tmp_path, Sizing(hollow=x)) for x in (np.pi / 4, ASKED))
+    monkeypatch.setattr(tetrahedral, "MOST_UNKNOWNS", 1000)
+    usual, mesh = (meshed(bored_shaft, tmp_path, Sizing(concave_angle=x)) for x in (np.pi / 4, ASKED))
     assert len(mesh.points) == len(usual.points)
     assert "fillets and free bores no finer" in mesh.method
 
@@ -73,8 +73,8 @@ def test_too_many_elements_along_a_bore_are_made_fewer_and_it_says_so(
 ) -> None:
     usual = meshed(bored_shaft, tmp_path, Sizing())
     most = 3 * len(usual.points) + 20_000
-    monkeypatch.setattr(filling, "MOST_UNKNOWNS", most)
-    mesh = meshed(bored_shaft, tmp_path, Sizing(hollow=np.radians(10)))
+    monkeypatch.setattr(tetrahedral, "MOST_UNKNOWNS", most)
+    mesh = meshed(bored_shaft, tmp_path, Sizing(concave_angle=np.radians(10)))
     assert 3 * len(usual.points) < 3 * len(mesh.points) <= most
     assert "fillets and free bores by " in mesh.method
 
@@ -89,5 +89,5 @@ def rounded(occ: ModuleType) -> None:
 @pytest.mark.parametrize(("draw", "hollow"), [(shaft, True), (rounded, False)])
 def test_a_fillet_around_a_shaft_is_hollow_and_a_round_is_not(draw: Draw, hollow: bool, tmp_path: Path) -> None:
     with read(draw, tmp_path) as (_, solid):
-        found = {face.kind: face.hollow for face in solid.faces}
+        found = {face.kind: face.concave for face in solid.faces}
     assert found == {"plane": False, "cylinder": False, "other": hollow}
