@@ -165,7 +165,7 @@ def ball(r: float, at: float, inward: bool) -> CadFace:
     return CadFace(0, "", "sphere", np.array([at, 0.0, 0.0]), np.full(3, np.nan), r, inward, np.nan, np.nan)
 
 
-def found(*round_faces: tuple[CadFace, ...]) -> list[Any]:
+def found(*rounds: tuple[CadFace, ...]) -> list[Any]:
     return assembly_joints([AssemblySolid(f"s{i}", 0.1, each) for i, each in enumerate(rounds)])
 
 

@@ -24,7 +24,7 @@ from kedfem.mesh.swept.core import disc
 from kedfem.mesh.swept.path import path_mesh
 from kedfem.mesh.swept.revolved import revolved_mesh
 from kedfem.mesh.tetrahedral import tetrahedral_mesh
-from kedfem.mesh.unknowns import nearest
+from kedfem.mesh.unknowns import nearest_mesh
 from kedfem.scene import Material, link_from
 from kedfem.scene.records.shapes import Cad
 from tests.verification.linear import frequencies
@@ -270,12 +270,12 @@ def test_the_search_for_a_number_of_unknowns_passes_over_sizes_that_change_nothi
     for wanted in (2_500, 4_100, 15_000, 40_000):
         for start in starts:
             tried.clear()
-            size, note = nearest(wanted, start, 4.0, power, mesh_of)
+            size, note = nearest_mesh(wanted, start, 4.0, power, mesh_of)
             assert not note
             assert 1 / 1.3 < mesh_of(size)[1] / wanted < 1.3
             assert len(tried) <= 7
     tried.clear()
-    size, note = nearest(500, 1.0, 4.0, power, mesh_of)
+    size, note = nearest_mesh(500, 1.0, 4.0, power, mesh_of)
     assert size == 4.0  # the largest, and no more are made of it
     assert tried.count(4.0) == 1
     assert "nearest found to the 500" in note
