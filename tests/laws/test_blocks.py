@@ -91,9 +91,13 @@ def test_singular_values_and_least_squares_are_those_of_the_whole_matrix(name: s
     rhs = np.random.default_rng(2).standard_normal((len(along.phi), link.rows.count, 2))  # not to be fulfilled
     wanted = whole.solve(rhs)
     assert_allclose(by_entry.solve(rhs), wanted, atol=1e-9 * np.abs(wanted).max())
+    assert_allclose(by_entry.left(rhs), whole.left(rhs), atol=1e-9)
+    forces = np.random.default_rng(3).standard_normal((len(along.phi), len(link.bodies) - 1, 6))
+    wanted = whole.least_norm(forces)
+    assert_allclose(by_entry.least_norm(forces), wanted, atol=1e-9 * np.abs(wanted).max())
     for k in range(len(along.phi)):
-        there = link.blocks.values(link.rows, f, link.size)[k]
-        assert link.blocks.agree(there, by_entry.values[0]) == (np.linalg.slogdet(whole.J[k].T @ whole.J[0])[0] > 0)
+        there = by_entry.J[k]
+        assert link.blocks.agree(there, by_entry.J[0]) == (np.linalg.slogdet(whole.J[k].T @ whole.J[0])[0] > 0)
 
 
 PARALLEL = four_bar(0.3, 0.9, 0.3, 0.9, np.radians(60))

@@ -106,12 +106,6 @@ class Blocks:
         extremes(values, self.starts, self.body, *self._plan(), first, out)
         return out
 
-    def dense(self, values: Float[np.ndarray, "e 6"]) -> Float[np.ndarray, "m k"]:
-        """The rows as a matrix."""
-        J = np.zeros((self.rows, self.count, 6))
-        np.add.at(J, (self.row, self.body), values)
-        return J[:, self.place].reshape(self.rows, -1)
-
     def agree(self, one: Float[np.ndarray, "e 6"], other: Float[np.ndarray, "e 6"]) -> bool:
         """Whether J₁ᵀ J₂ has a positive determinant, so that no singular position lies between both."""
         import scipy.sparse as sp

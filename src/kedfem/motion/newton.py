@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from kedfem.arrays import Bool, Float, Inexact
+from kedfem.arrays import Bool, Float, Inexact, Int
 from kedfem.motion.blocks import Blocks
 from kedfem.motion.constraints import Rows
 from kedfem.motion.linkage import Linkage
@@ -83,11 +83,24 @@ class Factor:
         """x that leaves least of J x = rhs."""
         return np.linalg.solve(self.U, rhs if self.Q is None else np.swapaxes(self.Q, 1, 2) @ rhs)
 
+    def left(self, rhs: Float[np.ndarray, "T m c"]) -> Float[np.ndarray, "T m c"]:
+        """What the least squares leave of J x = rhs: its part on the null space of Jᵀ."""
+        return np.zeros_like(rhs) if self.Q is None else np.asarray(rhs - self.Q @ (np.swapaxes(self.Q, 1, 2) @ rhs))
+
+    def least_norm(self, rhs: Float[np.ndarray, "T b 6"]) -> Float[np.ndarray, "T m"]:
+        """The least y with Jᵀ y = rhs."""
+        y = np.linalg.solve(np.swapaxes(self.U, 1, 2), rhs.reshape(len(rhs), -1, 1))
+        return np.asarray((y if self.Q is None else self.Q @ y)[..., 0])
+
     def extremes(self) -> Float[np.ndarray, "T 2"]:
         """Greatest and least singular value of the scaled rows; the latter is 0 at a dead point."""
         if not self.U.shape[-1]:
             return np.ones((len(self.U), 2))
         return np.asarray(np.linalg.svd(self.U, compute_uv=False)[:, [0, -1]])
+
+    def of_body(self, body: int) -> tuple[Int[np.ndarray, " r"], Float[np.ndarray, "T r 6"]]:
+        """Rows that may have entries for a body but the ground, and these."""
+        return np.arange(self.J.shape[1]), self.J[:, :, 6 * body - 6 : 6 * body]
 
 
 class BlockFactor:
@@ -95,15 +108,28 @@ class BlockFactor:
 
     def __init__(self, link: Linkage, f: Features, blocks: Blocks) -> None:
         self.f, self.blocks = f, blocks
-        self.J = self.values = blocks.values(link.rows, f, link.size)
+        self.J = blocks.values(link.rows, f, link.size)
 
     def solve(self, rhs: Float[np.ndarray, "T m c"]) -> Float[np.ndarray, "T k c"]:
         """x that leaves least of J x = rhs."""
-        return self.blocks.least_squares(self.values, rhs)
+        return self.blocks.least_squares(self.J, rhs)
+
+    def left(self, rhs: Float[np.ndarray, "T m c"]) -> Float[np.ndarray, "T m c"]:
+        """What the least squares leave of J x = rhs; nothing where rows hold every motion once."""
+        return self.blocks.left(self.J, rhs) if self.blocks.rows > 6 * self.blocks.count else np.zeros_like(rhs)
+
+    def least_norm(self, rhs: Float[np.ndarray, "T b 6"]) -> Float[np.ndarray, "T m"]:
+        """The least y with Jᵀ y = rhs."""
+        return self.blocks.least_norm(self.J, rhs)
 
     def extremes(self) -> Float[np.ndarray, "T 2"]:
         """Greatest and least singular value of the scaled rows; the latter is 0 at a dead point."""
-        return self.blocks.extremes(self.values)
+        return self.blocks.extremes(self.J)
+
+    def of_body(self, body: int) -> tuple[Int[np.ndarray, " r"], Float[np.ndarray, "T r 6"]]:
+        """Rows that have entries for a body but the ground, and these; a row may be there twice."""
+        here = np.flatnonzero(self.blocks.body == self.blocks.place[body - 1])
+        return self.blocks.row[here], self.J[:, here]
 
 
 def factored(link: Linkage, f: Features, rows: Rows | None = None) -> Factor | BlockFactor:

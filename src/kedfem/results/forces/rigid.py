@@ -12,7 +12,7 @@ from kedfem.dynamics.rigid_elements import RigidElements, rigid_elements
 from kedfem.motion.joint_equations import ordered
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path, path
-from kedfem.motion.reactions import BlockReactions, Reactions, effort, reactions
+from kedfem.motion.reactions import Reactions, effort, reactions
 from kedfem.motion.released_motions import components
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.channels import XYZ, Channel
@@ -81,18 +81,16 @@ class RigidForces:
         return self._rows
 
     def _joint_forces(self, motion: RigidMotion, step: int | None, wrench: Float[np.ndarray, "T b 6"]) -> dict[str, Rows]:
-        """All channels where forces and moments act on the bodies; of many bodies without a matrix of responses."""
+        """All channels where forces and moments act on the bodies; where poses return, by responses that are kept."""
         names = [each.channel.name for each in self.every]
-        if self.linkage.blocks is not None:
-            return dict(zip(names, self._by_entries(motion, wrench), strict=True))
+        if not self.turn or step is None or step < 1:
+            return dict(zip(names, self._by_multipliers(motion, wrench), strict=True))
         values = (self._responses(motion, step) @ wrench.reshape(len(motion.t), -1, 1))[..., 0]
         ends = np.cumsum([len(each.channel.columns) for each in self.every])[:-1]
         return dict(zip(names, np.split(values, ends, axis=1), strict=True))
 
-    def _by_entries(self, motion: RigidMotion, wrench: Float[np.ndarray, "T b 6"]) -> Iterator[Rows]:
+    def _by_multipliers(self, motion: RigidMotion, wrench: Float[np.ndarray, "T b 6"]) -> Iterator[Rows]:
         found = reactions(self.linkage, motion)
-        if not isinstance(found, BlockReactions):
-            raise TypeError("a linkage of few bodies is solved as one matrix")
         multipliers = found.multipliers(wrench)
         for each in self.every:
             if each.which < 2:
@@ -101,10 +99,8 @@ class RigidForces:
             else:
                 yield (multipliers @ effort(self.linkage, each.which - 2))[:, None]
 
-    def _responses(self, motion: RigidMotion, step: int | None) -> Responses:
-        """All channels from forces and moments; where poses return, those of the first revolution again."""
-        if not self.turn or step is None or step < 1:
-            return self._made(motion)
+    def _responses(self, motion: RigidMotion, step: int) -> Responses:
+        """All channels from forces and moments; those of the first revolution again and again."""
         known = sum(map(len, self._kept))
         if known < self.turn and step == known + 1:
             self._kept.append(self._made(motion))
@@ -117,8 +113,6 @@ class RigidForces:
 
     def _made(self, motion: RigidMotion) -> Responses:
         found = reactions(self.linkage, motion)
-        if not isinstance(found, Reactions):
-            raise TypeError("a linkage of many bodies is not solved as one matrix")
         return found.responses(np.concatenate([self.channel_of(found, each) for each in self.every], axis=2))
 
     def channel_of(self, found: Reactions, each: RigidChannel) -> Float[np.ndarray, "T m c"]:
@@ -126,7 +120,7 @@ class RigidForces:
         if each.which < 2:
             return np.asarray(found.on(each.joint, each.body, each.at)[each.which] @ each.project.T)
         of_rows = effort(self.linkage, each.which - 2)
-        return np.broadcast_to(of_rows[:, None], (*found.Q.shape[:2], 1))
+        return np.broadcast_to(of_rows[:, None], (len(found.motion.t), len(of_rows), 1))
 
 
 def rigid_forces(scene: Scene, linkage: Linkage, inertias: Inertias, along: Path | None = None) -> RigidForces:
@@ -143,7 +137,8 @@ def rigid_forces(scene: Scene, linkage: Linkage, inertias: Inertias, along: Path
     elements = None
     if scene.springs or scene.motors or scene.limits:
         elements = rigid_elements(scene, linkage, along or path(linkage, *drive_range(scene)))
-    return RigidForces(scene, linkage, inertias, tuple(every), elements, returning(scene, along))
+    turn = returning(scene, along) if linkage.blocks is None else 0  # responses of many bodies would fill the memory
+    return RigidForces(scene, linkage, inertias, tuple(every), elements, turn)
 
 
 def returning(scene: Scene, along: Path | None) -> int:
@@ -167,7 +162,7 @@ def _drive(scene: Scene, linkage: Linkage, k: int) -> RigidChannel:
     return RigidChannel(channel, drive.joint, 2 + k, linkage.bodies.index(link), np.asarray(joint.at), np.zeros((1, 3)))
 
 
-def _joint(scene: Scene, linkage: Linkage, found: Reactions | BlockReactions, name: str) -> list[RigidChannel]:
+def _joint(scene: Scene, linkage: Linkage, found: Reactions, name: str) -> list[RigidChannel]:
     joint = scene.joints[name]
     link = stated_link(scene, joint)
     other = next(each for each in joint.links if each != link)
