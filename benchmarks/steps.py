@@ -13,7 +13,7 @@ from kedfem.dynamics.history import LinkMoment
 from kedfem.dynamics.matrices.substructure import factored
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.start import motion_of
-from kedfem.dynamics.stepping.transient import snapshots
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system.sparse import SparsePart
 from kedfem.dynamics.system.steps import Steps
 from kedfem.scene import time_grid
@@ -34,9 +34,9 @@ def bench_steps(folder: Path, quick: bool) -> None:
         for _ in range(2):  # compiled code is loaded once
             found: list[list[LinkMoment]] = []
             since = process_time()
-            for each in snapshots(*given, ready.model, taken):
+            for block in transient(*given, ready.model, taken):
                 since = since if found else process_time()  # after the start
-                found.append(each.states)
+                found += [block.at(k).states for k in range(len(block))]
         step = (process_time() - since) / CONDENSED_STEPS
         motion = motion_of(*given)(time_grid(ready.scene).step * np.arange(MONOLITHIC_STEPS + 1))
         wanted, slow = marched(ready.model, taken.ready.scheme, motion)

@@ -1,12 +1,12 @@
 """Mechanisms with joints between links that both move, for tests: inverted slider-cranks, a shaft of universal joints."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from kedfem.accuracy.prepared import Prepared, meshed
-from kedfem.dynamics.history import Block
+from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.results.recording import recording
@@ -50,6 +50,12 @@ def ran(raw: dict[str, Any]) -> tuple[Prepared, list[Block]]:
     ready = meshed(scene)
     steps = steps_of(scene, ready.model)
     return ready, list(transient(scene, ready.linkage, ready.path, ready.model, steps))
+
+
+def snapshots(*run: Any) -> Iterator[Snapshot]:
+    """All time points of `transient`, one by one."""
+    for block in transient(*run):
+        yield from (block.at(k) for k in range(len(block)))
 
 
 def state(blocks: list[Block], k: int, name: str) -> np.ndarray:

@@ -19,10 +19,10 @@ from kedfem.dynamics.modes.residual import residual_deflections
 from kedfem.dynamics.reduced_model import reduced_model
 from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.stepping.solvers import steps_of
-from kedfem.dynamics.stepping.transient import snapshots
 from kedfem.links.reduced import rigid, rigid_modes
 from kedfem.scene import scene_from
 from tests import scenes
+from tests.moving import snapshots
 from tests.rooms.test_dynamics import four_bar
 from tests.scenes import bar, cycloidal
 

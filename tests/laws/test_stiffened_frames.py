@@ -59,7 +59,7 @@ def stresses(raw: Raw, link: str) -> np.ndarray:
     motion = rigid_motion(ready.linkage, ready.path, t, path_parameter(ready.scene, t))
     found = stiffening(ready.model)
     k = [each.name for each in ready.model.links].index(link)
-    modes, s = found.modes[k], found.over(forcings(ready.model, motion), motion)[k].factors
+    modes, s = found.modes[k], found.over(forcings(ready.model, motion), motion)[k]
     return np.array(
         [np.asarray(each.toarray() if hasattr(each, "toarray") else each) for each in map(modes.stiffness, s)]
     )

@@ -19,13 +19,13 @@ from kedfem.dynamics.matrices.substructure import mass_substructure
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_body import drive_range
 from kedfem.dynamics.stepping.solvers import steps_of
-from kedfem.dynamics.stepping.transient import snapshots
 from kedfem.dynamics.system.steps import Steps
 from kedfem.links.record import mass_times
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path
 from kedfem.scene import scene_from
 from tests import scenes
+from tests.moving import snapshots
 from tests.scenes import arm, bar, constant_speed
 
 BAR = {"width": 0.0254, "thickness": 0.0254}

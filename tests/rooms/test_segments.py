@@ -19,13 +19,14 @@ from kedfem.dynamics.modes.bases import bases
 from kedfem.dynamics.modes.reduction import energy_sorted, excited, port_functions, static_parts
 from kedfem.dynamics.reduced_model import restored_model, stored_model
 from kedfem.dynamics.stepping.solvers import steps_of
-from kedfem.dynamics.stepping.transient import snapshots, transient
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.errors import MeshError, SceneError
 from kedfem.links.record import Link
 from kedfem.links.recovery import stress_recovery
 from kedfem.output.frames import link_fields
 from kedfem.scene import scene_from
 from kedfem.tables import check_tables
+from tests.moving import snapshots
 from tests.runs import quick
 from tests.scenes import arm, bar
 

@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from kedfem.analysis import analyse
+from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.stepping.transient import Snapshot
 from kedfem.links.beams.beam_axis import smooth_axis, straight_axis
 from kedfem.links.beams.section import rectangle, tube
 from kedfem.links.beams.spatial_beam import spatial_beam_link

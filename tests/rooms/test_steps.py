@@ -16,7 +16,7 @@ from kedfem.dynamics.rigid_body import motions
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.start import started
-from kedfem.dynamics.stepping.transient import snapshots, transient
+from kedfem.dynamics.stepping.transient import transient
 from kedfem.dynamics.system import (
     algebra_kernel,
     bodies_kernel,
@@ -33,6 +33,7 @@ from kedfem.errors import SolveError
 from kedfem.motion.rigid import rigid_motion
 from kedfem.results import Channel
 from kedfem.scene import drive_angle, scene_from, time_grid
+from tests.moving import snapshots
 
 from .test_dynamics import four_bar, slider_crank
 

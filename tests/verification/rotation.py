@@ -7,13 +7,13 @@ from scipy.sparse.linalg import spsolve
 from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.rigid_body import drive_range
 from kedfem.dynamics.stepping.solvers import steps_of
-from kedfem.dynamics.stepping.transient import snapshots
 from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
 from kedfem.links.surfaces.coupling_surfaces import face_surface
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path
 from kedfem.scene import Material, Scene, scene_from
+from tests.moving import snapshots
 
 from .cases import Row, case
 from .linear import deflection, free_map, held, vector_mass

@@ -146,7 +146,7 @@ class GeometricError:
         if not looked_at:
             return
         self.strain = max(self.strain, float(np.sum(looked_at, axis=0).max()))
-        some, axial = block.every(max(1, len(block) // INSTANTS)), np.zeros(1)
+        some, axial = block.chosen(slice(None, None, max(1, len(block) // INSTANTS))), np.zeros(1)
         guides = {body for _, body in self._slides}
         model = self.model
         joined = zip(model.links, model.joints, model.bodies, some.links, self._of, strict=True)

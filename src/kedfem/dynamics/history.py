@@ -16,24 +16,14 @@ class Forcing:
 
     R : (T, d, d) orientation, link to world
     F : (T, n, d) P − M R0'', world components [N]
-    stress : (T, m) factors of the link's stress modes; None without stiffening
     """
 
     R: Float[np.ndarray, "T d d"]
     F: Float[np.ndarray, "T n d"]
-    stress: Float[np.ndarray, "T m"] | None = None
 
     def part(self, first: int, end: int) -> "Forcing":
         """The time points from one number up to another."""
-        stress = None if self.stress is None else self.stress[first:end]
-        return Forcing(self.R[first:end], self.F[first:end], stress)
-
-    @property
-    def factors(self) -> Float[np.ndarray, "T m"]:
-        """Those of the stress modes, with stiffening."""
-        if self.stress is None:
-            raise ValueError("stress factors must be there, got none")
-        return self.stress
+        return Forcing(self.R[first:end], self.F[first:end])
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,10 +170,6 @@ class Block:
         levels = tuple(each.part(first, end) for each in self.levels)
         multipliers = self.multipliers.every(slice(first, end))
         return Block(self.step + first, self.motion.part(first, end), links, levels, self.fine, multipliers)
-
-    def every(self, stride: int) -> "Block":
-        """Some of its time points, the first and each so many further on; without products."""
-        return self.chosen(slice(None, None, stride))
 
     def chosen(self, which: slice | Int[np.ndarray, " k"]) -> "Block":
         """Some of its time points; without products and levels."""

@@ -73,30 +73,27 @@ class Stiffening:
 
     joints : those that are enforced by constraint equations
     elements : motors and springs, whose forces are those that the rigid-body motion has
-    turned : links with follower loads in co-rotational frames: number, link, all its loads, as rotated by the rigid-body
-        motion, and number in the linkage
+    following : links with follower loads in co-rotational frames: number, link, all its loads, as rotated by the
+        rigid-body motion, and number in the linkage
     """
 
     parts: Sequence[Substructure]
     modes: Sequence[StressModes]
     joints: Sequence[ConstraintJoint]
     elements: RigidElements | None
-    turned: Sequence[tuple[int, Link, tuple[Pattern, ...], int]]
+    following: Sequence[tuple[int, Link, tuple[Pattern, ...], int]]
 
-    def over(self, forcing: Sequence[Forcing], motion: RigidMotion) -> list[Forcing]:
-        """The same over the times of a motion with the factors s_i of the stress modes."""
+    def over(self, forcing: Sequence[Forcing], motion: RigidMotion) -> list[Float[np.ndarray, "T _"]]:
+        """Factors s_i (T, m) of the stress modes of all links over the times of a motion."""
         rows = constraint_matrices(self.joints, motion, self.parts[0].attachment.unknowns)
         loads = [F @ each.R for F, each in zip(self._loads(forcing, motion), forcing, strict=True)]
         forces = closed(self.parts, [each.R for each in forcing], rows).forces(loads)
-        return [
-            replace(each, stress=_factors(modes, part, load, force))
-            for each, modes, part, load, force in zip(forcing, self.modes, self.parts, loads, forces, strict=True)
-        ]
+        return [_factors(*each) for each in zip(self.modes, self.parts, loads, forces, strict=True)]
 
     def _loads(self, forcing: Sequence[Forcing], motion: RigidMotion) -> list[Float[np.ndarray, "T n d"]]:
         """Loads of all links with those of motors and springs, world components."""
         F = [each.F for each in forcing]
-        for k, link, loads, body in self.turned:
+        for k, link, loads, body in self.following:
             F[k] = applied(link, loads, motion, body)
         for k, more in self.elements.loads(motion) if self.elements else ():
             F[k] = F[k] + more
@@ -104,15 +101,13 @@ class Stiffening:
 
     def stress_forces(self, forcing: Sequence[Forcing], motion: RigidMotion) -> list[StressForce]:
         """g → k g P of all links at the first time of a motion."""
-        every = zip(self.modes, self.over(forcing, motion), strict=True)
-        return [modes.force(now.factors[0]) for modes, now in every]
+        return [modes.force(s[0]) for modes, s in zip(self.modes, self.over(forcing, motion), strict=True)]
 
     def stiffness(self, forcing: Sequence[Forcing], motion: RigidMotion) -> list[Matrix]:
         """k ⊗ R P Rᵀ of all links at the first time of a motion, world frame, (dn, dn)."""
-        every = zip(self.modes, self.over(forcing, motion), strict=True)
+        every = zip(self.modes, self.over(forcing, motion), forcing, strict=True)
         return [
-            sp.kron(modes.stiffness(now.factors[0]), now.R[0] @ modes.P @ now.R[0].T, format="csr")
-            for modes, now in every
+            sp.kron(modes.stiffness(s[0]), each.R[0] @ modes.P @ each.R[0].T, format="csr") for modes, s, each in every
         ]
 
 
@@ -135,11 +130,11 @@ def stiffening(model: Model, elements: RigidElements | None = None) -> Stiffenin
         for k, (link, part, loads) in enumerate(zip(model.links, parts, model.loads, strict=True))
     ]  # fmt: skip
     every = enumerate(zip(model.links, model.loads, model.bodies, strict=True))
-    turned = [
+    following = [
         (k, link, tuple(replace(load, own=False) for load in loads), body)
         for k, (link, loads, body) in every if any(load.own for load in loads)
     ]  # fmt: skip
-    return Stiffening(parts, modes, model.rows, elements, turned)
+    return Stiffening(parts, modes, model.rows, elements, following)
 
 
 def stress_modes(link: Link, part: Substructure, loads: Sequence[Pattern], elements: Sequence[Nodal] = ()) -> StressModes:

@@ -24,7 +24,7 @@ from functools import cache, partial
 import numpy as np
 
 from kedfem.arrays import Float, Int
-from kedfem.dynamics.history import Block, Forcing, LinkHistory
+from kedfem.dynamics.history import Block, LinkHistory
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
@@ -165,11 +165,11 @@ class Account:
         found = Stress(none, none)
         if stresses is None:
             return found
-        forcing = stresses.over(forcings(self.model, block.motion), block.motion)
+        factors = stresses.over(forcings(self.model, block.motion), block.motion)
         at = rates_of_bodies(block.motion)
         for group in self._groups:
             of, links = [self.of[i] for i in group], [block.links[i] for i in group]
-            made = [partial(_stress_force, stresses.modes[i], forcing[i]) for i in group]
+            made = [partial(_stress_force, stresses.modes[i], factors[i]) for i in group]
             more = stress(of, links, made, at.of(_bodies(of), of[0].k))
             found = Stress(found.power + more.power, found.stored + more.stored)
         return found
@@ -229,11 +229,9 @@ def balance_warning(found: Balance) -> tuple[str, ...]:
     )
 
 
-def _stress_force(modes: StressModes, forcing: Forcing, t: int) -> StressForce:
+def _stress_force(modes: StressModes, s: Float[np.ndarray, "T m"], t: int) -> StressForce:
     """g → k g P of a link at a time point."""
-    if forcing.stress is None:
-        raise ValueError("stress factors must be there, got none")
-    return modes.force(forcing.stress[t])
+    return modes.force(s[t])
 
 
 def _grouped(of: Sequence[Constants], k: int) -> list[list[int]]:

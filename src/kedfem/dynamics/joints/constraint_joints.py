@@ -118,7 +118,7 @@ def constrained(scene: Scene, name: str) -> tuple[Constraint, ...]:
         found.append((bushing(joint, 2, turning=True), (Term(record.TURN, 0, 1, one, one, other),)))
     for n in map("xyz".index, turns):
         law = bushing(joint, n, turning=True)
-        found.append((law, (rotation_term(0, 1, frame, n, law, tilt=len(turns) < 3),)))
+        found.append((law, (rotation_term(frame, n, law, tilt=len(turns) < 3),)))
     if joint.kind == "screw":  # its thread, a constraint of two terms
         lead = -(joint.lead or 0.0) / (2 * np.pi)
         found.append((Held(), (coordinate(joint, turns=False), coordinate(joint, lead, turns=True))))

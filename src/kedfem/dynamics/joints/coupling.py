@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from kedfem.arrays import Float
+from kedfem.dynamics.force_elements import force_elements
 from kedfem.dynamics.joints.attachments import Attachment, SharedCut, used_columns
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side, needs_constraints
 from kedfem.dynamics.joints.constraint_ports import (
@@ -95,11 +96,7 @@ def joined(
     unknowns = 0
     enforced = [constraint_joint(scene, name, links, layout) for name in scene.joints if needs_constraints(scene, name)]
     geared = [gear_joint(scene, name, links, layout) for name in scene.gears]
-    acting = [
-        element_joint(scene, f"{kind}.{name}", element, links, layout)
-        for kind, every in (("springs", scene.springs), ("motors", scene.motors), ("limits", scene.limits))
-        for name, element in (every.items() if elements else ())
-    ]
+    acting = [element_joint(scene, *each, links, layout) for each in (force_elements(scene) if elements else ())]
     stiff = [rigid_points(link, key, layout) for key, link in links.items() if bars and can_be_bars(link)]
     rows = [row for row in (*enforced, *geared, *acting, *stiff) if any(row.all_sides)]
     sides = [(row.name, side) for row in rows for side in row.all_sides]

@@ -59,12 +59,10 @@ def static_parts(model: Model) -> list[Substructure]:
     return [factored(link, joint, 0.0, 1.0) for link, joint in zip(model.links, model.joints, strict=True)]
 
 
-def excited(
-    model: Model, parts: Sequence[Substructure], motion: RigidMotion, levels: int = LANCZOS
-) -> list[list[NodalOf]]:
+def excited(model: Model, parts: Sequence[Substructure], motion: RigidMotion) -> list[list[NodalOf]]:
     """Static deflections at the times of a motion, with their shares in modes of the frozen linkage; per link."""
     out: list[list[NodalOf]] = [[] for _ in model.links]
-    krylov = _krylov(model, parts, motion, levels)
+    krylov = _krylov(model, parts, motion)
     shares = np.array([_dots(M_b, krylov.static) for M_b in krylov.images])  # (l, T)
     for t, found in enumerate(krylov.found):
         Z = np.linalg.eigh(krylov.T[t, :found, :found])[1]
@@ -77,14 +75,12 @@ def excited(
     return out
 
 
-def frozen_frequencies(
-    model: Model, parts: Sequence[Substructure], motion: RigidMotion, levels: int = LANCZOS
-) -> list[Float[np.ndarray, " f"]]:
+def frozen_frequencies(model: Model, parts: Sequence[Substructure], motion: RigidMotion) -> list[Float[np.ndarray, " f"]]:
     """Lowest circular frequencies of the linkage standing still, drive held, among modes that its loads excite [rad/s].
 
     1/ω² are Ritz values of K⁻¹ M: the first is good, those after it less and less. None where nothing is loaded.
     """
-    out, krylov = [], _krylov(model, parts, motion, levels)
+    out, krylov = [], _krylov(model, parts, motion)
     for T, found in zip(krylov.T, krylov.found, strict=True):
         values = np.linalg.eigvalsh(T[:found, :found])[::-1]
         out.append(np.asarray(1 / np.sqrt(values[values > REPEATED * values[:1]])))
@@ -99,11 +95,11 @@ class _Krylov:
     T : (T, l, l); found : (T,) levels at each time
     """
 
-    def __init__(self, model: Model, static: list[Rows], levels: int) -> None:
+    def __init__(self, model: Model, static: list[Rows]) -> None:
         self.static = static
         self.vectors: list[list[Rows]] = []
         self.images: list[list[Rows]] = []
-        self.T = np.zeros((len(static[0]), levels, levels))
+        self.T = np.zeros((len(static[0]), LANCZOS, LANCZOS))
         self.found = np.zeros(len(static[0]), int)
         self._model, self._next, self._size = model, static, _mass_norms(model, static)[0]
 
@@ -130,12 +126,12 @@ class _Krylov:
             self.T[:, level, k] = self.T[:, k, level] = _dots(M_b, x)
 
 
-def _krylov(model: Model, parts: Sequence[Substructure], motion: RigidMotion, levels: int) -> _Krylov:
+def _krylov(model: Model, parts: Sequence[Substructure], motion: RigidMotion) -> _Krylov:
     """Of the linkage frozen at the times of a motion, from its static deflection under P − M R0'' there, link frames."""
     forcing = forcings(model, motion)
     frozen = closed(parts, [x.R for x in forcing], constraint_matrices(model.rows, motion, model.interface_unknowns))
-    found = _Krylov(model, list(frozen.deflections([x.F @ x.R for x in forcing])), levels)
-    for _ in range(levels):
+    found = _Krylov(model, list(frozen.deflections([x.F @ x.R for x in forcing])))
+    for _ in range(LANCZOS):
         if not found.grows():
             break
         found.add(list(frozen.deflections(found.images[-1])))

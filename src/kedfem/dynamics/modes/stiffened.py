@@ -82,15 +82,14 @@ class Stiffened:
 
     def system_at(self, motion: RigidMotion) -> tuple[System, float]:
         """The system with its links as they are at a position, and s [1/s²] with which K + s M holds each of them."""
-        forcing = self.stresses.over(forcings(self.driven, motion), motion)
+        factors = self.stresses.over(forcings(self.driven, motion), motion)
         links, shift = [], 0.0
         model = self.system.model
-        for link, rigid, modes, body, force in zip(
-            model.links, self.rigid, self.stresses.modes, model.bodies, forcing, strict=True
+        for link, rigid, modes, body, s in zip(
+            model.links, self.rigid, self.stresses.modes, model.bodies, factors, strict=True
         ):
-            s = np.zeros(len(modes.k)) if force.stress is None else force.stress[0]
             R = motion.R[0, body]
-            added = sp.kron(modes.stiffness(s), modes.P) + _rotation_inertia(link, R.T @ motion.omega[0, body])
+            added = sp.kron(modes.stiffness(s[0]), modes.P) + _rotation_inertia(link, R.T @ motion.omega[0, body])
             links.append(replace(link, K0=_plus(link.K0, added)))
             shift = max(shift, AMPLE * _unstable(rigid, added))
         return replace(self.system, model=replace(model, links=tuple(links))), shift

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from kedfem.dynamics.history import Block, Snapshot
+from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_body import forcings, motions
 from kedfem.dynamics.stepping.marks import Mark
@@ -148,12 +148,6 @@ def _finer(model: Model, failed: ConvergenceError) -> str:
     beams = {link.name for link in model.links if link.kind == "spatial_beam"}
     needed = " (beams in space: shorter than some 100 radii of gyration where they bend much)"
     return "give it more elements or segments" + needed * (failed.moves in beams)
-
-
-def snapshots(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps) -> Iterator[Snapshot]:
-    """All time points of `transient`, one by one."""
-    for block in transient(scene, linkage, along, model, solver):
-        yield from (block.at(k) for k in range(len(block)))
 
 
 def instant_in_words(linkage: Linkage, motion: RigidMotion, k: int) -> str:

@@ -213,8 +213,9 @@ def _at_a_point(system: System, term: Term) -> bool:
     return term.kind == GAP and other.form == RIGID and bool((term.a == one.origin).all())
 
 
-def rotation_term(i: int, j: int, frame: Float[np.ndarray, "3 3"], n: int, law: Law, tilt: bool) -> Term:
-    """The rotation about axis n of a joint: of a bushing, whose rotation may be large, that of the rotation vector.
+def rotation_term(frame: Float[np.ndarray, "3 3"], n: int, law: Law, tilt: bool) -> Term:
+    """The rotation about axis n of a joint, of its end 0 against 1: of a bushing, whose rotation may be large, that of
+    the rotation vector.
 
     Parameters
     ----------
@@ -222,8 +223,8 @@ def rotation_term(i: int, j: int, frame: Float[np.ndarray, "3 3"], n: int, law: 
     """
     if isinstance(law, Held):
         a, b = (frame[0], frame[1]) if n == 2 else (frame[2], frame[1 - n])
-        return Term(TURN, i, j, a, a, b)
-    return Term(TILT if tilt else ROTATION, i, j, frame[2], frame[2], frame[n])
+        return Term(TURN, 0, 1, a, a, b)
+    return Term(TILT if tilt else ROTATION, 0, 1, frame[2], frame[2], frame[n])
 
 
 def without_unknowns(system: System, each: Constraint) -> bool:

@@ -34,8 +34,8 @@ class Stressed:
     def over(self, forcing: Sequence[Forcing], motion: RigidMotion) -> Terms:
         """Terms over the times of a motion."""
         every = []
-        for each, entries, size in zip(self.stiffening.over(forcing, motion), self.entries, self.size, strict=True):
-            every.append(fewer_terms(each.factors * size, entries / size[:, None]))
+        for s, entries, size in zip(self.stiffening.over(forcing, motion), self.entries, self.size, strict=True):
+            every.append(fewer_terms(s * size, entries / size[:, None]))
         sizes = [k.shape[1] for _, k in every for _ in range(len(k))]
         factors = np.ascontiguousarray(np.concatenate([s for s, _ in every], axis=1))
         return factors, ends_of([len(k) for _, k in every]), ends_of(sizes), flat([k for _, k in every])
