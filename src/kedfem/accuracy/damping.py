@@ -29,12 +29,13 @@ LITTLE = 0.95, 0.9, 0.8  # ρ∞ of the compared run: the first in which no vibr
 LOST = 0.01
 
 
-def damped_errors(ready: Prepared, base: Histories) -> dict[str, float]:
+def damped_errors(ready: Prepared, base: Histories, zeros: set[str] | None = None) -> dict[str, float]:
     """Channel → what numerical damping takes from it, at the worst time, of its peak; empty where that is little.
 
     Parameters
     ----------
     base : the channels of the prepared scene
+    zeros : to which the names of channels are added that are zero beside others
     """
     if ready.scene.analysis.rho_inf > STRONG:
         return {}
@@ -48,7 +49,7 @@ def damped_errors(ready: Prepared, base: Histories) -> dict[str, float]:
         except KedfemError:  # it takes the damping to run
             continue
         if turned.most <= stable_rotation(rho_inf):
-            return relative_errors(base, found)
+            return relative_errors(base, found, zeros)
     return {}
 
 

@@ -12,7 +12,7 @@ takes a fraction. Their channels are compared as `histories` does: what two step
   companion is run with links that much softer; stress errs besides by a part of η itself.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
@@ -142,7 +142,7 @@ def budget(
         return Budget(joined(shares), tuple(limits), eta)
     own = ran is not None and small.model is ready.model and len(ran.time) > 1
     small = replace(small, scene=beginning(small.scene, small.model))
-    known = dict(step or {})
+    known, zeros = dict(step or {}), set[str]()
     try:
         near = ran.begun if ran is not None and small.model is ready.model else None
         base = replace(ran, size=extent(ready.model)) if ran is not None and own else histories(small, near=near)
@@ -153,14 +153,15 @@ def budget(
         longer = None
         if seen.steps:
             if not known:
-                known, longer = step_errors(small, base)
-            step_share, known = _step_share(small, base, known)
+                known, longer = step_errors(small, base, zeros)
+            step_share, known = _step_share(small, base, known, zeros)
             shares.append(step_share)
         elif not states_step(ready.scene):  # stated positions are wanted there
             shares.append(positions_share(base, sizes))
         if longer is not None and differs_alike(small):
             small, base = replace(small, scene=doubled(small.scene)), longer
-        shares.append(mesh_share(small, base, eta))
+        shares.append(mesh_share(small, base, eta, zeros))
+        limits += _zeros(sizes, zeros)
     except KedfemError as fault:
         limits.append(f"step and mesh: a run beside this one failed ({str(fault).splitlines()[0]})")
     return Budget(joined(shares), tuple(limits), eta, known)
@@ -194,10 +195,16 @@ def frames_share(geometric: GeometricError, kinds: Sequence[str]) -> Share | Non
     return Share("frames", errors, f"{how}; {remedy}" if remedy else "")
 
 
-def step_errors(ready: Prepared, base: Histories) -> tuple[dict[str, float], Histories | None]:
+def step_errors(
+    ready: Prepared, base: Histories, zeros: set[str] | None = None
+) -> tuple[dict[str, float], Histories | None]:
     """Channel → step error of a run of a single level in memory: its difference from another level.
 
     That one has steps twice as long; where it cannot, half as long.
+
+    Parameters
+    ----------
+    zeros : to which the names of channels are added that are zero beside others
 
     Returns
     -------
@@ -207,15 +214,25 @@ def step_errors(ready: Prepared, base: Histories) -> tuple[dict[str, float], His
     finer = with_analysis(in_steps(ready.scene, 0.5 * grid.step, 2 * grid.steps), extrapolation_levels=1)
     other = histories(replace(ready, scene=doubled(ready.scene) if longer else finer), near=base.begun)
     fine, coarse = (base, other) if longer else (other, base)
-    return single_errors(fine, coarse, bool(ready.scene.limits))[0 if longer else 1], other if longer else None
+    return single_errors(fine, coarse, bool(ready.scene.limits), zeros)[0 if longer else 1], other if longer else None
 
 
-def _step_share(ready: Prepared, base: Histories, marched: Mapping[str, float]) -> tuple[Share, dict[str, float]]:
+def _step_share(
+    ready: Prepared, base: Histories, marched: Mapping[str, float], zeros: set[str]
+) -> tuple[Share, dict[str, float]]:
     """The share of the step, and channel → its error, from what levels or marches show and from numerical damping."""
-    sizes, damped = counted(base), damped_errors(ready, base)
+    sizes, damped = counted(base), damped_errors(ready, base, zeros)
     every = {name: max(error, damped.get(name, 0.0)) for name, error in (damped | dict(marched)).items()}
     shown = {name: error for name, error in every.items() if name in sizes}
     return Share("step", by_kind(shown), damping_remedy(ready.scene, marched, damped)), every
+
+
+def _zeros(sizes: Collection[str], zeros: Collection[str]) -> list[str]:
+    """Channels that are zero beside others, and what their errors are relative to, in words."""
+    return [
+        f"{name} by itself: it cannot be told from zero beside others; its error is that of the largest in its unit"
+        for name in sizes if name in zeros
+    ]  # fmt: skip
 
 
 def _limits(ready: Prepared, found: Mapping[int, Indicator]) -> list[str]:

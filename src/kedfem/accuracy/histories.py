@@ -19,8 +19,10 @@ from kedfem.results.channels import largest_by_unit
 from kedfem.results.on_demand import ChannelSelection
 from kedfem.results.recording import recording, rows
 
-# of the largest force at the linkage's size: a torque below is what is left of others that cancel
-FAINT = 3e-3
+# of the largest force at the linkage's size: a torque below is what is left of others that cancel; of the largest value
+# of the same unit: a force, displacement or stress below is zero to the accuracy of that one, and one below SMALL is if
+# its error is larger than itself
+FAINT, SMALL = 3e-3, 0.1
 ROUGHLY = 1e-6  # of its size: residual of a period that a compared steady motion may have
 NOTHING = 1e-6  # of the largest value of the same unit: a channel below holds rounding, not results
 
@@ -96,25 +98,35 @@ def asked_for(name: str) -> bool:
     return kind_of_name(name) is not None
 
 
-def relative_errors(found: Histories, reference: Histories) -> dict[str, float]:
-    """Largest difference over time of every judged channel, relative to the channel's largest value.
+def relative_errors(found: Histories, reference: Histories, zeros: set[str] | None = None) -> dict[str, float]:
+    """Largest difference over time of every judged channel, relative to what `scales` gives.
 
     Both runs need not have the same steps: the reference is interpolated (cubic spline).
+
+    Parameters
+    ----------
+    zeros : to which the names of channels are added that are zero beside others
     """
     end = min(found.time[-1], reference.time[-1]) * (1 + 1e-12)
     here = found.time <= end
-    errors = {}
-    for name, size in counted(reference).items():
+    errors, sizes = {}, judged(reference)
+    for name in sizes:
         channel, wanted = reference.channels[name]
         if name in found.channels:
             values = _columns(found.channels[name], channel)[here]
             there = _at(found.time[here], reference.time, wanted)
-            errors[name] = float(np.linalg.norm(values - there, axis=1).max()) / size
-    return errors
+            errors[name] = float(np.linalg.norm(values - there, axis=1).max())
+    scale = scales(errors, sizes, zeros)
+    return {name: error / scale[name] for name, error in errors.items()}
 
 
 def counted(reference: Histories) -> dict[str, float]:
     """Judged channel → its largest value; negligible channels are left out."""
+    return {name: size for name, (_, size) in judged(reference).items()}
+
+
+def judged(reference: Histories) -> dict[str, tuple[str, float]]:
+    """Judged channel → its unit and its largest value; negligible channels are left out."""
     units = largest_by_unit(reference.channels.values())
     sizes = {
         name: (channel.unit, float(np.linalg.norm(values, axis=1).max()))
@@ -124,7 +136,35 @@ def counted(reference: Histories) -> dict[str, float]:
     least["N m"] = max(least.get("N m", 0.0), FAINT * reference.size * units.get("N", 0.0))
     if reference.size:  # of rotors in balance
         least["N"] = max(least.get("N", 0.0), NOTHING * units.get("N m", 0.0) / reference.size)
-    return {name: size for name, (unit, size) in sizes.items() if size > least[unit]}
+    return {name: (unit, size) for name, (unit, size) in sizes.items() if size > least[unit]}
+
+
+def scales(
+    errors: Mapping[str, float], sizes: Mapping[str, tuple[str, float]], zeros: set[str] | None = None
+) -> dict[str, float]:
+    """Channel → the value to which its error is relative: its largest, or of one that is zero the largest of its unit.
+
+    Zero is what is below FAINT of that, or below SMALL of it and less than its own error. Torques keep their own scale:
+    that of a wrist is small beside that of a shoulder, and counts.
+
+    Parameters
+    ----------
+    errors : in the channel's unit
+    sizes : channel → unit, largest value
+    zeros : to which the names of those that are zero are added
+    """
+    largest: dict[str, float] = {}
+    for unit, size in sizes.values():
+        largest[unit] = max(largest.get(unit, 0.0), size)
+    out = {}
+    for name, error in errors.items():
+        unit, size = sizes[name]
+        most = largest[unit]
+        zero = unit != "N m" and (size <= FAINT * most or error > size <= SMALL * most)
+        out[name] = most if zero else size
+        if zero and zeros is not None:
+            zeros.add(name)
+    return out
 
 
 def worst(errors: Mapping[str, float]) -> float:

@@ -22,30 +22,40 @@ SOFT = 2.0  # times η²: few elements a link, averaged with few neighbours, hid
 LOCAL = 0.05  # of η: stress at a point, of its peak, beside what the compliance does
 
 
-def mesh_errors(small: Prepared, base: Histories, eta: Mapping[str, float]) -> dict[str, float]:
-    """Channel → error of all meshes: beams with twice the elements, other links softer by 2 η²."""
+def mesh_errors(
+    small: Prepared, base: Histories, eta: Mapping[str, float], zeros: set[str] | None = None
+) -> dict[str, float]:
+    """Channel → error of all meshes: beams with twice the elements, other links softer by 2 η².
+
+    Parameters
+    ----------
+    zeros : to which the names of channels are added that are zero beside others
+    """
     model, every = small.model, small.scene.links.items()
     beams = {name: refined(link, 2.0) for name, link in every if link.category == "beam" and link.shape is not None}
     if beams:
         scene = with_links(small.scene, beams)
         links = {link.name: link.full or link for link in model.links}
         if any(link.meshed for link in links.values()):
-            return _separate(small, base, scene, eta)
+            return _separate(small, base, scene, eta, zeros)
         model = elastic_model(scene, small.linkage, along=small.path)
         other = histories(replace(small, scene=scene, model=model))
-        return {name: REST * error for name, error in relative_errors(base, other).items()}
+        return {name: REST * error for name, error in relative_errors(base, other, zeros).items()}
     other = histories(replace(small, model=softened(model, eta)), near=base.begun)
-    return relative_errors(base, other)
+    return relative_errors(base, other, zeros)
 
 
-def _separate(small: Prepared, base: Histories, finer: Scene, eta: Mapping[str, float]) -> dict[str, float]:
+def _separate(
+    small: Prepared, base: Histories, finer: Scene, eta: Mapping[str, float], zeros: set[str] | None
+) -> dict[str, float]:
     """Error of a scene with both beams and meshed links: the sum of their separate errors."""
-    soft = relative_errors(base, histories(replace(small, model=softened(small.model, eta)), near=base.begun))
+    softer = histories(replace(small, model=softened(small.model, eta)), near=base.begun)
+    soft = relative_errors(base, softer, zeros)
     if any(link.meshed and link.fit is not None for link in small.model.links):
         return soft
     model = elastic_model(finer, small.linkage, along=small.path)
     whole = first_reduced(replace(small, scene=finer, model=model), FUNCTIONS)
-    other = relative_errors(base, histories(whole))
+    other = relative_errors(base, histories(whole), zeros)
     return {name: soft[name] + REST * other.get(name, 0.0) for name in soft}
 
 
@@ -79,9 +89,9 @@ def plain_mesh_share(eta: Mapping[str, float], kinds: tuple[str, ...]) -> Share 
     return Share("mesh", errors)
 
 
-def mesh_share(small: Prepared, base: Histories, eta: Mapping[str, float]) -> Share:
-    """The error of the elements of beams, and of solid and plane links, as a share of the budget."""
-    errors = by_kind(mesh_errors(small, base, eta))
+def mesh_share(small: Prepared, base: Histories, eta: Mapping[str, float], zeros: set[str] | None = None) -> Share:
+    """The error of the elements of beams, and of solid and plane links, as a share of the budget; as `mesh_errors`."""
+    errors = by_kind(mesh_errors(small, base, eta, zeros))
     if eta and "stress" in errors:
         errors["stress"] += LOCAL * max(eta.values())
     return Share("mesh", errors)

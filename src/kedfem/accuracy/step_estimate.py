@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from kedfem.accuracy.error_budget import kind_of_name
-from kedfem.accuracy.histories import Histories, counted
+from kedfem.accuracy.histories import Histories, counted, scales
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.resolution import StepError
 from kedfem.arrays import Float
@@ -216,25 +216,28 @@ class StepWatch:
             errors = {each.channel.name: min(1.0, SINGLE * running) for each in self.recorded}
             return StepEstimate(h, 1, errors, {}, {}, running)
         sizes = {name: x for name, x in self.sizes.items() if x.peak}
+        units = {each.channel.name: each.channel.unit for each in self.recorded}
+        found = {name: _error(x) for name, x in sizes.items()}
+        scale = scales(found, {name: (units[name], x.peak) for name, x in sizes.items()})
         return StepEstimate(
-            h, analysis.extrapolation_levels or 1, {name: _error(x) for name, x in sizes.items()},
-            {name: tuple((x.differences / x.peak).tolist()) for name, x in sizes.items()},
+            h, analysis.extrapolation_levels or 1, {name: error / scale[name] for name, error in found.items()},
+            {name: tuple((x.differences / scale[name]).tolist()) for name, x in sizes.items()},
             {name: x.fast for name, x in sizes.items()}, running,
         )  # fmt: skip
 
 
 def _error(x: _Sizes) -> float:
-    """Error of the combined values, relative to the peak.
+    """Error of the combined values, in their unit.
 
     Of two levels, D = x_{h/2} − x_h: fast motion goes wrong first, and second differences in time weigh it most. By
     q = |D''|/|x''| of it the levels disagree; the next power of the step leaves about q D, and where q is near 1, D
     itself. Of three, what the two pairs' combinations differ by, δ, is such a D, and δ/D another q.
     """
-    peak, q = x.peak, x.fast
+    q = x.fast
     if len(x.differences) == 1:
-        return float(x.differences[0]) / peak * min(1.0, TWO * q)
+        return float(x.differences[0]) * min(1.0, TWO * q)
     s = x.next / float(x.differences[0]) if x.differences[0] else 0.0
-    return x.next / peak * min(1.0, THREE * float(np.sqrt(q * min(1.0, s))))
+    return x.next * min(1.0, THREE * float(np.sqrt(q * min(1.0, s))))
 
 
 def single_level(fast: float) -> tuple[float, float]:
@@ -247,7 +250,9 @@ def single_level(fast: float) -> tuple[float, float]:
     return finer, 1 + finer
 
 
-def single_errors(fine: Histories, coarse: Histories, stops: bool) -> tuple[dict[str, float], dict[str, float]]:
+def single_errors(
+    fine: Histories, coarse: Histories, stops: bool, zeros: set[str] | None = None
+) -> tuple[dict[str, float], dict[str, float]]:
     """Channel → error of two marches by themselves: of the finer one, and of that with steps twice as long.
 
     Parameters
@@ -255,8 +260,10 @@ def single_errors(fine: Histories, coarse: Histories, stops: bool) -> tuple[dict
     fine, coarse : from the same time on, both with all their time points
     stops : whether there are limits, which may be met between two times of the coarse one. Elsewhere values that jump
         are those of loads and drives.
+    zeros : to which the names of channels are added that are zero beside others
     """
-    finer, coarser = {}, {}
+    errors: list[dict[str, float]] = [{}, {}]
+    peaks: dict[str, tuple[str, float]] = {}
     for name in counted(fine):
         channel, every = fine.channels[name]
         which = [k for k, column in enumerate(channel.columns) if column != "von_mises"]
@@ -265,9 +272,12 @@ def single_errors(fine: Histories, coarse: Histories, stops: bool) -> tuple[dict
         sizes = _Sizes()
         sizes.add((4 * own - other[: len(own)]) / 3, [other[: len(own)], own])
         if sizes.peak:
-            peak = largest_row(every[:, which])
-            D, jolt = float(sizes.differences[0]) / peak, _jolt(every[:, which]) / peak if stops else 0.0
-            finer[name], coarser[name] = (max(D * factor, jolt) for factor in single_level(sizes.fast))
+            peaks[name] = channel.unit, largest_row(every[:, which])
+            D, jolt = float(sizes.differences[0]), _jolt(every[:, which]) if stops else 0.0
+            for found, factor in zip(errors, single_level(sizes.fast), strict=True):
+                found[name] = max(D * factor, jolt)
+    scale = [scales(found, peaks, zeros) for found in errors]
+    finer, coarser = ({n: x / by[n] for n, x in found.items()} for found, by in zip(errors, scale, strict=True))
     return finer, coarser
 
 
