@@ -12,7 +12,7 @@ from kedfem.links.beams.beam_recovery import straight_run
 from kedfem.links.beams.section import rectangle
 from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
-from kedfem.links.recovery import stress_recovery
+from kedfem.links.recovery import extreme_stresses, stress_modes, stress_recovery
 from kedfem.output.frames import link_field
 from tests.laws.strategies import MATERIAL
 
@@ -116,6 +116,33 @@ def test_a_kink_of_the_moment_is_not_smoothed() -> None:
         assert abs(stress - exact) < 1e-7 * largest  # linear on both sides: exact but for rounding
     smooth = (point_rows(link, "probe", place(0.99, HEIGHT / 2), np.zeros((0, 3))).stress @ g)[0]
     assert abs(smooth + 0.01 * HEIGHT / 2 / SECTION.second_moment) > 1e-3 * largest  # what kinks are there for
+
+
+@pytest.mark.parametrize("nodes", [2, 3, 5])
+@pytest.mark.parametrize("elements", [2, 8])
+def test_a_jump_of_the_moment_is_not_averaged(elements: int, nodes: int) -> None:
+    """Clamped, F at the end and −F L in the middle: the highest moment is F L/2."""
+    link = beam(elements, nodes=nodes)
+    distance = np.linalg.norm(link.X, axis=1)
+    root, middle, end = int(distance.argmin()), int(np.abs(distance - LENGTH / 2).argmin()), int(distance.argmax())
+    F = np.zeros((link.n, 3))
+    F[end, :2], F[middle, 2] = TURN[:, 1], -LENGTH
+    recovery, g = stress_recovery(link), held_still(link, [root], F)
+    highest = LENGTH / 2 * HEIGHT / 2 / SECTION.second_moment
+    von, principal = extreme_stresses(recovery, g.reshape(-1, 3))
+    assert von.argmax() == middle
+    assert_allclose([von.max(), principal.max(), -principal.min()], highest, rtol=1e-6)
+    modes = stress_modes(recovery, link, g[None])  # those of the envelope and of fatigue
+    assert_allclose(np.linalg.norm(modes[:, :5, 0], axis=1).max(), highest, rtol=1e-6)
+
+
+@pytest.mark.parametrize("offset", [0.5, 0.53])
+def test_a_probe_a_little_outside_has_the_stress_of_the_outer_fibre(offset: float) -> None:
+    """A thousandth of the length is 4 % of the height of a slender beam."""
+    link = beam(4)
+    g = held_still(link, [int(np.linalg.norm(link.X, axis=1).argmin())], sine_load(link, 1.0))
+    fibre = point_rows(link, "probe", place(0.7, HEIGHT / 2)).stress @ g
+    assert_allclose(point_rows(link, "probe", place(0.7, offset * HEIGHT)).stress @ g, fibre)
 
 
 def test_two_node_elements_and_single_ones_keep_what_they_have() -> None:

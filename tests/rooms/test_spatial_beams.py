@@ -13,11 +13,12 @@ from scipy.spatial.transform import Rotation
 from kedfem.analysis import analyse
 from kedfem.dynamics.history import Snapshot
 from kedfem.dynamics.model import Model
+from kedfem.errors import SceneError
 from kedfem.links.beams.beam_axis import smooth_axis, straight_axis
-from kedfem.links.beams.section import rectangle, tube
+from kedfem.links.beams.section import box, i_profile, rectangle, tube
 from kedfem.links.beams.spatial_beam import spatial_beam_link
 from kedfem.links.build import bare_link, link_axes
-from kedfem.links.point_rows import point_rows
+from kedfem.links.point_rows import point_rows, stress_rows
 from kedfem.links.recovery import nodal_stress, stress_recovery
 from kedfem.scene import Material, scene_from, spatial_beams
 from tests.linkages import joint, moved_scene, rssr
@@ -329,6 +330,26 @@ def clamped(section: Any, force: np.ndarray, moment: float = 0.0) -> tuple[Any, 
     f[-4] = force
     f[-2], f[-1] = [0, 0, moment / 2], [0, -moment / 2, 0]  # θ = ½ (p·z − q·y)
     return link, deflection(link, free_map(link, np.arange(12)), f)
+
+
+HOLLOW = {  # a point in the material, and one where there is none
+    "tube": (tube(0.04, 0.03, 0.6), (0.017, 0.006), (0.005, -0.008)),
+    "box": (box(0.04, 0.03, 0.004, (0.4, 0.4)), (0.017, 0.002), (0.012, -0.008)),
+    "i": (i_profile(0.04, 0.03, 0.003, 0.004, (0.4, 0.4)), (0.012, 0.001), (0.012, -0.008)),
+}
+
+
+@pytest.mark.parametrize("kind", HOLLOW)
+def test_stress_is_where_there_is_material(kind: str) -> None:
+    """On the axis too, where a tube has that of tension; a little beside the material that of the outer fibre."""
+    section, within, hollow = HOLLOW[kind]
+    link, g = clamped(section, np.array([1e4, 300.0, 200.0]), 50.0)
+    for y, z in ((0.0, 0.0), within):
+        stress_rows(link, "p", np.array([0.3, y, z]))
+    with pytest.raises(SceneError, match=r"p: must lie in link 'c', .* its material is nearest at \(0\.3, "):
+        stress_rows(link, "p", np.array([0.3, *hollow]))
+    outer, beside = (point_rows(link, "p", np.array([0.3, y, 0.0])).stress @ g.ravel() for y in (0.02, 0.0209))
+    assert_allclose(beside, outer, rtol=1e-12)
 
 
 @pytest.mark.parametrize("section", [rectangle(0.04, 0.02), tube(0.04, 0.0, 0.9), tube(0.04, 0.03, 0.6)])

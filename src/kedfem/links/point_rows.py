@@ -9,6 +9,7 @@ from kedfem.arrays import Float
 from kedfem.errors import SceneError
 from kedfem.links.beams.beam import shape_functions
 from kedfem.links.beams.beam_recovery import fibre_row, nearest_on_beam
+from kedfem.links.beams.section import nearest_in_section
 from kedfem.links.beams.spatial_recovery import (
     beam_strains,
     element_frame,
@@ -16,7 +17,7 @@ from kedfem.links.beams.spatial_recovery import (
     section_stress,
     section_value,
 )
-from kedfem.links.record import Link
+from kedfem.links.record import Link, section_of
 from kedfem.links.recovery import nodal_gradients, stress_of_gradient
 from kedfem.links.surfaces.coupling_surfaces import rigid_link_surface
 from kedfem.mesh.elements.shape_functions import barycentric
@@ -69,6 +70,22 @@ def point_rows(
             return _beam_rows(link, where, point, kinks)
         case _:
             return _solid_rows(link, where, point)
+
+
+def stress_rows(
+    link: Link, where: str, point: Float[np.ndarray, "3"], kinks: Float[np.ndarray, "_ 3"] | None = None
+) -> PointRows:
+    """`point_rows` of a point that must be in the material: not in the hollow of a section, or beside its web."""
+    of, at = link.full or link, point_rows(link, where, point, kinks)
+    if of.kind == "spatial_beam":
+        _, e, r, yz = nearest_on_axis(of, point)
+        nearest = nearest_in_section(section_of(of), *yz)
+        gap = float(np.hypot(nearest[0] - yz[0], nearest[1] - yz[1]))
+        if gap > POINT_TOLERANCE * of.size:
+            N, frame = shape_functions(r, of.cells.shape[1])[0], element_frame(of, e)
+            place = np.array([1.0, *nearest]) @ np.einsum("m,mkc->kc", N, frame)
+            raise SceneError(_outside(of, where, point, gap, place, "its material"))
+    return at
 
 
 def require_on_axis(
@@ -189,7 +206,8 @@ def _beam_rows(
         raise SceneError(_outside(link, where, point, beyond, nearest))
     value = np.zeros(link.n)
     value[link.cells[e]] = shape_functions(r, link.cells.shape[1])[0]
-    row = fibre_row(link, e, r, offset, kinks)
+    half = link.section.height / 2
+    row = fibre_row(link, e, r, float(np.clip(offset, -half, half)), kinks)
     stress = sp.csr_array(sp.vstack([row[None, :], np.zeros((5, 3 * link.n))]))
     return PointRows(value, stress, value @ link.X)
 
@@ -201,16 +219,17 @@ def _section_rows(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Poin
         raise SceneError(_outside(link, where, point, beyond, nearest))
     value = section_value(link, e, r, y, z)
     stress = np.zeros((6, 3 * link.n))
-    stress[[0, 3, 5]] = section_stress(link, beam_strains(link, e, r), y, z)
+    stress[[0, 3, 5]] = section_stress(link, beam_strains(link, e, r), *nearest_in_section(section_of(link), y, z))
     return PointRows(value, sp.csr_array(stress), value @ link.X)
 
 
 def _outside(
-    link: Link, where: str, point: Float[np.ndarray, "3"], gap: float, nearest: Float[np.ndarray, "3"]
+    link: Link, where: str, point: Float[np.ndarray, "3"], gap: float, nearest: Float[np.ndarray, "3"],
+    what: str = "its axis",
 ) -> str:  # fmt: skip
     """The message for a point beside a link, with a place of the link near to it: of a beam one of its axis."""
     shown, instead = (", ".join(f"{v + 0.0:.6g}" for v in np.round(x, 9)) for x in (point, nearest))
-    near = f"its axis is nearest at ({instead})" if link.section is not None else f"({instead}) is the nearest"
+    near = f"{what} is nearest at ({instead})" if link.section is not None else f"({instead}) is the nearest"
     advice = f"take a point of its material, {near}"
     if link.meshed and where.startswith("output"):
         advice += ", or for a motion the centre of a bore with a joint"

@@ -94,8 +94,8 @@ class StressRecovery:
 
     @property
     def stressed(self) -> int:
-        """Number of places with a stress of their own: a planar beam has both its outer fibres at each node."""
-        return 2 * self.points if self.link.kind == "beam" else self.points
+        """Number of places with a stress of their own: of planar beams four a node, two fibres in two elements."""
+        return len(self.matrices) * self.points if self.link.kind == "beam" else self.points
 
     def at_points(self, state: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "p d"]:
         """What coefficients (of position, of displacement) mean at the points."""
@@ -112,14 +112,14 @@ def stress_recovery(link: Link) -> StressRecovery:
         values, stresses, cells = drawn(link)
         return StressRecovery(link, stresses, cells, "hexahedron", values)
     half = link.section.height / 2 if link.section else 0.0
-    fibres = (beam_fibre(link, half), beam_fibre(link, -half))
+    fibres = (*beam_fibre(link, half), *beam_fibre(link, -half))
     if link.cells.shape[1] <= 3:
         return StressRecovery(link, fibres, link.cells, link.cell_type)
     return StressRecovery(link, fibres, line_pairs(link.cells), "line")
 
 
 def nodal_stress(recovery: StressRecovery, g: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "p 6"]:
-    """Stresses at the nodes in link axes [Pa]; of a planar beam σ_xx of the outer fibre where it is larger in size.
+    """Stresses at the nodes in link axes [Pa]; of a planar beam σ_xx where it is largest in size, of both outer fibres.
 
     Of a spatial beam at the points of its sections, in the axes (tangent, n1, n2) of the section.
 
@@ -134,9 +134,9 @@ def nodal_stress(recovery: StressRecovery, g: Float[np.ndarray, "n d"]) -> Float
         sections = np.zeros((recovery.matrices[0].shape[0], 6))
         sections[:, [0, 3, 5]] = np.stack([m @ g.ravel() for m in recovery.matrices], axis=1)
         return sections
-    top, bottom = (m @ g.ravel() for m in recovery.matrices)
+    fibres = np.stack([m @ g.ravel() for m in recovery.matrices])
     out = np.zeros((recovery.link.n, 6))
-    out[:, 0] = np.where(np.abs(top) >= np.abs(bottom), top, bottom)
+    out[:, 0] = np.take_along_axis(fibres, np.abs(fibres).argmax(axis=0)[None], axis=0)[0]
     return out
 
 

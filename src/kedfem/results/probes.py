@@ -8,7 +8,7 @@ from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.attachments import used_columns
 from kedfem.dynamics.model import Model, on_segment
-from kedfem.links.point_rows import point_rows
+from kedfem.links.point_rows import stress_rows
 from kedfem.links.recovery import von_mises
 from kedfem.motion.linkage import Linkage, linkage
 from kedfem.motion.released_motions import components
@@ -93,7 +93,7 @@ def _motion(probe: Probe, point: LinkPoint) -> Callable[[Block], Rows]:
 
 def _stress(scene: Scene, model: Model, where: str, name: str, probe: Probe) -> Recorded:
     drawn, kinks = np.asarray(probe.at), _kinks(scene, probe.link)
-    k, at = on_segment(model.links, probe.link, drawn, lambda link: point_rows(link, where, drawn, kinks))
+    k, at = on_segment(model.links, probe.link, drawn, lambda link: stress_rows(link, where, drawn, kinks))
     dofs, dense = used_columns(at.stress)
     nodes, components = np.divmod(dofs, model.links[k].d)
 

@@ -99,15 +99,19 @@ def straight_run(link: Link, element: int, kinks: Points) -> Int[np.ndarray, " e
     return np.array(sorted(run))
 
 
-def beam_fibre(link: Link, offset: float) -> sp.csr_array:
-    """(n, 3n): σ_xx of a fibre at every node, averaged between elements."""
-    nodes = link.cells.shape[1]
-    total, count = np.zeros((link.n, 3 * link.n)), np.zeros(link.n)
+def beam_fibre(link: Link, offset: float) -> tuple[sp.csr_array, sp.csr_array]:
+    """(n, 3n): σ_xx of a fibre at every node, by the first and by the last of the elements that meet there.
+
+    These differ where a torque, a weld or a body acts on the axis, which one side may bear alone.
+    """
+    first, last = np.zeros((link.n, 3 * link.n)), np.zeros((link.n, 3 * link.n))
+    met = np.zeros(link.n, bool)
     for e, cell in enumerate(link.cells):
-        for a, r in zip(cell, parent_nodes(nodes), strict=True):
-            total[a] += fibre_row(link, e, r, offset)
-            count[a] += 1
-    return sp.csr_array(total / count[:, None])
+        for a, r in zip(cell, parent_nodes(len(cell)), strict=True):
+            last[a] = fibre_row(link, e, r, offset)
+            first[a] = first[a] if met[a] else last[a]
+            met[a] = True
+    return sp.csr_array(first), sp.csr_array(last)
 
 
 def _gauss(link: Link) -> Float[np.ndarray, " q"]:

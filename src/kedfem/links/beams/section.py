@@ -216,6 +216,29 @@ def _prandtl_slopes(a: float, b: float, s: float, t: float) -> tuple[float, floa
     return float(along_t), float(along_s)
 
 
+def nearest_in_section(section: Section, y: float, z: float) -> tuple[float, float]:
+    """The point (y, z) of the material nearest to a given one [m]; on the axis itself, even where that is hollow."""
+    half_y, half_z = section.height / 2, section.thickness / 2
+    if np.hypot(y, z) <= EDGE * (half_y + half_z):
+        return y, z
+    if section.kind in {"round", "tube"}:
+        along = np.clip(np.hypot(y, z), section.bore / 2, half_y) / np.hypot(y, z)
+        return float(y * along), float(z * along)
+    found = [(float(np.clip(y, *ys)), float(np.clip(z, *zs))) for ys, zs in _walls(section, half_y, half_z)]
+    return min(found, key=lambda point: np.hypot(point[0] - y, point[1] - z))
+
+
+def _walls(section: Section, h: float, t: float) -> list[tuple[tuple[float, float], tuple[float, float]]]:
+    """Rectangles, from and to along y and along z, that make up a section with corners."""
+    along_y, along_z = section.walls
+    if section.kind not in {"box", "i"}:
+        return [((-h, h), (-t, t))]
+    flanges = [((-h, along_z - h), (-t, t)), ((h - along_z, h), (-t, t))]
+    if section.kind == "i":
+        return [*flanges, ((-h, h), (-along_y / 2, along_y / 2))]
+    return [*flanges, ((-h, h), (-t, along_y - t)), ((-h, h), (t - along_y, t))]
+
+
 def outline(section: Section) -> tuple[Float[np.ndarray, "c 2"], Int[np.ndarray, "q 4"]]:
     """Points (y, z) of a section and quadrilaterals between them, to draw it."""
     h, t = section.height / 2, section.thickness / 2
