@@ -3,6 +3,7 @@
 import math
 import signal
 import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import meshio
@@ -20,7 +21,8 @@ from kedfem.mesh.elements.quality import scaled_jacobian
 from kedfem.mesh.elements.shape_functions import HEX8, HEX20, HEX27, QUAD9, shape_functions, shape_gradients
 from kedfem.mesh.planar.areas import PlaneQuads, pillowed, quadratic_quads
 from kedfem.mesh.planar.choice import distortion, relaxed
-from kedfem.mesh.session import gmsh_model
+from kedfem.mesh.session import GmshError, gmsh_errors_at_end, gmsh_model
+from kedfem.mesh.unknowns import TooCoarseError, nearest_mesh
 from kedfem.scene import LinkScene, part_geometry
 from tests.laws.strategies import examples
 
@@ -306,6 +308,30 @@ class TestUnknowns:
         assert len(mesh.points) > 130
         assert mesh.method == "the nearest found to the 300 unknowns asked for"
 
+    @staticmethod
+    def cubes(coarsest: float) -> Callable[[float], tuple[float, int]]:
+        """Elements of a unit cube, of their size; none above the coarsest that there may be."""
+
+        def made(size: float) -> tuple[float, int]:
+            if size > coarsest:
+                raise TooCoarseError(f"no elements of {size}")
+            return size, round(size**-3)
+
+        return made
+
+    def test_sizes_that_give_no_mesh_are_too_coarse(self):
+        """The nearest is among finer ones: 8,000 with elements of a twentieth, if none are larger."""
+        size, note = nearest_mesh(1000, 0.2, 1.0, 3.0, self.cubes(0.05))
+        assert size == pytest.approx(0.05, rel=0.15)
+        assert note == "the nearest found to the 1,000 unknowns asked for"
+        size, note = nearest_mesh(30_000, 0.2, 1.0, 3.0, self.cubes(0.05))
+        assert 30_000 / 1.3 < size**-3 < 30_000 * 1.3
+        assert not note
+
+    def test_where_no_size_gives_a_mesh_the_last_reason_is_told(self):
+        with pytest.raises(TooCoarseError, match=r"no elements of 0\.2"):
+            nearest_mesh(1000, 0.8, 1.0, 3.0, self.cubes(0.0))
+
 
 class TestParts:
     @pytest.mark.parametrize("name", PARTS)
@@ -564,6 +590,20 @@ class TestSession:
         for thread in threads:
             thread.join()
         assert_array_equal(made[0].points, made[1].points)
+
+    def test_meshes_on_after_an_error(self):
+        """A disk has not the corners of a mapped face; without that wish it can be meshed."""
+        with gmsh_model() as gmsh:
+            disk = gmsh.model.occ.addDisk(0, 0, 0, 1, 1)
+            gmsh.model.occ.synchronize()
+            gmsh.model.mesh.setTransfiniteSurface(disk)
+            with pytest.raises(GmshError, match="is transfinite but has 1 corner"), gmsh_errors_at_end(gmsh):
+                gmsh.model.mesh.generate(2)
+            gmsh.model.mesh.removeConstraints([(2, disk)])
+            gmsh.model.mesh.clear()
+            with gmsh_errors_at_end(gmsh):
+                gmsh.model.mesh.generate(2)
+            assert len(gmsh.model.mesh.getElements(2)[1][0]) > 10
 
     def test_is_silent(self, capfd):
         meshed(**extrusion_shape(*OUTLINES[2]))

@@ -65,6 +65,17 @@ def test_parts_mesh_unattended_with_their_bores_found(part: str) -> None:
     assert_allclose(sorted(1e3 * face.radius for face in surfaces), ROUND[part], rtol=1e-6)
 
 
+@pytest.mark.long
+@pytest.mark.parametrize(("unknowns", "most"), [(3000, 20_000), (6000, 12_000)])
+def test_a_coarse_mesh_is_found_where_settings_of_gmsh_fail(unknowns: int, most: int) -> None:
+    """The arm's eyes leave no flat element only down to some size; gmsh finds overlapping facets at coarser ones."""
+    mesh = made("wishbone.step", {"unknowns": unknowns})
+    assert 3 * len(mesh.points) < most
+    assert mesh_quality(mesh).least > methods.FLAT
+    assert f"the nearest found to the {unknowns:,} unknowns asked for" in mesh.method
+    assert valid_everywhere(mesh.points, mesh.cells).all()
+
+
 class TestLadder:
     def test_the_best_way_that_the_part_allows_is_taken_and_told(self) -> None:
         assert "swept along z" in made().method

@@ -124,6 +124,8 @@ def test_what_gmsh_says_of_surfaces_is_told_in_words(tmp_path: Path) -> None:
         assert said == f"Unable to recover the edge on {face_in_words(bore)} (on 99)"
         assert "bore of radius" in said
         assert " mm (face " in said
+        twice = with_faces_in_words(f"Overlapping facets on surface {bore.tag} surface {bore.tag}", solid.faces)
+        assert twice == f"Overlapping facets on {face_in_words(bore)}"
         blind = with_faces_in_words("PLC Error", solid.faces, [bore.tag])
         assert blind == f"PLC Error at the {face_in_words(bore)}"
         assert with_faces_in_words("No elements", solid.faces) == "No elements"

@@ -26,7 +26,7 @@ from kedfem.mesh.swept.blocks import block_mesh
 from kedfem.mesh.swept.path import path_mesh
 from kedfem.mesh.swept.revolved import revolved_mesh
 from kedfem.mesh.tetrahedral import subdivided_mesh, tetrahedral_mesh, tetrahedron_size
-from kedfem.mesh.unknowns import nearest_mesh
+from kedfem.mesh.unknowns import TooCoarseError, nearest_mesh
 from kedfem.scene import Cad, LinkScene, MeshFile, Meshing
 from kedfem.store import contents, itself, kept
 
@@ -100,7 +100,7 @@ def _sized_or_healed(where: str, gmsh: ModuleType, solid: Solid, link: LinkScene
     """The mesh; if it fails or has flat tetrahedra, that of the CAD model without tiny edges and faces."""
     best: SolidMesh | MeshError
     try:
-        best = _sized(where, gmsh, solid, link, asked)
+        best = _sized(where, gmsh, solid, link, asked, METHODS["tet10" if link.element == "tet10" else link.mesh.kind])
         if not best.tetrahedra or mesh_quality(best).least > FLAT:
             return best
     except MeshError as error:
@@ -109,8 +109,8 @@ def _sized_or_healed(where: str, gmsh: ModuleType, solid: Solid, link: LinkScene
         best = error
     for mended, words in healed(gmsh, where, solid, tetrahedron_size(solid, asked)):
         try:
-            mesh = tetrahedral_mesh(gmsh, mended, asked)
-        except OtherMethodError:
+            mesh = _sized(where, gmsh, mended, link, asked, (tetrahedral_mesh,))
+        except MeshError:
             continue
         if mesh_quality(mesh).least > FLAT:
             return replace(mesh, method=f"{mesh.method}; {words}")
@@ -140,18 +140,28 @@ def _wanted(link: LinkScene, shape: Cad, kept_blends: KeptBlends) -> Sizing:
     return replace(sizing(link.mesh), kept_points=inside, kept_faces=names)
 
 
-def _sized(where: str, gmsh: ModuleType, solid: Solid, link: LinkScene, asked: Sizing) -> SolidMesh:
+def _sized(
+    where: str, gmsh: ModuleType, solid: Solid, link: LinkScene, asked: Sizing, methods: tuple[Method, ...]
+) -> SolidMesh:
     """The mesh of the size or of about the number of unknowns asked for."""
     wanted, element = link.mesh.unknowns, str(link.element)
-    methods, form = METHODS["tet10" if element == "tet10" else link.mesh.kind], FORMS[element]
+    form = FORMS[element]
     if wanted is None:
         return best_mesh(where, gmsh, solid, asked, form, methods)
 
     def sized(size: float) -> tuple[SolidMesh, int]:
         nonlocal methods
-        mesh = best_mesh(where, gmsh, solid, replace(asked, size=size), form, methods)
+        try:
+            mesh = best_mesh(where, gmsh, solid, replace(asked, size=size), form, methods)
+        except MeshError as error:
+            raise TooCoarseError(str(error)) from error
         if mesh.tetrahedra:
             methods = (tetrahedral_mesh,)  # other sizes cannot be swept either
+            if mesh_quality(mesh).least <= FLAT:
+                raise TooCoarseError(
+                    f"{where}: must be meshed without flat elements, got some of {1e3 * size:.3g} mm; take another size "
+                    "(mesh.size)"
+                )
         return mesh, 3 * len(form(mesh).points)
 
     nodes_each = {"hex8": 2, "hex20": 8, "hex27": 16, "tet10": 13}[element]  # for each cube of the size

@@ -83,6 +83,36 @@ def gmsh_options(gmsh: ModuleType, options: dict[str, float]) -> Iterator[None]:
             gmsh.option.setNumber(name, value)
 
 
+class GmshError(Exception):
+    """Errors that gmsh reported while it made a mesh, line by line."""
+
+    def __init__(self, lines: Sequence[str]) -> None:
+        super().__init__("; ".join(lines))
+        self.lines = tuple(lines)
+
+
+@contextmanager
+def gmsh_errors_at_end(gmsh: ModuleType) -> Iterator[None]:
+    """gmsh goes on after errors in the block, in which it makes a mesh; they are raised at its end.
+
+    Else gmsh would stay locked by the first one: it would make no other mesh in this process, without a word.
+
+    Raises
+    ------
+    GmshError
+        gmsh reported errors.
+    """
+    gmsh.logger.start()
+    try:
+        with gmsh_options(gmsh, {"General.AbortOnError": 0}):
+            yield
+        lines = [line.partition(":")[2].strip() for line in gmsh.logger.get() if line.startswith("Error")]
+    finally:
+        gmsh.logger.stop()
+    if lines:
+        raise GmshError(lines)
+
+
 def boundary(gmsh: ModuleType, dimension: int, *tags: int) -> set[int]:
     """Tags of the entities that bound some others: faces of solids, edges of faces, ends of edges."""
     entities = [(dimension, tag) for tag in tags]

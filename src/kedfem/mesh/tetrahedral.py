@@ -1,7 +1,6 @@
 """Meshes of 10-node tetrahedra, curved onto the CAD model's faces, for solids that cannot be swept."""
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from types import ModuleType
 
@@ -16,7 +15,7 @@ from kedfem.mesh.elements.hexahedra import SolidMesh
 from kedfem.mesh.elements.quality import scaled_jacobian
 from kedfem.mesh.elements.shape_functions import TET10, node_numbers
 from kedfem.mesh.elements.tetrahedra import edge_middles, unfolded
-from kedfem.mesh.session import GMSH_HEX27, gmsh_options, numbered_nodes
+from kedfem.mesh.session import GMSH_HEX27, GmshError, gmsh_errors_at_end, gmsh_options, numbered_nodes
 from kedfem.mesh.swept.blocks import gmsh_hexahedra
 
 _TET10 = 11  # gmsh's number of the 10-node tetrahedron
@@ -111,21 +110,23 @@ def _with_concave_faces(
 
 def subdivided_mesh(gmsh: ModuleType, solid: Solid, sizing: Sizing) -> SolidMesh:
     """hex27 mesh of any solid, a `Method`: gmsh divides each tetrahedron into four hexahedra of poor quality."""
-    failures: list[str] = []
     size = 2 * tetrahedron_size(solid, sizing)
     numbers = _options(size, min(2 * _TURN, np.pi / 3), size / _FINEST, SETTINGS[0])
-    with gmsh_options(gmsh, numbers | {"Mesh.SubdivisionAlgorithm": 2}), _recording_failures(gmsh, failures, solid.faces):
-        gmsh.model.mesh.clear()
-        gmsh.model.mesh.generate(3)
-        gmsh.model.mesh.setOrder(2)
-        gmsh.model.mesh.optimize("HighOrder")
-        kinds, _, nodes = gmsh.model.mesh.getElements(3, solid.tag)
-        if list(kinds) == [GMSH_HEX27]:
-            points, tags = numbered_nodes(gmsh)
-            mesh = gmsh_hexahedra(gmsh, points, np.searchsorted(tags, nodes[0]).reshape(-1, 27))
-            method = f"gmsh's subdivision of {len(mesh.cells) // 4:,} tetrahedra into four hexahedra each"
-            return replace(mesh, method=method)
-    raise OtherMethodError(f"{solid.name}: gmsh's subdivision gives no hexahedra: {'; '.join(failures)}")
+    gmsh.model.mesh.clear()
+    try:
+        with gmsh_options(gmsh, numbers | {"Mesh.SubdivisionAlgorithm": 2}), gmsh_errors_at_end(gmsh):
+            gmsh.model.mesh.generate(3)
+            gmsh.model.mesh.setOrder(2)
+            gmsh.model.mesh.optimize("HighOrder")
+    except GmshError as error:
+        failures = "; ".join(_in_words(gmsh, error, solid.faces))
+        raise OtherMethodError(f"{solid.name}: gmsh's subdivision gives no hexahedra: {failures}") from error
+    kinds, _, nodes = gmsh.model.mesh.getElements(3, solid.tag)
+    if list(kinds) != [GMSH_HEX27]:
+        raise OtherMethodError(f"{solid.name}: gmsh's subdivision gives other elements than hexahedra")
+    points, tags = numbered_nodes(gmsh)
+    mesh = gmsh_hexahedra(gmsh, points, np.searchsorted(tags, nodes[0]).reshape(-1, 27))
+    return replace(mesh, method=f"gmsh's subdivision of {len(mesh.cells) // 4:,} tetrahedra into four hexahedra each")
 
 
 def tetrahedron_size(solid: Solid, sizing: Sizing) -> float:
@@ -179,35 +180,29 @@ def _options(size: float, turn: float, finest: float, setting: Setting) -> dict[
     }  # fmt: skip
 
 
-@contextmanager
-def _recording_failures(gmsh: ModuleType, failures: list[str], faces: Sequence[CadFace]) -> Iterator[None]:
-    """Append gmsh's errors to `failures`, with descriptions of faces, and continue after the block."""
-    gmsh.logger.start()
-    try:
-        yield
-    except Exception as error:
-        if type(error) is not Exception:  # gmsh raises nothing more special
-            raise
-        lines = [line.partition(":")[2].strip() for line in gmsh.logger.get() if line.startswith("Error")]
-        failed = [tag for dim, tag in gmsh.model.mesh.getLastEntityError() if dim == 2]
-        failures += [with_faces_in_words(line, faces, failed) for line in lines or [str(error)]]
-    finally:
-        gmsh.logger.stop()
+def _in_words(gmsh: ModuleType, error: GmshError, faces: Sequence[CadFace]) -> list[str]:
+    """gmsh's errors, with descriptions of faces."""
+    failed = [tag for dim, tag in gmsh.model.mesh.getLastEntityError() if dim == 2]
+    return [with_faces_in_words(line, faces, failed) for line in error.lines]
 
 
 def _generated(gmsh: ModuleType, solid: Solid, failures: list[str]) -> SolidMesh | None:
     """A mesh under gmsh's present settings, or None; its errors are appended to `failures`."""
-    points, cells, sides = np.zeros((0, 3)), np.zeros((0, 10), dtype=np.int64), {}
-    with _recording_failures(gmsh, failures, solid.faces):
-        gmsh.model.mesh.clear()
-        gmsh.model.mesh.generate(3)
-        gmsh.model.mesh.setOrder(2)
+    gmsh.model.mesh.clear()
+    try:
+        with gmsh_errors_at_end(gmsh):
+            gmsh.model.mesh.generate(3)
+        with gmsh_errors_at_end(gmsh):
+            gmsh.model.mesh.setOrder(2)
         points, cells = _tetrahedra(gmsh, solid)
         if _worth_optimising(points, cells):
-            with gmsh_options(gmsh, _BRIEF):
+            with gmsh_options(gmsh, _BRIEF), gmsh_errors_at_end(gmsh):
                 gmsh.model.mesh.optimize("HighOrder")
             points, cells = _tetrahedra(gmsh, solid)
-        sides = {face.tag: _sides(gmsh, face.tag) for face in solid.faces}
+    except GmshError as error:
+        failures += _in_words(gmsh, error, solid.faces)
+        return None
+    sides = {face.tag: _sides(gmsh, face.tag) for face in solid.faces}
     if not len(cells) or not sides:
         return None
     straightened = unfolded(points, cells, _BAD)

@@ -61,7 +61,7 @@ def with_faces_in_words(text: str, faces: Iterable[CadFace], failed: Iterable[in
         face = known.get(int(found[1]))
         return found[0] if face is None else face_in_words(face)
 
-    in_words = re.sub(r"(?i)\bsurfaces? (\d+)", words, text)
+    in_words = re.sub(r"(?i)\bsurfaces? (\d+)(?: surface \1\b)?", words, text)  # of facets of one face it names both
     named = [face_in_words(known[tag]) for tag in failed if tag in known]
     return in_words if in_words != text or not named else f"{text} at the {', '.join(named[:3])}"
 

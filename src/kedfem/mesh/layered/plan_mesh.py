@@ -15,7 +15,7 @@ from kedfem.mesh.layered.partition import Plan, Region
 from kedfem.mesh.places import in_mm
 from kedfem.mesh.planar.areas import PlaneQuads, directed_sides, quadratic_quads
 from kedfem.mesh.planar.choice import GOOD, SETTINGS, Setting, best_quads
-from kedfem.mesh.session import gmsh_model, gmsh_options, quadrilaterals
+from kedfem.mesh.session import gmsh_errors_at_end, gmsh_model, gmsh_options, quadrilaterals
 
 _BETTER = 0.05  # least improvement of the scaled Jacobian by gmsh's quadrilaterals over mapped ones
 _LINE, _POINT = 1, 15  # gmsh's numbers of element types
@@ -145,7 +145,7 @@ def _meshed(gmsh: ModuleType, rim: Rim, setting: Setting) -> PlaneQuads | None:
         "Mesh.MeshSizeMax": step * float(sides.max()),
     }
     gmsh.model.mesh.setRecombine(2, surface)
-    with gmsh_options(gmsh, options):
+    with gmsh_options(gmsh, options), gmsh_errors_at_end(gmsh):
         gmsh.model.mesh.generate(2)
     if (found := quadrilaterals(gmsh)) is None:
         return None

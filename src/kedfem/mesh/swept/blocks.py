@@ -10,7 +10,7 @@ from kedfem.mesh.elements.hexahedra import SolidMesh, without_unused_nodes
 from kedfem.mesh.elements.quality import mesh_quality
 from kedfem.mesh.elements.shape_functions import HEX27, node_numbers
 from kedfem.mesh.layered.size_trials import good_enough
-from kedfem.mesh.session import GMSH_HEX27, boundary, gmsh_copy, gmsh_options, numbered_nodes
+from kedfem.mesh.session import GMSH_HEX27, boundary, gmsh_copy, gmsh_errors_at_end, gmsh_options, numbered_nodes
 
 _MOST = 2000  # cubes of the default size in the volume
 _TURN = np.radians(20)  # angle of a curved edge per element: parabolas miss 5e-5 of a circle's area
@@ -99,7 +99,7 @@ def _transfinite(gmsh: ModuleType, groups: list[set[int]], counts: list[int]) ->
         model.setRecombine(2, face)
     for _, volume in gmsh.model.getEntities(3):
         model.setTransfiniteVolume(volume)
-    with gmsh_options(gmsh, _OPTIONS):
+    with gmsh_options(gmsh, _OPTIONS), gmsh_errors_at_end(gmsh):
         model.generate(3)
         model.setOrder(2)
     kinds, _, nodes = model.getElements(3)
