@@ -11,7 +11,7 @@ from kedfem.compiled import compiled, inner
 from kedfem.dynamics.anderson_kernel import accelerated
 from kedfem.dynamics.beams_kernel import begun
 from kedfem.dynamics.matrices.profile_kernel import profile_solved
-from kedfem.dynamics.system.algebra_kernel import add_transposed, frame_copied, product, turned, turned_back
+from kedfem.dynamics.system.algebra_kernel import add_transposed, frame_copied, product, rotated
 from kedfem.dynamics.system.bodies_kernel import internal_forces, orientation
 from kedfem.dynamics.system.corotational_kernel import newmark
 from kedfem.dynamics.system.interface_kernel import gathered, offset, pushed
@@ -88,7 +88,7 @@ def stage(c, c_inside, bodies, ends, of, driving, t, before, size, state, trial,
     R, memory = driving.R[t], (state.pairs, state.products, state.last, trial.memory)
     inside(c, c_inside, bodies, driving, t, size, state, trial, work)
     for i in range(len(bodies.motion)):
-        orientation(bodies, i, R, trial.u, trial, trial.Rp[i])
+        orientation(bodies, i, R, trial, trial.Rp[i])
     gathered(bodies, trial)
     for iteration in range(PASSES):
         asked(c, bodies, ends, of, driving, t, iteration, state, trial, work, solved)
@@ -143,7 +143,7 @@ def inside(c, c_inside, bodies, driving, t, size, state, trial, work):  # type: 
                         state.strain[1, beam, m, e] += scale * trial.strained[beam, m, e]
         for i in range(len(bodies.motion)):
             first, own = bodies.at[i], bodies.at[i + 1] - bodies.at[i]
-            turned_back(R[bodies.motion[i]], bodies.components[i], trial.r[first : first + own], work.room[:own])
+            rotated(R[bodies.motion[i]].T, bodies.components[i], trial.r[first : first + own], work.room[:own])
             for x in range(own):
                 state.damped[1, first + x] = c.alpha * work.room[x]
     seen(c_inside, bodies, driving, t, state, trial, work)
@@ -199,7 +199,7 @@ def force_at(c, bodies, driving, t, size, state, trial, work):  # type: ignore[n
     """trial.f becomes the internal force at trial.u with the rates state.v, trial.Rp the bodies' orientations."""
     inside(c, c, bodies, driving, t, size, state, trial, work)
     for i in range(len(bodies.motion)):
-        orientation(bodies, i, driving.R[t], trial.u, trial, trial.Rp[i])
+        orientation(bodies, i, driving.R[t], trial, trial.Rp[i])
 
 
 @compiled
@@ -214,7 +214,7 @@ def solved_often(bodies, count, trial, y):  # type: ignore[no-untyped-def]
         trial.right[:] = 0.0
         for i in range(len(bodies.motion)):
             first, last, p0, p1 = bodies.at[i], bodies.at[i + 1], bodies.port_at[i], bodies.port_at[i + 1]
-            turned_back(trial.Rp[i], bodies.components[i], trial.r[first:last], y[first:last])
+            rotated(trial.Rp[i].T, bodies.components[i], trial.r[first:last], y[first:last])
             product(bodies.Y, bodies.Y_at[i], p1 - p0, last - first, y[first:last], trial.reaction[p0:p1])
             offset(bodies, i, y[first:last], trial, True)
             pushed(bodies, i, trial)
@@ -228,4 +228,4 @@ def solved_often(bodies, count, trial, y):  # type: ignore[no-untyped-def]
             ported(bodies, i, trial)
             product(bodies.G, bodies.G_at[i], last - first, last - first, trial.r[first:last], y[first:last])
             add_transposed(bodies.Y, bodies.Y_at[i], p1 - p0, last - first, trial.w[p0:p1], y[first:last])
-            turned(trial.Rp[i], bodies.components[i], y[first:last], trial.held[first:last])
+            rotated(trial.Rp[i], bodies.components[i], y[first:last], trial.held[first:last])

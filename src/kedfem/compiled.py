@@ -33,7 +33,7 @@ from kedfem.indexing_kernel import compact
 ROOT = Path(__file__).parent
 KNOWN = numba.version_info.short <= (0, 68)
 """Whether numba's insides are those that compiling in less time was written for; later ones compile as they are."""
-RECORDS = ("dynamics/system/arrays.py", "dynamics/system/state.py", "dynamics/metric.py")
+RECORDS = ("dynamics/system/arrays.py", "dynamics/system/state.py", "dynamics/metric.py", "motion/blocks.py")
 """Where the named tuples stand that kernels are given: numba's cache names them by their modules."""
 
 PATIENCE = 120.0  # s, with a process that compiles a function; one that was stopped would be waited for for ever

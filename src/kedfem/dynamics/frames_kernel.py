@@ -57,21 +57,21 @@ def balanced(kind, fit, R, g, Q, f, work):  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    work : y (D, n) the shape in the rigid-body frame; turned (D, n) K of what is strained
+    work : y (D, n) the shape in the rigid-body frame; Kg (D, n) K of what is strained
     """
-    y, turned, _, _, U, change = work
-    d, n = (2 if kind == PLANE else len(turned)), turned.shape[1]
+    y, Kg, _, _, U, change = work
+    d, n = (2 if kind == PLANE else len(Kg)), Kg.shape[1]
     if kind == SPACE:
-        balanced_space(fit, y, Q, g, turned, U, change)
+        balanced_space(fit, y, Q, g, Kg, U, change)
     else:
-        balanced_plane(fit, y, Q, g, turned)
+        balanced_plane(fit, y, Q, g, Kg)
     for b in range(d):  # R Q: from the frame to the world
         for m in range(d):
             x = 0.0
             for k in range(d):
                 x += R[b, k] * entry(kind, Q, k, m)
             for j in range(n):
-                f[b, j] += x * turned[m, j]
+                f[b, j] += x * Kg[m, j]
 
 
 @inner

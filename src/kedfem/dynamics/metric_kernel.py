@@ -25,14 +25,14 @@ def metric_force(rates, e, elements, shapes, R, u, seen, frame, f, work, room): 
     (g0, v0, a0), (g, v, a) = seen
     rows, share, tangents, gradients = elements.rows, elements.share, elements.tangents, elements.gradients
     E, M, K, P = elements.sizes[e]
-    turned, s, stress, on_g, on_x = room[0], room[7], room[8], room[5], room[6]
+    rotations, s, stress, on_g, on_x = room[0], room[7], room[8], room[5], room[6]
     n, width, S = u.shape[1], tangents.shape[2], 6 * E + P
     shaped(X, R, u, 3, y)
     rotation(SPACE, fit, y, frame, A, U, change)
     for node in range(M):
         for b in range(3):
             for m in range(3):
-                turned[node, b, m] = frame[0][b, m]
+                rotations[node, b, m] = frame[0][b, m]
     strains(e, elements, y, room, A, U, change)
     for b in range(3):
         for j in range(n):
@@ -73,7 +73,7 @@ def strains(e, elements, y, room, A, U, change):  # type: ignore[no-untyped-def]
     tangents, gradients, node, drawn = elements.tangents, elements.gradients, elements.node, elements.drawn
     directors, N, D, bend, pairs = elements.directors, elements.N, elements.D, elements.bend, elements.pairs
     E, M, K, P = elements.sizes[e]
-    turned, x, d, g, s = room[0], room[1], room[2], room[3], room[7]
+    rotations, x, d, g, s = room[0], room[1], room[2], room[3], room[7]
     n = y.shape[1]
     for k in range(K):
         for b in range(3):
@@ -88,12 +88,12 @@ def strains(e, elements, y, room, A, U, change):  # type: ignore[no-untyped-def]
                 for b in range(3):
                     for m in range(3):
                         A[b, m] += g[k, b] * drawn[e, k, m]
-        nearest(A, turned[a], U, change)
+        nearest(A, rotations[a], U, change)
         for c in range(2):
             for b in range(3):
                 total = 0.0
                 for m in range(3):
-                    total += turned[a, b, m] * directors[e, a, c, m]
+                    total += rotations[a, b, m] * directors[e, a, c, m]
                 d[a, c, b] = total
     for p in range(E):
         xx, x1, x2, xs1, xs2, d11, d12, d22, twist = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -140,7 +140,7 @@ def pulled_back(e, elements, room, U, w):  # type: ignore[no-untyped-def]
     node, drawn, N, D = elements.node, elements.drawn, elements.N, elements.D
     bend, pairs = elements.bend, elements.pairs
     E, M, K, P = elements.sizes[e]
-    turned, x, d, g, on_d, on_g, on_x, _, stress = room
+    rotations, x, d, g, on_d, on_g, on_x, _, stress = room
     on_d[:] = 0.0
     for p in range(E):
         b1, b2, b3, b4 = bend[e, p, 0], bend[e, p, 1], bend[e, p, 2], bend[e, p, 3]
@@ -164,7 +164,7 @@ def pulled_back(e, elements, room, U, w):  # type: ignore[no-untyped-def]
                 on_d[a, 0, b] += N[e, p, a] * f1 + D[e, p, a] * g1
                 on_d[a, 1, b] += N[e, p, a] * f2 + D[e, p, a] * g2
     for a in range(M):
-        Q = turned[a]
+        Q = rotations[a]
         t0, t1, t2 = 0.0, 0.0, 0.0
         for c in range(2):
             t0 += d[a, c, 1] * on_d[a, c, 2] - d[a, c, 2] * on_d[a, c, 1]

@@ -6,8 +6,8 @@ proportion to the number of loops.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,38 +16,50 @@ from kedfem.motion.constraints import Rows
 from kedfem.motion.values import Features, coupled_terms, gradients
 
 
-@dataclass(frozen=True)
-class Blocks:
-    """Where the entries of constraint rows are, and the plan by which JᵀJ is factored.
+class Plan(NamedTuple):
+    """By which JᵀJ is factored, and J multiplied, as `blocks_kernel` takes it.
 
-    count : moving bodies
-    row : (e,) constraint of each entry, rising
-    term, side, share : (e,) its elementary row, which of the two bodies there, and the coefficient
-    body : (e,) its body's place in the order of elimination
-    place : (b,) of each moving body
-    columns, below : first block of each column of the factor, and the block row of each
-    updates, of_column : blocks that change another, and first of each column
+    starts : (m + 1,) first entry of each row, and their number
+    body : (e,) place of each entry's body in the order of elimination
     pairs : (n, 3) block of JᵀJ and the two entries whose product goes there
+    columns, below : (b + 1,), (blocks,) first block of each column of the factor, its diagonal, and the row of each
+    updates, of_column : (u, 3) block that two others of one column change; (b + 1,) first of each column
     """
 
-    count: int
-    row: Int[np.ndarray, " e"]
-    term: Int[np.ndarray, " e"]
-    side: Int[np.ndarray, " e"]
-    share: Float[np.ndarray, " e"]
+    starts: Int[np.ndarray, " m1"]
     body: Int[np.ndarray, " e"]
-    place: Int[np.ndarray, " b"]
+    pairs: Int[np.ndarray, "p 3"]
     columns: Int[np.ndarray, " c"]
     below: Int[np.ndarray, " n"]
     updates: Int[np.ndarray, "u 3"]
     of_column: Int[np.ndarray, " c"]
-    pairs: Int[np.ndarray, "p 3"]
-    rows: int
 
-    @cached_property
-    def starts(self) -> Int[np.ndarray, " m"]:
-        """First entry of each row, and their number."""
-        return np.searchsorted(self.row, np.arange(self.rows + 1))
+
+@dataclass(frozen=True, slots=True)
+class Blocks:
+    """Where the entries of constraint rows are, and the plan by which JᵀJ is factored.
+
+    row : (e,) constraint of each entry, rising
+    term, side, share : (e,) its elementary row, which of the two bodies there, and the coefficient
+    place : (b,) of each moving body in the order of elimination
+    """
+
+    row: Int[np.ndarray, " e"]
+    term: Int[np.ndarray, " e"]
+    side: Int[np.ndarray, " e"]
+    share: Float[np.ndarray, " e"]
+    place: Int[np.ndarray, " b"]
+    plan: Plan
+
+    @property
+    def rows(self) -> int:
+        """Number of constraints."""
+        return len(self.plan.starts) - 1
+
+    @property
+    def count(self) -> int:
+        """Number of moving bodies."""
+        return len(self.place)
 
     def values(self, rows: Rows, f: Features, size: float) -> Float[np.ndarray, "T e 6"]:
         """Entries of the scaled rows, as `values.jacobian` has them."""
@@ -76,7 +88,7 @@ class Blocks:
 
         T, _, c = rhs.shape
         x, left = np.empty((T, c, self.count, 6)), np.array(np.swapaxes(rhs, 1, 2), order="C")
-        if least_squares(values, left, self.starts, self.body, *self._plan(), x) < T:
+        if least_squares(values, left, self.plan, x) < T:
             raise np.linalg.LinAlgError("rows leave a motion free")
         return x, left
 
@@ -92,7 +104,7 @@ class Blocks:
 
         y, right = np.empty((len(rhs), self.rows)), np.empty(rhs.shape)
         right[:, self.place] = rhs
-        if least_norm(values, right, self.starts, self.body, *self._plan(), y) < len(rhs):
+        if least_norm(values, right, self.plan, y) < len(rhs):
             raise np.linalg.LinAlgError("rows leave a motion free")
         return y
 
@@ -103,7 +115,7 @@ class Blocks:
         out = np.empty((len(values), 2))
         first = np.random.default_rng(1).standard_normal((self.count, 6))
         first /= np.linalg.norm(first)
-        extremes(values, self.starts, self.body, *self._plan(), first, out)
+        extremes(values, self.plan, first, out)
         return out
 
     def agree(self, one: Float[np.ndarray, "e 6"], other: Float[np.ndarray, "e 6"]) -> bool:
@@ -111,7 +123,7 @@ class Blocks:
         import scipy.sparse as sp
         from scipy.sparse.linalg import splu
 
-        columns = (6 * self.body[:, None] + np.arange(6)).ravel()
+        columns = (6 * self.plan.body[:, None] + np.arange(6)).ravel()
         shape = (self.rows, 6 * self.count)
         J1, J2 = (sp.csr_matrix((x.ravel(), (np.repeat(self.row, 6), columns)), shape) for x in (one, other))
         try:
@@ -120,9 +132,6 @@ class Blocks:
             return False
         sign = np.sign(factor.U.diagonal()).prod() * _parity(factor.perm_r) * _parity(factor.perm_c)
         return bool(sign > 0)
-
-    def _plan(self) -> tuple[np.ndarray, ...]:
-        return self.pairs, self.columns, self.below, self.updates, self.of_column
 
 
 def blocks(rows: Rows, bodies: int, size: float) -> Blocks:
@@ -161,10 +170,11 @@ def blocks(rows: Rows, bodies: int, size: float) -> Blocks:
     every = (pair for here in of_row.values() for pair in product(here, here))
     pairs = [(number[int(body[a]), int(body[b])], a, b) for a, b in every if body[a] >= body[b]]
     row, term, side, share, _ = (np.array(x) for x in zip(*entries, strict=True))
-    return Blocks(
-        bodies - 1, row, term, side, share.astype(float), body, place, np.array(columns), np.array(below),
-        np.array(updates, int).reshape(-1, 3), np.array(of_column), np.array(pairs, int).reshape(-1, 3), rows.count,
+    plan = Plan(
+        np.searchsorted(row, np.arange(rows.count + 1)), body, np.array(pairs, int).reshape(-1, 3), np.array(columns),
+        np.array(below), np.array(updates, int).reshape(-1, 3), np.array(of_column),
     )  # fmt: skip
+    return Blocks(row, term, side, share.astype(float), place, plan)
 
 
 def _elimination(near: list[set[int]]) -> tuple[list[int], dict[int, set[int]]]:

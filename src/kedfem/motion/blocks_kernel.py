@@ -3,10 +3,7 @@
 A row touches two to four bodies: JᵀJ has a block for each pair of bodies that a joint connects, its factor few more.
 
 values (T, e, 6) : of each entry, the derivative of a row by the twist of one body
-starts (m + 1,) : first entry of each row; body (e,) : place of its body in the order of elimination
-pairs (n, 3) : block of JᵀJ, and the two entries whose product goes there
-columns (b + 1,) : first block of each column of the factor, that of the diagonal; below (blocks,) : its block row
-updates (n, 3) : block that two blocks of one column change; of_column (b + 1,) : first of each column
+plan : `blocks.Plan`
 """
 
 import numpy as np
@@ -18,8 +15,9 @@ TRIES, SETTLED = 60, 1e-5  # of the iterations for extreme singular values: rela
 
 
 @inner
-def factored(value, pairs, columns, updates, of_column, L):  # type: ignore[no-untyped-def]
+def factored(value, plan, L):  # type: ignore[no-untyped-def]
     """Factor of JᵀJ at one time; whether it is definite."""
+    pairs, columns, updates, of_column = plan.pairs, plan.columns, plan.updates, plan.of_column
     L[:] = 0.0
     for n in range(len(pairs)):
         block, a, b = L[pairs[n, 0]], value[pairs[n, 1]], value[pairs[n, 2]]
@@ -60,8 +58,9 @@ def factored(value, pairs, columns, updates, of_column, L):  # type: ignore[no-u
 
 
 @inner
-def solved(L, columns, below, x):  # type: ignore[no-untyped-def]
+def solved(L, plan, x):  # type: ignore[no-untyped-def]
     """Solution with the factor, in place, of x (b, 6)."""
+    columns, below = plan.columns, plan.below
     count = len(columns) - 1
     for k in range(count):
         D = L[columns[k]]
@@ -90,8 +89,9 @@ def solved(L, columns, below, x):  # type: ignore[no-untyped-def]
 
 
 @inner
-def onto_rows(value, starts, body, x, out):  # type: ignore[no-untyped-def]
+def onto_rows(value, plan, x, out):  # type: ignore[no-untyped-def]
     """J x of x (b, 6)."""
+    starts, body = plan.starts, plan.body
     for r in range(len(starts) - 1):
         total = 0.0
         for n in range(starts[r], starts[r + 1]):
@@ -102,8 +102,9 @@ def onto_rows(value, starts, body, x, out):  # type: ignore[no-untyped-def]
 
 
 @inner
-def onto_bodies(value, starts, body, rows, out):  # type: ignore[no-untyped-def]
+def onto_bodies(value, plan, rows, out):  # type: ignore[no-untyped-def]
     """Jᵀ y of y (m,)."""
+    starts, body = plan.starts, plan.body
     out[:] = 0.0
     for r in range(len(starts) - 1):
         y = rows[r]
@@ -115,51 +116,51 @@ def onto_bodies(value, starts, body, rows, out):  # type: ignore[no-untyped-def]
 
 
 @inner
-def refined(value, right, starts, body, columns, below, L, x, left, change):  # type: ignore[no-untyped-def]
+def refined(value, right, plan, L, x, left, change):  # type: ignore[no-untyped-def]
     """x (b, 6) that leaves least of J x = right, and left (m,), what it leaves."""
     x[:] = 0.0
     for r in range(len(left)):
         left[r] = right[r]
     for _ in range(REFINEMENTS + 1):
-        onto_bodies(value, starts, body, left, change)
-        solved(L, columns, below, change)
+        onto_bodies(value, plan, left, change)
+        solved(L, plan, change)
         for k in range(len(x)):
             for i in range(6):
                 x[k, i] += change[k, i]
-        onto_rows(value, starts, body, x, left)
+        onto_rows(value, plan, x, left)
         for r in range(len(left)):
             left[r] = right[r] - left[r]
 
 
 @compiled
-def least_squares(values, rhs, starts, body, pairs, columns, below, updates, of_column, x):  # type: ignore[no-untyped-def]
+def least_squares(values, rhs, plan, x):  # type: ignore[no-untyped-def]
     """x (T, c, b, 6) that leaves least of J x = rhs (T, c, m), which becomes what is left; times where defined."""
-    L = np.empty((len(below), 6, 6))
+    L = np.empty((len(plan.below), 6, 6))
     left, change = np.empty(rhs.shape[2]), np.empty(x.shape[2:])
     for t in range(len(values)):
-        if not factored(values[t], pairs, columns, updates, of_column, L):
+        if not factored(values[t], plan, L):
             return t
         for c in range(rhs.shape[1]):
-            refined(values[t], rhs[t, c], starts, body, columns, below, L, x[t, c], left, change)
+            refined(values[t], rhs[t, c], plan, L, x[t, c], left, change)
             rhs[t, c] = left
     return len(values)
 
 
 @compiled
-def least_norm(values, rhs, starts, body, pairs, columns, below, updates, of_column, y):  # type: ignore[no-untyped-def]
+def least_norm(values, rhs, plan, y):  # type: ignore[no-untyped-def]
     """The least y (T, m) with Jᵀ y = rhs (T, b, 6); the number of times at which that is defined."""
-    L = np.empty((len(below), 6, 6))
+    L = np.empty((len(plan.below), 6, 6))
     more, left = np.empty(y.shape[1]), np.empty(rhs.shape[1:])
     for t in range(len(values)):
-        if not factored(values[t], pairs, columns, updates, of_column, L):
+        if not factored(values[t], plan, L):
             return t
         y[t] = 0.0
         left[:] = rhs[t]
         for _ in range(REFINEMENTS + 1):
-            solved(L, columns, below, left)
-            onto_rows(values[t], starts, body, left, more)
+            solved(L, plan, left)
+            onto_rows(values[t], plan, left, more)
             y[t] += more
-            onto_bodies(values[t], starts, body, y[t], left)
+            onto_bodies(values[t], plan, y[t], left)
             for k in range(len(left)):
                 for i in range(6):
                     left[k, i] = rhs[t, k, i] - left[k, i]
@@ -181,32 +182,24 @@ def normalised(x):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def extremes(values, starts, body, pairs, columns, below, updates, of_column, first, out):  # type: ignore[no-untyped-def]
+def extremes(values, plan, first, out):  # type: ignore[no-untyped-def]
     """Greatest and least singular values of J, out (T, 2), by iterations from first (b, 6), then from the last."""
-    L = np.empty((len(below), 6, 6))
-    rows, high, low = np.empty(len(starts) - 1), first.copy(), first.copy()
+    L = np.empty((len(plan.below), 6, 6))
+    rows, vectors = np.empty(len(plan.starts) - 1), (first.copy(), first.copy())
     for t in range(len(values)):
-        high += 0.01 * first
-        before = 0.0
-        normalised(high)
-        for _ in range(TRIES):
-            onto_rows(values[t], starts, body, high, rows)
-            onto_bodies(values[t], starts, body, rows, high)
-            size = normalised(high)
-            if abs(size - before) < SETTLED * size:
-                break
-            before = size
-        out[t, 0] = np.sqrt(size)
-        if not factored(values[t], pairs, columns, updates, of_column, L):
-            out[t, 1] = 0.0
-            continue
-        low += 0.01 * first
-        before = 0.0
-        normalised(low)
-        for _ in range(TRIES):
-            solved(L, columns, below, low)
-            size = normalised(low)
-            if abs(size - before) < SETTLED * size:
-                break
-            before = size
-        out[t, 1] = 1.0 / np.sqrt(size)
+        out[t, 1] = 0.0
+        for which in range(2 if factored(values[t], plan, L) else 1):
+            x, size, before = vectors[which], 0.0, 0.0
+            x += 0.01 * first
+            normalised(x)
+            for _ in range(TRIES):
+                if which == 0:
+                    onto_rows(values[t], plan, x, rows)
+                    onto_bodies(values[t], plan, rows, x)
+                else:
+                    solved(L, plan, x)
+                size = normalised(x)
+                if abs(size - before) < SETTLED * size:
+                    break
+                before = size
+            out[t, which] = np.sqrt(size) if which == 0 else 1.0 / np.sqrt(size)

@@ -128,7 +128,7 @@ class BlockFactor:
 
     def of_body(self, body: int) -> tuple[Int[np.ndarray, " r"], Float[np.ndarray, "T r 6"]]:
         """Rows that have entries for a body but the ground, and these; a row may be there twice."""
-        here = np.flatnonzero(self.blocks.body == self.blocks.place[body - 1])
+        here = np.flatnonzero(self.blocks.plan.body == self.blocks.place[body - 1])
         return self.blocks.row[here], self.J[:, here]
 
 

@@ -25,8 +25,8 @@ def frame_copied(R, out):  # type: ignore[no-untyped-def]
 
 
 @inner
-def turned(R, d, x, out):  # type: ignore[no-untyped-def]
-    """out becomes R x for d components of coordinates."""
+def rotated(R, d, x, out):  # type: ignore[no-untyped-def]
+    """out becomes R x for d components of coordinates; of R.T Rᵀ x."""
     n = len(x) // d
     first, second, third = x[:n], x[n : 2 * n], x[(d - 1) * n : d * n]
     for b in range(d):
@@ -40,22 +40,7 @@ def turned(R, d, x, out):  # type: ignore[no-untyped-def]
 
 
 @inner
-def turned_back(R, d, x, out):  # type: ignore[no-untyped-def]
-    """out becomes Rᵀ x for d components of coordinates."""
-    n = len(x) // d
-    first, second, third = x[:n], x[n : 2 * n], x[(d - 1) * n : d * n]
-    for b in range(d):
-        to, p, q, r = out[b * n : (b + 1) * n], R[0, b], R[1, b], R[2, b]
-        if d == 3:
-            for j in range(n):
-                to[j] = p * first[j] + q * second[j] + r * third[j]
-        else:
-            for j in range(n):
-                to[j] = p * first[j] + q * second[j]
-
-
-@inner
-def ports_turned(bodies, i, R, x, out):  # type: ignore[no-untyped-def]
+def rotated_ports(bodies, i, R, x, out):  # type: ignore[no-untyped-def]
     """out becomes R x for held components of interface points; the same columns of both."""
     first, last = bodies.port_at[i], bodies.port_at[i + 1]
     for q in range(first, last):

@@ -8,7 +8,7 @@ import numpy as np
 from kedfem.compiled import inner
 from kedfem.dynamics.beams_kernel import bent
 from kedfem.dynamics.frames_kernel import entry
-from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, state_of, turned, turned_back
+from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, rotated, state_of
 from kedfem.dynamics.system.corotational_kernel import corotational_end, corotational_force, unforeseen
 from kedfem.dynamics.system.follower_loads_kernel import add_follower_loads
 from kedfem.dynamics.system.products_kernel import mass_times
@@ -28,7 +28,7 @@ def right_hand_side(c, bodies, i, R, F, state, out, room):  # type: ignore[no-un
     F0, F1, f0, alpha_f = state.F[first:last], F[first:last], state.f[first:last], c.alpha_f
     for x in range(N):
         room[x] = n0 * u[x] + n1 * v[x] + n2 * a[x] + c_f * F1[x] + alpha_f * (F0[x] - f0[x])
-    turned_back(R, d, room[:N], out[first:last])
+    rotated(R.T, d, room[:N], out[first:last])
     if c.alpha != 0.0 or c.beta != 0.0:
         for m in range(3):
             for x in range(first, last):
@@ -36,12 +36,13 @@ def right_hand_side(c, bodies, i, R, F, state, out, room):  # type: ignore[no-un
 
 
 @inner
-def rigid_frame_end(c, bodies, i, R, F, g, Ag, state, history, t, work):  # type: ignore[no-untyped-def]
-    """End of the step of a body with the rigid-body frame, from g and its balance A g = r + Wᵀ λ."""
+def rigid_frame_end(c, bodies, i, F, trial, state, history, t, work):  # type: ignore[no-untyped-def]
+    """End of the step of a body with the rigid-body frame, from g in work.y and its balance A g = r + Wᵀ λ in
+    work.rotated."""
     first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
     N = last - first
-    u, Mg, c_M, c_K = work.room[:N], work.strained[:N], c.c_M, c.c_K
-    turned(R, d, g, u)
+    R, g, Ag, u, Mg, c_M, c_K = trial.Rp[i], work.y[:N], work.rotated[:N], work.room[:N], work.strained[:N], c.c_M, c.c_K
+    rotated(R, d, g, u)
     moved_to(c, first, last, u, F, state, history, t)
     copied(g, history.g[t, first:last])
     if bodies.dense[i]:
@@ -50,7 +51,7 @@ def rigid_frame_end(c, bodies, i, R, F, g, Ag, state, history, t, work):  # type
         mass_times(bodies.mass, bodies, i, u, Mg)
         newmark_advanced(c, Mg, state_of(state.momentum, first, last))
         copied(state.momentum[1, first:last], history.Mv[t, first:last])
-        turned_back(R, d, Mg, u)
+        rotated(R.T, d, Mg, u)
         copied(u, Mg)
     energy, Kg = 0.0, history.Kg[t, first:last]
     for x in range(N):
@@ -66,7 +67,7 @@ def rigid_frame_end(c, bodies, i, R, F, g, Ag, state, history, t, work):  # type
             copied(u, history.Cg[t, first:last])
         for x in range(N):
             Ag[x] += state.damped[1, first + x]
-    turned(R, d, Ag, state.f[first:last])
+    rotated(R, d, Ag, state.f[first:last])
     frame_copied(R, history.R[t, i])
 
 
@@ -117,36 +118,36 @@ def internal_forces(c, bodies, R, amounts, state, trial, work, first):  # type: 
         if bodies.frame[i] == COROTATIONAL:
             corotational_force(bodies.K, c, bodies, i, R, state, trial, work, first)
         if bodies.frame[i] > RIGID_BODY and c.alpha != 0.0:
-            mass_damped(c, bodies, i, R[bodies.motion[i]], trial.u, state, trial, work)
+            mass_damped(c, bodies, i, R[bodies.motion[i]], state, trial, work)
     add_follower_loads(bodies.turning, bodies, R, amounts, trial.u, f, work.frame)
 
 
 @inner
-def mass_damped(c, bodies, i, R, u, state, trial, work):  # type: ignore[no-untyped-def]
+def mass_damped(c, bodies, i, R, state, trial, work):  # type: ignore[no-untyped-def]
     """Add to trial.f the rate of α M δ in the rigid-body frame."""
     first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
-    N = last - first
+    N, u = last - first, trial.u[first:last]
     if bodies.dense[i]:
-        turned_back(R, d, u[first:last], work.y[:N])
+        rotated(R.T, d, u, work.y[:N])
     else:
-        mass_times(bodies.mass, bodies, i, u[first:last], work.turned)
-        turned_back(R, d, work.turned[:N], work.y[:N])
+        mass_times(bodies.mass, bodies, i, u, work.rotated)
+        rotated(R.T, d, work.rotated[:N], work.y[:N])
     for x in range(N):
         work.y[x] *= c.alpha
     for m in range(3):
         copied(state.damped[m, first:last], trial.damped[m, first:last])
     newmark_advanced(c, work.y[:N], state_of(trial.damped, first, last))
-    turned(R, d, trial.damped[1, first:last], work.turned[:N])
+    rotated(R, d, trial.damped[1, first:last], work.rotated[:N])
     for x in range(N):
-        trial.f[first + x] += work.turned[x]
+        trial.f[first + x] += work.rotated[x]
 
 
 @inner
-def orientation(bodies, i, R, u, trial, out):  # type: ignore[no-untyped-def]
+def orientation(bodies, i, R, trial, out):  # type: ignore[no-untyped-def]
     """out becomes the mean orientation of a body with frames of its own, link to world; trial.Q known but of beams."""
     body = bodies.motion[i]
     if bodies.frame[i] == TANGENTIAL:
-        beam_rotation(bodies, i, R[body], u, trial.Q[i])
+        beam_rotation(bodies, i, R[body], trial.u, trial.Q[i])
     for b in range(3):
         for m in range(3):
             x = 0.0
@@ -171,13 +172,13 @@ def beam_rotation(bodies, i, R, u, Q):  # type: ignore[no-untyped-def]
 
 
 @inner
-def residual(c, bodies, i, R, F, u, state, trial, out, work):  # type: ignore[no-untyped-def]
-    """out becomes what is missing to balance at the end of the step, without interface forces, in the frame R."""
+def residual(c, bodies, i, F, state, trial, work):  # type: ignore[no-untyped-def]
+    """trial.r becomes what is missing to balance at the end of the step, without interface forces, in its frame."""
     first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
     n0, n1, n2 = c.acceleration
-    u0, v0, a0, F0, f0, f1 = state.u, state.v, state.a, state.F, state.f, trial.f
+    u, u0, v0, a0, F0, f0, f1 = trial.u, state.u, state.v, state.a, state.F, state.f, trial.f
     c_m, c_f, alpha_m, alpha_f = 1 - c.alpha_m, 1 - c.alpha_f, c.alpha_m, c.alpha_f
-    room = work.room
+    room, out = work.room, trial.r
     if bodies.dense[i]:
         for x in range(first, last):
             a = n0 * (u[x] - u0[x]) - n1 * v0[x] - n2 * a0[x]
@@ -190,17 +191,17 @@ def residual(c, bodies, i, R, F, u, state, trial, out, work):  # type: ignore[no
             later = n0 * (out[x] - momentum[x]) - n1 * rate[x] - n2 * second[x]
             r = c_f * (F[x] - f1[x]) - c_m * later
             room[x - first] = r + alpha_f * (F0[x] - f0[x]) - alpha_m * second[x]
-    turned_back(R, d, room[: last - first], out[first:last])
+    rotated(trial.Rp[i].T, d, room[: last - first], out[first:last])
 
 
 @inner
-def own_end(c, bodies, i, R, F, u, state, trial, history, t, work):  # type: ignore[no-untyped-def]
+def own_end(c, bodies, i, R, F, state, trial, history, t, work):  # type: ignore[no-untyped-def]
     """End of the step of a body with frames of its own: what passes found becomes the state."""
     first, last = bodies.at[i], bodies.at[i + 1]
-    N = last - first
-    moved_to(c, first, last, u[first:last], F, state, history, t)
+    N, u = last - first, trial.u[first:last]
+    moved_to(c, first, last, u, F, state, history, t)
     if not bodies.dense[i]:
-        mass_times(bodies.mass, bodies, i, u[first:last], work.y)
+        mass_times(bodies.mass, bodies, i, u, work.y)
         newmark_advanced(c, work.y[:N], state_of(state.momentum, first, last))
     copied(trial.f[first:last], state.f[first:last])
     if bodies.rigid[i]:
@@ -212,6 +213,6 @@ def own_end(c, bodies, i, R, F, u, state, trial, history, t, work):  # type: ign
             copied(trial.damped[m, first:last], state.damped[m, first:last])
     if bodies.frame[i] == COROTATIONAL:
         corotational_end(bodies.K, bodies, i, trial, state, history, t, work)
-    orientation(bodies, i, R, u, trial, history.R[t, i])
+    orientation(bodies, i, R, trial, history.R[t, i])
     frame_copied(trial.Q[i], state.Q[i])
     state.angle[i] = trial.angle[i]

@@ -26,13 +26,13 @@ from kedfem.dynamics.system.record import (
 
 
 @inner
-def coordinate(ends, of, r, rigid_motion, place, turned, row, y, w):  # type: ignore[no-untyped-def]
+def coordinate(ends, of, r, rigid_motion, place, angles, row, y, w):  # type: ignore[no-untyped-def]
     """Value of coordinate r, its gradient added to a row on z; and its rate in the rigid-body motion, z constant.
 
     Parameters
     ----------
     rigid_motion : R (M, 3, 3), v and ω (M, 3) of all bodies of the linkage
-    turned : (terms,) angles as they were, replaced by those they are
+    angles : (terms,) those of terms as they were, replaced by those they are
     y, w : (16,), (12, 3) room
     """
     total, rate = 0.0, 0.0
@@ -47,7 +47,7 @@ def coordinate(ends, of, r, rigid_motion, place, turned, row, y, w):  # type: ig
             total += factor * value
             rate += factor * turning
             rate += borne(ends, i, w[6], w[7], factor, rigid_motion, place, row, y, w)
-            rate += borne_by_line(ends.knots, ends, j, w[6], w[8], factor, rigid_motion, row, w)
+            rate += borne_by_line(ends.knots, ends, j, factor, rigid_motion, row, w)
             continue
         if kind in (GAP, DISTANCE):
             value = between(kind, ends, of, t, x, Q, w)
@@ -61,8 +61,8 @@ def coordinate(ends, of, r, rigid_motion, place, turned, row, y, w):  # type: ig
         elif kind == TILT:
             value = tilt_along(Q[i], Q[j], of.a[t], of.b[t], w)
         else:
-            value = angle(of, t, Q, turned[t], w)
-            turned[t] = value
+            value = angle(of, t, Q, angles[t], w)
+            angles[t] = value
         if kind not in (GAP, DISTANCE):
             for m in range(3):
                 w[6, m], w[8, m], w[9, m] = 0.0, 0.0, -w[7, m]

@@ -6,7 +6,7 @@ Without such bodies K may be None; this module is then not compiled.
 from kedfem.compiled import inner
 from kedfem.dynamics.frames_kernel import balanced, strained
 from kedfem.dynamics.metric_kernel import metric_force
-from kedfem.dynamics.system.algebra_kernel import copied, state_of, turned
+from kedfem.dynamics.system.algebra_kernel import copied, rotated, state_of
 from kedfem.dynamics.system.products_kernel import stiffness_times
 
 
@@ -33,19 +33,19 @@ def corotational_force(K, c, bodies, i, R, state, trial, work, first_pass):  # t
         (trial.Q[i], trial.angle[i : i + 1]),
     )
     rooms = (
-        work.y[:N].reshape(d, n), work.turned[:N].reshape(d, n), work.strained[:N], work.A, work.U, work.change,
+        work.y[:N].reshape(d, n), work.rotated[:N].reshape(d, n), work.strained[:N], work.A, work.U, work.change,
     )  # fmt: skip
     element = number_of(bodies.elements, i)
     if element >= 0:
         metric_force(newmark(c), element, bodies.elements, shapes, body, moved, seen, frame, f, rooms, work.element)
         return
     strained(newmark(c), bodies.kind[i], shapes, body, moved, seen, frame, rooms)
-    stiffness_times(bodies, i, work.strained, work.turned)
+    stiffness_times(bodies, i, work.strained, work.rotated)
     if bodies.rigid[i]:
-        copied(work.turned[:N], trial.response[first:last])
+        copied(work.rotated[:N], trial.response[first:last])
         if first_pass:
-            copied(work.turned[:N], trial.foreseen[first:last])
-        copied(trial.foreseen[first:last], work.turned[:N])
+            copied(work.rotated[:N], trial.foreseen[first:last])
+        copied(trial.foreseen[first:last], work.rotated[:N])
         unforeseen(bodies, i, trial, work)
         for x in range(N):
             trial.f[first + x] += work.room[x]
@@ -71,7 +71,7 @@ def unforeseen(bodies, i, trial, work):  # type: ignore[no-untyped-def]
     N = last - first
     for x in range(N):
         work.strained[x] = trial.response[first + x] - trial.foreseen[first + x]
-    turned(trial.Rp[i], bodies.components[i], work.strained[:N], work.room[:N])
+    rotated(trial.Rp[i], bodies.components[i], work.strained[:N], work.room[:N])
 
 
 @inner
@@ -81,10 +81,10 @@ def foresee(K, c, bodies, i, change, trial, work):  # type: ignore[no-untyped-de
         return
     first, last = bodies.at[i], bodies.at[i + 1]
     N = last - first
-    stiffness_times(bodies, i, change[:N], work.turned[:N])
+    stiffness_times(bodies, i, change[:N], work.rotated[:N])
     late = 1 + c.beta * c.late * c.acceleration[0]
     for x in range(N):
-        trial.foreseen[first + x] = trial.response[first + x] + late * work.turned[x]
+        trial.foreseen[first + x] = trial.response[first + x] + late * work.rotated[x]
 
 
 @inner

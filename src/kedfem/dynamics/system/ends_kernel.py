@@ -227,7 +227,6 @@ def borne(ends, e, force, moment, factor, rigid_motion, place, row, y, w):  # ty
     -------
     Their power in the rigid-body motion, z constant
     """
-    _, Q, D, U, _ = place
     R, v, omega = rigid_motion
     form, d, body = ends.form[e], ends.components[e], ends.body[e]
     times(R[body], ends.origin[e], w[0])
@@ -247,7 +246,7 @@ def borne(ends, e, force, moment, factor, rigid_motion, place, row, y, w):  # ty
     if form == PLANAR_BEAM:
         y[2] = moment[2]
     elif form != POINT:
-        power += turning(ends, e, moment, R[body], omega[body], Q[e], D[e], U[e], y, w)
+        power += turning(ends, e, moment, R[body], omega[body], place, y, w)
     for r in range(rows):
         if y[r] != 0.0:
             for m in range(c):
@@ -256,12 +255,13 @@ def borne(ends, e, force, moment, factor, rigid_motion, place, row, y, w):  # ty
 
 
 @inner
-def turning(ends, e, moment, R, omega, Q, D, U, y, w):  # type: ignore[no-untyped-def]
+def turning(ends, e, moment, R, omega, place, y, w):  # type: ignore[no-untyped-def]
     """Add to forces y at an end's points those that a moment on its orientation is; its power in the rigid-body
     motion."""
     form, d, known = ends.form[e], ends.components[e], ends.known[e]
+    Q, D = place[1][e], place[2][e]
     times_transposed(Q, moment, w[0])
-    turn_of(U, w[0])
+    turn_of(place[3][e], w[0])
     for k in range(3):
         cross(w[0], ends.directions[e, k], w[3])
         times(Q, w[3], w[k + 1] if k < 2 else w[0])

@@ -22,7 +22,7 @@ def add_follower_loads(loads, bodies, R, amounts, u, f, frame):  # type: ignore[
         if amounts[w] == 0.0:
             continue
         i = loads.body[w]
-        first, n, turned = bodies.at[i], bodies.functions[i], bodies.components[i]
+        first, n, d = bodies.at[i], bodies.functions[i], bodies.components[i]
         shown_frame(loads, bodies, w, R[bodies.motion[i]], u, frame)
         amount, share, along = amounts[w], 0.0, 0.0
         for b in range(3):
@@ -33,11 +33,11 @@ def add_follower_loads(loads, bodies, R, amounts, u, f, frame):  # type: ignore[
             amount *= share
         at = loads.force_at[w]
         if loads.planar_beam[w]:
-            turned = 2
+            d = 2
             for x in range(n):
                 f[first + 2 * n + x] -= amount * loads.force[at + 2 * n + x]
-        for b in range(turned):
-            for m in range(turned):
+        for b in range(d):
+            for m in range(d):
                 p = amount * frame[b, m]
                 for x in range(n):
                     f[first + b * n + x] -= p * loads.force[at + m * n + x]

@@ -137,7 +137,7 @@ def evaluated(c, ends, of, driving, t, state, trial, work, begins):  # type: ign
 def differentiated(ends, of, a, rigid_motion, trial, work):  # type: ignore[no-untyped-def]
     """Coordinate a and its rate in the rigid-body motion, as `coordinate`; its gradient is put into trial.C."""
     place = trial.fixed if of.linear[a] else trial.moving
-    found = coordinate(ends, of, a, rigid_motion, place, trial.turned, trial.row, work.end, work.vectors)
+    found = coordinate(ends, of, a, rigid_motion, place, trial.term_angles, trial.row, work.end, work.vectors)
     columns, row = gradient(of, a, trial)
     for m in range(len(columns)):
         row[m] = trial.row[columns[m]]

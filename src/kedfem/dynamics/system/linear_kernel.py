@@ -22,7 +22,7 @@ def marched_linear(c, bodies, ends, of, driving, state, trial, work, history, so
     """Take T steps in place; as `step_kernel.marched`, all of them."""
     trial.z[:] = 0.0
     for t in range(len(driving.t)):
-        copied(state.turned, trial.turned)
+        copied(state.term_angles, trial.term_angles)
         for i in range(len(bodies.motion)):
             R, F = driving.R[t, bodies.motion[i]], driving.F[t]
             rigid_frame_begin(c, bodies, i, R, F, state, trial, work, solved)

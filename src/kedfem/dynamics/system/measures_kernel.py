@@ -198,11 +198,11 @@ def spline_at(ends, n, s, X, w):  # type: ignore[no-untyped-def]
 
 
 @inner
-def borne_by_line(knots, ends, e, force, slope, factor, rigid_motion, row, w):  # type: ignore[no-untyped-def]
-    """As `ends_kernel.borne`: what the stations of the line of end e bear, N' `slope` − N `force`."""
+def borne_by_line(knots, ends, e, factor, rigid_motion, row, w):  # type: ignore[no-untyped-def]
+    """As `ends_kernel.borne`: what the stations of the line of end e bear, N' w[8] − N w[6]."""
     if knots is None:
         return 0.0
-    R, v, omega = rigid_motion
+    (R, v, omega), force, slope = rigid_motion, w[6], w[8]
     n, d, body = ends.number[e], ends.components[e], ends.body[e]
     first, column, c = ends.line_at[n], ends.column_at[e], ends.column_at[e + 1] - ends.column_at[e]
     for m in range(3):

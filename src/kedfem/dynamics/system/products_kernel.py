@@ -113,9 +113,11 @@ def held(arrays, r, y, reaction, solve):  # type: ignore[no-untyped-def]
 
 
 @inner
-def add_answer(arrays, w, out):  # type: ignore[no-untyped-def]
-    """out + Y (S w − v): what interface points that move by w, and anchors, do to Ã⁻¹ r."""
-    at, _, _, S, Y, forces, v = condensed(arrays)
+def add_answer(arrays, i, w, out):  # type: ignore[no-untyped-def]
+    """out + Y (S w − v) of sparse body i: what interface points that move by w, and anchors, do to Ã⁻¹ r."""
+    if arrays is None:
+        return
+    at, _, _, S, Y, forces, v = condensed(arrays[i])
     c = len(at) - 1
     for k in range(c):
         row, x = S[k * c : k * c + len(w)], -v[k]
@@ -149,15 +151,7 @@ def displaced(bodies, i, trial, out):  # type: ignore[no-untyped-def]
         add_transposed(bodies.Y, bodies.Y_at[i], q, N, w, out)
     else:
         copied(trial.held[first:last], out[:N])
-        sparse_answer(bodies.arrays, i, w, out[:N])
-
-
-@inner
-def sparse_answer(arrays, i, w, out):  # type: ignore[no-untyped-def]
-    """`add_answer` of body i."""
-    if arrays is None:
-        return
-    add_answer(arrays[i], w, out)
+        add_answer(bodies.arrays, i, w, out[:N])
 
 
 @inner
@@ -210,5 +204,5 @@ def take_sparse_ports(arrays, i, u, out):  # type: ignore[no-untyped-def]
 @compiled
 def held_alone(arrays, r, out, reaction):  # type: ignore[no-untyped-def]
     """out becomes G r, and reaction Yᵀ r, for what is not compiled."""
-    held(arrays, r, out, reaction, True)
-    add_answer(arrays, reaction[:0], out)
+    held(arrays[0], r, out, reaction, True)
+    add_answer(arrays, 0, reaction[:0], out)

@@ -1,8 +1,8 @@
 """Beginning and end of a step for a body with a rigid-body frame and for the interface, compiled by numba."""
 
 from kedfem.compiled import inner
-from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, ports_turned, product
-from kedfem.dynamics.system.bodies_kernel import right_hand_side, rigid_frame_end
+from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, product, rotated_ports
+from kedfem.dynamics.system.bodies_kernel import newmark_advanced, right_hand_side, rigid_frame_end
 from kedfem.dynamics.system.constraints_kernel import coordinate
 from kedfem.dynamics.system.ends_kernel import placed
 from kedfem.dynamics.system.interface_kernel import along, gradient, known, newmark_rate
@@ -29,16 +29,16 @@ def rigid_frame_finish(c, bodies, i, F, trial, state, history, t, work):  # type
     first, last, of_ports = bodies.at[i], bodies.at[i + 1], bodies.port_at[i]
     N = last - first
     displaced(bodies, i, trial, work.y)
-    copied(trial.r[first:last], work.turned[:N])
-    add_at_ports(bodies, i, trial.force[of_ports : bodies.port_at[i + 1]], work.turned)
-    rigid_frame_end(c, bodies, i, trial.Rp[i], F, work.y[:N], work.turned[:N], state, history, t, work)
+    copied(trial.r[first:last], work.rotated[:N])
+    add_at_ports(bodies, i, trial.force[of_ports : bodies.port_at[i + 1]], work.rotated)
+    rigid_frame_end(c, bodies, i, F, trial, state, history, t, work)
 
 
 @inner
 def ports_end(c, bodies, i, trial, state, history, t, room):  # type: ignore[no-untyped-def]
     """Forces on a body at its interface points at the end of the step, world components."""
     of_ports, q = bodies.port_at[i], bodies.port_at[i + 1] - bodies.port_at[i]
-    ports_turned(bodies, i, trial.Rp[i], trial.force[of_ports : of_ports + q], room)
+    rotated_ports(bodies, i, trial.Rp[i], trial.force[of_ports : of_ports + q], room)
     for r in range(q):
         x = (room[r] - c.alpha_f * state.port_force[of_ports + r]) / (1 - c.alpha_f)
         state.port_force[of_ports + r] = history.port_force[t, of_ports + r] = x
@@ -75,7 +75,9 @@ def constraints_end(c, ends, of, driving, t, state, trial, work, history):  # ty
             e = along(row, columns, trial.z)
         else:
             rigid_motion = (driving.R[t], driving.v[t], driving.omega[t])
-            e, rate = coordinate(ends, of, a, rigid_motion, trial.moving, trial.turned, trial.row, work.end, work.vectors)
+            e, rate = coordinate(
+                ends, of, a, rigid_motion, trial.moving, trial.term_angles, trial.row, work.end, work.vectors
+            )
             if of.drive[a] >= 0:
                 e -= driving.drives[t, of.drive[a]]
         second = n0 * (e - state.e[0, a]) - n1 * state.e[1, a] - n2 * state.e[2, a]
@@ -92,16 +94,12 @@ def constraints_end(c, ends, of, driving, t, state, trial, work, history):  # ty
             state.bearing[columns[m]] += state.multiplier[a] * row[m]
             trial.row[columns[m]] = 0.0
         history.e[t, a], history.multiplier[t, a] = e, state.multiplier[a]
-    copied(trial.turned, state.turned)
+    copied(trial.term_angles, state.term_angles)
 
 
 @inner
 def interface_end(c, driving, t, trial, state, history):  # type: ignore[no-untyped-def]
     """Interface unknowns with their rates, and the time, at the end of the step."""
-    n0, n1, n2 = c.acceleration
-    for m in range(len(trial.z)):
-        second = n0 * (trial.z[m] - state.z[0, m]) - n1 * state.z[1, m] - n2 * state.z[2, m]
-        state.z[1, m] += c.late * second + c.early * state.z[2, m]
-        state.z[0, m], state.z[2, m] = trial.z[m], second
-        history.z[t, m] = trial.z[m]
+    newmark_advanced(c, trial.z, (state.z[0], state.z[1], state.z[2]))
+    copied(trial.z, history.z[t])
     state.time[0] = driving.t[t]

@@ -112,7 +112,7 @@ def compiled_held(arrays: tuple[np.ndarray, ...], d: int, q: int) -> Held:
         from kedfem.dynamics.system.products_kernel import held_alone
 
         g, reaction = np.empty(r.size), np.empty(q)
-        held_alone(addresses(arrays), np.ascontiguousarray(r.T, float).ravel(), g, reaction)
+        held_alone(addresses(arrays)[None], np.ascontiguousarray(r.T, float).ravel(), g, reaction)
         return g.reshape(d, -1).T, reaction
 
     return held

@@ -12,7 +12,7 @@ from kedfem.dynamics.system.record import RIGID_BODY
 
 
 class State(namedtuple("State", (
-    "time u v a F f damped momentum seen Q angle strain direction turn port_force z e turned bearing "
+    "time u v a F f damped momentum seen Q angle strain direction turn port_force z e term_angles bearing "
     "multiplier pairs products last counts passes"
 ))):  # fmt: skip
     """Everything that a step remembers, flat and with names; N coordinates, k interface unknowns, r constraints.
@@ -27,7 +27,7 @@ class State(namedtuple("State", (
     strain, direction, turn : of planar beams at their points, see `beams_kernel`
     port_force : (q,) force on each body at its interface points, world components
     z : (3, k) interface unknowns and their rates
-    e : (3, r) coordinates and their rates; turned : (terms,) angles, counting turns
+    e : (3, r) coordinates and their rates; term_angles : (terms,) counting revolutions
     bearing : (k,) force of all constraints and laws on z; multiplier : (r,) force along each
     pairs, products, last, counts : Anderson acceleration's memory, see `anderson_kernel`
     passes : (3,) taken so far, steps whose tolerance was eased, largest in a step
@@ -64,7 +64,7 @@ class Driving(namedtuple("Driving", (
 
 
 class Trial(namedtuple("Trial", (
-    "u f damped seen Q angle base resisted strained r held reaction w force Rp RB SRB H K inverse x z e turned "
+    "u f damped seen Q angle base resisted strained r held reaction w force Rp RB SRB H K inverse x z e term_angles "
     "C target compliance beside m right dz known row change memory fixed moving stress response foreseen"
 ))):  # fmt: skip
     """The end of a step while it is sought; arrays as in `State`.
@@ -85,7 +85,7 @@ class Trial(namedtuple("Trial", (
     """
 
 
-class Work(namedtuple("Work", "y turned strained room A U change points end vectors law element frame")):
+class Work(namedtuple("Work", "y rotated strained room A U change points end vectors law element frame")):
     """Room for one body or end at a time."""
 
 
@@ -102,8 +102,9 @@ def empty_state(bodies: Bodies, of: Constraints) -> State:
         Q=np.tile(np.eye(3), (L, 1, 1)), angle=np.zeros(L),
         strain=np.zeros((3, b, 3, E)), direction=direction, turn=np.zeros((b, E)),
         port_force=np.zeros(int(bodies.port_at[-1])), z=np.zeros((3, k)), e=np.zeros((3, r)),
-        turned=np.zeros(len(of.kind)), bearing=np.zeros(k), multiplier=np.zeros(r), pairs=np.zeros((2, DEPTH, moving)),
-        products=np.zeros((DEPTH, DEPTH)), last=np.zeros((2, moving)), counts=np.zeros(4), passes=np.zeros(3),
+        term_angles=np.zeros(len(of.kind)), bearing=np.zeros(k), multiplier=np.zeros(r),
+        pairs=np.zeros((2, DEPTH, moving)), products=np.zeros((DEPTH, DEPTH)), last=np.zeros((2, moving)),
+        counts=np.zeros(4), passes=np.zeros(3),
     )  # fmt: skip
 
 
@@ -119,7 +120,7 @@ def empty_trial(bodies: Bodies, ends: Ends, of: Constraints, like: State) -> Tri
         strained=np.zeros((b, 6, points)), r=like.u.copy(), held=like.u.copy(),
         reaction=np.zeros(q), w=np.zeros(q), force=np.zeros(q),
         Rp=np.zeros((L, 3, 3)), RB=np.zeros(B), SRB=np.zeros(B), H=np.zeros(size), K=np.zeros(size),
-        inverse=np.zeros(k + r), x=np.zeros(k + r), z=np.zeros(k), e=np.zeros(r), turned=like.turned.copy(),
+        inverse=np.zeros(k + r), x=np.zeros(k + r), z=np.zeros(k), e=np.zeros(r), term_angles=like.term_angles.copy(),
         C=np.zeros(len(of.columns)), target=np.zeros(r), compliance=np.zeros(r), beside=np.zeros(r), m=np.zeros(r),
         right=np.zeros(k), dz=np.zeros(k), row=np.zeros(k),
         known=np.zeros(int(np.diff(bodies.column_at).max(initial=0))),
@@ -132,10 +133,10 @@ def empty_trial(bodies: Bodies, ends: Ends, of: Constraints, like: State) -> Tri
 def room(bodies: Bodies) -> Work:
     """Room for one body or end at a time."""
     n = max(int(np.diff(bodies.at).max()), int(np.diff(bodies.port_at).max(initial=0)))
-    y, turned, strained, other = np.zeros((4, n))
+    y, rotated, strained, other = np.zeros((4, n))
     points = np.zeros((5, bodies.beams.tangent.shape[2]))
     return Work(
-        y, turned, strained, other, np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), points, np.zeros(16),
+        y, rotated, strained, other, np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), points, np.zeros(16),
         np.zeros((12, 3)), np.zeros(3), room_for(bodies.elements), np.zeros((3, 3)),
     )  # fmt: skip
 

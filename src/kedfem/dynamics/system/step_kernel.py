@@ -11,7 +11,7 @@ import numpy as np
 from kedfem.compiled import compiled, inner
 from kedfem.dynamics.anderson_kernel import accelerated
 from kedfem.dynamics.beams_kernel import begun, ended
-from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, product, turned, turned_back
+from kedfem.dynamics.system.algebra_kernel import copied, frame_copied, product, rotated
 from kedfem.dynamics.system.bodies_kernel import internal_forces, orientation, own_end, residual
 from kedfem.dynamics.system.corotational_kernel import foresee, newmark
 from kedfem.dynamics.system.ends_kernel import unmoved
@@ -97,7 +97,7 @@ def beyond(knots, ends):  # type: ignore[no-untyped-def]
 def begin(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type: ignore[no-untyped-def]
     """The predictor, right-hand sides of bodies with rigid-body frames, the common matrix of z."""
     R, h = driving.R[t], c.h
-    copied(state.turned, trial.turned)
+    copied(state.term_angles, trial.term_angles)
     combined(bodies.stresses, driving, t, trial.stress)
     for m in range(len(trial.z)):
         trial.z[m] = state.z[0, m] + h * state.z[1, m] + h * h / 2 * state.z[2, m]
@@ -116,7 +116,7 @@ def begin(c, bodies, ends, of, driving, t, state, trial, work, solved):  # type:
     internal_forces(c, bodies, R, driving.amounts[t], state, trial, work, True)
     for i in range(len(bodies.motion)):
         if bodies.frame[i] > RIGID_BODY:
-            orientation(bodies, i, R, trial.u, trial, trial.Rp[i])
+            orientation(bodies, i, R, trial, trial.Rp[i])
     gathered(bodies, trial)
     unmoved(ends, of, driving, t, trial, work)
 
@@ -164,7 +164,7 @@ def asked(c, bodies, ends, of, driving, t, iteration, state, trial, work, solved
         first, last, d = bodies.at[i], bodies.at[i + 1], bodies.components[i]
         q, N, own = bodies.port_at[i + 1] - bodies.port_at[i], last - first, bodies.frame[i] > RIGID_BODY
         if own:
-            residual(c, bodies, i, trial.Rp[i], driving.F[t], trial.u, state, trial, trial.r, work)
+            residual(c, bodies, i, driving.F[t], state, trial, work)
         elif bodies.frame[i] == STRESSED:
             stressed_side(bodies.stresses, c, bodies, i, trial, work)
         if bodies.frame[i] != NOMINAL:
@@ -174,7 +174,7 @@ def asked(c, bodies, ends, of, driving, t, iteration, state, trial, work, solved
             else:
                 sparse_held(bodies.arrays, bodies, i, trial, solved)
         if own:
-            turned_back(trial.Rp[i], d, trial.u[first:last], work.y[:N])
+            rotated(trial.Rp[i].T, d, trial.u[first:last], work.y[:N])
         offset(bodies, i, work.y, trial, own)
         pushed(bodies, i, trial)
     evaluated(c, ends, of, driving, t, state, trial, work, iteration == 0)
@@ -186,7 +186,7 @@ def asked(c, bodies, ends, of, driving, t, iteration, state, trial, work, solved
             N, to = last - first, bodies.passed[i]
             displaced(bodies, i, trial, work.y)
             change, size = trial.change[to : to + N], bodies.size[i]
-            turned(trial.Rp[i], d, work.y[:N], change)
+            rotated(trial.Rp[i], d, work.y[:N], change)
             if bodies.frame[i] == STRESSED:
                 before = trial.u[first:last]
                 for x in range(N):
@@ -256,7 +256,7 @@ def finish(c, bodies, ends, of, driving, t, state, trial, work, history):  # typ
     R, F = driving.R[t], driving.F[t]
     for i in range(len(bodies.motion)):
         if bodies.frame[i] > RIGID_BODY:
-            own_end(c, bodies, i, R, F, trial.u, state, trial, history, t, work)
+            own_end(c, bodies, i, R, F, state, trial, history, t, work)
         else:
             rigid_frame_finish(c, bodies, i, F, trial, state, history, t, work)
         if bodies.frame[i] == STRESSED:

@@ -4,7 +4,7 @@ Without such bodies `of` may be None; this module is then not compiled.
 """
 
 from kedfem.compiled import inner
-from kedfem.dynamics.system.algebra_kernel import frame_copied, turned, turned_back
+from kedfem.dynamics.system.algebra_kernel import frame_copied, rotated
 from kedfem.dynamics.system.bodies_kernel import right_hand_side
 
 
@@ -38,9 +38,9 @@ def stressed_side(of, c, bodies, i, trial, work):  # type: ignore[no-untyped-def
         return
     first, last = bodies.at[i], bodies.at[i + 1]
     N, share = last - first, 1 - c.alpha_f
-    turned_back(trial.Rp[i], bodies.components[i], trial.u[first:last], work.y[:N])
+    rotated(trial.Rp[i].T, bodies.components[i], trial.u[first:last], work.y[:N])
     work.strained[:N] = 0.0
-    add_stress(of, bodies, i, trial.stress, work.y, work.turned, work.strained)
+    add_stress(of, bodies, i, trial.stress, work.y, work.rotated, work.strained)
     for x in range(N):
         trial.r[first + x] = trial.f[first + x] - share * work.strained[x]
 
@@ -53,8 +53,8 @@ def stressed_end(of, bodies, i, trial, state, g, work):  # type: ignore[no-untyp
     first, last = bodies.at[i], bodies.at[i + 1]
     N = last - first
     work.strained[:N] = 0.0
-    add_stress(of, bodies, i, trial.stress, g[first:last], work.turned, work.strained)
-    turned(trial.Rp[i], bodies.components[i], work.strained[:N], work.y[:N])
+    add_stress(of, bodies, i, trial.stress, g[first:last], work.rotated, work.strained)
+    rotated(trial.Rp[i], bodies.components[i], work.strained[:N], work.y[:N])
     for x in range(N):
         state.f[first + x] += work.y[x]
 

@@ -62,7 +62,7 @@ class Now:
     g: list[list[Seen]]
     z: Column
     e: Float[np.ndarray, "3 r"]
-    turned: Column
+    term_angles: Column
     bearing: Column
     damped: list[np.ndarray]
     z_rates: Float[np.ndarray, "3 k"]
@@ -147,7 +147,7 @@ class Monolithic:
             m[hard] = (1 - scheme.alpha_f) * old.multiplier[hard]
         for _ in range(ITERATIONS):
             self._evaluated(now, old, at)
-            e, C = self.coordinates(now.z, now.turned, at)
+            e, C = self.coordinates(now.z, now.term_angles, at)
             now.e[0] = e
             now.e[1], now.e[2] = self.rates(e, *old.e)
             own = self.own_rates(now, self.rates(now.z, *old.z_rates)[0], at)
@@ -194,7 +194,7 @@ class Monolithic:
         F = self.applied(at)
         zero = np.zeros_like(old.u)
         z = old.z_rates[0] + h * old.z_rates[1] + h * h / 2 * old.z_rates[2]
-        return Now(u, zero, zero, zero, F, [], z, np.zeros_like(old.e), old.turned.copy(), zero, [],
+        return Now(u, zero, zero, zero, F, [], z, np.zeros_like(old.e), old.term_angles.copy(), zero, [],
                    old.z_rates)  # fmt: skip
 
     def applied(self, at: RigidMotion) -> Column:
@@ -245,7 +245,7 @@ class Monolithic:
         return np.asarray(inertia + (1 - s.alpha_f) * (now.f - now.F) + s.alpha_f * (old.f - old.F))
 
     def coordinates(
-        self, z: Column, turned: Column, at: RigidMotion, which: Collection[int] | None = None
+        self, z: Column, angles: Column, at: RigidMotion, which: Collection[int] | None = None
     ) -> tuple[Column, Float[np.ndarray, "r k"]]:
         """All coordinates less their drives' travels, and their gradients; zero but for some, if these are given."""
         constraints = self.system.constraints
@@ -254,7 +254,7 @@ class Monolithic:
             mine = [k for k, (n, _) in enumerate(self.terms)
                     if constraints[n].linear is linear and (which is None or n in which)]  # fmt: skip
             terms, place = [self.terms[k][1] for k in mine], (at.R[0], at.p[0], 0 * z if linear else z)
-            values, rows, turned[mine] = measured(self.system, terms, place, turned[mine])
+            values, rows, angles[mine] = measured(self.system, terms, place, angles[mine])
             for k, value, row in zip(mine, values, rows, strict=True):
                 n, term = self.terms[k]
                 e[n] += term.factor * value
@@ -281,13 +281,13 @@ class Monolithic:
         for dt in ahead:
             turn = Rotation.from_rotvec(dt * at.omega[0]).as_matrix() @ at.R[0]
             moved = replace(at, R=turn[None], p=at.p + dt * at.v)
-            values.append(self.coordinates(now.z + dt * z1, now.turned.copy(), moved, which)[0][which])
+            values.append(self.coordinates(now.z + dt * z1, now.term_angles.copy(), moved, which)[0][which])
         out[which] = np.array([-1, 9, -45, 45, -9, 1]) @ np.array(values) / (60 * RATES * self.scheme.h)
         return np.asarray(out)
 
     def _ended(self, now: Now, old: Now, at: RigidMotion, m: Column, lam: Column) -> Now:
         self._evaluated(now, old, at)
-        e, C = self.coordinates(now.z, now.turned, at)
+        e, C = self.coordinates(now.z, now.term_angles, at)
         now.e = np.stack([e, *self.rates(e, *old.e)])
         now.z_rates = np.stack([now.z, *self.rates(now.z, *old.z_rates)])
         now.multiplier = m / (1 - self.scheme.alpha_f)

@@ -81,7 +81,7 @@ def begun(of: Ready, state: State, motion_at: Motion | None) -> Now:
         inside = Instant(of, motion_at, float(state.time[0])).internal_states(state.u, state.v)
         seen = [[(x.angle, np.stack([x.g, x.g1, 0 * x.g])) for x in each.frames] for each in inside]
     return Now(
-        u, v, a, f, F, seen, state.z[0, number], state.e.copy(), state.turned.copy(),
+        u, v, a, f, F, seen, state.z[0, number], state.e.copy(), state.term_angles.copy(),
         state.bearing[number], damped, state.z[:, number], state.multiplier.copy(), state.port_force.copy(),
     )  # fmt: skip
 

@@ -85,7 +85,7 @@ def _pushed(of: Monolithic, now: Now, at: RigidMotion) -> Now:
     s, damping, hard = of.scheme, of.system.model.damping, of.hard
     c = [getattr(each.law, "damping", 0.0) for each in of.system.constraints]
     m = np.where(now.met, -np.array(c) * of.own_rates(now, now.z_rates[1], at), 0.0)
-    C = of.coordinates(now.z, now.turned.copy(), at)[1]
+    C = of.coordinates(now.z, now.term_angles.copy(), at)[1]
     c_M = (1 - s.alpha_m) * s.a0 + (1 - s.alpha_f) * s.a1 * damping.alpha
     c_K = (1 - s.alpha_f) * (1 + s.a1 * damping.beta)
     A = sp.csr_array(c_M * of.M + c_K * sp.block_diag([_stiffness(of, k, now, at) for k in range(len(of.of))]))

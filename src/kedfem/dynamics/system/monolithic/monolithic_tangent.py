@@ -88,7 +88,7 @@ def _of_pull(of: Monolithic, now: Now, old: Now, at: RigidMotion, m: Column) -> 
         x, pushed = DIFFERENCE * np.eye(of.k)[column], []
         which = [n for n, each in zip(varied, felt[:, column], strict=True) if each]
         for sign in (1, -1):
-            e, moved = of.coordinates(now.z + sign * x, now.turned.copy(), at, which)
+            e, moved = of.coordinates(now.z + sign * x, now.term_angles.copy(), at, which)
             pull, rate = m.copy(), of.rates(e, *old.e)[0]
             for n in set(which).difference(of.hard):
                 each = of.system.constraints[n]

@@ -20,7 +20,7 @@ from kedfem.links.reduced import on_functions
 START, LATER = 1e-6, 1e-2  # what is left of the first of its equations, and of those that precondition
 MOST = 60  # its marches for one of them
 RESONANT = 1e-3  # |1 − μ| of a vibration of reduced links that would be taken for one that repeats itself
-SAME = ("port_force", "z", "e", "turned", "bearing", "multiplier")  # whose meaning reduction does not change
+SAME = ("port_force", "z", "e", "term_angles", "bearing", "multiplier")  # whose meaning reduction does not change
 
 
 class Coarse:

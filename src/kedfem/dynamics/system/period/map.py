@@ -25,12 +25,12 @@ from kedfem.motion.rigid import RigidMotion
 
 VECTOR_FIELDS = (
     "u", "v", "a", "F", "f", "damped", "momentum", "seen", "Q", "angle", "strain", "direction", "turn", "port_force",
-    "z", "e", "turned", "bearing", "multiplier",
+    "z", "e", "term_angles", "bearing", "multiplier",
 )  # fmt: skip
 BLOW, SHORTEST = 0.05, 8.0  # of the period, and steps at least: what a blow lasts, and excites
 SWUNG = ("a", "port_force", "bearing", "multiplier")  # in which steps alternate, by ρ∞ less from step to step
 HIDDEN = 1e-4  # of the energy: what these count
-ANGLES = ("angle", "turn", "turned")  # which may have gone on by whole revolutions
+ANGLES = ("angle", "turn", "term_angles")  # which may have gone on by whole revolutions
 
 
 StateArrays = Mapping[str, Any]
@@ -146,7 +146,7 @@ class PeriodMap:
         z = now.interface(state.u)
         state.z[0, now.always.number] = z
         state.e[0] = now.coordinates(np.stack([z, 0 * z, 0 * z]))[0]
-        state.turned[:] = term_angles(now, z)
+        state.term_angles[:] = term_angles(now, z)
         return self.vector(state)
 
     def complete(self, state: State) -> None:

@@ -79,7 +79,7 @@ def begun(
     state.z[:, now.always.number] = np.stack([z, z1, found.z])
     state.a[:], state.port_force[:] = found.x, found.forces
     state.e[:], state.multiplier[:], state.bearing[now.always.number] = e, m, C.T @ m
-    state.turned[:] = term_angles(now, z)
+    state.term_angles[:] = term_angles(now, z)
     put_momenta(of, state)
     return state
 

@@ -197,7 +197,7 @@ def instant_near(of: Ready, motion_at: Motion, time: float, like: Instant | None
     """An instant whose revolutions and frames are sought from those of a state, if given, whatever was sought last."""
     if near is None:
         return Instant(of, motion_at, time, like)
-    now = Instant(of, motion_at, time, like, near.turned)
+    now = Instant(of, motion_at, time, like, near.term_angles)
     now.always.static.seek_from((near.Q, near.angle))
     return now
 

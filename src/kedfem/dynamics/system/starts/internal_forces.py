@@ -112,7 +112,7 @@ class StaticForces:
             omega = np.ascontiguousarray(motion.omega[0])  # laid out as in steps: compiled once for both
             turning = motion.R[0], motion.v[0], omega
             ends, constraints, handed_trial, work = self._of_gradients
-            trial.turned[:] = near
+            trial.term_angles[:] = near
             static_gradients(ends, constraints, turning, motion.p[0], stations, z, handed_trial, work)
         return trial.C.copy(), trial.e.copy(), trial.m.copy()
 

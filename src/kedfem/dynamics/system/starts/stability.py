@@ -48,7 +48,7 @@ def stability(of: Ready, motion_at: Motion, state: State, at_rest: bool, like: I
     at_rest : whether it is one of standing still
     like : another instant, with what does not depend on time
     """
-    now = Instant(of, motion_at, float(state.time[0]), like, state.turned)
+    now = Instant(of, motion_at, float(state.time[0]), like, state.term_angles)
     spins, z1 = (None, None) if at_rest else (spins_of(now), now.interface(state.v))
     problem = Equilibrium(now, lambda u, f: np.zeros_like(u), spins, z1)
     at = problem.at(state.u)

@@ -23,7 +23,7 @@ def static_forces(c, bodies, R, amounts, state, trial, work):  # type: ignore[no
     internal_forces(c, bodies, R, amounts, state, trial, work, True)
     for i in range(len(bodies.motion)):
         if bodies.frame[i] > RIGID_BODY:
-            orientation(bodies, i, R, trial.u, trial, trial.Rp[i])
+            orientation(bodies, i, R, trial, trial.Rp[i])
 
 
 @compiled
@@ -34,7 +34,7 @@ def static_gradients(ends, of, rigid_motion, p, stations, z, trial, work):  # ty
 
     Parameters
     ----------
-    trial : whose `turned` has angles of all terms to within half a turn
+    trial : whose `term_angles` has angles of all terms to within half a turn
     rigid_motion, p : R (M, 3, 3), v and ω (M, 3), and origins (M, 3) of all bodies of the linkage
     stations : weights of ends on lines
     """
