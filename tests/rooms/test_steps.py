@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose
 from kedfem.accuracy.histories import Histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.dynamics.rigid_body import motions
+from kedfem.dynamics.stepping.marks import Mark
 from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.start import started
@@ -197,7 +198,7 @@ def test_a_signal_as_a_large_link_begins_to_be_solved_ends_the_march(monkeypatch
     sys.setprofile(watch)
     try:
         with pytest.raises(KeyboardInterrupt):
-            list(transient(ready.scene, ready.linkage, ready.path, ready.model, solver, start))
+            list(transient(ready.scene, ready.linkage, ready.path, ready.model, solver, Mark(start=start)))
     finally:
         sys.setprofile(None)
         after = signal.signal(signal.SIGINT, before)
@@ -216,6 +217,6 @@ def test_an_interruption_while_a_large_link_is_solved_ends_the_march(monkeypatch
 
     start = started(ready.scene, ready.linkage, ready.path, ready.model, solver)
     solver.ready.parts[1] = replace(solver.ready.parts[1], solve=stopped)
-    given = ready.scene, ready.linkage, ready.path, ready.model, solver, start
+    given = ready.scene, ready.linkage, ready.path, ready.model, solver, Mark(start=start)
     with pytest.raises(KeyboardInterrupt):
         list(transient(*given))

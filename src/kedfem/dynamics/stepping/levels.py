@@ -108,7 +108,11 @@ def leveled(
     for each, mark in zip(solvers, marks.levels, strict=True):
         each.eased, each.steady, each.unstable = mark.eased, mark.steady, [*mark.unstable]
     if len(solvers) == 1:
-        yield from _single(scene, linkage, along, model, solvers[0], marks)
+        since = marks.done
+        for block in transient(scene, linkage, along, model, solvers[0], marks.levels[0]):
+            marks.done = block.step + len(block)
+            if marks.done > since:
+                yield block.part(max(0, since - block.step), len(block))
         return
     scenes, done, steady = level_scenes(scene), marks.done, scene.analysis.kind == "steady"
     begins = any(mark.state is None for mark in marks.levels)
@@ -142,15 +146,6 @@ def leveled(
             if stream.failed is not None and here < count:
                 raise stream.failed
         done += count
-
-
-def _single(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps, marks: Marks) -> Iterator[Block]:
-    """All time points of a march by itself, from those on that were handed on before."""
-    since = marks.done
-    for block in transient(scene, linkage, along, model, solver, marks.levels[0]):
-        marks.done = block.step + len(block)
-        if marks.done > since:
-            yield block.part(max(0, since - block.step), len(block))
 
 
 @dataclass

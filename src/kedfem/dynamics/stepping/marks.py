@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from kedfem.dynamics.system.state import State
+from kedfem.dynamics.system.steps import Steps
 
 
 @dataclass
@@ -33,14 +34,13 @@ class Mark:
     start: Any = None
     REMEMBERED: ClassVar = ("step", "state", "eased", "last", "steady", "unstable")
 
-    def set(self, step: int, state: Any, solver: Any) -> None:
+    def set(self, step: int, state: Any, solver: Steps) -> None:
         """The march begins a block; a state that its solver uses up is copied, if anybody stores it.
 
         The system's states are never used up.
         """
         if self.kept:
-            self.step, self.eased = step, int(getattr(solver, "eased", 0))
-            self.steady, self.unstable = getattr(solver, "steady", None), [*getattr(solver, "unstable", ())]
+            self.step, self.eased, self.steady, self.unstable = step, solver.eased, solver.steady, [*solver.unstable]
             self.state = state if isinstance(state, State) else deepcopy(state)
 
 

@@ -39,8 +39,9 @@ def started(scene: Scene, linkage: Linkage, along: Path, model: Model, solver: S
         return start
 
     over = period_map(scene, linkage, along, model, solver, solver.search.start(start))
+    over.watch = solver.watch
     small = coarse_map(scene, linkage, along, model) if over.linear else None
-    solver.steady = periodic(over, scene.analysis.stability, solver.watch, solver.search.closed, small)
+    solver.steady = periodic(over, scene.analysis.stability, solver.search.closed, small)
     solver.over = None if solver.corotational else over
     return solver.steady.state
 

@@ -18,7 +18,6 @@ from kedfem.dynamics.system.starts.deflected import quasi_static_position, stati
 from kedfem.dynamics.system.starts.instant import Instant
 from kedfem.dynamics.system.starts.modified_newton import NoBalanceError
 from kedfem.dynamics.system.starts.stability import UNSTABLE, stability
-from kedfem.dynamics.system.state import State
 from kedfem.dynamics.system.steps import Steps
 from kedfem.errors import SolveError
 from kedfem.motion.linkage import Linkage
@@ -32,22 +31,20 @@ STIFFENED = 'stiffening is not a small term; take frames = "co-rotational"'
 
 
 def transient(
-    scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps,
-    start: State | Mark | None = None,
-) -> Iterator[Block]:  # fmt: skip
+    scene: Scene, linkage: Linkage, along: Path, model: Model, solver: Steps, mark: Mark | None = None
+) -> Iterator[Block]:
     """All time points of the analysis, [KED, eq. (20)], block after block; nothing is kept.
 
     Parameters
     ----------
-    start : the state at t = 0, that of `started` if not given; or the mark of a march, which goes on from the beginning
-        of its block; it is set anew at every block
+    mark : of a march that goes on from the beginning of its block; it is set anew at every block
 
     Raises
     ------
     SolveError
         If a displacement is not finite: with step, time and drive angle.
     """
-    mark = start if isinstance(start, Mark) else Mark(start=start)
+    mark = mark or Mark()
     since = mark.step
     if without_vibration(scene):
         yield from _positions(scene, linkage, along, model, solver, mark)

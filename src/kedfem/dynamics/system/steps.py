@@ -27,8 +27,7 @@ from kedfem.dynamics.system.forces.follower_loads import own_patterns, rotated_f
 from kedfem.dynamics.system.forces.supports import Supports
 from kedfem.dynamics.system.layout import points_of
 from kedfem.dynamics.system.march import march
-from kedfem.dynamics.system.period.krylov import Watch
-from kedfem.dynamics.system.period.map import PeriodMap
+from kedfem.dynamics.system.period.map import PeriodMap, Watch
 from kedfem.dynamics.system.period.search import Periodic, Search
 from kedfem.dynamics.system.ready import Motion, Ready, displacements, ready
 from kedfem.dynamics.system.record import TANGENTIAL, System

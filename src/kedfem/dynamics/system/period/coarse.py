@@ -11,7 +11,7 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.matrices.dense import coordinates
-from kedfem.dynamics.system.period.krylov import Derivative, Watched, gmres
+from kedfem.dynamics.system.period.krylov import Derivative, gmres
 from kedfem.dynamics.system.period.map import PeriodMap
 from kedfem.dynamics.system.starts.instant import Flat
 from kedfem.dynamics.system.starts.internal_forces import own, rows
@@ -33,9 +33,8 @@ class Coarse:
 
     def __init__(self, fine: PeriodMap, small: PeriodMap) -> None:
         self.fine, self.small = fine, small
-        self._steps = Watched(small, lambda marched: None, 0.0)
         x = small.vector(small.start)
-        self._at = x, self._steps(x)
+        self._at = x, small(x)
         small.weighed(self._at[1])
         links = zip(fine.of.system.model.links, small.of.system.model.links, strict=True)
         self._modes = [on_functions(less) if less is not each else None for each, less in links]
@@ -54,7 +53,7 @@ class Coarse:
         size = self.small.whole(reduced)
         if not self.usable or not size > 0.0:
             return r
-        found = gmres(Derivative(self._steps, *self._at, size), reduced, left * size, MOST)
+        found = gmres(Derivative(self.small, *self._at, size), reduced, left * size, MOST)
         self.usable = found.nearest > RESONANT
         return r + self._moved(found.d - reduced, self.small, self.fine) if self.usable else r
 

@@ -9,46 +9,25 @@ from kedfem.arrays import Float
 from kedfem.dynamics.system.period.map import PeriodMap
 from kedfem.dynamics.system.starts.instant import Flat
 
+SMALL = 1e-4  # of the size of the state: differences by which Φ of a system that is not linear is found
 WHOLE = 1e-12  # what a new direction adds where a basis holds all that there is
-Watch = Callable[[int], None]
-"""Called with the number of periods that were marched so far."""
 Nearer = Callable[[Flat], Flat]
 """r → about (I − Φ)⁻¹ r."""
-
-
-@dataclass(frozen=True, slots=True)
-class Watched:
-    """The map, reported about."""
-
-    map: PeriodMap
-    watch: Watch
-    closed: float
-
-    def __call__(self, x: Flat, blow: Sequence[np.ndarray] | None = None) -> Flat:
-        """As the map itself."""
-        out = self.map(x, blow)
-        self.watch(self.map.marches)
-        return out
 
 
 @dataclass(frozen=True, slots=True)
 class Derivative:
     """Φ at x, of which y = P(x), from the difference that `by` times a vector makes: a march a product."""
 
-    steps: Watched
+    map: PeriodMap
     x: Flat
     y: Flat
     by: float
 
-    @property
-    def map(self) -> PeriodMap:
-        """The map whose derivative it is."""
-        return self.steps.map
-
     def __call__(self, v: Flat) -> Flat:
         """Φ v."""
         moved = self.map.possible(self.x + self.by * v)
-        return self.map.change(self.steps(moved), self.y) / self.by
+        return self.map.change(self.map(moved), self.y) / self.by
 
 
 def scale_of(of: PeriodMap, y: Flat) -> float:

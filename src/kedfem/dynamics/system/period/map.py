@@ -8,7 +8,7 @@ Sums of states of a linear system are states. With co-rotational frames the nonl
 computed anew (`possible`): strains, rotations of points, coordinates. A march would keep their errors for ever.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,8 @@ ANGLES = ("angle", "turn", "term_angles")  # which may have gone on by whole rev
 
 StateArrays = Mapping[str, Any]
 """Arrays of a state by name, those that a vector is made of."""
+Watch = Callable[[int], None]
+"""Called with the number of periods that were marched so far."""
 
 
 def state_arrays(state: State) -> StateArrays:
@@ -50,12 +52,14 @@ class PeriodMap:
     start : any state of the system, where a search begins
     period : whole number of steps [s]
     length : time points whose history is held at once
+    watch : called after each march
     steps : in the period; marches : periods so far; largest : largest energy of deformation in the last one, twice [J]
     """
 
     def __init__(self, of: Ready, start: State, motion_at: Motion, period: float, length: int) -> None:
         self.of, self.motion_at, self.linear = of, motion_at, of.c.single
         self.marches, self.largest, self.start = 0, 0.0, copied(start)
+        self.watch: Watch = lambda marched: None
         self.steps = steps = round(period / of.c.h)
         t = of.c.h * np.arange(1, steps + 1)
         self._parts = [motion_at(t[k : k + length]) for k in range(0, steps, length)]
@@ -100,6 +104,7 @@ class PeriodMap:
         state = self.start
         for state, found in self._marched(x, blow):  # noqa: B007 - the last one counts
             self.largest = max(self.largest, 2 * float(found.energy.sum(axis=1).max()))
+        self.watch(self.marches)
         return self.vector(state)
 
     def histories(self, x: Flat) -> Iterator[tuple[RigidMotion, History]]:

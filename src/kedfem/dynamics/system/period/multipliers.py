@@ -7,31 +7,31 @@ included. The largest magnitude is the factor by which a vibration grows, or dec
 import numpy as np
 
 from kedfem.arrays import Complex
-from kedfem.dynamics.system.period.krylov import Derivative, Watched, arnoldi, combined, scale_of
+from kedfem.dynamics.system.period.krylov import SMALL, Derivative, arnoldi, combined, scale_of
+from kedfem.dynamics.system.period.map import PeriodMap
 from kedfem.dynamics.system.starts.instant import Flat
 
 MOST, AGAIN = 80, 5  # marches, at most; those after which no larger one may have come up
 SURE, ABOUT = 1e-7, 1e-3  # residuals of multipliers of linear systems, and of others
-SMALL = 1e-4  # of the size of the state: differences by which Φ of a system that is not linear is found
 
 
-def multipliers(steps: Watched, x: Flat, y: Flat) -> tuple[Complex[np.ndarray, " f"], bool, Flat]:
+def multipliers(over: PeriodMap, x: Flat, y: Flat) -> tuple[Complex[np.ndarray, " f"], bool, Flat]:
     """Eigenvalues of Φ, of largest magnitude first, whether the first is certain, and the real part of its vector."""
-    map_, tolerance = steps.map, SURE if steps.map.linear else ABOUT
-    links = map_.of.system.model.links
+    tolerance = SURE if over.linear else ABOUT
+    links = over.of.system.model.links
     random = np.random.default_rng(0)
     blow = [random.standard_normal((link.n, link.d)) for link in links]
-    v, scale = map_.change(steps(x, blow), y), scale_of(map_, y)
-    if not map_.linear and map_.size(v) > 0.0:
-        blow = [each * (SMALL * scale / map_.size(v)) for each in blow]
-        v = map_.change(steps(x, blow), y)
-    map_.weighed(v)
-    size = map_.whole(v)
+    v, scale = over.change(over(x, blow), y), scale_of(over, y)
+    if not over.linear and over.size(v) > 0.0:
+        blow = [each * (SMALL * scale / over.size(v)) for each in blow]
+        v = over.change(over(x, blow), y)
+    over.weighed(v)
+    size = over.whole(v)
     if not size > 0.0:
         return np.zeros(1, complex), True, 0 * v
-    by, found, since = (scale or 1.0) * (1.0 if map_.linear else SMALL), np.zeros(0, complex), 0
+    by, found, since = (scale or 1.0) * (1.0 if over.linear else SMALL), np.zeros(0, complex), 0
     basis = [v / size]
-    for H in arnoldi(Derivative(steps, x, y, by), basis, MOST):
+    for H in arnoldi(Derivative(over, x, y, by), basis, MOST):
         values, shapes = np.linalg.eig(H[:-1].astype(complex))
         order = np.argsort(-np.abs(values))
         off = H[-1, -1] * np.abs(shapes[-1, order]) / np.linalg.norm(shapes[:, order], axis=0)

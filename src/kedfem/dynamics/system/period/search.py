@@ -13,7 +13,7 @@ import numpy as np
 
 from kedfem.arrays import Complex
 from kedfem.dynamics.system.period.coarse import Coarse
-from kedfem.dynamics.system.period.krylov import Derivative, Solution, Watch, Watched, combined, gmres, scale_of
+from kedfem.dynamics.system.period.krylov import SMALL, Derivative, Solution, combined, gmres, scale_of
 from kedfem.dynamics.system.period.map import VECTOR_FIELDS, PeriodMap, StateArrays
 from kedfem.dynamics.system.period.multipliers import multipliers
 from kedfem.dynamics.system.record import ANGLE, COORDINATE, Spring, Stop, curve_of
@@ -28,7 +28,6 @@ ENOUGH, LOOSE = 1e-8, 1e-6  # what is taken where nothing less is found, of line
 ROUGH = 0.3  # of the tolerance of iterations: what a period may leave where steps iterate
 NEWTON, KRYLOV, INNER = 12, 300, 0.1  # solutions; marches of one; what it may leave, of what a period may
 MIXINGS, PATIENCE, DEPTH = 60, 8, 30  # of Anderson: marches, those without gain, those that it remembers
-SMALL = 1e-4  # of the size of the state: differences by which Φ of a system that is not linear is found
 REPEATS = 1e-4  # |1 − μ| of a vibration that repeats itself with the period
 
 
@@ -81,10 +80,7 @@ class Periodic:
         return float(np.abs(self.multipliers).max(initial=0.0))
 
 
-def periodic(
-    over: PeriodMap, stability: bool = True, watch: Watch = lambda marched: None, closed: float = CLOSED,
-    small: PeriodMap | None = None,
-) -> Periodic:  # fmt: skip
+def periodic(over: PeriodMap, stability: bool = True, closed: float = CLOSED, small: PeriodMap | None = None) -> Periodic:
     """The state at t = 0 that returns after a period; the search begins with `over.start`.
 
     Parameters
@@ -98,15 +94,16 @@ def periodic(
     SolveError
         If there is none, or none is found; iterations of a step that do not converge.
     """
-    steps = Watched(over, watch, closed)
-    x, y, scale = _fixed(steps, over.vector(over.start), None if small is None else Coarse(over, small))
+    if not over.linear:  # what iterations of steps leave is more
+        closed = max(closed, ROUGH * over.of.c.tolerance)
+    x, y, scale = _fixed(over, closed, None if small is None else Coarse(over, small))
     stops = any(isinstance(each.law, Stop) for each in over.of.system.constraints)
     found, certain, shape = np.zeros(0, complex), not stops, np.zeros(0)
     if stability and not stops:
         if over.linear:  # P(x) as GMRES knows it is noise beside small multipliers
-            y = steps(x)
+            y = over(x)
             scale = scale_of(over, y)
-        found, certain, shape = multipliers(steps, x, y)
+        found, certain, shape = multipliers(over, x, y)
     residual = residual_of(over, x, y, scale)
     return Periodic(over.state(x), over.period, residual, scale, over.marches, found, certain, shape)
 
@@ -116,37 +113,31 @@ def residual_of(over: PeriodMap, x: Flat, y: Flat, scale: float) -> float:
     return over.size(over.change(y, x)) / max(scale, 1e-300)
 
 
-def _closed(steps: Watched) -> float:
-    """What a period may leave of the size of a state: what iterations of steps leave of it are more, if there are any."""
-    of = steps.map
-    return steps.closed if of.linear else max(steps.closed, ROUGH * of.of.c.tolerance)
-
-
-def _fixed(steps: Watched, x: Flat, coarse: Coarse | None) -> tuple[Flat, Flat, float]:
+def _fixed(over: PeriodMap, closed: float, coarse: Coarse | None) -> tuple[Flat, Flat, float]:
     """x and P(x), which are the same, and their size, to which what a period leaves is compared."""
-    map_, last = steps.map, np.inf
-    y = steps(x)
-    _refuse_windings(map_, x, y)
-    map_.weighed(y)
-    x = y if coarse is None else x + coarse.start(map_.change(y, x))  # a period damps most vibrations away
-    y = steps(x)
-    if not map_.linear:
-        x, y = _mixed(steps, x, y)
-    scale = scale_of(map_, y)
+    x, last = over.vector(over.start), np.inf
+    y = over(x)
+    _refuse_windings(over, x, y)
+    over.weighed(y)
+    x = y if coarse is None else x + coarse.start(over.change(y, x))  # a period damps most vibrations away
+    y = over(x)
+    if not over.linear:
+        x, y = _mixed(over, closed, x, y)
+    scale = scale_of(over, y)
     for _ in range(NEWTON):
-        r = map_.change(y, x)
-        left = map_.size(r)
-        enough = (ENOUGH if map_.linear else LOOSE) * scale
-        if left <= _closed(steps) * scale or (left <= enough and left > 0.5 * last):
+        r = over.change(y, x)
+        left = over.size(r)
+        enough = (ENOUGH if over.linear else LOOSE) * scale
+        if left <= closed * scale or (left <= enough and left > 0.5 * last):
             return x, y, scale
         if not np.isfinite(left):
             break
         last = left
-        found = _solved(steps, x, y, r, scale, coarse)
-        x = map_.possible(x + found.d)
-        y = x + found.left if map_.linear else steps(x)
-        now = scale_of(map_, y)
-        scale = min(scale, now) if map_.linear else now  # the last march was not that of x, but of a product
+        found = _solved(over, x, y, closed * scale, scale, coarse)
+        x = over.possible(x + found.d)
+        y = x + found.left if over.linear else over(x)
+        now = scale_of(over, y)
+        scale = min(scale, now) if over.linear else now  # the last march was not that of x, but of a product
     raise SolveError(
         "analysis.kind: must be a motion for which a steady state can be found, got one whose search does not "
         f"converge: a period still leaves {100 * left / scale:.2g} % of it; take more damping, smaller steps, or "
@@ -154,47 +145,47 @@ def _fixed(steps: Watched, x: Flat, coarse: Coarse | None) -> tuple[Flat, Flat, 
     )
 
 
-def _mixed(steps: Watched, x: Flat, y: Flat) -> tuple[Flat, Flat]:
+def _mixed(over: PeriodMap, closed: float, x: Flat, y: Flat) -> tuple[Flat, Flat]:
     """x and P(x) nearer to one another, by Anderson acceleration.
 
     Until a period leaves as little as it must, or no march of the last PATIENCE has led nearer.
     """
-    map_, best, since = steps.map, (np.inf, x, y), 0
+    best, since = (np.inf, x, y), 0
     before: list[tuple[Flat, Flat]] = []  # differences of residuals and of P(x), one march to the next
-    r = map_.change(y, x)
+    r = over.change(y, x)
     for _ in range(MIXINGS):
-        left, scale = map_.size(r), scale_of(map_, y)
+        left, scale = over.size(r), scale_of(over, y)
         best, since = ((left, x, y), 0) if left < best[0] else (best, since + 1)
-        if left <= _closed(steps) * scale or since > PATIENCE or not np.isfinite(left):
+        if left <= closed * scale or since > PATIENCE or not np.isfinite(left):
             break
         r0, y0 = r, y
         x = y
         if before:
             basis = [each for each, _ in before]
-            G = np.array([map_.products(basis, each) for each in basis])
-            c = np.linalg.lstsq(G, map_.products(basis, r), rcond=1e-14)[0]
+            G = np.array([over.products(basis, each) for each in basis])
+            c = np.linalg.lstsq(G, over.products(basis, r), rcond=1e-14)[0]
             x = y - combined(c, [moved for _, moved in before])
-        x = map_.possible(x)
-        y = steps(x)
-        r = map_.change(y, x)
-        before = [*before, (r - r0, map_.change(y, y0))][-DEPTH:]
+        x = over.possible(x)
+        y = over(x)
+        r = over.change(y, x)
+        before = [*before, (r - r0, over.change(y, y0))][-DEPTH:]
     return best[1], best[2]
 
 
-def _solved(steps: Watched, x: Flat, y: Flat, r: Flat, scale: float, coarse: Coarse | None) -> Solution:
-    """(I − Φ) d = r by GMRES in the energy's product.
+def _solved(over: PeriodMap, x: Flat, y: Flat, enough: float, scale: float, coarse: Coarse | None) -> Solution:
+    """(I − Φ) d = r by GMRES in the energy's product, r what a period from x to y leaves; enough : what it may leave.
 
     Raises
     ------
     SolveError
         If a vibration repeats itself with the period.
     """
-    map_, beta = steps.map, steps.map.whole(r)
-    least = INNER * _closed(steps) * scale
-    by, allowed = (beta, least) if map_.linear else (SMALL * scale, max(least, SMALL * beta))
-    found = gmres(Derivative(steps, x, y, by), r, allowed, KRYLOV, coarse)
+    r, least = over.change(y, x), INNER * enough
+    beta = over.whole(r)
+    by, allowed = (beta, least) if over.linear else (SMALL * scale, max(least, SMALL * beta))
+    found = gmres(Derivative(over, x, y, by), r, allowed, KRYLOV, coarse)
     if found.nearest < REPEATS:
-        raise SolveError(_resonant(map_, found.shape))
+        raise SolveError(_resonant(over, found.shape))
     return found
 
 
@@ -213,15 +204,15 @@ def _repeats(curve: Pieces, gone: float) -> bool:
     return abs(times - round(times)) < REPEATED
 
 
-def _refuse_windings(map_: PeriodMap, x: Flat, y: Flat) -> None:
+def _refuse_windings(over: PeriodMap, x: Flat, y: Flat) -> None:
     """Refuse springs on hinges that rotate continuously: they are wound up further in each period.
 
     Raises
     ------
     SolveError
     """
-    before, after = (map_.state(each).e[0] for each in (x, y))
-    for n, each in enumerate(map_.of.system.constraints):
+    before, after = (over.state(each).e[0] for each in (x, y))
+    for n, each in enumerate(over.of.system.constraints):
         gone = float(after[n] - before[n])
         curve = curve_of(each.law)
         depends = (isinstance(each.law, Spring) and each.law.stiffness != 0.0) or (
