@@ -107,17 +107,24 @@ def factored(link: Link, joint: Attachment, c_M: float, c_K: float) -> Substruct
 
 
 def _held(link: Link, joint: Attachment, c_M: float, c_K: float) -> Substructure:
+    factor, anchors, kappa = anchored(link, c_M, c_K)
+    made = substructure(
+        link, joint, lambda r: factor.solve(r.ravel()).reshape(r.shape), factor.solve_many, anchors, kappa
+    )
+    return replace(made, factor=factor if isinstance(factor, Cholesky) else None)
+
+
+def anchored(
+    link: Link, c_M: float, c_K: float
+) -> tuple["Cholesky | _Dense", Int[np.ndarray, " e"], Float[np.ndarray, " e"]]:
+    """Ã of a link, factored, its anchors, and how stiffly it holds each."""
     anchors, diagonal = anchors_of(link), link.K0.diagonal()
     mean = float((diagonal if link.full is not None else diagonal[anchors]).mean())
     kappa = np.full(len(anchors), ANCHORAGE * c_K * mean)
     springs = sp.coo_array((kappa, (anchors, anchors)), shape=link.K0.shape)
     A = sp.csr_array(effective_matrix(link, c_M, c_K) + springs)
     X = link.X if link.kind == "solid" else None
-    factor = _Dense(A, link.name) if link.full is not None else Cholesky(A, f"links.{link.name}", X)
-    made = substructure(
-        link, joint, lambda r: factor.solve(r.ravel()).reshape(r.shape), factor.solve_many, anchors, kappa
-    )
-    return replace(made, factor=factor if isinstance(factor, Cholesky) else None)
+    return (_Dense(A, link.name) if link.full is not None else Cholesky(A, f"links.{link.name}", X)), anchors, kappa
 
 
 class _Dense:

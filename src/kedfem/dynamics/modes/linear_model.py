@@ -15,7 +15,7 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.dynamics.modes.frozen import Frozen
 from kedfem.dynamics.stepping.state import Rayleigh
-from kedfem.dynamics.system.starts.deflected import as_work
+from kedfem.dynamics.system.starts.initial_states import as_work
 from kedfem.dynamics.system.starts.linear_equations import LinearEquations
 from kedfem.errors import SolveError
 from kedfem.links.record import Link

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -29,6 +30,7 @@ class Ready:
 
     stressed : stress stiffness on the coordinates, if geometric stiffening counts
     halves : the same for steps half as long, once these have been needed
+    condensed : with large bodies in static modes, once a balance has been sought: `starts.condensed`
     """
 
     system: System
@@ -40,6 +42,7 @@ class Ready:
     constraints: Constraints
     stressed: Stressed | None = None
     halves: list["Ready"] = field(default_factory=list)
+    condensed: list[Any] = field(default_factory=list)
 
 
 def ready(system: System, scheme: Scheme, tolerance: float = TOLERANCE) -> Ready:

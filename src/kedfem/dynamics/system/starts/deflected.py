@@ -11,15 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.matrices.bordered import ConstraintTerms
-from kedfem.dynamics.matrices.dense import work_on
 from kedfem.dynamics.system.ready import Ready
-from kedfem.dynamics.system.starts.accelerations import accelerations, own_spin
+from kedfem.dynamics.system.starts.condensed import Rows, condensed
 from kedfem.dynamics.system.starts.initial_states import as_coordinates, begun
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, instant_near, term_angles
-from kedfem.dynamics.system.starts.internal_forces import drawn, own, rotated_rate, rows
+from kedfem.dynamics.system.starts.internal_forces import own
 from kedfem.dynamics.system.starts.laws import feels_rates
-from kedfem.dynamics.system.starts.modified_newton import FREE, ROUNDING, NoBalanceError, direct_balance, equilibrium
+from kedfem.dynamics.system.starts.modified_newton import ROUNDING, NoBalanceError, direct_balance, equilibrium
+from kedfem.dynamics.system.starts.relieved import relieved
 from kedfem.dynamics.system.starts.rotating_bodies import CONVERGED, Spins, spins_of
 from kedfem.dynamics.system.state import State
 from kedfem.errors import MotionError, SolveError
@@ -38,8 +37,6 @@ LATER = np.array([
 AHEAD = {1: [1], 2: [-1, 2], 3: [1, -3, 3], 4: [-1, 4, -6, 4]}  # the next of values at equal steps
 
 THIRD, FOURTH = np.array([[-1, 3, -3, 1, 0], [1, -4, 6, -4, 1]])  # third and fourth differences
-
-Rows = Sequence[Float[np.ndarray, "_ _"]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,9 +65,10 @@ def quasi_static(of: Ready, motion_at: Motion, rates: Rows | None = None, time: 
     """
     now = Instant(of, motion_at, time)
     if not now.motion.drives.shape[1]:
-        return begun(now, *_relieved(now, as_coordinates(of, rates or [])))
-    found = _moving(now, motion_at)
-    return begun(now, found.u, found.v, strained=found.strained)
+        small = condensed(now, None)
+        u, v = relieved(small.at(now, motion_at), small.onto(as_coordinates(of, rates or [])))
+        return begun(now, small.back(u), small.back(v))
+    return _moving_state(now, motion_at)
 
 
 def quasi_static_position(
@@ -89,8 +87,17 @@ def quasi_static_position(
         If no deflection is found.
     """
     now = instant_near(of, motion_at, time, like, near)
-    found = _moving(now, motion_at, WIDER if _feels_rates(of) else 0)
-    return begun(now, found.u, found.v, strained=found.strained)
+    return _moving_state(now, motion_at, WIDER if _feels_rates(of) else 0, near)
+
+
+def _moving_state(
+    now: Instant, motion_at: Motion, widenings: int = WIDER, near: State | None = None, forces: Rows | None = None
+) -> State:
+    """The state at an instant with a deflection that moves on with the rigid-body motion, under forces beside loads."""
+    small = condensed(now, motion_at(now.time + now.of.c.h / 4 * np.arange(5)), forces)
+    first = small.at(now, motion_at, near)
+    found = _moving(first, motion_at, widenings, 0.0 if forces is None else small.forces(forces))
+    return begun(now, small.back(found.u), small.back(found.v), strained=small.back(found.strained))
 
 
 def static(
@@ -112,12 +119,15 @@ def static(
         If no balance is found, as of an unconstrained link.
     """
     now = instant_near(of, motion_at, time, like, near)
-    none = np.zeros(int(of.bodies.at[-1]))
-    pull = none if forces is None else as_work(of, forces)
-    if near is None:
-        return begun(now, _balance(now, none, pull, None), none)
-    before = Instant(of, motion_at, float(near.time[0]), now)
-    return begun(now, _balance(now, _with_links(before, now, near.u), pull, None), none)
+    small = condensed(now, None, forces)
+    here = small.at(now, motion_at, near)
+    none = np.zeros(int(here.of.bodies.at[-1]))
+    pull, guess = none if forces is None else small.forces(forces), none
+    if near is not None:
+        before = Instant(here.of, motion_at, float(near.time[0]), here)
+        guess = _with_links(before, here, small.onto(near.u))
+    u = small.back(_balance(here, guess, pull, None))
+    return begun(now, u, np.zeros_like(u))
 
 
 def _constant(forces: Flat) -> Callable[[Flat, Flat], Flat]:
@@ -167,13 +177,7 @@ def plucked(of: Ready, motion_at: Motion, forces: Rows, time: float = 0.0) -> St
     now = Instant(of, motion_at, time)
     if not now.motion.drives.shape[1]:
         return static(of, motion_at, time, forces)
-    found = _moving(now, motion_at, pull=as_work(of, forces))
-    return begun(now, found.u, found.v, strained=found.strained)
-
-
-def as_work(of: Ready, forces: Rows) -> Flat:
-    """Nodal forces (n, d) of all bodies on their coordinates."""
-    return np.concatenate([work_on(part, each).ravel() for part, each in zip(of.parts, forces, strict=True)])
+    return _moving_state(now, motion_at, forces=forces)
 
 
 def _moving(first: Instant, motion_at: Motion, widenings: int = WIDER, pull: Flat | float = 0.0) -> MovingDeflection:
@@ -269,27 +273,3 @@ def _scatter(u: Float[np.ndarray, "5 N"]) -> float:
 def _feels_rates(of: Ready) -> bool:
     """Whether a law's force depends on a rate."""
     return any(feels_rates(each.law) for each in of.system.constraints)
-
-
-def _relieved(now: Instant, v: Flat) -> tuple[Flat, Flat]:
-    """Deflection of a system that nothing drives, and its rates: it turns with its links."""
-    of, links = now.of, now.of.system.model.links
-    spins = [
-        own_spin(link, rows(of, k, v[own(of, k)]), drawn(link) @ now.R[k][: link.d, : link.d].T)
-        for k, link in enumerate(links)
-    ]
-
-    def rate(u: Flat) -> Flat:
-        turning = [rotated_rate(S, rows(of, k, u[own(of, k)])) for k, S in enumerate(spins)]
-        return np.asarray(v + as_coordinates(of, turning))
-
-    def inertia(u: Flat, f: Flat) -> Flat:
-        z, moving = now.interface(u), rate(u)
-        C, e = now.gradients(z), now.coordinates(np.stack([z, now.interface(moving), 0 * z]))
-        hard = now.hard(C)
-        m = np.where(hard, 0.0, now.forces(e)[:, 0])
-        asked = ConstraintTerms(C[hard], -e[2, hard], np.zeros(int(hard.sum())), C.T @ m)
-        return -accelerations(now, now.F - f, u, moving, asked, rigid=True).x
-
-    u = equilibrium(now, np.zeros_like(v), inertia, None, now.interface(v), FREE)
-    return u, rate(u)

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from kedfem.dynamics.matrices.bordered import ConstraintTerms
-from kedfem.dynamics.matrices.dense import coordinates
+from kedfem.dynamics.matrices.dense import coordinates, work_on
 from kedfem.dynamics.system.ready import Ready
 from kedfem.dynamics.system.starts.accelerations import accelerations
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, term_angles
@@ -44,6 +44,11 @@ def as_coordinates(of: Ready, given: Sequence[np.ndarray]) -> Flat:
     for k, each in enumerate(given):
         out[own(of, k)] = coordinates(of.system.model.links[k], of.parts[k], each).ravel()
     return out
+
+
+def as_work(of: Ready, forces: Sequence[np.ndarray]) -> Flat:
+    """Nodal forces (n, d) of all bodies on their coordinates."""
+    return np.concatenate([work_on(part, each).ravel() for part, each in zip(of.parts, forces, strict=True)])
 
 
 def begun(

@@ -22,7 +22,7 @@ from kedfem.dynamics.system.sparse import SparsePart, softening
 from kedfem.dynamics.system.starts.coordinate_rates import angles, coordinates, pins, places, travels
 from kedfem.dynamics.system.starts.internal_forces import InternalState, StaticForces, internal_state, own, rows
 from kedfem.dynamics.system.starts.laws import TemporarySprings, exerted, feels_rates
-from kedfem.dynamics.system.starts.linear_equations import HeldBody, mass_body, sparse_body
+from kedfem.dynamics.system.starts.linear_equations import HeldBody, held_body, mass_body, sparse_body
 from kedfem.dynamics.system.state import State
 from kedfem.errors import SolveError
 from kedfem.motion.newton import cross_matrix
@@ -46,7 +46,7 @@ class Always:
     closed : z from displacements at all interface points, w = B z as nearly as can be
     static : internal forces of bodies
     least : what the stiffness of body k gets of its mass, so that it is definite where nothing constrains it [1/s²]
-    held, mass : a sparse body with that stiffness, and a body with its mass for a matrix, factored once
+    held, mass : a body with that stiffness, and with its mass, for a matrix, factored once
     """
 
     number: Int[np.ndarray, " k"]
@@ -218,6 +218,8 @@ def always(of: Ready) -> Always:
         return softening(links[k]) if isinstance(of.parts[k], SparsePart) else lowest()
 
     def held(k: int) -> HeldBody:
+        if not isinstance(of.parts[k], SparsePart):
+            return held_body(static.K[k] + least(k) * np.eye(len(static.K[k])), of.parts[k].W)
         return sparse_body(links[k], joints[k], factored(links[k], joints[k], least(k), 1.0))
 
     number = renumbered(of)

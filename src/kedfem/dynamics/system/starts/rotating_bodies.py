@@ -36,14 +36,11 @@ class RotatingBodies:
         """All bodies, the inertia of those that turn as their frames first were: iterations take out the rest."""
         for k in range(len(self._made), len(R)):
             link = self.now.of.system.model.links[k]
-            if self.sparse[k]:
+            if self.sparse[k] or self.spins is None or not self.spins[k].any():
                 self._made.append(self.now.always.held(k))
                 continue
-            A = self.static.K[k] + self.now.always.least(k) * np.eye(len(self.static.K[k]))
-            if self.spins is not None:
-                S = (R[k].T @ self.spins[k] @ R[k])[: link.d, : link.d]
-                A = A + np.kron(S, np.eye(link.n))
-            self._made.append(held_body(A, self.now.of.parts[k].W))
+            S = (R[k].T @ self.spins[k] @ R[k])[: link.d, : link.d] + self.now.always.least(k) * np.eye(link.d)
+            self._made.append(held_body(self.static.K[k] + np.kron(S, np.eye(link.n)), self.now.of.parts[k].W))
         return self._made
 
     def change(self, balance: LinearEquations, r: Flat, exact: bool = False) -> Flat:

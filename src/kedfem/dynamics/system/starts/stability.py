@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kedfem.dynamics.system.ready import Ready
+from kedfem.dynamics.system.starts.condensed import condensed
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion
 from kedfem.dynamics.system.starts.internal_forces import moved
 from kedfem.dynamics.system.starts.linear_equations import LinearEquations
@@ -48,19 +49,21 @@ def stability(of: Ready, motion_at: Motion, state: State, at_rest: bool, like: I
     at_rest : whether it is one of standing still
     like : another instant, with what does not depend on time
     """
-    now = Instant(of, motion_at, float(state.time[0]), like, state.term_angles)
-    spins, z1 = (None, None) if at_rest else (spins_of(now), now.interface(state.v))
+    whole = Instant(of, motion_at, float(state.time[0]), like, state.term_angles)
+    small = condensed(whole, None if at_rest else whole.motion)
+    now, u = small.at(whole, motion_at, state), small.onto(state.u)
+    spins, z1 = (None, None) if at_rest else (spins_of(now), now.interface(small.onto(state.v)))
     problem = Equilibrium(now, lambda u, f: np.zeros_like(u), spins, z1)
-    at = problem.at(state.u)
+    at = problem.at(u)
     m = np.zeros(len(at.e))
     try:
-        balance = LinearEquations(of, problem.bodies.held(at.R), at.R, problem.asked(at, m))
+        balance = LinearEquations(now.of, problem.bodies.held(at.R), at.R, problem.asked(at, m))
         m = problem.reactions(at, m, balance.solved(at.r, at.moved).m)
         tangent = _Tangent(problem, at, problem.exerted(at, m), balance)
         least, x = tangent.least()
     except (SolveError, np.linalg.LinAlgError):
         return None
-    return Stability(least, of.system.model.links[int(np.argmax(moved(of, x)))].name)
+    return Stability(least, of.system.model.links[int(np.argmax(moved(now.of, x)))].name)
 
 
 class _Tangent:
