@@ -13,10 +13,11 @@ from kedfem.analysis import analyse
 from kedfem.dynamics.stepping.levels import level_steps
 from kedfem.dynamics.stepping.start import motion_of
 from kedfem.dynamics.system.starts import deflected
-from kedfem.errors import SolveError
+from kedfem.errors import SceneError, SolveError
 from kedfem.kinematics import kinematics
 from kedfem.results import read_results
 from kedfem.scene import scene_from, time_grid
+from kedfem.scene.questions.modelling import unsupported
 from tests.cells import Cell, scene_of
 from tests.laws.test_limits import AXES
 from tests.moving import bar, beam_in_space, channels, inverted, ran, turning
@@ -300,16 +301,58 @@ def test_what_nothing_loads_is_told(axis: str, tmp_path: Path) -> None:
     assert not any("stressed at all" in text for text in loaded.warnings)
 
 
-def test_what_nothing_holds_is_told_in_words() -> None:
-    hanging = {
-        "gravity": [0, -G],
-        "links": {"rod": {"model": "beam", "material": "steel", "mesh": {"elements": 2},
-                          "shape": {"kind": "bar", "between": [[0, 0], [1, 0]], "width": 0.02, "thickness": 0.02}}},
-        "joints": {"A": {"kind": "revolute", "links": ["rod", "ground"], "at": [0, 0]}},
+def floating(springs: dict[str, Any]) -> dict[str, Any]:
+    """Two rods on a hinge with each other, none of them on the ground; two forces on them balance each other."""
+
+    def rod(a: float, b: float) -> dict[str, Any]:
+        shape = {"kind": "bar", "between": [[a, 0], [b, 0]], "width": 0.02, "thickness": 0.02}
+        return {"model": "beam", "material": "steel", "mesh": {"elements": 1}, "shape": shape}
+
+    pulls = {"one": (0, -10.0), "two": (1, 10.0)}
+    loads = {n: {"kind": "force", "link": n, "at": [x, 0], "vector": [f, 0]} for n, (x, f) in pulls.items()}
+    hinge = {"kind": "revolute", "links": ["one", "two"], "at": [0.5, 0]}
+    return {
+        "links": {"one": rod(0, 0.5), "two": rod(0.5, 1)}, "joints": {"B": hinge}, "loads": loads, "springs": springs,
         "analysis": {"kind": "static"},
     }  # fmt: skip
+
+
+def test_links_that_nothing_connects_with_the_ground_are_refused_before_a_balance_is_sought(tmp_path: Path) -> None:
+    with pytest.raises(SceneError) as refused:
+        analyse(scene_from(floating({}), tmp_path))
+    assert [fault.where for fault in refused.value.faults] == [("links", "one"), ("links", "two")]
+    assert "must be connected with the ground in a static analysis" in str(refused.value)
+    ends = [{"link": "ground", "at": [0, 1]}, {"link": "two", "at": [1, 0]}]
+    assert unsupported(scene_from(floating({"s": {"kind": "spring", "between": ends, "stiffness": 10.0}}))) == ()
+
+
+def test_where_the_least_load_has_no_balance_no_larger_one_is_sought(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One search for the whole load, one for the least part of it; there were six."""
+    sought: list[float] = []
+    whole = deflected.direct_balance
+
+    def counted(now: Any, *given: Any) -> Any:
+        sought.append(float(np.abs(now.F).max()))
+        return whole(now, *given)
+
+    monkeypatch.setattr(deflected, "direct_balance", counted)
+    with pytest.raises(SolveError):
+        values(HANGING)
+    assert len(sought) == 1
+
+
+HANGING: dict[str, Any] = {
+    "gravity": [0, -G],
+    "links": {"rod": {"model": "beam", "material": "steel", "mesh": {"elements": 2},
+                      "shape": {"kind": "bar", "between": [[0, 0], [1, 0]], "width": 0.02, "thickness": 0.02}}},
+    "joints": {"A": {"kind": "revolute", "links": ["rod", "ground"], "at": [0, 0]}},
+    "analysis": {"kind": "static"},
+}  # fmt: skip
+
+
+def test_what_nothing_holds_is_told_in_words() -> None:
     with pytest.raises(SolveError, match="must balance at each position of a static analysis, got no balance at t = 0 s"):
-        values(hanging)
+        values(HANGING)
 
 
 @pytest.mark.parametrize("frames", ["rigid-body", "co-rotational"])

@@ -451,3 +451,13 @@ def test_a_curve_of_motion_that_repeats_itself_needs_no_end():
     motion = {"kind": "curve", "time": [0, 0.25, 0.5, 0.75], "value": [0, 1, 0, -1], "period": 1}
     scene = scene_from(changed(GOOD, {"drive/motion": motion, "analysis": {"kind": "steady", "step": 0.1}}))
     assert time_grid(scene).end == pytest.approx(1.0)
+
+
+def test_a_fault_of_a_motion_that_repeats_itself_has_no_echo():
+    """Whatever it is of: the analysis still needs no end."""
+    curve = {"kind": "curve", "time": [0, 0.5], "value": [0, "x"], "period": 1}
+    back = {"kind": "cycloidal", "angle": "x", "rise": 1.0, "return_time": 1.0}
+    for motion in (curve, back, {"kind": "constant_speed", "speed": "x"}):
+        for kind in ("steady", "static", "quasi-static"):
+            faults = faults_of(scene_from, changed(GOOD, {"drive/motion": motion, "analysis": {"kind": kind}}))
+            assert [fault[:12] for fault in faults] == ["drive.motion"]

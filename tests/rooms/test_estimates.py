@@ -13,7 +13,8 @@ from kedfem.accuracy import estimates
 from kedfem.accuracy.error_budget import Budget, Share, budget_warning, by_kind, meaningless
 from kedfem.accuracy.estimates import budget, step_errors, watcher
 from kedfem.accuracy.histories import Histories, histories, relative_errors
-from kedfem.accuracy.positions import missed
+from kedfem.accuracy.mesh_estimate import mesh_errors
+from kedfem.accuracy.positions import fewer_positions, missed
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.step_estimate import single_errors
 from kedfem.accuracy.variants import with_steps
@@ -239,6 +240,24 @@ def test_what_is_missed_between_positions_is_part_of_the_error() -> None:
     assert found is not None
     assert least < found < 2 * least
     assert estimated(pressed(steps_per_revolution=72))[0].of("positions") is None  # asked for as they are
+
+
+@pytest.mark.long
+def test_meshes_are_compared_in_as_few_positions_as_show_the_largest_values() -> None:
+    """Every third of 73 positions of a four-bar shows the error of its elements; a load within 2° takes all."""
+    raw = example("four_bar_beams", 72, {"mesh": {"elements": 1}}, revolutions=1.0, kind="quasi-static")
+    del raw["analysis"]["initial"]
+    ready = meshed(scene_from(raw))
+    base = histories(ready)
+    scene, some = fewer_positions(ready.scene, base)
+    assert_allclose(some.time, np.linspace(0.0, base.time[-1], 25), rtol=1e-12)
+    assert time_grid(scene).steps == 24
+    few, every = (by_kind(mesh_errors(*each, {})) for each in ((replace(ready, scene=scene), some), (ready, base)))
+    assert min(every.values()) > 1e-4
+    assert_allclose([few[kind] for kind in every], list(every.values()), rtol=0.25)
+    channel = Channel("joints/A/force", ("x",), "N", "", "")
+    brief = replace(base, channels={channel.name: (channel, np.eye(73)[50][:, None])})
+    assert fewer_positions(ready.scene, brief) == (ready.scene, brief)
 
 
 def test_a_smooth_curve_between_positions_is_missed_by_an_eighth_of_its_second_difference() -> None:

@@ -13,6 +13,7 @@ from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.scene import scene_from
+from kedfem.tables.check import resolution_table
 from tests import scenes
 from tests.scenes import bar, constant_speed, material
 
@@ -104,3 +105,12 @@ def test_error_of_a_step_is_that_of_a_swinging_mass(rho_inf: float) -> None:
     theta = (1 - rho_inf) / (1 + rho_inf)  # |α_m − α_f|
     wanted = (2 * np.pi / 40) ** 3 * (1 + 3 * theta**2) / 12 / 2
     assert_allclose(watcher.relative, wanted, rtol=0.05)  # the arm's own mass, and 40 steps see no maximum exactly
+
+
+def test_positions_have_no_steps_in_a_period() -> None:
+    for kind, said in (("quasi-static", False), ("transient", True)):
+        ready = meshed(scene_from(arm("beam", kind=kind)))
+        found = resolution(ready)
+        assert found is not None
+        rows = [str(cell) for cell in resolution_table(found, ready.scene).columns[0].cells]
+        assert ("steps in a period" in rows) is said

@@ -25,7 +25,7 @@ from kedfem.accuracy.geometric import GeometricError, bent, geometric_warning
 from kedfem.accuracy.histories import Histories, counted, extent, histories
 from kedfem.accuracy.longer_steps import can_double, differs_alike, doubled, in_steps
 from kedfem.accuracy.mesh_estimate import FUNCTIONS, link_errors, mesh_share, plain_mesh_share
-from kedfem.accuracy.positions import positions_share
+from kedfem.accuracy.positions import fewer_positions, positions_share
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, first_reduced
 from kedfem.accuracy.resolution import StepError, step_error
@@ -156,8 +156,11 @@ def budget(
                 known, longer = step_errors(small, base, zeros)
             step_share, known = _step_share(small, base, known, zeros)
             shares.append(step_share)
-        elif not states_step(ready.scene):  # stated positions are wanted there
-            shares.append(positions_share(base, sizes))
+        else:
+            if not states_step(ready.scene):  # stated positions are wanted there
+                shares.append(positions_share(base, sizes))
+            some, base = fewer_positions(small.scene, base)
+            small = replace(small, scene=some)
         if longer is not None and differs_alike(small):
             small, base = replace(small, scene=doubled(small.scene)), longer
         shares.append(mesh_share(small, base, eta, zeros))

@@ -37,7 +37,7 @@ from kedfem.accuracy.reduction import Reduction, prepared
 from kedfem.accuracy.trials import Stage, Trials
 from kedfem.accuracy.variants import families, of_family, with_analysis, with_links
 from kedfem.links.record import Link
-from kedfem.scene import LinkScene, Scene
+from kedfem.scene import LinkScene, Scene, refuse_unsupported
 from kedfem.store import itself, kept
 
 STEP, MESH, MODEL, REDUCTION = 0.3, 0.4, 0.2, 0.1  # shares of the error asked for
@@ -112,7 +112,14 @@ def plan_for(scene: Scene, stage: Stage = lambda name: None) -> Plan | None:
 def ready_to_step(
     scene: Scene, stage: Stage = lambda name: None, ends: Sequence[Scene] = ()
 ) -> tuple[Plan | None, Prepared, Reduction | None]:
-    """A scene prepared for a run: its plan, and all that does not need a time step (`accuracy.reduction.prepared`)."""
+    """A scene prepared for a run: its plan, and all that does not need a time step (`accuracy.reduction.prepared`).
+
+    Raises
+    ------
+    KedfemError
+        As `plan_for` and `prepared`; at once where nothing holds links that are to be in static balance.
+    """
+    refuse_unsupported(scene)
     plan = plan_for(scene, stage)
     ready, reduction = prepared(plan.scene if plan else scene, stage, ends, plan.links if plan else None)
     return plan, ready, reduction

@@ -3,16 +3,24 @@
 A smooth curve with the second difference D about its highest point rises by at most D/8 above it between two points.
 Where a load comes or goes the curve jumps (the median of five second differences knows nothing of it), and what it has
 reached by then is open by half the step to the flatter side.
+
+Meshes are compared in fewer positions than those of a run, which take as long as its own: in as few as show the largest
+values of all channels nearly.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from kedfem.accuracy.error_budget import Share, by_kind
-from kedfem.accuracy.histories import Histories
+from kedfem.accuracy.histories import Histories, counted
+from kedfem.accuracy.longer_steps import in_steps
 from kedfem.arrays import Float
+from kedfem.scene import Scene, time_grid
 
+FEWEST = 24  # positions in which meshes are compared
+SHOWN = 0.9  # of the largest value of each channel, in them
 AROUND = 2  # positions on both sides of the highest one at which the curve's bend counts
 
 
@@ -44,3 +52,17 @@ def missed(values: Float[np.ndarray, " n"]) -> float:
     steps, bends = np.abs(np.diff(values)), np.abs(np.diff(values, 2))
     around = bends[max(k - 1 - AROUND, 0) : k + AROUND]  # bends[k - 1] is that at k
     return float(max(steps[k - 1 : k + 1].min() / 2, np.median(around) / 8))
+
+
+def fewer_positions(scene: Scene, found: Histories) -> tuple[Scene, Histories]:
+    """The scene in as few positions as show the largest values of its channels nearly, and the channels there."""
+    grid, sizes = time_grid(scene), counted(found)
+    lengths = {name: np.linalg.norm(found.channels[name][1], axis=1) for name in sizes}
+    apart = max(1, grid.steps // FEWEST)
+    while apart > 1 and any(lengths[name][::apart].max() < SHOWN * size for name, size in sizes.items()):
+        apart //= 2
+    if apart == 1 or len(found.time) != grid.steps + 1:
+        return scene, found
+    some = {name: (channel, values[::apart]) for name, (channel, values) in found.channels.items()}
+    scene = in_steps(scene, apart * grid.step, grid.steps // apart)
+    return scene, replace(found, time=found.time[::apart], channels=some)

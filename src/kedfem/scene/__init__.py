@@ -31,6 +31,7 @@ from kedfem.scene.read.scenes import (
     read_keys,
     read_scene,
     refuse_few_rows,
+    refuse_unsupported,
     scene_from,
 )
 from kedfem.scene.records.analysis import Analysis, Animation, InitialMotion, Output, Probe

@@ -36,7 +36,7 @@ from kedfem.results.cross_checks import CrossChecks
 from kedfem.results.forces.force_elements import element_forces
 from kedfem.results.recording import recording
 from kedfem.scene import Curve, Limit, LineSpring, Scene, Spring, is_constant, time_grid
-from kedfem.scene.questions.timing import revolution_steps
+from kedfem.scene.questions.timing import revolution_steps, without_vibration
 from kedfem.stepping import Watched, frame_steps, stepped
 from kedfem.tables.layout import facts
 from kedfem.tables.model import link_tables, mobility_table
@@ -118,7 +118,7 @@ def resolution_table(found: Resolution, scene: Scene) -> Table:
     low, high = found.first.min(), found.first.max()
     return facts("First frequency (drive fixed, of what the loads excite)", [
         (span, f"{low:.4g} Hz" if high < 1.001 * low else f"{low:.4g} to {high:.4g} Hz"),
-        ("steps in a period", f"{found.steps_per_period:.3g} at least"),
+        *([] if without_vibration(scene) else [("steps in a period", f"{found.steps_per_period:.3g} at least")]),
         *((f"met by harmonic {each.harmonic}", f"{each.frequency:.4g} Hz, near {np.degrees(each.angle) % 360:.0f}°")
           for each in found.resonances),
     ])  # fmt: skip

@@ -158,9 +158,12 @@ def _repeats(parts: Parts) -> bool:
     """
     if not parts.all_drives:
         return parts.analysis.word("kind") == "static"
-    drives = [drive.record for drive in parts.all_drives]
-    known = len(drives) == 1 and drives[0] is not None and cycle(drives[0].motion) is not None
-    return parts.analysis.word("kind") in {"steady", *WITHOUT_VIBRATION} and known
+    if len(parts.all_drives) > 1 or parts.analysis.word("kind") not in {"steady", *WITHOUT_VIBRATION}:
+        return False
+    drive = parts.all_drives[0]
+    if drive.record is None:  # its fault is one of another key: what it was meant to be repeats itself
+        return any(drive.has("motion", key) for key in ("period", "return_time", "speed", "frequency"))
+    return cycle(drive.record.motion) is not None
 
 
 def drive_and_analysis_faults(parts: Parts, drive: Entry) -> Iterator[Fault]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from kedfem.scene.records.drives import Drive, prescribes_travel
+from kedfem.scene.records.force_elements import LineSpring
 from kedfem.scene.records.joints import Joint
 from kedfem.scene.records.links import GROUND, Frames
 from kedfem.scene.records.points import XYZ
@@ -35,6 +36,17 @@ def driven_travel(scene: Scene, name: str) -> bool:
     """Whether one of `Scene.all_drives` prescribes a travel of its joint, not an angle."""
     drive = scene.all_drives[name]
     return prescribes_travel(scene.joints[drive.joint].kind, drive.coordinate, drive.along)
+
+
+def unsupported(scene: Scene) -> tuple[str, ...]:
+    """Names of the links that neither joints nor springs connect with the ground, over others or directly."""
+    pairs = [set(joint.links) for joint in scene.joints.values()]
+    springs = [x for x in scene.springs.values() if isinstance(x, LineSpring)]
+    pairs += [{end.link for end in spring.between} for spring in springs if spring.between is not None]
+    reached = {GROUND}
+    while more := {name for pair in pairs if reached & pair for name in pair} - reached:
+        reached |= more
+    return tuple(name for name in scene.links if name not in reached)
 
 
 SHARED = ("revolute", "spherical", "weld")  # kinds that hold points together, wherever these go

@@ -15,7 +15,7 @@ from kedfem.scene.checks.faults import record_faults
 from kedfem.scene.checks.links import ELEMENTS, meshing_faults
 from kedfem.scene.checks.parts import Entry, scene_parts
 from kedfem.scene.checks.values import bare_numbers
-from kedfem.scene.questions.modelling import default_frames
+from kedfem.scene.questions.modelling import default_frames, unsupported
 from kedfem.scene.questions.timing import states_step, time_grid, without_vibration
 from kedfem.scene.read.files import file_faults, inside, outside, toml_table
 from kedfem.scene.read.including import KEY, toml_text, with_includes
@@ -148,6 +148,17 @@ def refuse_few_rows(scene: Scene) -> None:
     """SceneError where rows are to be farther apart than the analysis has steps, stated or planned."""
     if (every := scene.output.every) > (steps := time_grid(scene).steps):
         raise SceneError([Fault(("output", "every"), f"must be at most {steps}, the steps of the analysis, got {every}")])
+
+
+def refuse_unsupported(scene: Scene) -> None:
+    """SceneError where nothing holds links that are to be in static balance; a search for one would be long."""
+    loose = unsupported(scene) if scene.analysis.kind == "static" else ()
+    if loose:
+        wanted = (
+            "must be connected with the ground in a static analysis, by joints or springs, directly or over others, got "
+        )
+        remedy = "no way there; connect it, or take kind = 'transient', in which it flies"
+        raise SceneError([Fault(("links", name), wanted + remedy) for name in loose])
 
 
 def _spelt_out(raw: dict[str, Any]) -> dict[str, Any]:

@@ -146,19 +146,23 @@ def _balance(now: Instant, guess: Flat, pull: Flat, spins: Spins | None) -> Flat
 
 
 def _in_increments(now: Instant, pull: Flat, spins: Spins | None) -> Flat:
-    """The deflection under loads that grow from nothing, in parts as large as their balance can be found for.
-
-    So grows with what springs pull in the reference position.
-    """
-    part_loaded, u = copy(now), np.zeros_like(pull)
+    """The deflection under loads, and pulls of springs in the reference position, that grow from nothing, in parts as
+    large as their balance can be found for."""
+    part_loaded, u, frames = copy(now), np.zeros_like(pull), now.always.static.frames()
     drawn_apart = now.forces(now.measured(now.interface(u))[1])[:, 0]
+
+    def loaded(tried: float, u: Flat) -> Flat:
+        part_loaded.F, part_loaded.amounts = tried * now.F, tried * now.amounts
+        part_loaded.relief = (1.0 - tried) * drawn_apart
+        return direct_balance(part_loaded, u, _constant(tried * pull), spins, None, ROUNDING)
+
+    loaded(LEAST, u)  # without a balance under the least part there is none to go on from, as of what nothing holds
+    now.always.static.seek_from(frames)
     share, part = 0.0, 0.25
     while share < 1.0:
         tried = min(1.0, share + part)
-        part_loaded.F, part_loaded.amounts = tried * now.F, tried * now.amounts
-        part_loaded.relief = (1.0 - tried) * drawn_apart
         try:
-            u = direct_balance(part_loaded, u, _constant(tried * pull), spins, None, ROUNDING)
+            u = loaded(tried, u)
         except NoBalanceError:
             part /= 2
             if part < LEAST:
