@@ -274,7 +274,14 @@ def said(joints: JointTable, high: float = LITTLE, sliders: tuple[str, ...] = ()
     console = Console(width=160, file=StringIO())
     scene = linkage_scene(joints, sliders=sliders)
     console.print(mobility_table(scene, linkage(scene), found(joints, high, sliders)))
-    return console.file.getvalue()  # type: ignore[attr-defined]
+    rows: list[list[str]] = []
+    for line in console.file.getvalue().splitlines():  # type: ignore[attr-defined]
+        cells = [cell.strip() for cell in line.strip("│").split("│")]
+        if len(cells) == 2 and not cells[0]:  # a text that goes on
+            rows[-1][1] += f" {cells[1]}"
+        else:
+            rows.append(cells)
+    return "\n".join("│".join(cells) for cells in rows)
 
 
 def test_the_table_reads_as_sentences() -> None:

@@ -7,6 +7,7 @@ import pytest
 from rich.table import Table
 
 from kedfem.cli import screen
+from kedfem.tables.layout import facts
 from kedfem.terminal import terminal
 
 
@@ -59,3 +60,16 @@ def test_short_stages_are_not_told(capsys: pytest.CaptureFixture[str]) -> None:
         watch("motion", 0, 0)
         watch("steps", 1, 2)
     assert capsys.readouterr().err == ""
+
+
+def test_facts_are_read_in_a_hundred_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Long texts of a table go over several lines, in a pipe too, and none of their words is lost."""
+    monkeypatch.delenv("COLUMNS", raising=False)
+    note = " ".join(f"word{k}" for k in range(60))
+    for rows in ([("note", note)], [("constrained redundantly at joints O, B, C and bore", note), ("note", "short")],
+                 [("s", "spring along joint B", note)]):  # fmt: skip
+        console = terminal()
+        console.file = said = StringIO()
+        console.print(facts("Chosen for 1 %", rows))
+        assert max(map(len, said.getvalue().splitlines())) <= 103  # at least 44 for the last column
+        assert re.findall(r"word\d+", said.getvalue()) == note.split()

@@ -233,7 +233,7 @@ def _step_share(
 def _zeros(sizes: Collection[str], zeros: Collection[str]) -> list[str]:
     """Channels that are zero beside others, and what their errors are relative to, in words."""
     return [
-        f"{name} by itself: it cannot be told from zero beside others; its error is that of the largest in its unit"
+        f"{name} by itself: it is zero but for the accuracy of others; its error is relative to the largest in its unit"
         for name in sizes if name in zeros
     ]  # fmt: skip
 

@@ -117,7 +117,7 @@ def ready_to_step(
     Raises
     ------
     KedfemError
-        As `plan_for` and `prepared`; at once where nothing holds links that are to be in static balance.
+        As `plan_for` and `prepared`; at once where nothing constrains links that are to be in static balance.
     """
     refuse_unsupported(scene)
     plan = plan_for(scene, stage)

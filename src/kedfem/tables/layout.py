@@ -6,6 +6,8 @@ from typing import Any
 from rich.table import Column, Table
 from rich.text import Text
 
+READ, LEAST = 100, 44  # characters of a line that is read well, and of the last column's at least
+
 
 def left(*names: str, **look: Any) -> list[Column]:
     """Columns of words."""
@@ -18,8 +20,13 @@ def right(*names: str, **look: Any) -> list[Column]:
 
 
 def facts(title: str | Text, rows: Iterable[Sequence[str | Text]] = (), **look: Any) -> Table:
-    """A table without a heading: what it is, and how much."""
-    return listed(title, (), rows, show_header=False, **look)
+    """A table without a heading: what it is, and how much; longer texts go over several lines, in pipes and files too."""
+    every = [tuple(row) for row in rows]
+    columns = max(map(len, every), default=0)
+    before = [max(len(row[k]) for row in every) for k in range(columns - 1)]
+    most = max(LEAST, READ - sum(before) - 3 * columns - 1)  # lines and spaces between columns and at both ends
+    last = [Column(overflow="fold", max_width=most)] if every else []
+    return listed(title, [*left(*([""] * len(before))), *last], every, show_header=False, **look)
 
 
 def listed(title: str | Text, columns: Iterable[Column], rows: Iterable[Sequence[str | Text]] = (), **look: Any) -> Table:

@@ -103,24 +103,20 @@ def mobility_table(scene: Scene, link: Linkage, found: Mobility, works: bool = F
     ----------
     works : whether a run's first steps were found: what is free is meant to be
     """
-    table = facts(f"Mobility (in the reference position{', in its plane' * found.plane})")
     driven = f"driven at {of_joints(tuple(scene.driven_joints))}" if found.drives else "none driven"
-    table.add_row("degrees of freedom", f"{found.freedom}, {driven}")
     twice = f"{found.redundancy} of them redundant" if found.redundancy else "none redundant"
-    table.add_row("joint equations", f"{found.equations}, {twice}")
-    for each in found.redundant:
-        table.add_row(f"constrained redundantly at {of_joints(each.joints)}", each.words)
+    rows = [("degrees of freedom", f"{found.freedom}, {driven}"), ("joint equations", f"{found.equations}, {twice}")]
+    rows += [(f"constrained redundantly at {of_joints(each.joints)}", each.words) for each in found.redundant]
     if found.redundancy:
-        table.add_row("without these", found.remedy)
+        rows.append(("without these", found.remedy))
     if found.free:
-        table.add_row("free motions", str(sum(motion.basis.shape[1] for motion in found.free)))
+        rows.append(("free motions", str(sum(motion.basis.shape[1] for motion in found.free))))
     for motion in found.free:
-        table.add_row("free", motion.words)
+        rows.append(("free", motion.words))
         if found.drives and not works:
-            table.add_row("to constrain it", held_by(motion))
-    for row in _dead_point(link, found.dead_point):
-        table.add_row(*row)
-    return table
+            rows.append(("to constrain it", held_by(motion)))
+    rows += _dead_point(link, found.dead_point)
+    return facts(f"Mobility (in the reference position{', in its plane' * found.plane})", rows)
 
 
 def _dead_point(link: Linkage, found: DeadPoint | None) -> Iterator[tuple[str, str]]:

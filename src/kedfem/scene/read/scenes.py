@@ -151,7 +151,7 @@ def refuse_few_rows(scene: Scene) -> None:
 
 
 def refuse_unsupported(scene: Scene) -> None:
-    """SceneError where nothing holds links that are to be in static balance; a search for one would be long."""
+    """SceneError where nothing constrains links that are to be in static balance; a search for one would be long."""
     loose = unsupported(scene) if scene.analysis.kind == "static" else ()
     if loose:
         wanted = (

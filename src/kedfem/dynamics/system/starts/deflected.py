@@ -156,7 +156,7 @@ def _in_increments(now: Instant, pull: Flat, spins: Spins | None) -> Flat:
         part_loaded.relief = (1.0 - tried) * drawn_apart
         return direct_balance(part_loaded, u, _constant(tried * pull), spins, None, ROUNDING)
 
-    loaded(LEAST, u)  # without a balance under the least part there is none to go on from, as of what nothing holds
+    loaded(LEAST, u)  # without a balance under the least part there is none to go on from, as of what nothing constrains
     now.always.static.seek_from(frames)
     share, part = 0.0, 0.25
     while share < 1.0:
