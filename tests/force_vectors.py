@@ -12,8 +12,8 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.dynamics.force_elements import law_of, on_hinge
 from kedfem.dynamics.history import LinkHistory
-from kedfem.dynamics.joints.places import surface_of
-from kedfem.dynamics.model import Model, on_segment
+from kedfem.dynamics.joints.places import on_part, surface_of
+from kedfem.dynamics.model import Model
 from kedfem.dynamics.system.record import Law, Times
 from kedfem.links.point_rows import point_rows, require_on_axis
 from kedfem.links.record import Link
@@ -196,7 +196,7 @@ class _Ends:
         """A point of a link or the ground."""
         if name in self.fixed:
             return End(-1, self.fixed[name], POINT, np.zeros((1, 0)), at[None], link=name)
-        k, rows = on_segment(self.links, name, at, lambda link: point_rows(link, where, at))
+        k, rows = on_part(dict(enumerate(self.links)), name, at, lambda link: point_rows(link, where, at))
         require_on_axis(self.links[k], where, at, rows.X)
         return self._end(k, POINT, rows.value[None], rows.X[None])
 
@@ -224,7 +224,7 @@ class _Ends:
     def surface(self, joint: str, name: str) -> tuple[int, CouplingSurface]:
         """The number of the link, or segment, on which a joint is, and its coupling surface there."""
         at = np.asarray(self.scene.joints[joint].at)
-        return on_segment(self.links, name, at, lambda link: surface_of(self.scene, joint, link))
+        return on_part(dict(enumerate(self.links)), name, at, lambda link: surface_of(self.scene, joint, link))
 
     def _end(
         self, k: int, form: int, weights: Float[np.ndarray, "m n"], X: Float[np.ndarray, "m 3"],

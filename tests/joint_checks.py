@@ -204,7 +204,6 @@ def row_values(ready: Prepared, block: Block) -> tuple[np.ndarray, np.ndarray, n
     """C (T, r, k) of all rows, z (T, k), and the rows' forces μ (T, r) from port forces alone: Σ Bᵀ R λ = Cᵀ μ."""
     model, T = ready.model, len(block)
     rows = constraint_matrices(model.rows, block.motion, model.interface_unknowns)
-    assert rows is not None
     C = np.stack([rows.at(k).toarray() for k in range(T)])
     every = list(zip(model.joints, block.links, strict=True))
     w = [(x.weights @ own.u[:, x.nodes]).reshape(T, -1)[:, x.keep] for x, own in every]

@@ -7,7 +7,7 @@ import numpy as np
 
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.model import on_segment
+from kedfem.dynamics.joints.places import on_part
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.links.point_rows import point_rows
@@ -43,10 +43,9 @@ class Ran:
 
     def displaced(self, link: str, at: Any, name: str = "u") -> np.ndarray:
         """Displacement from the rigid-body motion (T, 3), or its rates."""
-        k, weights = on_segment(
-            self.ready.model.links, link, point(at), lambda part: point_rows(part, link, point(at)).value
-        )
-        part = self.ready.model.links[k]
+        links = dict(enumerate(self.ready.model.links))
+        k, weights = on_part(links, link, point(at), lambda part: point_rows(part, link, point(at)).value)
+        part = links[k]
         return in_space(part, np.einsum("n,tnd->td", weights, self.state(k, name)))
 
     def rigid_motion(self, link: str, at: Any) -> np.ndarray:

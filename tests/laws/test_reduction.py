@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 from kedfem.accuracy.histories import histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed, training_motion
 from kedfem.accuracy.reduction import reduced
+from kedfem.dynamics.joints.constraint_matrices import constraint_matrices
 from kedfem.dynamics.matrices.closed import closed
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.bases import bases
@@ -114,9 +115,11 @@ def test_a_reduced_link_is_too_stiff_and_less_so_with_more_functions(kind: str) 
 
 
 def static_work(model: Model, full: Prepared) -> float:
-    last = [each.part(-1, len(each.R)) for each in forcings(model, training_motion(full))]
+    motion = training_motion(full)
+    last = forcings(model, motion.part(-1, len(motion.t)))
     F = [each.F @ each.R for each in last]
-    u = closed(static_parts(model), [each.R for each in last]).deflections(F)
+    rows = constraint_matrices(model.rows, motion.part(-1, len(motion.t)), model.interface_unknowns)
+    u = closed(static_parts(model), [each.R for each in last], rows).deflections(F)
     return sum(float(np.vdot(x, f)) for x, f in zip(u, F, strict=True))
 
 

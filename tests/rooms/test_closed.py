@@ -26,7 +26,7 @@ from tests.spatial_joints import BEAMS, SOLIDS
 TURNS = {
     "z": np.eye(3), "x": np.eye(3)[[2, 0, 1]], "oblique": Rotation.from_rotvec([0.7, -1.1, 0.4]).as_matrix(),
 }  # fmt: skip
-Given = tuple[list[Substructure], list[np.ndarray], ConstraintMatrices | None, list[np.ndarray]]
+Given = tuple[list[Substructure], list[np.ndarray], ConstraintMatrices, list[np.ndarray]]
 
 
 def given(ready: Prepared, times: int = 3) -> Given:
@@ -68,7 +68,6 @@ def test_forces_of_closed_joints_are_those_of_the_assembled_equations(kind: str,
     """Of what constraints hold and bushings bear, whatever the direction; once more beside constraints twice as large."""
     made: dict[str, Callable[[], Any]] = BEAMS | SOLIDS
     parts, R, rows, loads = given(meshed(scene_from(turned(made[kind](), TURNS[turn]))))
-    assert rows is not None
     wanted, held = assembled(parts, R, rows, loads), np.isinf(rows.stiffness).sum()
     found = closed(parts, R, rows).forces(loads)
     width = np.diff(rows.row_at)
@@ -86,7 +85,6 @@ def test_forces_of_closed_joints_are_those_of_the_assembled_equations(kind: str,
 
 def test_a_linkage_whose_joints_let_links_move_freely_is_refused() -> None:
     parts, R, rows, loads = given(meshed(scene_from(BEAMS["prismatic"]())))
-    assert rows is not None
     none = replace(rows, entries=0.0 * rows.entries)
     with pytest.raises(SolveError, match="common system must be definite"):
         closed(parts, R, none).forces(loads)

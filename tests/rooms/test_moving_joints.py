@@ -101,7 +101,6 @@ def test_joints_stay_closed_and_what_is_free_is_free(kind: str) -> None:
     open_, size = 0.0, 0.0
     for block in blocks:
         rows = constraint_matrices(ready.model.rows, block.motion, ready.model.interface_unknowns)
-        assert rows is not None
         for k in range(len(block)):
             z = interface_values(ready.model.joints, [link.u[k] for link in block.links])
             open_ = max(open_, float(np.abs(rows.at(k) @ z)[np.isinf(rows.stiffness)].max()))
@@ -116,7 +115,6 @@ def test_joints_let_the_rigid_motion_pass(kind: str) -> None:
     ready, blocks = ran(KINDS[kind]())
     motion, model = blocks[-1].motion, ready.model
     rows = constraint_matrices(model.rows, motion, model.interface_unknowns)
-    assert rows is not None
     velocities = drive_rates(ready.linkage, ready.path, motion.phi)
     for t in (0, len(motion.t) - 1):
         rates = []
@@ -146,7 +144,6 @@ def test_the_first_rates_and_accelerations_keep_rows_closed() -> None:
         blocks[0].links,
         constraint_matrices(ready.model.rows, blocks[1].motion, ready.model.interface_unknowns),
     )
-    assert later is not None
     z, z1, z2 = (interface_values(ready.model.joints, [getattr(x, k)[0] for x in first]) for k in "uva")
     t = blocks[1].motion.t[[3, 7]]
     e = [np.abs(later.at(k) @ (z + s * z1 + s**2 / 2 * z2)).max() for k, s in zip((3, 7), t, strict=True)]

@@ -11,6 +11,7 @@ from kedfem.accuracy.histories import histories, relative_errors, worst
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import prepared
 from kedfem.dynamics import stiffening
+from kedfem.dynamics.joints.constraint_matrices import constraint_matrices
 from kedfem.dynamics.joints.ports import add_port_forces
 from kedfem.dynamics.matrices.closed import closed
 from kedfem.dynamics.rigid_body import forcings, motions
@@ -65,7 +66,8 @@ def test_stress_modes_hold_every_stress_of_the_rigid_body_motion(made: Any, monk
     found = stiffening.stiffening(model)
     forcing = forcings(model, motion)
     stressed = found.over(forcing, motion)
-    frozen, loads = closed(found.parts, [each.R for each in forcing]), [each.F @ each.R for each in forcing]
+    rows = constraint_matrices(model.rows, motion, model.interface_unknowns)
+    frozen, loads = closed(found.parts, [each.R for each in forcing], rows), [each.F @ each.R for each in forcing]
     deflections, port_forces = frozen.deflections(loads), frozen.forces(loads)
     for k in range(len(t)):
         load, g, forces = ([x[k] for x in every] for every in (loads, deflections, port_forces))

@@ -53,6 +53,13 @@ def rotation(link: Link, fit: Float[np.ndarray, "n 3"], y: Nodal, angle: float) 
     return Q, float(turn + 2 * np.pi * np.round((angle - turn) / (2 * np.pi)))
 
 
+def rotations(A: Float[np.ndarray, "T 3 3"]) -> Float[np.ndarray, "T 3 3"]:
+    """Q of A = Q U, U symmetric; of rank two as well."""
+    left, _, right = np.linalg.svd(A)
+    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
+    return np.asarray(left @ right)
+
+
 def mean_rotations(
     link: Link, fit: Float[np.ndarray, "n 3"], y: Float[np.ndarray, "T n d"]
 ) -> Float[np.ndarray, "T d d"]:
@@ -64,9 +71,7 @@ def mean_rotations(
         cos, sin = np.cos(turn), np.sin(turn)
         Q[:, 0, 0], Q[:, 0, 1], Q[:, 1, 0], Q[:, 1, 1] = cos, -sin, sin, cos
         return Q
-    left, _, right = np.linalg.svd(A)
-    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
-    Q = left @ right
+    Q = rotations(A)
     # once more by Newton: a slender segment shows its twist by small numbers
     U = Q.transpose(0, 2, 1) @ A
     axial = np.stack([U[:, 2, 1] - U[:, 1, 2], U[:, 0, 2] - U[:, 2, 0], U[:, 1, 0] - U[:, 0, 1]], axis=1)

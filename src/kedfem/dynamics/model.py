@@ -1,23 +1,15 @@
 """The elastic model of a scene: links with their attached bodies, joints, loads, damping."""
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
 
-import numpy as np
-
-from kedfem.arrays import Float
 from kedfem.dynamics.joints.attachments import Attachment, SharedCut
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint
-from kedfem.dynamics.joints.places import on_part
 from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.dynamics.stepping.step_limit import StepLimit
 from kedfem.dynamics.system.record import Driven, Held
 from kedfem.links.record import Link
 from kedfem.mesh.memory_forecast import least_bytes
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,18 +88,6 @@ def mesh_methods(model: Model) -> dict[str, str]:
     """How the links that are parts from CAD were meshed, in words."""
     links = [*model.links, *(prescribed.link for prescribed in model.prescribed)]
     return {link.name: method for link in links if (method := (link.full or link).method)}
-
-
-def on_segment(links: Sequence[Link], name: str, at: Float[np.ndarray, "3"], found: Callable[[Link], T]) -> tuple[int, T]:
-    """The number of the link or segment that has a coupling surface or load at a reference point, and that.
-
-    Raises
-    ------
-    MeshError, SceneError
-        That of the nearest segment, if none has it.
-    """
-    key, thing = on_part({str(k): link for k, link in enumerate(links)}, name, at, found)
-    return int(key), thing
 
 
 def factor_bytes(model: Model) -> float:

@@ -7,7 +7,8 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
-from kedfem.dynamics.model import Model, on_segment
+from kedfem.dynamics.joints.places import on_part
+from kedfem.dynamics.model import Model
 from kedfem.errors import SceneError
 from kedfem.links.point_rows import point_rows, require_on_axis
 from kedfem.links.record import Link, in_space
@@ -56,7 +57,7 @@ def link_point(model: Model, linked: Linkage, where: str, name: str, at: Point) 
     if all(link.name != name for link in model.links):
         raise SceneError(f"{where.removesuffix('.at')}.link: must name a link with a shape, got {name!r}")
     try:
-        k, (value, X) = on_segment(model.links, name, at, lambda link: _value(link, where, at))
+        k, (value, X) = on_part(dict(enumerate(model.links)), name, at, lambda link: _value(link, where, at))
     except SceneError:
         held = _held(model, name, at)
         if held is None:

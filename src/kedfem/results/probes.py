@@ -7,7 +7,8 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.joints.attachments import used_columns
-from kedfem.dynamics.model import Model, on_segment
+from kedfem.dynamics.joints.places import on_part
+from kedfem.dynamics.model import Model
 from kedfem.links.point_rows import stress_rows
 from kedfem.links.recovery import von_mises
 from kedfem.motion.linkage import Linkage, linkage
@@ -93,7 +94,7 @@ def _motion(probe: Probe, point: LinkPoint) -> Callable[[Block], Rows]:
 
 def _stress(scene: Scene, model: Model, where: str, name: str, probe: Probe) -> Recorded:
     drawn, kinks = np.asarray(probe.at), _kinks(scene, probe.link)
-    k, at = on_segment(model.links, probe.link, drawn, lambda link: stress_rows(link, where, drawn, kinks))
+    k, at = on_part(dict(enumerate(model.links)), probe.link, drawn, lambda link: stress_rows(link, where, drawn, kinks))
     dofs, dense = used_columns(at.stress)
     nodes, components = np.divmod(dofs, model.links[k].d)
 

@@ -38,20 +38,17 @@ class ConstraintMatrices:
         return sp.csr_array((self.entries[k], self.columns, self.row_at), (len(self.stiffness), self.unknowns))
 
 
-def constraint_matrices(
-    joints: Sequence[ConstraintJoint], motion: RigidMotion, unknowns: int
-) -> ConstraintMatrices | None:
-    """Rows of all joints, on so many interface unknowns, at the times of a motion; None without any."""
-    if not joints:
-        return None
+def constraint_matrices(joints: Sequence[ConstraintJoint], motion: RigidMotion, unknowns: int) -> ConstraintMatrices:
+    """Rows of all joints, on so many interface unknowns, at the times of a motion."""
+    none, T = np.zeros(0, int), len(motion.t)
     every = [(joint, _columns(joint)) for joint in joints]
-    width = [np.full(len(joint.constraints), len(columns)) for joint, columns in every]
-    entries = [gradients_over_time(joint, motion, columns).reshape(len(motion.t), -1) for joint, columns in every]
-    columns = np.concatenate([np.tile(columns, len(joint.constraints)) for joint, columns in every])
+    width = [none, *(np.full(len(joint.constraints), len(columns)) for joint, columns in every)]
+    entries = [gradients_over_time(joint, motion, columns).reshape(T, -1) for joint, columns in every]
+    columns = np.concatenate([none, *(np.tile(columns, len(joint.constraints)) for joint, columns in every)])
     laws = [each.law for joint in joints for each in joint.constraints]
-    stiffness = np.array([law.stiffness if isinstance(law, Spring) else np.inf for law in laws])
+    stiffness = np.array([law.stiffness if isinstance(law, Spring) else np.inf for law in laws], float)
     row_at = np.append(0, np.cumsum(np.concatenate(width)))
-    return ConstraintMatrices(np.concatenate(entries, axis=1), row_at, columns, unknowns, stiffness)
+    return ConstraintMatrices(np.concatenate([np.zeros((T, 0)), *entries], axis=1), row_at, columns, unknowns, stiffness)
 
 
 def gradients_over_time(

@@ -12,6 +12,7 @@ from kedfem.links.record import Link
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, joint_surface
 from kedfem.scene import Scene
 
+Key = TypeVar("Key")
 T = TypeVar("T")
 
 
@@ -23,9 +24,9 @@ def surface_of(scene: Scene, name: str, link: Link) -> CouplingSurface:
 
 
 def on_part(
-    links: Mapping[str, Link], name: str, at: Float[np.ndarray, "3"], found: Callable[[Link], T]
-) -> tuple[str, T]:
-    """The segment of a link that has something at a point, nearest first, and what was found on it.
+    links: Mapping[Key, Link], name: str, at: Float[np.ndarray, "3"], found: Callable[[Link], T]
+) -> tuple[Key, T]:
+    """The key of the segment of a link that has something at a point, nearest first, and what was found on it.
 
     Raises
     ------

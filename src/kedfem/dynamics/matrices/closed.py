@@ -60,9 +60,7 @@ class Closed:
         ]
 
 
-def closed(
-    parts: Sequence[Substructure], R: Sequence[Float[np.ndarray, "T _ _"]], rows: ConstraintMatrices | None = None
-) -> Closed:
+def closed(parts: Sequence[Substructure], R: Sequence[Float[np.ndarray, "T _ _"]], rows: ConstraintMatrices) -> Closed:
     """A linkage with its joints closed: A g = r + Wᵀ λ, R W g = B z, and joint forces in balance, Σ Bᵀ R λ = 0.
 
     The mechanism of [KED, eq. (19)]: joints make shared points move together.
@@ -72,9 +70,7 @@ def closed(
     R : per link, link to world
     rows : constraint equations, springs of bushings among them, on z; then Σ Bᵀ R λ is what these exert
     """
-    joints, T = [part.attachment for part in parts], len(R[0])
-    if rows is None:
-        rows = ConstraintMatrices(np.zeros((T, 0)), np.zeros(1, int), np.zeros(0, int), joints[0].unknowns, np.zeros(0))
+    joints = [part.attachment for part in parts]
     coupled = [rows.columns[first:last] for first, last in pairwise(rows.row_at)]
     made = profile_of([joint.columns for joint in joints], coupled, rows.unknowns)
     order = [first + np.argsort(made.number[c]) for first, c in zip(rows.row_at[:-1], coupled, strict=True)]
@@ -85,7 +81,7 @@ def closed(
         column_at=rows.row_at,
         columns=flat(made.columns, int),
     )
-    frames = np.zeros((T, len(parts), 3, 3))
+    frames = np.zeros((len(R[0]), len(parts), 3, 3))
     for k, each in enumerate(R):
         frames[:, k, : each.shape[1], : each.shape[2]] = each
     C = np.ascontiguousarray(rows.entries[:, flat(order, int)])

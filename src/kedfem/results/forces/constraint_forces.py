@@ -31,8 +31,6 @@ class ConstraintForces:
         """Rows of all joints in the reference position, and redundant combinations of those without springs."""
         still = resting(1 + max((b for joint in self.model.rows for b in joint.bodies), default=0), np.zeros(1))
         found = constraint_matrices(self.model.rows, still, self.model.interface_unknowns)
-        if found is None:
-            return np.zeros((0, 0)), np.zeros((0, 0))
         C, holds = found.at(0), np.isinf(found.stiffness)
         silent, null = holds.copy(), []
         for here, _, dense in blocks(sp.csr_array(sp.diags_array(holds.astype(float)) @ C)):

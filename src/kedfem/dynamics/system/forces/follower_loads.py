@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kedfem.arrays import Float
+from kedfem.dynamics.frames import rotations
 from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.matrices.dense import Coordinates, work_on
 from kedfem.dynamics.system.arrays import FollowerLoads, flat
@@ -79,13 +80,6 @@ def rotated_forces(
         about, world = load.share
         factor = factor * (Q @ about @ world)
     return np.asarray(factor[:, None, None] * (load.forces @ Q[:, : link.d, : link.d].transpose(0, 2, 1)))
-
-
-def rotations(A: Float[np.ndarray, "T 3 3"]) -> Float[np.ndarray, "T 3 3"]:
-    """Q of A = Q U, U symmetric; of rank two as well."""
-    left, _, right = np.linalg.svd(A)
-    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
-    return np.asarray(left @ right)
 
 
 def shown_by(link: Link, forces: Float[np.ndarray, "n d"]) -> Shown:

@@ -3,9 +3,9 @@
 import numpy as np
 
 from kedfem.arrays import Float
+from kedfem.dynamics.frames import rotations
 from kedfem.dynamics.system import record
 from kedfem.dynamics.system.ends import line_weights
-from kedfem.dynamics.system.forces.follower_loads import rotations
 from kedfem.dynamics.system.forces.rotations import rotation_moment, tilt_moment
 from kedfem.dynamics.system.record import End, Term
 from kedfem.motion.rigid import RigidMotion
