@@ -605,6 +605,13 @@ class TestSession:
                 gmsh.model.mesh.generate(2)
             assert len(gmsh.model.mesh.getElements(2)[1][0]) > 10
 
+    def test_what_gmsh_raises_is_an_error_of_gmsh_and_others_are_left(self):
+        with gmsh_model() as gmsh:
+            with pytest.raises(GmshError, match="Unknown"), gmsh_errors_at_end(gmsh):
+                raise Exception("Unknown entity")
+            with pytest.raises(ValueError, match="ours"), gmsh_errors_at_end(gmsh):
+                raise ValueError("ours")
+
     def test_is_silent(self, capfd):
         meshed(**extrusion_shape(*OUTLINES[2]))
         assert capfd.readouterr() == ("", "")

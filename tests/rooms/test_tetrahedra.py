@@ -152,7 +152,7 @@ class TestBlends:
             self.made("plate_with_chamfered_bores", tmp_path, ignore=0.5e-3)
 
     def test_concave_fillets_go_on_request(self, tmp_path: Path) -> None:
-        with pytest.raises(OtherMethodError, match="a concave fillet is in the way of layers"):
+        with pytest.raises(OtherMethodError, match="a concave fillet prevents layers"):
             self.made("crank_with_counterweight", tmp_path)
         assert "left out: 1 blend below 2 mm" in self.made("crank_with_counterweight", tmp_path, 2e-3).method
 

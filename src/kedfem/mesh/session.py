@@ -103,14 +103,19 @@ def gmsh_errors_at_end(gmsh: ModuleType) -> Iterator[None]:
         gmsh reported errors.
     """
     gmsh.logger.start()
+    other: list[str] = []
     try:
         with gmsh_options(gmsh, {"General.AbortOnError": 0}):
             yield
-        lines = [line.partition(":")[2].strip() for line in gmsh.logger.get() if line.startswith("Error")]
+    except Exception as error:
+        if type(error) is not Exception:  # gmsh raises nothing more special
+            raise
+        other = [str(error)]
     finally:
+        lines = [line.partition(":")[2].strip() for line in gmsh.logger.get() if line.startswith("Error")]
         gmsh.logger.stop()
-    if lines:
-        raise GmshError(lines)
+    if lines or other:
+        raise GmshError(lines or other)
 
 
 def boundary(gmsh: ModuleType, dimension: int, *tags: int) -> set[int]:
