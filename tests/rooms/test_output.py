@@ -24,7 +24,7 @@ from kedfem.output.plots import write_plots
 from kedfem.output.plots.drawing import drawn_over, envelope
 from kedfem.output.plots.files import shown
 from kedfem.output.plots.groups import pictures
-from kedfem.output.views import hidden, labels, sight, view
+from kedfem.output.views import hidden, hiding, labels, sight, view
 from kedfem.output.vtu import write_frame
 from kedfem.output.words import prefixed
 from kedfem.results import Channel, Results
@@ -589,6 +589,24 @@ def test_the_highest_stress_is_cut_free_where_no_side_shows_it(tmp_path: Path) -
         assert ((red > green + 60) & (red > blue + 60)).sum() > 100  # nothing else is above the blue tenth
     np.testing.assert_allclose(found[0].cut, inside.points[26])
     assert found[1].cut is None
+
+
+def test_links_that_hide_nothing_stay_whole_beside_a_cut(tmp_path: Path) -> None:
+    """A slider beside the highest stress, and nearer to the eye than that, was as faint as what hides it."""
+    import pyvista
+
+    inside = replace(warped(), von_mises=np.where(np.arange(27) == 26, 1e6, 1e5))
+    none = np.full_like(inside.von_mises, np.nan)
+    beside = replace(inside, name="slider", points=inside.points + np.array([3.0, 0, 1.0]), von_mises=none)
+    vtu = drawn(tmp_path, [inside, beside])
+    grid = pyvista.read(vtu)
+    shown = view(grid, np.zeros(3))
+    assert shown.cut is not None
+    assert hiding(grid, shown.direction) == {0}
+    write_picture(vtu, tmp_path / "picture.png", "two links")
+    red, green, blue = pixels(tmp_path / "picture.png")[:, :-260].reshape(-1, 3).T.astype(int)
+    grey = (np.abs(red - green) < 12) & (np.abs(green - blue) < 12)
+    assert (grey & (red > 120) & (red < 215)).sum() > 5000
 
 
 def test_a_missing_frame(tmp_path: Path) -> None:

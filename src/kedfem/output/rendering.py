@@ -14,7 +14,7 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.output.bars import LINES, bars, heights
 from kedfem.output.fields import SPRING, VON_MISES
-from kedfem.output.views import LIFT, View, labels, view
+from kedfem.output.views import LIFT, View, hiding, labels, view
 from kedfem.processes import end_with_parent
 
 WIDTHS, HEIGHTS = (1000, 1600), (700, 1100)  # least and most pixels; in between as the linkage asks
@@ -109,10 +109,12 @@ def draw_links(plotter: Any, grid: Any, shown: View) -> None:
     above = lifted(grid)
     is_line = np.isin(grid.celltypes, list(LINES))
     solids, pieces = above.extract_cells(~is_line), []
-    if solids.n_cells and shown.cut is not None:
-        before = curved_surface(solids.clip(-shown.direction, shown.cut))
+    if solids.n_cells and shown.cut is not None:  # links elsewhere stay whole
+        cut = np.isin(solids.cell_data["link"], list(hiding(grid, shown.direction)))
+        hide, solids = solids.extract_cells(cut), solids.extract_cells(~cut)
+        before = curved_surface(hide.clip(-shown.direction, shown.cut))
         plotter.add_mesh(before, **look, opacity=THROUGH)
-        solids = solids.clip(shown.direction, shown.cut)
+        pieces.append(curved_surface(hide.clip(shown.direction, shown.cut)))
     if solids.n_cells:
         pieces.append(curved_surface(solids))
     if is_line.any():

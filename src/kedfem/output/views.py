@@ -21,7 +21,8 @@ class View:
     """From where a linkage is drawn, and what it takes up there.
 
     direction, across, up : (3,) unit vectors towards the eye, to the right and upwards in the picture [-]
-    cut : (3,) the highest stress, where it is hidden: what is before it is drawn translucent [m]; else None
+    cut : (3,) the highest stress, where it is hidden: of links that hide it what is before it is drawn translucent [m];
+        else None
     middle, size : (2,) centre, width and height of the linkage in the picture [m]
     """
 
@@ -41,16 +42,31 @@ def labels(grid: Any, what: str = BODY) -> dict[int, str]:
 
 def hidden(grid: Any, direction: Float[np.ndarray, " 3"]) -> bool:
     """Whether something is in front of the highest stress."""
-    stress = grid.point_data[VON_MISES]
-    if not np.isfinite(stress).any():
-        return False
+    solids = _opaque(grid)
+    return solids is not None and _meets(grid, solids, direction)
+
+
+def hiding(grid: Any, direction: Float[np.ndarray, " 3"]) -> set[int]:
+    """Numbers of the links that are in front of the highest stress."""
+    solids = _opaque(grid)
+    if solids is None:
+        return set()
+    links = np.unique(solids.cell_data["link"])
+    return {int(k) for k in links if _meets(grid, solids.extract_cells(solids.cell_data["link"] == k), direction)}
+
+
+def _opaque(grid: Any) -> Any:
+    """The cells that may hide the highest stress; None without any, or without stress."""
     before = ~np.isin(grid.celltypes, list(LINES))
     if apart := labels(grid) | labels(grid, SPRING):  # translucent, and thin
         before &= ~np.isin(grid.cell_data["link"], list(apart))
-    solids = grid.extract_cells(before)
-    if not solids.n_cells:
-        return False
-    place = grid.points[int(np.nanargmax(stress))]
+    stressed = np.isfinite(grid.point_data[VON_MISES]).any()
+    return grid.extract_cells(before) if before.any() and stressed else None
+
+
+def _meets(grid: Any, solids: Any, direction: Float[np.ndarray, " 3"]) -> bool:
+    """Whether a ray from the highest stress towards the eye meets some cells."""
+    place = grid.points[int(np.nanargmax(grid.point_data[VON_MISES]))]
     surface = solids.extract_surface(nonlinear_subdivision=1, algorithm=None).triangulate()
     ends = place + LIFT * grid.length * direction, place + 2 * grid.length * direction
     return len(surface.ray_trace(*ends)[0]) > 0
