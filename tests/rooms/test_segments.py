@@ -1,5 +1,6 @@
 """Segments of links with co-rotational frames: reduced, chosen, told, stored and drawn."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,15 +21,15 @@ from kedfem.dynamics.modes.reduction import energy_sorted, excited, port_functio
 from kedfem.dynamics.reduced_model import restored_model, stored_model
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
-from kedfem.errors import MeshError, SceneError
+from kedfem.errors import MeshError
 from kedfem.links.record import Link
 from kedfem.links.recovery import stress_recovery
 from kedfem.output.frames import link_fields
 from kedfem.scene import scene_from
 from kedfem.tables import check_tables
+from tests.laws.test_condensed_starts import UP, hanging
 from tests.moving import snapshots
 from tests.runs import quick
-from tests.scenes import arm, bar
 
 from .test_dynamics import four_bar
 
@@ -85,12 +86,39 @@ def test_beams_with_frames_that_follow_stay_in_full() -> None:
     assert [link.full for link in small.model.links] == 6 * [None]
 
 
-def test_reduced_links_need_a_motion_that_the_drive_prescribes() -> None:
-    link = bar(1, model="plane", reduction="modal", mesh={"elements": [4, 1]})
-    raw = arm(link, None, analysis={"end_time": 0.1, "step": 0.01})
-    wanted = r"links\.arm\.reduction: must be left out where motions are free .*, got 1 free"
-    with pytest.raises(SceneError, match=wanted):
-        prepared(scene_from(raw))
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("driven", "segments", "analysis"),
+    [
+        (False, 1, {"kind": "static"}),
+        (False, 2, {"initial": "rest", "end_time": 0.1}),
+        (True, 2, {"initial": "quasi-static"}),
+    ],
+)
+def test_reduced_links_move_freely_as_unreduced_ones(driven: bool, segments: int, analysis: dict[str, Any]) -> None:
+    """An arm sinks on its spring, and is lifted by it: within the estimate, and as by the monolithic solver."""
+    raw = hanging("oblique", segments, driven)
+    tip, up = np.array(raw["loads"].pop("push")["at"]), np.array(UP["oblique"])
+    raw["springs"]["up"].pop("preload")
+    raw["links"]["arm"]["mesh"] = {"elements": [6, 2, 2]}
+    probes = {"tip": (tip, "travel"), "middle": (0.5 * tip + 0.015 * up, "stress")}
+    raw["output"] = {"probes": {k: {"link": "arm", "at": at.tolist(), "quantity": q} for k, (at, q) in probes.items()}}
+    raw["analysis"] |= analysis | {"reduction_tolerance": 0.02}
+    if "kind" in analysis:
+        raw["analysis"].pop("rho_inf")
+    full = histories(meshed(scene_from(raw)))
+    raw["links"]["arm"]["reduction"] = "modal"
+    small, found = prepared(scene_from(raw))
+    assert found is not None
+    assert small.model.unknowns < 0.5 * meshed(scene_from(raw)).model.unknowns
+    errors = relative_errors(histories(small), full)
+    assert worst(errors) <= max(0.02, worst(found.estimate))
+    assert errors["probes/tip/travel"] < 2e-3
+    if "kind" not in analysis:
+        whole = small.scene.model_copy(
+            update={"analysis": small.scene.analysis.model_copy(update={"solver": "monolithic"})}
+        )
+        assert worst(relative_errors(histories(replace(small, scene=whole)), histories(small))) < 1e-4
 
 
 def test_functions_go_by_what_their_loss_costs() -> None:

@@ -31,7 +31,6 @@ from kedfem.dynamics.modes.bases import bases, reduced_at
 from kedfem.dynamics.modes.reduction import Basis, enriched, static_parts
 from kedfem.dynamics.modes.residual import residual_deflections
 from kedfem.dynamics.reduced_model import reduced_model, restored_model, stored_model
-from kedfem.errors import SceneError
 from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
@@ -127,19 +126,9 @@ def reduced(
     tolerance : relative error that the reduction may cause in probes, joint forces and the drive's torque [-]
     counts : number of modes of links that have it given
     others : scenes that are `alike`, and for which the modes must serve too
-
-    Raises
-    ------
-    SceneError
-        If the drive leaves motions free.
     """
-    if full.linkage.mobility:
-        raise SceneError(
-            f"links.{next(iter(chosen))}.reduction: must be left out where motions are free (modes are found for a "
-            f"motion that the drive prescribes), got {full.linkage.mobility} free"
-        )
     stage("modes")
-    parts = static_parts(full.model)
+    parts = static_parts(full.model, full.linkage.mobility > 0)
     needed = {link.name for link in full.model.links if link.name in chosen or link.unknowns > SMALL}
     needed &= reducible(full.model)
     if not needed:

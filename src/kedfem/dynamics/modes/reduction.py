@@ -20,11 +20,19 @@ from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.stepping.state import NodalOf
 from kedfem.links.record import Link, mass_times_over
-from kedfem.links.reduced import mass_orthonormal, on_functions, rigid_functions, scalar_block, stiffness_blocks
+from kedfem.links.reduced import (
+    mass_orthonormal,
+    on_functions,
+    rigid_functions,
+    scalar_block,
+    stiffness_blocks,
+    wave_frequency,
+)
 from kedfem.motion.rigid import RigidMotion
 
 LANCZOS = 6  # modes of the linkage per instant (docs/performance/reduction.md)
 INDEPENDENT = 1e-14  # of the largest energy: modes below repeat others
+SOFT = 1e-3  # of the first axial frequency of a link: what mass holds of a free linkage
 REPEATED = 1e-9  # of a deflection: what is left of it beside those before is rounding
 
 Rows = Float[np.ndarray, "T _ _"]
@@ -54,9 +62,13 @@ class Basis:
         return int(self.needed.shape[1] + np.count_nonzero(left > tolerance))
 
 
-def static_parts(model: Model) -> list[Substructure]:
-    """All links factored with A = K0."""
-    return [factored(link, joint, 0.0, 1.0) for link, joint in zip(model.links, model.joints, strict=True)]
+def static_parts(model: Model, free: bool = False) -> list[Substructure]:
+    """All links factored with A = K0; with so little of their mass where motions are free that only these take forces.
+
+    Then what balances no force accelerates as a rigid body.
+    """
+    shift = SOFT**2 * min((wave_frequency(link) ** 2 for link in model.links if not link.rigid), default=0.0) * free
+    return [factored(link, joint, shift, 1.0) for link, joint in zip(model.links, model.joints, strict=True)]
 
 
 def excited(model: Model, parts: Sequence[Substructure], motion: RigidMotion) -> list[list[NodalOf]]:
