@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from kedfem.links.beams.section import rectangle
 from tests.rooms.test_dynamics import run, worst_difference
+from tests.runs import ran
 from tests.verification.linear import free_map, frequencies
 from tests.verification.spatial_beams import ROOT, bent_cantilever, straight, tip_displacement, wanted_modes
 
@@ -42,3 +44,48 @@ def test_condensed_is_monolithic_on_a_slender_arm_in_space() -> None:
         raw["analysis"]["solver"] = "monolithic"
         _, _, slow = run(raw)
         assert worst_difference(fast, slow) < 1e-6
+
+
+ALL_WAYS = {"x": [0, 0, 0], "y": [0, 0, np.pi / 2], "z": [0, -np.pi / 2, 0], "oblique": [0.3, -0.7, 0.5]}
+IN_PLANE = {"x": [0, 0, 0], "y": [0, 0, np.pi / 2], "oblique": [0, 0, 0.7]}
+ARCS = {
+    "planar": (4, 360.0, 20, 1e-9, IN_PLANE),
+    "slender": (4, 60.0, 250, 1e-6, IN_PLANE),
+    "spatial": (3, 60.0, 250, 1e-3, ALL_WAYS),
+}
+
+
+@pytest.mark.parametrize(("kind", "along"), [(kind, along) for kind, arc in ARCS.items() for along in arc[-1]])
+def test_a_slender_cantilever_under_an_end_moment_is_an_arc(kind: str, along: str) -> None:
+    """Exactly a circle, M = EI φ/L, in one static position: the tip is at L sin φ/φ, L (1 − cos φ)/φ."""
+    elements, turn, slenderness, within, ways = ARCS[kind]
+    R = Rotation.from_rotvec(ways[along]).as_matrix()
+    side, angle = 1.0 / slenderness, np.deg2rad(turn)
+    M = 2e11 * side**4 / 12 * angle
+    shape = {
+        "kind": "bar",
+        "between": [[0, 0, 0], R[:, 0].tolist()],
+        "width": side,
+        "thickness": side,
+        "up": R[:, 2].tolist(),
+    }
+    arm = {
+        "model": "beam",
+        "beam": "spatial" if kind == "spatial" else "planar",
+        "material": "m",
+        "mesh": {"elements": elements},
+        "shape": shape,
+    }
+    done = ran(
+        {
+            "materials": {"m": {"density": 7850, "youngs_modulus": 2e11, "poisson_ratio": 0.3}},
+            "links": {"arm": arm},
+            "joints": {"A": {"kind": "weld", "links": ["ground", "arm"], "at": [0, 0]}},
+            "loads": {
+                "M": {"kind": "torque", "link": "arm", "at": shape["between"][1], "vector": (M * R[:, 2]).tolist()}
+            },
+            "analysis": {"kind": "static", "accuracy": "quick"},
+        }
+    )
+    tip = R.T @ done.position("arm", shape["between"][1])[-1]
+    np.testing.assert_allclose(tip, [np.sin(angle) / angle, (1 - np.cos(angle)) / angle, 0], atol=within)

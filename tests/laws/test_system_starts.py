@@ -14,7 +14,7 @@ from kedfem.dynamics.system.starts.coordinate_rates import coordinates, places
 from kedfem.dynamics.system.starts.deflected import plucked, quasi_static, static
 from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.dynamics.system.starts.instant import Instant
-from kedfem.dynamics.system.starts.newton_krylov import stands_off
+from kedfem.dynamics.system.starts.open_joints import stands_off
 from kedfem.errors import SolveError
 from tests.laws.test_system import HINGE, KINDS, elements, four_bar
 from tests.moving import bar

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from kedfem.accuracy.prepared import meshed
 from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.dynamics.rigid_body import drive_range
 from kedfem.dynamics.stepping.solvers import steps_of
@@ -173,3 +174,26 @@ def test_memory_does_not_grow_with_the_steps(monkeypatch: pytest.MonkeyPatch) ->
             held.append(tracemalloc.get_traced_memory()[0])
     tracemalloc.stop()
     assert held[1] < held[0] + 100_000  # one step's states are 10 kB, so 1200 of them would show
+
+
+@pytest.mark.parametrize("element", ["beam2", "beam3", "beam4"])
+@pytest.mark.parametrize("beam", ["planar", "spatial"])
+def test_a_bar_along_a_slot_has_nodes_for_its_stations(element: str, beam: str) -> None:
+    """Four at least, where one element a segment would have two or three."""
+    shape = {"kind": "bar", "between": [[0, 0], [0.6, 0]], "width": 0.02, "thickness": 0.02}
+    scene = scene_from(
+        {
+            "links": {
+                "arm": {"model": "beam", "beam": beam, "element": element, "material": "steel", "shape": shape},
+                "pin": {"model": "rigid", "mass": 0.2},
+            },
+            "joints": {
+                "A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]},
+                "S": {"kind": "slot", "links": ["pin", "arm"], "at": [0.3, 0], "axis": "x"},
+                "G": {"kind": "prismatic", "links": ["pin", "ground"], "at": [0.3, 0], "axis": "y"},
+            },
+            "drive": {"joint": "A", "motion": {"kind": "harmonic", "frequency": 2.0, "angle": 0.05}},
+            "analysis": {"end_time": 0.02, "step": 0.002, "accuracy": "quick"},
+        }
+    )
+    assert meshed(scene).model.links[0].X.shape[0] >= 4

@@ -57,6 +57,22 @@ def begun(rates, beams, R, strain, direction, base, resisted):  # type: ignore[n
 
 
 @inner
+def counted(beams, u, direction, turn):  # type: ignore[no-untyped-def]
+    """Have turns of tangents counted from the rotations ψ of sections: any number of revolutions in static balance."""
+    if beams is None:
+        return
+    _, _, begin, stride, rows, tangent, _ = beams
+    for b in range(len(begin)):
+        at, n = begin[b] + 2 * stride[b], stride[b]
+        for e in range(tangent.shape[2]):
+            psi = 0.0
+            for j in range(n):
+                psi += rows[b, 1, e, j] * u[at + j]
+            c, s, x, y = np.cos(psi), np.sin(psi), tangent[b, 0, e], tangent[b, 1, e]
+            direction[b, 0, e], direction[b, 1, e], turn[b, e] = c * x - s * y, s * x + c * y, psi
+
+
+@inner
 def bent(stiffer, beams, u, base, resisted, turn0, seen, f, w):  # type: ignore[no-untyped-def]
     """Internal force of all these segments at the displacement u, added to f; flat, component first, world components.
 

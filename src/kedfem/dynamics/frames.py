@@ -95,13 +95,14 @@ def deformation(link: Link, y: Nodal, Q: Float[np.ndarray, "d d"], angle: float)
 
 
 def seen_from(link: Link, frame: Frame, y: Nodal, y1: Nodal | None = None) -> Deformed:
-    """A frame within half a revolution of the rigid-body one, with the rate of deformation.
+    """A frame within half a revolution of the rigid-body one, of a planar beam of its ψ, with the rate of deformation.
 
     Parameters
     ----------
     y, y1 : (n, d) position in the rigid-body frame, of a planar beam (x, y, ψ), and its rate; at rest if not given
     """
-    Q, angle = rotation(link, frame.fit, y, 0.0)
+    m1 = link.m1[:, 0]
+    Q, angle = rotation(link, frame.fit, y, float(m1 @ y[:, 2] / (m1 @ link.one)) if link.kind == "beam" else 0.0)
     g = deformation(link, y, Q, angle)
     g1, size = np.zeros_like(g), 0.0 if y1 is None else float(np.abs(y1).max(initial=0.0))
     if y1 is not None and size:

@@ -13,11 +13,12 @@ import numpy as np
 
 from kedfem.arrays import Float, Int
 from kedfem.errors import MeshError
+from kedfem.links.beams.of_scene import FEWEST
 from kedfem.links.record import Link
 
 BESIDE = 1e-6  # of the link's size: nodes so far off a line are on it
 SPARE = 2  # stations beyond the travel of the slider, where the link has them
-FEWEST, MOST = 4, 48
+MOST = 48
 FAR = 10  # of a rigid link without a shape: its stations reach so many of its lengths beyond where it is held
 # relative: what rounding must not decide, as of elements as long as stations are apart, or at a cut
 SAME = 1e-6

@@ -1,5 +1,6 @@
 """Beams of a scene: their sections, and their axes with nodes at joints and bodies."""
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -12,6 +13,7 @@ from kedfem.links.beams.spatial_beam import spatial_beam_link
 from kedfem.links.record import Link
 from kedfem.scene import Bar, LinkScene, PointMass, Polyline, RectangleSection, Scene, SectionShape
 
+FEWEST = 4  # nodes along a slot
 SAME = 1e-6  # of a segment's length: what is so near is at one place
 
 
@@ -28,9 +30,8 @@ def scene_beam(scene: Scene, name: str, spatial: frozenset[str]) -> Link:
     section = scene_section(of_section, link.shear_coefficient, material.poisson_ratio)
     if name in spatial:
         return spatial_beam_link(name, scene_axis(scene, name), section, material)
-    points, elements = beam_points(scene, name, spatial=False), link.mesh.elements
-    count = elements if isinstance(elements, int) else 1
-    return beam_link(name, points, section, material, count, beam_nodes(link))
+    points = beam_points(scene, name, spatial=False)
+    return beam_link(name, points, section, material, segment_elements(scene, name), beam_nodes(link))
 
 
 def scene_axis(scene: Scene, name: str) -> Axis:
@@ -40,7 +41,7 @@ def scene_axis(scene: Scene, name: str) -> Axis:
     if not isinstance(shape, Bar | Polyline):
         raise TypeError("a beam is a bar or a polyline")  # refused by the scene already
     smooth, up = (shape.smooth, shape.up) if isinstance(shape, Polyline) else (False, shape.upward)
-    elements = link.mesh.elements if isinstance(link.mesh.elements, int) else 1
+    elements = segment_elements(scene, name)
     make = smooth_axis if smooth else straight_axis
     points = beam_points(scene, name, spatial=True)
     return make(points, elements, beam_nodes(link), None if up is None else np.array(up))
@@ -60,7 +61,7 @@ def beam_points(scene: Scene, name: str, spatial: bool) -> Float[np.ndarray, "p 
     held = [x.on(name) for x in joints if x.kind != "slot" or name != x.links[1]]  # a pin is anywhere along its slot
     light = [x.at for x in scene.bodies.values() if x.link == name and isinstance(x, PointMass)]
     heavy = [x.at for x in scene.bodies.values() if x.link == name and not isinstance(x, PointMass)]
-    elements = link.mesh.elements if isinstance(link.mesh.elements, int) else 1
+    elements = segment_elements(scene, name)
     nodes = spaced(elements, beam_nodes(link)) / elements
     out = [points[:1]]
     for P, Q in pairwise(points):
@@ -76,6 +77,16 @@ def beam_points(scene: Scene, name: str, spatial: bool) -> Float[np.ndarray, "p 
         apart = apart if any(corners) else []  # one new corner moves all nodes of the segment
         out += [P + np.array(apart)[:, None] * (Q - P), Q[None]]
     return np.concatenate(out)
+
+
+def segment_elements(scene: Scene, name: str) -> int:
+    """Elements of each segment of a beam, 1 if not given; of a bar along a slot enough for its stations."""
+    link = scene.links[name]
+    given = link.mesh.elements if isinstance(link.mesh.elements, int) else 1
+    slotted = any(x.kind == "slot" and x.links[1] == name for x in scene.joints.values())
+    if not slotted or not isinstance(link.shape, Bar):
+        return given
+    return max(given, math.ceil((FEWEST - 1) / (beam_nodes(link) - 1)))
 
 
 def beam_nodes(link: LinkScene) -> int:

@@ -39,7 +39,8 @@ class Meshing(Record):
 
     elements: Annotated[int | tuple[int, int] | tuple[int, int, int] | None, BeforeValidator(counts)] = None
     """bar: numbers along and across, of a solid also through the thickness; beam: number per segment
-    (1 if not given); joints and bodies between its corners begin segments of their own"""
+    (1 if not given; of a bar that is the line of a slot so many that it has four nodes at least); joints and bodies
+    between its corners begin segments of their own"""
     size: PositiveLength | None = None
     """other shapes: edge length of the elements, instead of `elements_across`"""
     elements_across: Count | None = None

@@ -137,18 +137,20 @@ def _constant(forces: Flat) -> Callable[[Flat, Flat], Flat]:
 
 def _balance(now: Instant, guess: Flat, pull: Flat, spins: Spins | None) -> Flat:
     """The deflection at which all forces balance, in increments where it is too far from a guess."""
+    frames = now.always.static.frames()
     try:
         return equilibrium(now, guess, _constant(pull), spins, None)
     except NoBalanceError:
         if now.of.c.single:
             raise
+        now.always.static.seek_from(frames)
         return _in_increments(now, pull, spins)
 
 
 def _in_increments(now: Instant, pull: Flat, spins: Spins | None) -> Flat:
     """The deflection under loads, and pulls of springs in the reference position, that grow from nothing, in parts as
     large as their balance can be found for."""
-    part_loaded, u, frames = copy(now), np.zeros_like(pull), now.always.static.frames()
+    part_loaded, static, u, before = copy(now), now.always.static, np.zeros_like(pull), np.zeros_like(pull)
     drawn_apart = now.forces(now.measured(now.interface(u))[1])[:, 0]
 
     def loaded(tried: float, u: Flat) -> Flat:
@@ -156,19 +158,21 @@ def _in_increments(now: Instant, pull: Flat, spins: Spins | None) -> Flat:
         part_loaded.relief = (1.0 - tried) * drawn_apart
         return direct_balance(part_loaded, u, _constant(tried * pull), spins, None, ROUNDING)
 
+    share, part, last, frames = 0.0, 0.25, 1.0, static.frames()
     loaded(LEAST, u)  # without a balance under the least part there is none to go on from, as of what nothing constrains
-    now.always.static.seek_from(frames)
-    share, part = 0.0, 0.25
+    static.seek_from(frames)
     while share < 1.0:
         tried = min(1.0, share + part)
         try:
-            u = loaded(tried, u)
+            found = loaded(tried, u + (tried - share) / last * (u - before))  # as the last increment went
         except NoBalanceError:
             part /= 2
             if part < LEAST:
                 raise
+            static.seek_from(frames)
             continue
-        share, part = tried, 1.5 * part
+        frames = static.frames()
+        u, before, last, share, part = found, u, tried - share, tried, 1.5 * part
     return u
 
 

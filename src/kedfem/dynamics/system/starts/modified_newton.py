@@ -11,7 +11,8 @@ from kedfem.dynamics.anderson import AndersonAcceleration
 from kedfem.dynamics.matrices.bordered import ConstraintTerms
 from kedfem.dynamics.system.starts.instant import Flat, Instant
 from kedfem.dynamics.system.starts.linear_equations import LinearEquations
-from kedfem.dynamics.system.starts.newton_krylov import Equilibrium, closed, solution, stands_off
+from kedfem.dynamics.system.starts.newton_krylov import Equilibrium, solution
+from kedfem.dynamics.system.starts.open_joints import closed, stands_off
 from kedfem.dynamics.system.starts.rotating_bodies import CONVERGED, RotatingBodies, Spins
 from kedfem.dynamics.system.starts.temporary_springs import has_stops, with_temporary_springs
 from kedfem.errors import SolveError

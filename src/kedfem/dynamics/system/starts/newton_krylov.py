@@ -7,7 +7,9 @@ With A the stiffness of bodies in their mean frames, and all forces on bodies an
 J Δ is a difference of forces along Δ, ∂C/∂z Δz one of gradients, so that both include forces that rotate with bodies:
 those of springs and joints, axial forces of beams, preloads. GMRES solves for Δ, preconditioned by A. Rigid bodies then
 take a finite rotation, as its linear part would strain them; the next Δ closes the joints that this opens. The step is
-shortened until the residual, preconditioned by the same factor, decreases (Deuflhard's monotonicity test).
+shortened until the residual, preconditioned by the same factor, decreases (Deuflhard's monotonicity test). Slender bodies
+need whole steps, and their tangents in A: what a large rotation stretches has a residual far above that of its bending,
+which the next step takes out. Where shortened steps find no balance such ones are taken.
 """
 
 from collections.abc import Callable
@@ -28,21 +30,21 @@ from kedfem.dynamics.system.starts.instant import Flat, Instant
 from kedfem.dynamics.system.starts.internal_forces import Frames as Sought
 from kedfem.dynamics.system.starts.internal_forces import drawn, moved, own, rows
 from kedfem.dynamics.system.starts.linear_equations import LinearEquations
+from kedfem.dynamics.system.starts.open_joints import gaps
 from kedfem.dynamics.system.starts.rotating_bodies import CONVERGED, RotatingBodies, Spins
+from kedfem.dynamics.system.starts.tangents import Tangents, held_by_tangents, tangents
 from kedfem.errors import SolveError
 from kedfem.links.reduced import reach
 
-ITERATIONS = 120
+ITERATIONS, WHOLE = 120, 30  # of shortened steps, and of whole ones
 SHORTEST, IN_A_ROW = 1 / 64, 4  # of a step; so many of them end a search
 FALLS = 0.25  # of a step's length: share by which what is left has to fall
 KRYLOV = 40
-OPEN = 1e-4  # of the largest link: what joints may be open in a balance; found ones are at 1e-9
-CLOSED = 1e-9  # of displacements at interface points: open by less is closed but for rounding
-FAR = 1e4  # of the largest link: displacements of unconstrained links
-LEFT = 1e-3  # of a residual by GMRES: an iteration leaves about as much of the error
+LEFT, NONE = 1e-3, 1e-7  # of a residual by GMRES: an iteration leaves about as much of the error; of whole steps
 ROUNDING = 1e-8  # of the deflection: changes below it that do not fall
 LEAST = 1e-6  # the same of soft directions, where nothing is left to rounding and no step lessens it
 DIFFERENCE = 1e-9  # of the size of bodies: displacements along which forces are differenced
+CENTRAL = 1e3  # times these on both sides: rounding in the axial force of a slender beam is little of its bending
 
 Frames = Float[np.ndarray, "L 3 3"]
 
@@ -123,24 +125,34 @@ class Equilibrium:
         """Forces along all coordinates."""
         return np.asarray(np.where(at.hard, m, at.laws))
 
-    def change(self, at: Point, m: Flat, balance: LinearEquations, direct: Flat) -> Flat:
-        """The change that brings all forces into balance, to first order."""
-        push = self.exerted(at, m)
+    def change(self, at: Point, m: Flat, balance: LinearEquations, direct: Flat, A: Tangents | None) -> Flat:
+        """The change that brings all forces into balance, to first order.
+
+        Parameters
+        ----------
+        A : tangents of bodies, if the balance has these
+        """
+        push, whole = self.exerted(at, m), A is not None
 
         def applied(x: Flat) -> Flat:
             long = float(np.linalg.norm(x))
             if long == 0.0:
                 return x
-            part = self.size / long
-            _, r, _ = self.forces(at.u + part * x)
-            turned = self.now.gradients(self.now.interface(at.u + part * x)).T @ push - at.C.T @ push
-            left = (at.r - r) / part - self.stiff(at, x)
-            return np.asarray(x + balance.solved(left, more=-turned / part, alone=True).x)
+            part = (CENTRAL if whole else 1.0) * self.size / long
+            r, C = at.r, at.C
+            if whole:
+                _, r, _ = self.forces(at.u - part * x)
+                C = self.now.gradients(self.now.interface(at.u - part * x))
+            apart = 2 * part if whole else part
+            _, ahead, _ = self.forces(at.u + part * x)
+            turned = self.now.gradients(self.now.interface(at.u + part * x)).T @ push - C.T @ push
+            left = (r - ahead) / apart - self.stiff(at, x, A)
+            return np.asarray(x + balance.solved(left, more=-turned / apart, alone=True).x)
 
-        whole = LinearOperator((len(direct),) * 2, applied, dtype=float)
-        return np.asarray(gmres(whole, direct, rtol=LEFT, restart=KRYLOV, maxiter=1)[0])
+        operator = LinearOperator((len(direct),) * 2, applied, dtype=float)
+        return np.asarray(gmres(operator, direct, rtol=NONE if whole else LEFT, restart=KRYLOV, maxiter=1)[0])
 
-    def stiff(self, at: Point, x: Flat) -> Flat:
+    def stiff(self, at: Point, x: Flat, A: Tangents | None = None) -> Flat:
         """A x of all bodies."""
         out, of, always = np.zeros_like(x), self.now.of, self.now.always
         links = of.system.model.links
@@ -150,7 +162,7 @@ class Equilibrium:
             R = at.R[k][:d, :d]
             local = (R.T @ x[here].reshape(d, -1)).ravel()
             mass = momentum(links[k], local) if self.bodies.sparse[k] else local
-            f = always.static.times(k, local) + always.least(k) * mass
+            f = A[k] @ local if A is not None and len(A[k]) else always.static.times(k, local) + always.least(k) * mass
             out[here] = (R @ f.reshape(d, -1)).ravel()
         return out
 
@@ -177,7 +189,7 @@ class Equilibrium:
         Parameters
         ----------
         before : what is left at the point, seen through the balance there
-        tiny : whether the change is rounding, and is taken as it is
+        tiny : whether the change is taken as it is
         """
         part = 1.0
         while True:
@@ -224,62 +236,37 @@ class Equilibrium:
         return np.asarray(u)
 
 
-def gaps(now: Instant, u: Flat, z: Flat) -> list[Flat]:
-    """How far the interface points of each body are from where the interface unknowns have them."""
-    every = zip(now.of.parts, now.of.system.model.joints, strict=True)
-    return [part.W @ u[own(now.of, k)] - joint.B @ z[joint.columns] for k, (part, joint) in enumerate(every)]
-
-
-def closed(now: Instant, u: Flat) -> Flat:
-    """The deflection with closed joints that is nearest to another."""
-    out = u.copy()
-    for k, open_ in enumerate(gaps(now, u, now.interface(u)) if u.any() else ()):
-        W, here = now.of.parts[k].W, own(now.of, k)
-        if np.abs(open_).max(initial=0.0) > CLOSED * np.abs(W @ u[here]).max(initial=0.0):
-            out[here] -= np.linalg.lstsq(W, open_)[0]
-    return out
-
-
-def stands_off(now: Instant, u: Flat, z1: Flat | None) -> str:
-    """Which link a deflection leaves off its joints, or farther off than anything holds it; nothing if it does neither.
-
-    Forces of open joints balance nothing: iterations of large motions may settle there. So may they where what nothing
-    holds has gone so far that changes are small beside it.
-    """
-    system, z = now.of.system, now.interface(u)
-    links = system.model.links
-    off = [np.abs(x).max(initial=0.0) for x in gaps(now, u, z)]
-    largest, far = max(map(reach, links)), moved(now.of, u)
-    if max(far) > FAR * largest and max(off) <= OPEN * max(far):
-        return f"link '{links[int(np.argmax(far))].name}' would move by {max(far):.3g} m"
-    size = OPEN * largest
-    if max(off) > size:
-        return f"link '{links[int(np.argmax(off))].name}' would be {max(off):.3g} m off its joints"
-    C, e = now.measured(z, z1)
-    open_ = np.abs(e[0]) * now.hard(C)
-    if open_.max(initial=0.0) > size:
-        return f"{system.constraints[int(open_.argmax())].name} would be open by {open_.max():.3g} (m or rad)"
-    return ""
-
-
 def solution(problem: Equilibrium, u: Flat) -> tuple[Flat, str]:
     """The deflection at which all forces balance, from a guess; what changed most where none is found, in words."""
+    frames = problem.bodies.static.frames()
+    found, moves = _searched(problem, u, whole=False)
+    if not moves:
+        return found, ""
+    problem.bodies.static.seek_from(frames)
+    again, still = _searched(problem, u, whole=True)
+    return (found, moves) if still else (again, "")
+
+
+def _searched(problem: Equilibrium, u: Flat, whole: bool) -> tuple[Flat, str]:
+    """The same by shortened steps, or by whole ones."""
     now, bodies, last, settled, short = problem.now, problem.bodies, np.inf, False, 0
     at = problem.at(u)
     m, change, new = np.zeros(len(at.e)), np.zeros_like(u), at
-    for _ in range(ITERATIONS):
+    for _ in range(WHOLE if whole else ITERATIONS):
         try:
-            balance = LinearEquations(now.of, bodies.held(at.R), at.R, problem.asked(at, m))
+            A = tangents(now, at.u, at.R, CENTRAL * problem.size) if whole else None
+            held = bodies.held(at.R) if A is None else held_by_tangents(now, A, bodies.held(at.R))
+            balance = LinearEquations(now.of, held, at.R, problem.asked(at, m))
             first = balance.solved(at.r, at.moved)
             m = problem.reactions(at, m, first.m)
-            change = problem.change(at, m, balance, first.x)
+            change = problem.change(at, m, balance, first.x, A)
         except (SolveError, np.linalg.LinAlgError):
             break
         if not np.isfinite(change).all():
             break
         size, reached = float(np.linalg.norm(change)), float(np.linalg.norm(at.u))
         left, tiny = float(np.linalg.norm(first.x)), size <= ROUNDING * reached
-        new, part = problem.stepped(at, m, balance, change, left, tiny)
+        new, part = problem.stepped(at, m, balance, change, left, tiny or whole)
         if settled:
             return new.u, ""
         stalls = size > last / 2 and tiny

@@ -1,7 +1,7 @@
 """Internal forces and gradients of coordinates in static balance, compiled by numba: those of a step, without rates."""
 
 from kedfem.compiled import compiled
-from kedfem.dynamics.beams_kernel import begun
+from kedfem.dynamics.beams_kernel import begun, counted
 from kedfem.dynamics.system.bodies_kernel import internal_forces, orientation
 from kedfem.dynamics.system.corotational_kernel import newmark
 from kedfem.dynamics.system.ends_kernel import on_lines, placed
@@ -17,8 +17,9 @@ def static_forces(c, bodies, R, amounts, state, trial, work):  # type: ignore[no
     ----------
     c : with Newmark's numbers and damping zero
     R : (M, 3, 3) of the rigid-body motion; amounts : (w,) of follower loads
-    state : in the reference position
+    state : in the reference position; turns of tangents become those at trial.u, but for what sections shear
     """
+    counted(bodies.beams, trial.u, state.direction, state.turn)
     begun(newmark(c), bodies.beams, R, state.strain, state.direction, trial.base, trial.resisted)
     internal_forces(c, bodies, R, amounts, state, trial, work, True)
     for i in range(len(bodies.motion)):
