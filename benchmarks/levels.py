@@ -14,7 +14,7 @@ from benchmarks.scenes import DAMPED, EYE, four_bar_of
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import prepared
 from kedfem.accuracy.resolution import step_error
-from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
+from kedfem.accuracy.step_estimate import StepErrorMonitor, StepEstimate
 from kedfem.dynamics.stepping.levels import level_steps, leveled
 from kedfem.results.recording import recording, rows
 from kedfem.scene import scene_from
@@ -85,7 +85,7 @@ def _marched(ready: Prepared) -> _Marched:
     solvers = level_steps(scene, model)
     recorded = [each for each in recording(scene, model) if each.channel.name in SHOWN.values()]
     running, found = step_error(ready), []
-    followed = StepWatch(ready, recorded, running)
+    followed = StepErrorMonitor(ready, recorded, running)
     since = process_time()
     for block in leveled(scene, ready.linkage, ready.path, model, solvers):
         values = rows(recorded, block)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from kedfem.accuracy.error_budget import Budget, by_kind
-from kedfem.accuracy.estimates import budget, watcher
+from kedfem.accuracy.estimates import budget, error_monitor
 from kedfem.accuracy.histories import histories, relative_errors
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import first_reduced
@@ -151,7 +151,7 @@ def solids(along: int, across: int) -> Raw:
 def judged(case: Case, known: dict[str, Any] | None = None) -> Judged:
     """Run a case and its finest one."""
     ready = case.ready(case.raw)
-    seen = watcher(ready)
+    seen = error_monitor(ready)
     base = histories(ready, look=seen.add)
     found = budget(ready, seen, None, base)
     key = repr((case.full, case.fine))

@@ -11,10 +11,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from kedfem.accuracy.estimates import ErrorMonitor, watcher
+from kedfem.accuracy.estimates import ErrorMonitor, error_monitor
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.singular import SingularPasses
-from kedfem.accuracy.step_estimate import StepEstimate, StepWatch
+from kedfem.accuracy.step_estimate import StepErrorMonitor, StepEstimate
 from kedfem.arrays import Float, Int
 from kedfem.dynamics.history import Block, Snapshot
 from kedfem.dynamics.model import mesh_methods, segments
@@ -90,8 +90,8 @@ def stepped(ready: Prepared, solvers: list[Steps], watched: Watched,
     scene, model, steps = ready.scene, ready.model, time_grid(ready.scene).steps
     shown = _Frames.of(ready, watched.recoveries, folder)
     envelope = Envelope(model, watched.recoveries, watched.stresses_since, watched.kept_since)
-    seen = watcher(ready, solvers)
-    errors = StepWatch(ready, watched.recorded, seen.running)
+    seen = error_monitor(ready, solvers)
+    errors = StepErrorMonitor(ready, watched.recorded, seen.running)
     channels = [each.channel for each in watched.recorded]
     notes, drive = _notes(ready, watched), drive_channel(scene)
     writer = ResultsWriter(folder / "results.h5", channels, scene.model_dump_json(), scene.source, notes, drive)

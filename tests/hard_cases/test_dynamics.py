@@ -193,4 +193,4 @@ def test_a_step_that_is_far_too_long_is_reported() -> None:
     ready = meshed(scene_from(raw))
     said = resolution_warnings(resolution(ready))
     assert len(said) == 1
-    assert "steps in a period: vibration is not followed" in said[0]
+    assert "steps in a period: vibration is not resolved" in said[0]

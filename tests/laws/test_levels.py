@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.resolution import step_error
-from kedfem.accuracy.step_estimate import StepWatch, cheapest
+from kedfem.accuracy.step_estimate import StepErrorMonitor, cheapest
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.model import factor_bytes
 from kedfem.dynamics.stepping import levels as in_time
@@ -54,14 +54,14 @@ def ready_linkage(kind: str) -> Prepared:
 
 
 @cache
-def marched(kind: str, steps: int, levels: int) -> tuple[Channels, StepWatch]:
+def marched(kind: str, steps: int, levels: int) -> tuple[Channels, StepErrorMonitor]:
     """All channels of a linkage in so many steps of so many levels, and what is known of their error."""
     ready = ready_linkage(kind)
     analysis = ready.scene.analysis.model_copy(update={"step": END / steps, "extrapolation_levels": levels})
     scene = ready.scene.model_copy(update={"analysis": analysis})
     ready = replace(ready, scene=scene)
     recorded = recording(scene, ready.model)
-    watch, found = StepWatch(ready, recorded, step_error(ready)), []
+    watch, found = StepErrorMonitor(ready, recorded, step_error(ready)), []
     for block in leveled(scene, ready.linkage, ready.path, ready.model, level_steps(scene, ready.model)):
         found.append(rows(recorded, block))
         watch.add(block, found[-1])

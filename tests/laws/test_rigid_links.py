@@ -203,7 +203,7 @@ def test_a_run_says_what_rigid_links_give(steps: int, tmp_path: Path) -> None:
         return
     (text,) = said
     assert f"by up to {1e3 * give:.2g} mm, 25 % of the largest displacement" in text
-    assert "no drive leads it, and steps of 0.001 s" in text
+    assert "no drive moves it, and steps of 0.001 s" in text
     assert "take 0.0002 s or less" in text
 
 

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy import estimates
 from kedfem.accuracy.error_budget import Budget, Share, budget_warning, by_kind, meaningless
-from kedfem.accuracy.estimates import budget, step_errors, watcher
+from kedfem.accuracy.estimates import budget, error_monitor, step_errors
 from kedfem.accuracy.histories import Histories, histories, relative_errors
 from kedfem.accuracy.mesh_estimate import mesh_errors
 from kedfem.accuracy.positions import fewer_positions, missed
@@ -34,7 +34,7 @@ from .test_audit import example
 
 def estimated(raw: dict[str, Any]) -> tuple[Budget, Prepared]:
     ready = meshed(scene_from(raw))
-    seen = watcher(ready)
+    seen = error_monitor(ready)
     solver = steps_of(ready.scene, ready.model)
     for block in transient(ready.scene, ready.linkage, ready.path, ready.model, solver):
         seen.add(block)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from kedfem.accuracy.estimates import watcher
+from kedfem.accuracy.estimates import error_monitor
 from kedfem.accuracy.geometric import GeometricError, axial_forces, geometric_warning, slices, slopes
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import prepared
@@ -388,7 +388,7 @@ def test_stiffening_does_not_know_how_hard_stops_are_met_and_its_estimate_says_s
     ready, blocks = ran(pressed(stiffness, frames="co-rotational"))
     wanted = channels(ready, blocks)["probes/m/deflection"]
     ready, blocks = ran(pressed(stiffness, stiffening=True))
-    found = watcher(ready).geometric
+    found = error_monitor(ready).geometric
     for block in blocks:
         found.add(block)
     error = float(np.abs(channels(ready, blocks)["probes/m/deflection"] - wanted).max() / np.abs(wanted).max())

@@ -9,12 +9,12 @@ import pytest
 from kedfem.accuracy import damping
 from kedfem.accuracy.damping import damped_errors
 from kedfem.accuracy.error_budget import Budget
-from kedfem.accuracy.estimates import budget, watcher
-from kedfem.accuracy.histories import Histories, asked_for, histories, relative_errors
+from kedfem.accuracy.estimates import budget, error_monitor
+from kedfem.accuracy.histories import Histories, histories, is_judged, relative_errors
 from kedfem.accuracy.prepared import Prepared, meshed
 from kedfem.accuracy.reduction import prepared
 from kedfem.accuracy.resolution import resolution
-from kedfem.accuracy.step_estimate import StepWatch
+from kedfem.accuracy.step_estimate import StepErrorMonitor
 from kedfem.accuracy.variants import with_analysis, with_steps
 from kedfem.results.recording import recording
 from kedfem.scene import scene_from, time_grid
@@ -102,9 +102,9 @@ def with_damping(ready: Prepared, rho_inf: float, levels: int = 1) -> Prepared:
 
 def estimated(ready: Prepared) -> tuple[Budget, Histories]:
     """The budget of a run, and its channels."""
-    seen = watcher(ready)
-    recorded = [x for x in recording(ready.scene, ready.model) if asked_for(x.channel.name)]
-    errors = StepWatch(ready, recorded, seen.running)
+    seen = error_monitor(ready)
+    recorded = [x for x in recording(ready.scene, ready.model) if is_judged(x.channel.name)]
+    errors = StepErrorMonitor(ready, recorded, seen.running)
     base = histories(ready, look=seen.add, follow=errors.add)
     levels = ready.scene.analysis.extrapolation_levels or 1
     return budget(ready, seen, None, base, errors.estimate.errors if levels > 1 else None), base

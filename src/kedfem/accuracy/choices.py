@@ -16,26 +16,26 @@ from kedfem.dynamics.stepping.levels import most_levels
 from kedfem.errors import KedfemError
 from kedfem.scene import LinkScene, Scene, revolution_steps, scene_from, states_step, time_grid, without_vibration
 
-FOLLOWED = 0.5  # of the accuracy: above this error of rigid-body frames, scenes of beams have co-rotational frames
-DEARER = 1.5  # the same for solid or plane links: these frames cost them more, and the estimate is cautious
-ELEMENTS = ("beam3", 1), *(("beam5", count) for count in (1, 2, 3, 4, 6))  # tried, coarsest first
-COUNTS = 1, 2, 3, 4, 6, 8, 12, 16, 24  # tried of an element that the scene states
-FINEST = 2  # times the elements of the last one tried: the reference of beams
-FEWEST = 50  # time points of an analysis
-ROWS = 180  # the same of a turn: curves and animations have no others
-# levels of a trial, which show whether errors fall with the step; its coarsest step, of the finest
+FRAMES_BEAMS = 0.5  # of the accuracy: error of rigid-body frames above which scenes of beams get co-rotational ones
+FRAMES_OTHERS = 1.5  # the same with solid or plane links, for which these cost more; the estimate is cautious too
+ELEMENTS = ("beam3", 1), *(("beam5", count) for count in (1, 2, 3, 4, 6))  # tried in turn, coarsest first
+COUNTS = 1, 2, 3, 4, 6, 8, 12, 16, 24  # numbers of elements tried if the scene states their kind
+FINEST = 2  # elements of the reference over those of the last one tried
+FEWEST = 50  # least number of time points of an analysis
+ROWS = 180  # least number of time points of a revolution, for curves and animations
+# levels of a trial, which show whether errors fall with the step; ratio of its coarsest step to its finest
 TRIED, COARSER = 3, 4
-LEAST = 12  # steps of the coarsest level of a trial
+LEAST = 12  # least number of steps of the coarsest level of a trial
 MOST_STEPS = 200_000  # of the analysis
-TRIES = 5  # steps tried
+TRIES = 5  # most trials of a step
 CHEAP = 2e7  # steps times unknowns that take seconds
-SHORTER, PATIENCE = 2.0, 2  # by which steps are made shorter that do not resolve what vibrates, and how often
-LEAP = 4  # times the steps of a trial, at most, for the next one: predictions of a coarse trial are not used further
-CLOSE = 0.15  # of the steps: fewer additional steps need no further trial
+SHORTER, PATIENCE = 2.0, 2  # factor by which steps become shorter if vibration is not resolved, and how often
+LEAP = 4  # most factor of the steps from one trial to the next, as predictions of a coarse trial are uncertain
+CLOSE = 0.15  # share of additional steps below which no further trial is made
 
 
 def open_frames(scene: Scene) -> bool:
-    """Whether the scene leaves its frames open; without a drive they are co-rotational."""
+    """Whether the scene leaves its frames open; without a drive they are always co-rotational."""
     if not scene.driven_joints:
         return False
     stated = "frames" in scene.analysis.model_fields_set or scene.analysis.stiffening
@@ -43,12 +43,12 @@ def open_frames(scene: Scene) -> bool:
 
 
 def open_step(scene: Scene) -> bool:
-    """Whether it leaves its step open; independent static positions have none."""
+    """Whether the scene leaves its step open; independent static positions have none."""
     return not states_step(scene) and not without_vibration(scene)
 
 
 def open_beams(scene: Scene) -> list[str]:
-    """Names of the elastic beams whose elements it leaves open."""
+    """Names of the elastic beams whose elements the scene leaves open."""
     links = scene.links.items()
     return [n for n, link in links if elastic(link, "beam") and "mesh" not in link.model_fields_set]
 
@@ -59,12 +59,12 @@ def beams_only(scene: Scene) -> bool:
 
 
 def elastic(link: LinkScene, *families: str) -> bool:
-    """Whether a link states that it is elastic and of one of some families."""
+    """Whether a link is stated to be elastic and belongs to one of some families."""
     return link.shape is not None and link.model not in {"rigid", "auto"} and link.family in families
 
 
 def chosen_frames(search: Trials, scene: Scene) -> tuple[Scene, float]:
-    """The scene with co-rotational frames if links bend too far for rigid-body ones; else with the error of these."""
+    """The scene, with co-rotational frames if rigid-body ones err too much, and the error of its frames."""
     if not open_frames(scene):
         return scene, 0.0
     trial = shortened(with_beams(scene, open_beams(scene), ELEMENTS[2]))
@@ -90,8 +90,8 @@ def chosen_frames(search: Trials, scene: Scene) -> tuple[Scene, float]:
 
 
 def frames_allowed(search: Trials, scene: Scene) -> float:
-    """The error of rigid-body frames beyond which links have co-rotational ones."""
-    return (FOLLOWED if beams_only(scene) else DEARER) * search.asked
+    """The error of rigid-body frames above which links get co-rotational ones."""
+    return (FRAMES_BEAMS if beams_only(scene) else FRAMES_OTHERS) * search.asked
 
 
 def _least(scene: Scene) -> float:
@@ -100,7 +100,7 @@ def _least(scene: Scene) -> float:
 
 
 def with_beams(scene: Scene, names: Sequence[str], choice: tuple[str, int]) -> Scene:
-    """The scene with a number of elements of a kind in some beams; an element that a beam states is kept."""
+    """The scene with a kind and number of elements in some beams; an element that a beam states is kept."""
     links = {}
     for name in names:
         link = scene.links[name]
@@ -111,7 +111,7 @@ def with_beams(scene: Scene, names: Sequence[str], choice: tuple[str, int]) -> S
 
 
 def chosen_beams(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, float]:
-    """The scene with the fewest elements in its open beams whose error is allowed, and that error, against fine beams."""
+    """The scene with the fewest elements in its open beams whose error against fine beams is allowed, and that error."""
     names = open_beams(scene)
     if not names:
         return scene, 0.0
@@ -144,10 +144,11 @@ def chosen_beams(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, f
 def chosen_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, float]:
     """The scene with the step and the levels in time that reach an allowed error with the least work, and that error.
 
-    One trial in several levels shows what they differ by, and where the error would be allowed; the next is made there.
-    Channels whose differences do not fall with the step hold vibration that is not resolved: they are given PATIENCE
-    shorter steps; then the others choose, unless steps that resolve it cost seconds; else it is reported, with the steps
-    that it would take. What the scene states of step and levels stays.
+    A trial in several levels shows their differences, from which the step with the allowed error is predicted; the next
+    trial has that step. Channels whose differences do not fall with the step contain unresolved vibration. Steps are
+    made shorter for them PATIENCE times; afterwards the other channels decide, unless steps that resolve the vibration
+    take only seconds. What remains is reported, with the steps that would be needed. A step and levels that the scene
+    states are kept.
     """
     if without_vibration(scene):
         return scene, 0.0
@@ -199,11 +200,11 @@ def chosen_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, fl
 def _resolving(
     search: Trials, scene: Scene, steps: int, allowed: float, levels: range, longest: float
 ) -> tuple[StepChoice | None, str]:
-    """The step that resolves all vibration, if a run with it takes seconds; else that step in words.
+    """The step that resolves all vibration if a run with it takes seconds; else None and a description of that step.
 
     Parameters
     ----------
-    steps : of the coarsest level, already tried
+    steps : number on the coarsest level that was tried already
     """
     trial = shortened(scene)
     span, whole = time_grid(trial).end, time_grid(scene).end
@@ -230,7 +231,7 @@ def _resolving(
 
 
 def _fewest_rows(trial: Scene) -> int:
-    """Least number of time points of a trial, for smooth curves and animations."""
+    """Least number of time points of a trial, so that curves and animations are smooth."""
     turn = revolution_steps(trial)
     return FEWEST if turn is None else max(FEWEST, math.ceil(ROWS * time_grid(trial).steps / turn))
 
@@ -246,7 +247,7 @@ def _possible_levels(search: Trials, scene: Scene) -> range:
 
 
 def _slow(found: StepEstimate, name: str, allowed: float) -> bool:
-    """Whether a channel's error is beyond the allowed one and does not fall as it should."""
+    """Whether a channel's error exceeds the allowed one and does not fall with the step."""
     far, near = found.differences.get(name, (0.0, 0.0))[:2]
     return far > allowed and near > far / 2**LEAST_ORDER and found.fast[name] > IN_STEP
 

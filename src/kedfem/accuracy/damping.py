@@ -1,7 +1,7 @@
-"""What damping takes beside the vibration that it is meant for: numerical damping, and damping by the mass.
+"""Side effects of damping: the error by numerical damping, and free motions that mass-proportional damping slows.
 
-Numerical: with a small ρ∞ a mode with ω h of 0.3 is gone after some periods, one with ω h of 3 within a few steps, in
-steps of h and in steps of 2 h alike: the two differ by less than either is wrong. In the same steps with ρ∞ = 0.95 it
+With a small ρ∞ a mode with ω h of 0.3 decays within some periods, and one with ω h of 3 within a few steps, both in
+steps of h and in steps of 2 h, so that the two differ by less than their errors. In the same steps with ρ∞ = 0.95 it
 stays. The difference from these is 0.5 to 1.4 of the true error at ρ∞ ≤ 0.3, whether the steps resolve the vibration or
 not.
 """
@@ -25,17 +25,17 @@ from kedfem.scene import Scene, time_grid, without_vibration
 
 STRONG = 0.7  # ρ∞ up to which a run is compared; above, steps twice as long show 0.55 and more of the true error
 LITTLE = 0.95, 0.9, 0.8  # ρ∞ of the compared run: the first in which no vibration grows
-# of the speed of what moves freely over the run, and of the energy exchanged: less is not reported
+# share of the speed of free motion lost over the run, or of the energy exchanged, below which nothing is reported
 LOST = 0.01
 
 
 def damped_errors(ready: Prepared, base: Histories, zeros: set[str] | None = None) -> dict[str, float]:
-    """Channel → what numerical damping takes from it, at the worst time, of its peak; empty where that is little.
+    """Error of each channel by numerical damping, at the worst time, relative to its peak; empty if there is little.
 
     Parameters
     ----------
     base : the channels of the prepared scene
-    zeros : to which the names of channels are added that are zero beside others
+    zeros : set to which the names of channels that are zero beside others are added
     """
     if ready.scene.analysis.rho_inf > STRONG:
         return {}
@@ -43,10 +43,10 @@ def damped_errors(ready: Prepared, base: Histories, zeros: set[str] | None = Non
         scene, turned = with_analysis(ready.scene, rho_inf=rho_inf), _Turned()
         if time_grid(scene).steps < fewest_steps(scene):
             continue
-        grows = fewest_steps(with_analysis(scene, rho_inf=1.0)) == math.inf  # in links that turn too far in a step
+        grows = fewest_steps(with_analysis(scene, rho_inf=1.0)) == math.inf  # in links that rotate too far in a step
         try:
             found = histories(replace(ready, scene=scene), look=turned.add if grows else _unwatched, near=base.begun)
-        except KedfemError:  # it takes the damping to run
+        except KedfemError:  # the run needs the damping
             continue
         if turned.most <= stable_rotation(rho_inf):
             return relative_errors(base, found, zeros)
@@ -54,7 +54,7 @@ def damped_errors(ready: Prepared, base: Histories, zeros: set[str] | None = Non
 
 
 def damping_remedy(scene: Scene, step: Mapping[str, float], damped: Mapping[str, float]) -> str:
-    """How to reduce the error of the step where most of it is numerical damping, in words; else empty."""
+    """Advice to reduce the error of the step if most of it is numerical damping; else empty."""
     if max(damped.values(), default=0.0) <= max(step.values(), default=0.0):
         return ""
     return (
@@ -82,13 +82,13 @@ def _unwatched(block: Block) -> None:
 
 
 def mass_damping_warning(ready: Prepared, taken: float | None = None) -> tuple[str, ...]:
-    """Effect of alpha on motions that no drive prescribes: their speed falls as exp(−α t), vibrations as exp(−α t/2).
+    """A warning if alpha slows motions that no drive prescribes: speed falls as exp(−α t), vibration as exp(−α t/2).
 
-    Rods that idly spin between balls, and mechanisms that the drive moves altogether, are not meant.
+    Rods that spin between spherical joints are not counted.
 
     Parameters
     ----------
-    taken : energy dissipated by alpha, relative to the largest exchanged; None before the run
+    taken : energy dissipated by alpha, relative to the largest energy exchanged [-]; None before the run
     """
     scene, damping, end = ready.scene, ready.model.damping, time_grid(ready.scene).end
     lost = 1.0 - float(np.exp(-damping.alpha * end))

@@ -1,4 +1,4 @@
-"""The error budget of a run, by source and kind of channel: one record for table, results file and warnings."""
+"""The error budget of a run by source and kind of channel, for the table, the results file and warnings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -8,14 +8,14 @@ from kedfem.results.balance import Balance
 KINDS = ("displacement", "stress", "joint forces", "drive")
 SOURCES = ("mesh", "step", "positions", "reduction", "frames", "rounding")
 WARNED = 0.05  # error above which every run warns
-TWICE = 2.0  # times the required accuracy: estimates are no better than that
-WHOLE = 1.0  # an error as large as the result
-FACTOR = 3.0  # estimates are right within it: an estimate of three times the result means an error as large as the result
-UNACCOUNTED = 0.5  # of energy
-UNKNOWNS = 60_000  # of a model, beyond which no mesh is refined automatically
-ROUNDING = 1e-12  # error that is nothing but rounding
+TWICE = 2.0  # factor on the required accuracy above which a run warns: estimates are no better than that
+WHOLE = 1.0  # error as large as the result
+FACTOR = 3.0  # accuracy of estimates: one of three times the result means an error as large as the result
+UNACCOUNTED = 0.5  # share of unaccounted energy above which results are meaningless
+UNKNOWNS = 60_000  # of a model, above which no mesh is refined automatically
+ROUNDING = 1e-12  # error below which there is only rounding
 LEAST = 0.005  # error below which no run warns
-OF_SOURCE, TOGETHER, UNKNOWN = "error of ", "error together, ", "no estimate "  # how notes of a budget begin
+OF_SOURCE, TOGETHER, UNKNOWN = "error of ", "error together, ", "no estimate "  # first words of a budget's notes
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,8 +23,9 @@ class Share:
     """The contribution of one source to the error.
 
     source : mesh, step, positions, reduction, frames or rounding
-    errors : kind of channel → estimated error, relative to the channel's largest value, at the worst instant and channel
-    remedy : how to reduce it, in words; if empty, the usual remedy of its source
+    errors : estimated error of each kind of channel, at the worst instant and in the worst channel, relative to the
+        channel's largest value
+    remedy : advice to reduce it; empty for the usual remedy of its source
     """
 
     source: str
@@ -36,10 +37,10 @@ class Share:
 class Budget:
     """Estimated errors of a run.
 
-    shares : by source; a source without a share causes no error
-    limits : where no estimate is claimed, in words
-    links : meshed link → error of its mesh in the energy norm [-]
-    step : channel → error of the step
+    shares : contributions by source; a source without a share causes no error
+    limits : descriptions of what has no estimate
+    links : error of each meshed link's mesh in the energy norm [-]
+    step : error of the step in each channel [-]
     """
 
     shares: tuple[Share, ...]
@@ -54,7 +55,7 @@ class Budget:
 
     @property
     def together(self) -> dict[str, float]:
-        """Kind → sum of all shares, as they may add up."""
+        """Sum of all shares of each kind, since they may add up."""
         return {kind: sum(share.errors.get(kind, 0.0) for share in self.shares) for kind in self.kinds}
 
     @property
@@ -81,7 +82,7 @@ class Budget:
 
 
 def kind_of_name(name: str) -> str | None:
-    """The kind of a channel that is judged, by its name; None for other channels.
+    """The kind of a judged channel, by its name; None for other channels.
 
     >>> kind_of_name("probes/tip/velocity"), kind_of_name("joints/A/force"), kind_of_name("drive/rigid_torque")
     ('displacement', 'joint forces', None)
@@ -96,7 +97,7 @@ def kind_of_name(name: str) -> str | None:
 
 
 def by_kind(errors: Mapping[str, float]) -> dict[str, float]:
-    """Errors by kind: that of the worst channel of each."""
+    """Error of the worst channel of each kind."""
     out: dict[str, float] = {}
     for name, error in errors.items():
         kind = kind_of_name(name)
@@ -123,15 +124,15 @@ def budget_warning(budget: Budget, asked: float | None = None, chosen: bool = Fa
 
 
 def _advice(budget: Budget, share: Share, chosen: bool) -> str:
-    """How to reduce the error, whose largest share is given; if several parts exceed the result, none is singled out."""
+    """Advice to reduce the error by its largest share; if several parts exceed the result, none is singled out."""
     kind = max(budget.together, key=lambda kind: budget.together[kind])
     beyond = _beyond(budget, kind)
     if len(beyond) > 1:
         parts = " and ".join(f"{x.source} {percent(x.errors[kind])}" for x in beyond)
         return (
-            f"no part of it can be singled out ({kind}: {parts}): the motion is another one with every change, "
-            "so that finer elements alone do not help; look at the animation and at the other warnings, then take a "
-            "step ten times shorter, and if the motion stays as it is, look for a link or a joint that gives way"
+            f"no part of it can be singled out ({kind}: {parts}): the motion differs with every change, "
+            "so that finer elements alone do not help; examine the animation and the other warnings, then take a "
+            "step ten times shorter; if the motion does not change, look for a link or a joint that is too compliant"
         )
     usual = CHOSEN_STEP if share.source == "step" and chosen else REMEDIES[share.source]
     return f"most of it from the {share.source}: {share.remedy or usual}"
@@ -143,14 +144,14 @@ def _beyond(budget: Budget, kind: str) -> list[Share]:
 
 
 def meaningless(budget: Budget, balance: Balance | None, unworked: float) -> str:
-    """Why the results of a run are meaningless by its own estimates, in words; else empty.
+    """The reason why a run's own estimates show its results to be meaningless; empty if they do not.
 
     Parameters
     ----------
-    balance : of energy; None without time steps
-    unworked : work of the drives that is missing in the energy account, relative to the energy exchanged [-]
+    balance : energy balance; None without time steps
+    unworked : work of the drives that is missing in the energy balance, relative to the energy exchanged [-]
     """
-    # one part alone may be the phase of a vibration, whose size is right; several are another motion altogether
+    # a single part may be the phase of a vibration with the right amplitude; several mean another motion
     lost = {
         f"estimated error of {kind}": error for kind, error in budget.together.items()
         if error >= FACTOR * WHOLE or len(_beyond(budget, kind)) > 1
@@ -182,7 +183,7 @@ CHOSEN_STEP = (
 
 
 def percent(error: float) -> str:
-    """An error in percent, with two digits: an estimate has no more. What is less than rounding is none.
+    """An error in percent with two digits, as many as an estimate has; below rounding it is about 0.
 
     >>> percent(0.01234), percent(9.3e-43)
     ('1.2 %', '≈ 0')
@@ -193,7 +194,7 @@ def percent(error: float) -> str:
 
 
 def attributes(budget: Budget) -> dict[str, float | str]:
-    """The budget as notes of a results file."""
+    """The budget as attributes of a results file."""
     every = ((share.source, *each) for share in budget.shares for each in share.errors.items())
     notes: dict[str, float | str] = {f"{OF_SOURCE}{source}, {kind}": error for source, kind, error in every}
     notes |= {f"{TOGETHER}{kind}": error for kind, error in budget.together.items()}

@@ -1,15 +1,15 @@
 """Error estimates of a run, from runs of the same linkage with other steps and other meshes.
 
-Small models are run again as they are; of large links a companion on a few modes is run instead, on which a step
-takes a fraction. Their channels are compared as `histories` does: what two steps, two meshes differ by, in every channel.
+Small models are run again as they are. Large links are replaced by a companion with a few modes, whose steps take a
+fraction of the time. Differences between two steps or two meshes are taken in every channel (`accuracy.histories`).
 
-* **Step**: of a single level, the run's step against twice that one, as levels in time are (`accuracy.step_estimate`);
-  strong numerical damping against little (`accuracy.damping`).
-* **Positions** that the scene leaves open: what may be missed between them (`accuracy.positions`).
-* **Mesh of beams**: twice the elements, in the same step.
-* **Rounding**: what a link's matrices leave of its rigid motion (`accuracy.rounding`).
+* **Step** of a single level: the run's step against one twice as long, as with levels in time
+  (`accuracy.step_estimate`); strong numerical damping against weak (`accuracy.damping`).
+* **Positions** that the scene leaves open: largest values that may lie between them (`accuracy.positions`).
+* **Mesh of beams**: twice the elements, with the same step.
+* **Rounding**: residual forces of a link's matrices in its rigid motion (`accuracy.rounding`).
 * **Meshes of solid and plane links**: their indicator η (`links.indicator`). Compliance errs by about 2 η², so the
-  companion is run with links that much softer; stress errs besides by a part of η itself.
+  companion is run with links softer by that much; stress also errs by a part of η itself.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -24,7 +24,7 @@ from kedfem.accuracy.error_budget import Budget, Share, by_kind, joined
 from kedfem.accuracy.geometric import GeometricError, bent, geometric_warning
 from kedfem.accuracy.histories import Histories, counted, extent, histories
 from kedfem.accuracy.longer_steps import can_double, differs_alike, doubled, in_steps
-from kedfem.accuracy.mesh_estimate import FUNCTIONS, link_errors, mesh_share, plain_mesh_share
+from kedfem.accuracy.mesh_estimate import COMPANION_MODES, link_errors, mesh_share, plain_mesh_share
 from kedfem.accuracy.positions import fewer_positions, positions_share
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.reduction import Reduction, first_reduced
@@ -42,11 +42,11 @@ from kedfem.links.indicator import Indicator, indicator
 from kedfem.results.recording import recording
 from kedfem.scene import ForceLoad, Scene, states_step, time_grid, without_vibration
 
-# unknowns of a model for which no companion is made: its modes cost as much as hundreds of steps
+# unknowns of a model above which no companion is made: its modes cost as much as hundreds of steps
 LARGE = 100_000
-SPAN = 6000  # steps of a companion's run, at most: of longer analyses only the beginning is run
-CHEAP = 2e7  # steps times unknowns that take seconds: small models may have more steps than SPAN
-SLOW = 1000  # steps at most without a compiled loop
+SPAN = 6000  # most steps of a companion's run; only the beginning of a longer analysis is run
+CHEAP = 2e7  # steps times unknowns that take seconds, so that small models may have more steps than SPAN
+SLOW = 1000  # most steps without a compiled loop
 
 
 @dataclass
@@ -98,8 +98,8 @@ class ErrorMonitor:
         self.rounding.add(block)
 
 
-def watcher(ready: Prepared, solvers: Sequence[Steps] = ()) -> ErrorMonitor:
-    """A monitor of a prepared scene's steps, by its solvers; without solvers of its links alone."""
+def error_monitor(ready: Prepared, solvers: Sequence[Steps] = ()) -> ErrorMonitor:
+    """A monitor of a prepared scene's steps; without solvers, rounding is estimated from the links alone."""
     scene, model = ready.scene, ready.model
     geometric = GeometricError(model, scene.analysis.stiffening, bool(scene.limits))
     rounding, steps = Rounding.of(model, solvers), not without_vibration(scene)
@@ -109,8 +109,8 @@ def watcher(ready: Prepared, solvers: Sequence[Steps] = ()) -> ErrorMonitor:
 
 
 def companion(ready: Prepared) -> Prepared | None:
-    """A model whose runs are cheap compared with those of a prepared scene; None if that is too large."""
-    return None if ready.model.unknowns > LARGE else first_reduced(ready, FUNCTIONS)
+    """A model whose runs cost little compared with those of a prepared scene; None if the scene is too large."""
+    return None if ready.model.unknowns > LARGE else first_reduced(ready, COMPANION_MODES)
 
 
 def budget(
@@ -122,8 +122,8 @@ def budget(
     Parameters
     ----------
     seen : the monitor of the run's steps
-    ran : the run's own channels, if available at all time points; else the state of its steady motion, if any
-    step : channel → error of the step, if the run itself estimates it
+    ran : the run's own channels if it has all time points; else only the state of its steady motion, if any
+    step : error of the step in each channel, if the run itself estimates it
     """
     found = seen.strained.indicators
     eta = link_errors(ready.model, found)
@@ -157,7 +157,7 @@ def budget(
             step_share, known = _step_share(small, base, known, zeros)
             shares.append(step_share)
         else:
-            if not states_step(ready.scene):  # stated positions are wanted there
+            if not states_step(ready.scene):  # positions that the scene states have no such error
                 shares.append(positions_share(base, sizes))
             some, base = fewer_positions(small.scene, base)
             small = replace(small, scene=some)
@@ -166,7 +166,7 @@ def budget(
         shares.append(mesh_share(small, base, eta, zeros))
         limits += _zeros(sizes, zeros)
     except KedfemError as fault:
-        limits.append(f"step and mesh: a run beside this one failed ({str(fault).splitlines()[0]})")
+        limits.append(f"step and mesh: a run for comparison failed ({str(fault).splitlines()[0]})")
     return Budget(joined(shares), tuple(limits), eta, known)
 
 
@@ -177,7 +177,7 @@ def channel_kinds(ready: Prepared) -> tuple[str, ...]:
 
 
 def beginning(scene: Scene, model: Model) -> Scene:
-    """The beginning of an analysis that is too long to be repeated; of a steady motion its period."""
+    """The beginning of an analysis that is too long to be repeated; for a steady motion its period."""
     if scene.analysis.kind == "steady":
         return with_analysis(scene, stability=False)
     grid = time_grid(scene)
@@ -201,17 +201,14 @@ def frames_share(geometric: GeometricError, kinds: Sequence[str]) -> Share | Non
 def step_errors(
     ready: Prepared, base: Histories, zeros: set[str] | None = None
 ) -> tuple[dict[str, float], Histories | None]:
-    """Channel → step error of a run of a single level in memory: its difference from another level.
+    """Step error of each channel of a run with a single level, and the run in steps twice as long.
 
-    That one has steps twice as long; where it cannot, half as long.
+    The error is the difference from a run in steps twice as long or, if these would be too long, half as long; there is
+    no second result then.
 
     Parameters
     ----------
-    zeros : to which the names of channels are added that are zero beside others
-
-    Returns
-    -------
-    And the run in steps twice as long
+    zeros : set to which the names of channels that are zero beside others are added
     """
     longer, grid = can_double(ready), time_grid(ready.scene)
     finer = with_analysis(in_steps(ready.scene, 0.5 * grid.step, 2 * grid.steps), extrapolation_levels=1)
@@ -231,7 +228,7 @@ def _step_share(
 
 
 def _zeros(sizes: Collection[str], zeros: Collection[str]) -> list[str]:
-    """Channels that are zero beside others, and what their errors are relative to, in words."""
+    """Sentences on channels that are zero beside others, which tell to what their errors are relative."""
     return [
         f"{name} by itself: it is zero but for the accuracy of others; its error is relative to the largest in its unit"
         for name in sizes if name in zeros
@@ -239,7 +236,7 @@ def _zeros(sizes: Collection[str], zeros: Collection[str]) -> list[str]:
 
 
 def _limits(ready: Prepared, found: Mapping[int, Indicator]) -> list[str]:
-    """Places where stress depends on the mesh, however fine it is."""
+    """Descriptions of places where stress grows with every refinement of the mesh."""
     scene, out, grows = ready.scene, [], "it grows as elements shrink"
     at_edges = dict.fromkeys(ready.model.links[k].name for k, each in found.items() if each.singular)
     if at_edges:

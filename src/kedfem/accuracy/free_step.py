@@ -1,7 +1,7 @@
-"""The step of a scene without a drive: marches in successively halved steps, until their differences show the error.
+"""The step of a scene without a drive, from runs in successively halved steps whose differences show the error.
 
-Nothing shows beforehand how fast such a scene moves, so nothing is taken from frequencies or from a coarse forecast:
-a step is chosen among those that were marched, over the whole analysis; its error is what the last halvings show.
+How fast such a scene moves is not known beforehand, so that neither frequencies nor a coarse forecast are used. The step
+is chosen among those with which the whole analysis was run; the last halvings show its error.
 """
 
 import math
@@ -19,15 +19,15 @@ from kedfem.accuracy.variants import with_analysis, with_steps
 from kedfem.errors import KedfemError
 from kedfem.scene import Scene
 
-FIRST = 200  # steps of the first march
-MOST = 51_200  # of the last one
-WORK = 2e7  # its steps times the unknowns of the model, at most: a minute or so
-PAIRS = 3  # of marches that are compared before anything is claimed: two ratios, so that a chance agreement is seen
+FIRST = 200  # steps of the first run
+MOST = 51_200  # most steps of the last run
+WORK = 2e7  # most product of its steps and the model's unknowns: about a minute
+PAIRS = 3  # least number of compared pairs of runs: they give two ratios, which reveal a chance agreement
 
 
 @dataclass(frozen=True, slots=True)
 class _Halved:
-    """The march in the shortest steps so far, and differences of marches, relative to a channel's peak, finest last."""
+    """The two runs in the shortest steps so far, and the differences of successive runs relative to a channel's peak."""
 
     steps: int
     coarse: Histories
@@ -36,19 +36,19 @@ class _Halved:
 
     @property
     def errors(self) -> dict[str, float]:
-        """Channel → error of the march in the shortest steps."""
+        """Error of each channel in the run with the shortest steps."""
         return {name: finest_error([pair.get(name, 1.0) for pair in self.pairs]) for name in counted(self.fine)}
 
 
 def free_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, float]:
-    """The scene in the longest step whose error is allowed, of one level, and that error.
+    """The scene in the longest step of a single level whose error is allowed, and that error.
 
-    Where no march reaches it, as in chaotic motion, the shortest step tried; reported is until when marches agree.
+    If no run reaches it, as in chaotic motion, the step is the shortest one tried, and a note says until when runs agree.
 
     Raises
     ------
     SolveError
-        If no march ends.
+        No run ends.
     """
     single = with_analysis(scene, extrapolation_levels=scene.analysis.extrapolation_levels or 1)
     unknowns = max(1, meshed(with_steps(single, FIRST)).model.unknowns)
@@ -58,8 +58,8 @@ def free_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, floa
     error = 1.0
     while steps <= most:
         try:
-            now = histories(meshed(with_steps(single, steps)))  # rigid links are as stiff as the step bears
-        except KedfemError:  # too long for its iterations
+            now = histories(meshed(with_steps(single, steps)))  # the step limits the stiffness of rigid links
+        except KedfemError:  # the step is too long for its iterations
             if 2 * steps > most:
                 raise
             before, pairs = None, []
@@ -69,21 +69,21 @@ def free_step(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, floa
                 found = _Halved(steps, before, now, tuple(pairs[-PAIRS:]))
                 error = max(found.errors.values(), default=0.0)
             if len(pairs) >= PAIRS and error <= SURE * allowed:
-                longer = max(0.5, math.sqrt(error / (SURE * allowed)))  # between two steps that were marched
+                longer = max(0.5, math.sqrt(error / (SURE * allowed)))  # between two steps that were run
                 return with_steps(single, math.ceil(steps * longer)), error / longer**2
             before = now
         steps *= 2
     if found is None:
         return with_steps(single, steps // 2), 1.0
     until = _agree_until(found, search.asked)
-    if until < found.coarse.time[-1]:  # nothing is promised of what falls there
+    if until < found.coarse.time[-1]:  # the order of convergence means nothing there
         error = min(1.0, max(max(pair.values(), default=0.0) for pair in found.pairs))
     search.notes.append(_unreached(found, search.asked, until, error))
     return with_steps(single, found.steps), error
 
 
 def finest_error(differences: Sequence[float]) -> float:
-    """Error of the finest march, from differences of successive ones and their order, at most 2."""
+    """Error of the finest run, from the differences of successive runs and their order, at most 2."""
     D = np.maximum(differences, 1e-300)
     if len(D) < PAIRS or not np.isfinite(D).all():
         return 1.0
@@ -108,7 +108,7 @@ def _unreached(found: _Halved, asked: float, until: float, error: float) -> str:
 
 
 def _agree_until(found: _Halved, asked: float) -> float:
-    """Time until which the two finest marches agree in every judged channel [s]."""
+    """Time until which the two finest runs agree in every judged channel [s]."""
     time, until = found.coarse.time, math.inf
     for name, size in counted(found.fine).items():
         coarse, fine = found.coarse.channels[name][1], found.fine.channels[name][1][::2]

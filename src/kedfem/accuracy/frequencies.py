@@ -1,4 +1,4 @@
-"""Meshes for natural frequencies, by comparison of a mesh with one of smaller elements."""
+"""Meshes for natural frequencies, judged by comparison with a finer mesh."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -21,17 +21,16 @@ from kedfem.motion.path import Path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.scene import MeshFile, Scene, path_parameter
 
-FACTOR, LITTLE = 1.5, 1.2  # by which elements are made smaller at a time: usually, and at least
-# at which the error of a frequency falls with the size of elements, of linear ones; that of others falls faster
-ORDER = 2.0
-LEFT = 1 / (FACTOR**ORDER - 1)  # of the change by smaller elements: the error that these leave
-STALLED = 0.8  # of the error before: where smaller elements of the open links leave more, others cause it
-USUAL = 0.01  # error that is allowed where a scene asks for plain defaults, and of parts
+FACTOR, LITTLE = 1.5, 1.2  # factor by which elements become smaller: the usual and the least one
+ORDER = 2.0  # of convergence of a frequency with linear elements, the lowest
+LEFT = 1 / (FACTOR**ORDER - 1)  # error that smaller elements leave, over the change that they cause
+STALLED = 0.8  # least reduction of the error by finer open links; otherwise other links cause it
+USUAL = 0.01  # allowed error of parts, and of scenes with accuracy = "quick"
 FEW = 6  # modes that a warning lists
 
 
 class Solved(Protocol):
-    """A solved model: its lowest frequencies [Hz], and its unknowns."""
+    """A solved model: its lowest frequencies (f,) [Hz], and its number of unknowns."""
 
     @property
     def frequencies(self) -> Float[np.ndarray, " f"]: ...  # noqa: D102
@@ -42,24 +41,25 @@ class Solved(Protocol):
 
 T = TypeVar("T", bound=Solved)
 Finer = Callable[[T, float], T]
-LetGo = Callable[[Scene], Scene]
+Release = Callable[[Scene], Scene]
 
 
 def resolved(made: T, finer: Finer[T], chosen: Finer[T] | None, allowed: float) -> tuple[T, Float[np.ndarray, " f"]]:
     """The model, with smaller elements where these are left open, until the error of the frequencies is allowed.
 
-    Two meshes show the error of the coarser one, as frequencies converge at ORDER at least (Strang and Fix, An Analysis
-    of the Finite Element Method, 6.3), though more slowly at edges that point inwards. Elements are made smaller up to
+    Two meshes show the error of the coarser one, since frequencies converge at least with ORDER (Strang and Fix, An
+    Analysis of the Finite Element Method, 6.3), though more slowly at re-entrant edges. Elements become smaller up to
     UNKNOWNS.
 
     Parameters
     ----------
-    finer : makes it with all elements smaller by a factor
-    chosen : the same with those that are left open; None where none is
+    finer : function that makes all elements of the model smaller by a factor
+    chosen : the same for those that are left open; None if none is
+    allowed : relative error of frequencies [-]
 
     Returns
     -------
-    Also relative errors, estimated; NaN where they are not known.
+    The model, and (f,) estimated relative errors; NaN where they are unknown.
     """
     before, errors = np.inf, np.full(len(made.frequencies), np.nan)
     while (UNKNOWNS / made.unknowns) ** (1 / 3) >= LITTLE:
@@ -79,8 +79,10 @@ def resolved(made: T, finer: Finer[T], chosen: Finer[T] | None, allowed: float) 
 
 
 def unsimplified(scene: Scene) -> Scene:
-    """The scene with links that leave their model open as the best that their shape allows: what is rigid or flat enough
-    for a motion lacks vibrations."""
+    """The scene whose links of open model have the most detailed one that their shape allows.
+
+    A rigid or plane model that suffices for a motion lacks vibrations.
+    """
     auto = {name: link for name, link in scene.links.items() if link.model == "auto"}
     return with_links(scene, {name: of_family(link, families(link)[-1]) for name, link in auto.items()})
 
@@ -99,24 +101,24 @@ class FrozenLinkage:
 
     @property
     def unknowns(self) -> int:
-        """Unknowns of all links, before joints share any."""
+        """Unknowns of all links, those shared at joints counted for each."""
         return int(self.system.model.unknowns)
 
 
 def frozen(
-    scene: Scene, modes: int, at: float, let_go: LetGo | None = None
+    scene: Scene, modes: int, at: float, release: Release | None = None
 ) -> tuple[FrozenLinkage, Float[np.ndarray, " f"], tuple[str, ...]]:
-    """A scene's linkage, unreduced; meshes that are left open resolve its lowest vibrations.
+    """A scene's unreduced linkage; meshes that are left open resolve its lowest vibrations.
 
     Parameters
     ----------
-    modes : how many
-    at : time at which the drive is where errors are estimated [s]
-    let_go : makes a scene whose drives have released their joints; None where they hold them
+    modes : number of modes
+    at : time of the position at which errors are estimated [s]
+    release : function that frees the driven joints of a scene; None if drives hold them
 
     Returns
     -------
-    Also relative errors, estimated (NaN where they are not known; none where no mesh can be finer), and warnings of them.
+    The linkage; (f,) estimated relative errors, NaN where they are unknown, none if no mesh can be finer; warnings.
     """
     scene, allowed = unsimplified(scene), allowed_error(scene)
     names = [name for name, link in scene.links.items() if elastic(link, "solid", "plane", "beam") and refinable(link)]
@@ -125,26 +127,26 @@ def frozen(
 
     def finer(made: FrozenLinkage, factor: float, names: Sequence[str] = names) -> FrozenLinkage:
         links = {name: refined(made.scene.links[name], factor) for name in names}
-        return _frozen(with_links(made.scene, links), modes, at, let_go)
+        return _frozen(with_links(made.scene, links), modes, at, release)
 
-    made, errors = _frozen(scene, modes, at, let_go), np.zeros(0)
+    made, errors = _frozen(scene, modes, at, release), np.zeros(0)
     if names:
         chosen = finer if left_open == names else partial(finer, names=left_open)
         made, errors = resolved(made, finer, chosen if left_open else None, allowed)
     return made, errors, (*mesh_warning(errors, allowed, remedy(scene)), *file_warning(scene))
 
 
-def _frozen(scene: Scene, modes: int, at: float, let_go: LetGo | None) -> FrozenLinkage:
+def _frozen(scene: Scene, modes: int, at: float, release: Release | None) -> FrozenLinkage:
     linkage, along = moving(scene)
-    system = system_of(let_go(scene) if let_go else scene, linkage, along)
-    solver = frozen_linkage(scene, system, linkage, along, modes, let_go is not None)
+    system = system_of(release(scene) if release else scene, linkage, along)
+    solver = frozen_linkage(scene, system, linkage, along, modes, release is not None)
     t = np.array([at])
     motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
     return FrozenLinkage(scene, linkage, along, system, solver, motion, solver.at(motion).frequencies)
 
 
 def allowed_error(scene: Scene) -> float:
-    """The error that its accuracy allows."""
+    """The error of frequencies that the scene's accuracy allows [-]."""
     return USUAL if scene.analysis.accuracy == "quick" else float(scene.analysis.accuracy)
 
 
@@ -157,10 +159,10 @@ def remedy(scene: Scene) -> str:
 
 
 def mesh_warning(errors: Float[np.ndarray, " f"], allowed: float, remedy: str) -> tuple[str, ...]:
-    """A warning of frequencies that the meshes do not resolve, or whose error is unknown."""
+    """A warning if the meshes do not resolve frequencies, or if the error is unknown."""
     if np.isnan(errors).any():
-        why = f"models of more than {UNKNOWNS:,} unknowns are not meshed more finely to see it"
-        return (f"frequencies: how far off they are by the mesh is not known, as {why}: compare with another mesh",)
+        why = f"models of more than {UNKNOWNS:,} unknowns are not refined to estimate it"
+        return (f"frequencies: their error by the mesh is not known, as {why}: compare with another mesh",)
     beyond = np.flatnonzero(errors > allowed)
     if not len(beyond):
         return ()
@@ -174,12 +176,12 @@ def mesh_warning(errors: Float[np.ndarray, " f"], allowed: float, remedy: str) -
 
 
 def error_words(errors: Float[np.ndarray, " f"]) -> str:
-    """The errors in words for a table; empty if they are unknown."""
+    """The errors for a table, in words; empty if they are unknown."""
     known = errors.size and not np.isnan(errors).any()
     return f"error by the mesh, estimated: {percent(errors.max())} at most" if known else ""
 
 
 def file_warning(scene: Scene) -> tuple[str, ...]:
-    """A warning of links with meshes from files, which are not refined."""
+    """A warning if links have meshes from files, which cannot be refined."""
     names = [name for name, link in scene.links.items() if link.model != "rigid" and isinstance(link.shape, MeshFile)]
     return (f"frequencies: errors by the meshes from files are not known: links {', '.join(names)}",) if names else ()

@@ -1,29 +1,30 @@
 """The geometric error of the linear equation, estimated from the deflections of a run.
 
-Equation (20) turns K with the rigid-body motion, which leaves three things out:
+Equation (20) rotates K with the rigid-body motion, which neglects three effects:
 
-* **Axial forces.** On a link that has rotated by ψ against its direction there an axial force N acts across it. This
-  changes the stiffness that the deflection meets by the share
+* **Axial forces.** An axial force N has a transverse component on a link whose elastic rotation is ψ. It changes the
+  stiffness against the deflection by the share
 
       e = ∫ N ψ² ds / 2V,     V = ½ gᵀ K0 g the strain energy,
 
-  Rayleigh's quotient of the geometric and the elastic stiffness in the very shape that the link takes: N L²/(π² E I) of
-  a strut that bends between its ends, N over the buckling load of any other in its own shape. No length, section or end
-  condition need be known, so it serves links of every kind.
-* **Large turns.** Where N vanishes, as under a force across a cantilever, the error is of second order, c ψ².
-* **Directions of slides.** What slides along an elastic link is held across the link's direction in the rigid-body
-  motion, not across the bent link, which is off by ψ: displacements, joint forces and efforts err by ψ, of first order.
-  Stiffening does not know how their forces turn with the bent link, so that what it leaves is not taken for less; nor
-  is it beside limits of joints, whose forces it does not know.
+  the Rayleigh quotient of the geometric and the elastic stiffness for the link's actual deflection: N L²/(π² E I) for a
+  strut that bends between its ends, in general N over the buckling load in that shape. Length, section and end
+  conditions need not be known, so that it applies to links of every kind.
+* **Large rotations.** Where N vanishes, as under a transverse force on a cantilever, the error is of second order,
+  c ψ².
+* **Directions of slides.** A body that slides along an elastic link is constrained across the link's rigid-body
+  direction, not across the bent link, whose direction differs by ψ: displacements, joint forces and efforts err by ψ,
+  which is of first order. Stiffening does not include the rotation of these forces with the bent link, nor the forces
+  of joint limits, so that it is not taken to reduce the error there.
 
-All links are counted together, because a joint's force on one is the next one's, with the largest sums over time. The
-factor of e is measured, on the four-bar of [KED] (docs/theory/errors.md): 3. One is the change of stiffness itself; the
-rest is the joint forces, which change as the deflected links pass them on, and the time that a changed stiffness shifts.
-An arm on its foot does not have that, and the estimate is then up to four times too large. c is that of the elastica
-under a load across its tip.
+All links are counted together, because the force of a joint acts on both of its links, with the largest sums over time.
+The factor of e, 3, was measured on the four-bar of [KED] (docs/theory/errors.md). A part of 1 is the change of stiffness
+itself; the rest is the change of the joint forces, which deflected links transmit, and the phase shift by a changed
+stiffness. A single arm has neither, and the estimate is then up to four times too large. c is that of the elastica
+under a transverse load at its tip.
 
-N comes from the forces beyond a cut: port forces and P − M R0'' − M δ''. ψ is the slope of the line through the mean
-displacements of slices across the link's axis; so both take scalar weights only.
+N follows from the forces beyond a cut: port forces and P − M R0'' − M δ''. ψ is the slope of the line through the mean
+displacements of slices across the link's axis. Both need scalar weights only.
 """
 
 from dataclasses import dataclass, field
@@ -40,14 +41,14 @@ from kedfem.links.record import Link, in_space
 from kedfem.motion.rigid import RigidMotion
 
 SLICES = 8  # of a link along its axis, if it has so many nodes
-SAME = 1e-6  # of a slice: nodes of one cross-section, which rounding places differently along the link
-APART = 0.5  # of a slice's length, between middles: the slope between nearer ones would be that of rounding or warping
+SAME = 1e-6  # of a slice's length: distance along the link within which nodes are in one cross-section
+APART = 0.5  # of a slice's length: least distance of middles; slopes over less would show rounding or warping
 INSTANTS = 256  # of a block that are examined
-AXIAL = 3.0  # error of the peak stress in units of e, measured
-TURN = 0.4  # and of ψ²: elastica, load across the tip, 0.42 of its deflection, 0.24 of the stress at its root
-STIFFENED = 0.4  # of the error that geometric stiffening leaves: 0.25 to 0.4, measured
-LARGE = 0.02  # an error that is worth a warning
-MODERATE = 0.15  # up to here stiffening helps
+AXIAL = 3.0  # error of the peak stress over e, measured
+TURN = 0.4  # error over ψ²: elastica under a transverse tip load, 0.42 for its deflection, 0.24 for the root stress
+STIFFENED = 0.4  # share of the error that geometric stiffening leaves: 0.25 to 0.4, measured
+LARGE = 0.02  # error above which a run warns
+MODERATE = 0.15  # error up to which stiffening helps
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,12 +56,12 @@ class Slices:
     """A link cut across its axis; k slices, k − 1 cuts between them.
 
     axis : (3,) along the link in the reference position
-    means : (k, n) mean displacement of each slice
-    beyond : (k − 1, n) sum of the nodal forces beyond each cut
-    mass : (k − 1, n) the same of M u
-    mended : (k − 1, 4) what `beyond` misses of −M (1 ⊗ p'' + X R''ᵀ) where modes are few
-    ports : (k − 1, p) 1 where a port is beyond a cut
-    gaps, lengths : (k − 1,) between the slices' middles; the same, but to the ends of the link [m]
+    means : (k, n) weights of the mean displacement of each slice [-]
+    beyond : (k − 1, n) weights of the sum of nodal forces beyond each cut [-]
+    mass : (k − 1, n) the same for M u [kg]
+    mended : (k − 1, 4) what `beyond` lacks of −M (1 ⊗ p'' + X R''ᵀ) with few modes [kg, kg m]
+    ports : (k − 1, p) 1 for each port beyond a cut
+    gaps, lengths : (k − 1,) distances of the slices' middles; the same, but up to the ends of the link [m]
     """
 
     axis: Float[np.ndarray, "3"]
@@ -74,9 +75,9 @@ class Slices:
 
 
 def slices(link: Link, joint: Attachment) -> Slices:
-    """Cut a link between its nodes into slices of about equal length, whose middles are well apart.
+    """A link cut between its nodes into slices of about equal length, whose middles are well apart.
 
-    Nodes that are as far along but for rounding are one cross-section: no cut parts them.
+    Nodes whose places along the link differ by rounding are one cross-section, which is not cut.
     """
     full, axis = link.full or link, link.axes[:, 0]
     nodes = np.flatnonzero(full.one)
@@ -99,7 +100,7 @@ def slices(link: Link, joint: Attachment) -> Slices:
 
 
 def _numbers(s: Float[np.ndarray, " k"]) -> Int[np.ndarray, " k"]:
-    """The slice of each node, by its position along the link; slices too near to the previous one are merged with it."""
+    """The slice of each node, by its place along the link; a slice too near to the previous one is merged with it."""
     length = float(np.ptp(s)) or 1.0
     of = np.clip(np.floor(SLICES * (s - s.min()) / length + SAME).astype(int), 0, SLICES - 1)
     used, of = np.unique(of, return_inverse=True)
@@ -113,14 +114,14 @@ def _numbers(s: Float[np.ndarray, " k"]) -> Int[np.ndarray, " k"]:
 
 @dataclass
 class GeometricError:
-    """Largest sums over time of a run, block by block, over links with rigid-body frames; others do not have this error.
+    """Largest sums over time, block by block, over links with rigid-body frames; only these have this error.
 
-    stiffened : whether the motion stiffens links
+    stiffened : whether geometric stiffening is included
     stopped : whether joints have limits
     axial : ∫ N ψ² ds of these links [J]
-    strain : their energy [J]
-    turn : ψ of any slice [rad]
-    slid : the same of links along which others slide
+    strain : their strain energy [J]
+    turn : largest ψ of any slice [rad]
+    slid : the same for links along which others slide [rad]
     """
 
     model: Model
@@ -142,10 +143,10 @@ class GeometricError:
     def add(self, block: Block) -> None:
         """Evaluate some time points of a block."""
         both = zip(self._of, block.links, strict=True)
-        looked_at = [history.strain for of, history in both if of is not None]
-        if not looked_at:
+        strains = [history.strain for of, history in both if of is not None]
+        if not strains:
             return
-        self.strain = max(self.strain, float(np.sum(looked_at, axis=0).max()))
+        self.strain = max(self.strain, float(np.sum(strains, axis=0).max()))
         some, axial = block.chosen(slice(None, None, max(1, len(block) // INSTANTS))), np.zeros(1)
         guides = {body for _, body in self._slides}
         model = self.model
@@ -170,7 +171,7 @@ class GeometricError:
 
     @property
     def worst(self) -> float:
-        """Largest relative error of any quantity, also of displacements and joint forces at slides of fixed direction."""
+        """Largest relative error of any quantity, including displacements and joint forces at slides."""
         return self.estimate + self.slid
 
     @property
@@ -181,7 +182,7 @@ class GeometricError:
 
 
 def slides(model: Model) -> list[tuple[str, int]]:
-    """Joints that hold some directions of an elastic link and leave others free, and the link's number in the linkage."""
+    """Joints that constrain some but not all directions of an elastic link, and the link's number in the linkage."""
     found = []
     for row in model.rows:
         if row.sides[1] is not None:
@@ -193,7 +194,7 @@ def slides(model: Model) -> list[tuple[str, int]]:
 
 
 def slopes(link: Link, of: Slices, history: LinkHistory, R: Float[np.ndarray, "T 3 3"]) -> Float[np.ndarray, "T c 3"]:
-    """ψ between slices: the rotation of the link's line off its axis in the rigid-body motion [rad]."""
+    """ψ between slices: the elastic rotation of the link's line from its rigid-body direction [rad]."""
     along = (R @ of.axis)[:, None]
     change = np.diff(in_space(link, of.means @ history.u), axis=1)
     across = change - (change * along).sum(axis=2, keepdims=True) * along
@@ -203,7 +204,7 @@ def slopes(link: Link, of: Slices, history: LinkHistory, R: Float[np.ndarray, "T
 def axial_forces(
     link: Link, joint: Attachment, of: Slices, history: LinkHistory, motion: RigidMotion, body: int
 ) -> Float[np.ndarray, "T c"]:
-    """N at each cut, tension positive: what P − M R0'' − M δ'' and the port forces beyond it pull along the axis [N]."""
+    """N at each cut, tension positive: the axial part of P − M R0'' − M δ'' and of the port forces beyond it [N]."""
     affine = np.concatenate([motion.p2[:, body, None], motion.R2[:, body].transpose(0, 2, 1)], axis=1)
     force = in_space(link, of.beyond @ history.F - of.mass @ history.a) + of.mended @ affine
     force += of.ports @ in_space(link, rotated_vectors(joint, history.R, history.port_forces))
@@ -217,13 +218,13 @@ def geometric_warning(found: GeometricError) -> tuple[str, ...]:
         return ()
     of = "displacements and joint forces" if found.sliding else "the peak stress"
     return (
-        f"{bent(found)}, which the linear equation takes as small: it is off by about "
+        f"{bent(found)}, which the linear equation assumes to be small: its error is about "
         f"{float(f'{100 * min(error, 1.0):.2g}'):g} % of {of}{' or more' if error > 1 else ''}; {_remedy(found, error)}",
     )
 
 
 def bent(found: GeometricError) -> str:
-    """Bending of links, and slides on them whose direction neglects it, in words."""
+    """Elastic rotation of links in words, with the slides whose direction neglects it."""
     names = found.sliding
     verb = "slides" if len(names) == 1 else "slide"
     sliding = f" ({', '.join(names)} {verb} along the undeformed link)" if names else ""
@@ -235,19 +236,19 @@ def _remedy(found: GeometricError, error: float) -> str:
     corotational = 'analysis.frames = "co-rotational"'
     if error >= MODERATE:
         return f"take {corotational}, which is right at any deflection"
-    known = found.stiffened or found.sliding  # neither once more, nor against what slides leave
+    known = found.stiffened or found.sliding  # stiffening is on already, or does not help slides
     stiffening = "" if known else "analysis.stiffening = true leaves about a third of it, "
     return f"{stiffening}{corotational} is right at any deflection"
 
 
 def _projected(full: Link, Q: Float[np.ndarray, "n s"], chosen: Float[np.ndarray, "c n"]) -> Float[np.ndarray, "c s"]:
-    """Coefficients of modes Q that come nearest to weights of nodes, by the functions' share in the volume."""
+    """Coefficients of modes Q that fit weights of nodes best, weighted by the volume of each function."""
     share = np.sqrt(_volumes(full))[:, None]
     return np.asarray(np.linalg.lstsq(share * Q, share * chosen.T, rcond=None)[0].T)
 
 
 def _volumes(full: Link) -> Float[np.ndarray, " n"]:
-    """Volume of each node; times the section's radius of gyration squared of its slopes, whose ∫ N_a dV vanishes."""
+    """Volume of each function; for slopes, whose ∫ N_a dV vanishes, times the section's squared radius of gyration."""
     own = full.one != 0
     volume = np.asarray(np.abs(full.volume[own])[np.cumsum(own) - 1])
     if full.section is None:
@@ -257,5 +258,5 @@ def _volumes(full: Link) -> Float[np.ndarray, " n"]:
 
 
 def _inertia(link: Link) -> Float[np.ndarray, "n 4"]:
-    """m [1, X]: −M (1 ⊗ p'' + X R''ᵀ) is its negative times p'' and R''ᵀ."""
+    """m [1, X]; its negative times p'' and R''ᵀ is −M (1 ⊗ p'' + X R''ᵀ)."""
     return np.column_stack([link.m1[:, 0], link.mX])

@@ -19,12 +19,10 @@ from kedfem.results.channels import largest_by_unit
 from kedfem.results.on_demand import ChannelSelection
 from kedfem.results.recording import recording, rows
 
-# of the largest force at the linkage's size: a torque below is what is left of others that cancel; of the largest value
-# of the same unit: a force, displacement or stress below is zero to the accuracy of that one, and one below SMALL is if
-# its error is larger than itself
-FAINT, SMALL = 3e-3, 0.1
-ROUGHLY = 1e-6  # of its size: residual of a period that a compared steady motion may have
-NOTHING = 1e-6  # of the largest value of the same unit: a channel below holds rounding, not results
+FAINT = 3e-3  # of the largest force times the linkage's size, or of the largest value of the same unit: zero if below
+SMALL = 0.1  # of the largest value of the same unit: a channel below it is zero if its error is larger than itself
+ROUGHLY = 1e-6  # relative residual of a period that a steady motion for comparison may have
+NOTHING = 1e-6  # of the largest value of the same unit: a channel below it is only rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,9 +30,9 @@ class Histories:
     """Channels over time.
 
     time : (T,) [s]
-    channels : name → (channel, values (T, c))
+    channels : channel and values (T, c), by name
     kept : states at the requested steps
-    size : of the linkage [m]
+    size : extent of the linkage [m]
     begun : the state at the beginning of a steady motion; None for other analyses, or if unknown
     """
 
@@ -55,14 +53,14 @@ def histories(
 
     Parameters
     ----------
-    keep : numbers of the steps whose states are kept too
-    watch : called regularly; an exception that it raises ends the run
+    keep : numbers of the steps whose states are kept
+    watch : called after every block; an exception that it raises ends the run
     look : called with every block
-    follow : called with every block and its rows
-    near : a state near to that at the beginning of a steady motion
+    follow : called with every block and its values by channel
+    near : an estimate of the state at the beginning of a steady motion
     """
     every = recording(ready.scene, ready.model, linked=ready.linkage)
-    recorded = [x for x in every if asked_for(x.channel.name)]
+    recorded = [x for x in every if is_judged(x.channel.name)]
     times, taken, kept = [], [], []
     solvers = level_steps(ready.scene, ready.model)
     for solver in solvers:
@@ -82,7 +80,7 @@ def histories(
 
 
 def steady_state(solvers: Sequence[Steps]) -> StateArrays | None:
-    """The state at the beginning of a steady motion, with the finest steps; None for other motions."""
+    """The state at the beginning of a steady motion in the finest steps; None for other motions."""
     found = getattr(solvers[-1], "steady", None)
     return state_arrays(found.state) if isinstance(found, Periodic) else None
 
@@ -93,19 +91,19 @@ def extent(model: Model) -> float:
     return float(np.ptp(nodes, axis=0).max())
 
 
-def asked_for(name: str) -> bool:
+def is_judged(name: str) -> bool:
     """Whether a required accuracy applies to a channel: probes, joint forces, the drive's torque."""
     return kind_of_name(name) is not None
 
 
 def relative_errors(found: Histories, reference: Histories, zeros: set[str] | None = None) -> dict[str, float]:
-    """Largest difference over time of every judged channel, relative to what `scales` gives.
+    """Largest difference over time in every judged channel, relative to what `scales` gives.
 
-    Both runs need not have the same steps: the reference is interpolated (cubic spline).
+    If the two runs have different steps, the reference is interpolated by a cubic spline.
 
     Parameters
     ----------
-    zeros : to which the names of channels are added that are zero beside others
+    zeros : set to which the names of channels that are zero beside others are added
     """
     end = min(found.time[-1], reference.time[-1]) * (1 + 1e-12)
     here = found.time <= end
@@ -121,20 +119,20 @@ def relative_errors(found: Histories, reference: Histories, zeros: set[str] | No
 
 
 def counted(reference: Histories) -> dict[str, float]:
-    """Judged channel → its largest value; negligible channels are left out."""
+    """Largest value of each judged channel; negligible channels are left out."""
     return {name: size for name, (_, size) in judged(reference).items()}
 
 
 def judged(reference: Histories) -> dict[str, tuple[str, float]]:
-    """Judged channel → its unit and its largest value; negligible channels are left out."""
+    """Unit and largest value of each judged channel; negligible channels are left out."""
     units = largest_by_unit(reference.channels.values())
     sizes = {
         name: (channel.unit, float(np.linalg.norm(values, axis=1).max()))
-        for name, (channel, values) in reference.channels.items() if asked_for(name)
+        for name, (channel, values) in reference.channels.items() if is_judged(name)
     }  # fmt: skip
     least = {unit: NOTHING * value for unit, value in units.items()}
     least["N m"] = max(least.get("N m", 0.0), FAINT * reference.size * units.get("N", 0.0))
-    if reference.size:  # of rotors in balance
+    if reference.size:  # for balanced rotors
         least["N"] = max(least.get("N", 0.0), NOTHING * units.get("N m", 0.0) / reference.size)
     return {name: (unit, size) for name, (unit, size) in sizes.items() if size > least[unit]}
 
@@ -142,16 +140,16 @@ def judged(reference: Histories) -> dict[str, tuple[str, float]]:
 def scales(
     errors: Mapping[str, float], sizes: Mapping[str, tuple[str, float]], zeros: set[str] | None = None
 ) -> dict[str, float]:
-    """Channel → the value to which its error is relative: its largest, or of one that is zero the largest of its unit.
+    """Value to which each channel's error is relative: its largest, or the largest of its unit if the channel is zero.
 
-    Zero is what is below FAINT of that, or below SMALL of it and less than its own error. Torques keep their own scale:
-    that of a wrist is small beside that of a shoulder, and counts.
+    A channel is zero if its largest value is below FAINT of the largest of its unit, or below SMALL of it and below its
+    own error. Torques keep their own scale: that of a wrist is small beside that of a shoulder, and matters.
 
     Parameters
     ----------
     errors : in the channel's unit
-    sizes : channel → unit, largest value
-    zeros : to which the names of those that are zero are added
+    sizes : unit and largest value of each channel
+    zeros : set to which the names of channels that are zero are added
     """
     largest: dict[str, float] = {}
     for unit, size in sizes.values():
@@ -173,7 +171,7 @@ def worst(errors: Mapping[str, float]) -> float:
 
 
 def _columns(found: tuple[Channel, Float[np.ndarray, "T c"]], like: Channel) -> Float[np.ndarray, "T d"]:
-    """The columns that another channel has; a planar link's third is zero."""
+    """The columns of another channel; missing ones, such as the third of a planar link, are zero."""
     channel, values = found
     known = dict(zip(channel.columns, values.T, strict=True))
     return np.stack([known.get(c, np.zeros(len(values))) for c in like.columns], axis=1)
@@ -190,7 +188,7 @@ def _at(
 
 
 def run_histories(results: Results, solvers: Sequence[Steps]) -> Histories:
-    """The channels of a run as its errors are judged; none where not all time points are rows."""
+    """The judged channels of a run; none if it did not record all time points."""
     if results.every > 1:
         return Histories(results.time[:0], {}, begun=steady_state(solvers))
     names = tuple(name for name in results.channels if kind_of_name(name) is not None)

@@ -1,4 +1,4 @@
-"""The error of elements: the change by twice as many, or the indicator of their stresses."""
+"""The error of meshes: the change by twice as many elements, or the indicator of their stresses."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -16,20 +16,20 @@ from kedfem.links.indicator import Indicator
 from kedfem.links.record import Link
 from kedfem.scene import Scene
 
-FUNCTIONS = 1e-3  # tolerance of a companion's modes: differences of runs need no better ones
-REST = 1.1  # of what twice the elements change: what is left beyond them (order 4 and more in beams)
-SOFT = 2.0  # times η²: few elements a link, averaged with few neighbours, hide half of their error (measured, 3 to 8)
-LOCAL = 0.05  # of η: stress at a point, of its peak, beside what the compliance does
+COMPANION_MODES = 1e-3  # tolerance of a companion's modes, sufficient for differences of runs
+REST = 1.1  # error over the change by twice as many elements (order 4 and more in beams)
+SOFT = 2.0  # error of the compliance over η²: few elements and neighbours hide half of it (measured, 3 to 8)
+LOCAL = 0.05  # error of the stress at a point over η, in addition to that of the compliance
 
 
 def mesh_errors(
     small: Prepared, base: Histories, eta: Mapping[str, float], zeros: set[str] | None = None
 ) -> dict[str, float]:
-    """Channel → error of all meshes: beams with twice the elements, other links softer by 2 η².
+    """Error of all meshes in each channel: beams with twice the elements, other links softer by 2 η².
 
     Parameters
     ----------
-    zeros : to which the names of channels are added that are zero beside others
+    zeros : set to which the names of channels that are zero beside others are added
     """
     model, every = small.model, small.scene.links.items()
     beams = {name: refined(link, 2.0) for name, link in every if link.category == "beam" and link.shape is not None}
@@ -48,19 +48,19 @@ def mesh_errors(
 def _separate(
     small: Prepared, base: Histories, finer: Scene, eta: Mapping[str, float], zeros: set[str] | None
 ) -> dict[str, float]:
-    """Error of a scene with both beams and meshed links: the sum of their separate errors."""
+    """Error in each channel of a scene with beams and meshed links: the sum of their separate errors."""
     softer = histories(replace(small, model=softened(small.model, eta)), near=base.begun)
     soft = relative_errors(base, softer, zeros)
     if any(link.meshed and link.fit is not None for link in small.model.links):
         return soft
     model = elastic_model(finer, small.linkage, along=small.path)
-    whole = first_reduced(replace(small, scene=finer, model=model), FUNCTIONS)
+    whole = first_reduced(replace(small, scene=finer, model=model), COMPANION_MODES)
     other = relative_errors(base, histories(whole), zeros)
     return {name: soft[name] + REST * other.get(name, 0.0) for name in soft}
 
 
 def softened(model: Model, eta: Mapping[str, float]) -> Model:
-    """A model whose meshed links are softer by the error of their meshes: K0 (1 − 2 η²)."""
+    """The model with meshed links softened by the error of their meshes: K0 (1 − 2 η²)."""
     factors = (max(1 - SOFT * eta.get(link.name, 0.0) ** 2, 0.2) for link in model.links)
     return replace(model, links=tuple(map(_softer, model.links, factors)))
 
@@ -72,7 +72,7 @@ def _softer(link: Link, factor: float) -> Link:
 
 
 def link_errors(model: Model, found: Mapping[int, Indicator]) -> dict[str, float]:
-    """Link → η of all its segments together."""
+    """η of each link, over all of its segments [-]."""
     sums: dict[str, np.ndarray] = {}
     for k, each in found.items():
         name = model.links[k].name
@@ -81,7 +81,7 @@ def link_errors(model: Model, found: Mapping[int, Indicator]) -> dict[str, float
 
 
 def plain_mesh_share(eta: Mapping[str, float], kinds: tuple[str, ...]) -> Share | None:
-    """Share of a model without a companion: η² for motion, η for stress."""
+    """The mesh's share of the error of a model without a companion: by η² for motion, and by η for stress."""
     if not eta:
         return None
     worst = max(eta.values())

@@ -20,17 +20,16 @@ from kedfem.links.build import most_segments
 from kedfem.links.segments import most_slices
 from kedfem.scene import Cad, Extrusion, LinkScene, MeshFile, Part, Scene, link_frames, time_grid
 
-MESH_ORDER = 2.0  # at which the error of a mesh falls; at edges that point inwards it does worse
-FACTOR, LITTLE = 2.0, 1.2  # by which elements are made smaller in one go: at most, and at least
-FINER = (1.0, 1.5, 2.0, 3.0, 4.0)  # meshes tried of links whose model is open
-FILLETS, FINEST_FILLET = ((0.1, 45.0), (0.05, 22.5)), 15.0  # degrees an element turns, by accuracy
-# segments tried: their error falls with the square of their number too, as what bends within one is not seen
-COUNTS = (3, 4, 6, 8, 12, 16, 24)
-LARGE, DEAR = 4_000, 2e7  # unknowns, and their product with steps (5 s), from which links are reduced unasked
+MESH_ORDER = 2.0  # of convergence of a mesh; lower at re-entrant edges
+FACTOR, LITTLE = 2.0, 1.2  # largest and least factor by which elements become smaller at a time
+FINER = (1.0, 1.5, 2.0, 3.0, 4.0)  # fineness of the meshes tried for links whose model is open
+FILLETS, FINEST_FILLET = ((0.1, 45.0), (0.05, 22.5)), 15.0  # angle of an element [deg] by accuracy, and the least
+COUNTS = (3, 4, 6, 8, 12, 16, 24)  # segments tried; their error falls with the square of their number
+LARGE, DEAR = 4_000, 2e7  # unknowns, and their product with steps (5 s), from which links are reduced by default
 
 
 def open_meshes(scene: Scene) -> list[str]:
-    """Names of the elastic solid and plane links whose mesh it leaves open."""
+    """Names of the elastic solid and plane links whose mesh the scene leaves open."""
     return [
         name for name, link in scene.links.items()
         if elastic(link, "solid", "plane") and "mesh" not in link.model_fields_set
@@ -39,7 +38,7 @@ def open_meshes(scene: Scene) -> list[str]:
 
 
 def with_fillets(scene: Scene, asked: float) -> Scene:
-    """The scene with fillets and free bores of CAD parts and outlines as fine as stress needs, where meshes are open."""
+    """The scene with fillets and free bores of CAD parts and outlines as fine as stress requires, if meshes are open."""
     angle = np.radians(next((angle for least, angle in FILLETS if asked >= least), FINEST_FILLET))
     links = scene.links.items()
     drawn = {name: link for name, link in links if isinstance(link.shape, Cad | Extrusion | Part)}
@@ -49,8 +48,10 @@ def with_fillets(scene: Scene, asked: float) -> Scene:
 
 
 def open_modes(scene: Scene) -> list[str]:
-    """Names of the elastic solid and plane links that do not say whether they are reduced, where a step or a mesh is open
-    too: what is chosen for these makes unreduced steps dear."""
+    """Names of the elastic solid and plane links whose reduction is open, if a step or a mesh is open too.
+
+    Unreduced steps may become expensive by the choice of these.
+    """
     if scene.analysis.solver == "monolithic" or not (open_step(scene) or open_meshes(scene)):
         return []
     links = scene.links.items()
@@ -58,8 +59,7 @@ def open_modes(scene: Scene) -> list[str]:
 
 
 def with_mesh(search: Trials, scene: Scene, left_open: Sequence[str], allowed: float) -> tuple[Scene, float, float]:
-    """The scene with the coarsest mesh of links whose model is open whose error is allowed, that error, and by what
-    it is finer."""
+    """The scene with the coarsest sufficient mesh of links whose model is open, its error, and its fineness."""
     names = [
         name for name in left_open
         if "mesh" not in scene.links[name].model_fields_set and refinable(scene.links[name])
@@ -67,9 +67,9 @@ def with_mesh(search: Trials, scene: Scene, left_open: Sequence[str], allowed: f
     if not names:
         return scene, 0.0, 1.0
     ladder = [(factor, _finer(scene, names, factor)) for factor in FINER]
-    pairs = zip(ladder, [None, *ladder], strict=False)  # few elements become more by whole numbers only
+    pairs = zip(ladder, [None, *ladder], strict=False)  # small numbers of elements may not change
     ladder = [now for now, before in pairs if before is None or now[1].links != before[1].links]
-    k, error = first_enough(search, ladder, allowed, "finer meshes")
+    k, error = first_accurate(search, ladder, allowed, "finer meshes")
     return ladder[k][1], error, ladder[k][0]
 
 
@@ -78,10 +78,10 @@ def _finer(scene: Scene, names: Sequence[str], factor: float) -> Scene:
 
 
 def chosen_meshes(search: Trials, scene: Scene, allowed: float, auto: Sequence[str]) -> tuple[Scene, float]:
-    """The scene with finer meshes of its open solid and plane links where their indicator asks for it, and the error.
+    """The scene with finer meshes of its open solid and plane links where their indicator requires them, and the error.
 
-    Trial runs, on the usual meshes first: elements are made smaller by what the error is beyond the allowed one, as far
-    as the UNKNOWNS allow.
+    Trial runs begin with the usual meshes. Elements become smaller by the ratio of the error to the allowed one, as far
+    as UNKNOWNS allows.
     """
     names = [name for name in open_meshes(scene) if name not in auto and refinable(scene.links[name])]
     error = 0.0
@@ -89,10 +89,10 @@ def chosen_meshes(search: Trials, scene: Scene, allowed: float, auto: Sequence[s
         ready = search.ready(shortened(scene))
         error, eta = _mesh_error(ready, names)
         unknowns = sum((link.full or link).unknowns for link in ready.model.links)
-        room = (UNKNOWNS / unknowns) ** (1 / 3)
-        if error <= allowed or room < LITTLE:
+        most = (UNKNOWNS / unknowns) ** (1 / 3)
+        if error <= allowed or most < LITTLE:
             break
-        factor = min((error / allowed) ** (1 / MESH_ORDER), FACTOR, room)
+        factor = min((error / allowed) ** (1 / MESH_ORDER), FACTOR, most)
         worst_links = [name for name in names if eta.get(name, 0.0) >= 0.3 * max(eta.values())]
         scene = _finer(scene, worst_links, factor)
     if error > allowed:
@@ -102,7 +102,7 @@ def chosen_meshes(search: Trials, scene: Scene, allowed: float, auto: Sequence[s
 
 
 def _mesh_error(ready: Prepared, names: Sequence[str]) -> tuple[float, dict[str, float]]:
-    """The error of some meshes in a trial run, and the indicators of all."""
+    """The error of some meshes in a trial run, and η of all links."""
     strained = PeakStrainStates(ready.model)
     base = histories(ready, look=strained.add)
     eta = link_errors(ready.model, strained.indicators)
@@ -110,7 +110,7 @@ def _mesh_error(ready: Prepared, names: Sequence[str]) -> tuple[float, dict[str,
 
 
 def with_modes(search: Trials, scene: Scene, names: Sequence[str]) -> Scene:
-    """The scene with reduced links if all unreduced steps would take longer than the computation of the modes."""
+    """The scene with reduced links if unreduced steps would take longer than the computation of the modes."""
     ready = search.ready(shortened(scene))
     if not names or ready.linkage.mobility:
         return scene
@@ -119,8 +119,8 @@ def with_modes(search: Trials, scene: Scene, names: Sequence[str]) -> Scene:
     if unknowns < LARGE or steps * unknowns < DEAR:
         return scene
     search.notes.append(
-        f"{', '.join(names)}: reduced, as {steps:,} steps of {unknowns:,} unknowns would take long; the run reports what "
-        "that costs"
+        f"{', '.join(names)}: reduced, as {steps:,} steps of {unknowns:,} unknowns would take long; the run reports the "
+        "error of that"
     )
     links = {name: scene.links[name].model_copy(update={"reduction": "modal"}) for name in names}
     return with_links(scene, links)
@@ -135,18 +135,24 @@ def open_segments(scene: Scene) -> list[str]:
 
 
 def with_segments(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, float]:
-    """The scene with the fewest segments whose error is allowed, the same number in all links that are not stubby, and
-    that error."""
+    """The scene with the fewest sufficient segments, the same number in all links that are not stubby, and the error."""
     most = {name: most_segments(scene, name) for name in open_segments(scene)}
     ladder = [(count, _segmented(scene, most, count)) for count in COUNTS]
-    k, error = first_enough(search, ladder, allowed, "more segments")
+    k, error = first_accurate(search, ladder, allowed, "more segments")
     return (scene, 0.0) if error == math.inf else (ladder[k][1], error)
 
 
-def first_enough(search: Trials, ladder: Sequence[tuple[float, Scene]], allowed: float, finer: str) -> tuple[int, float]:
-    """The first of successively finer scenes whose error is allowed, with its fineness, and that error.
+def first_accurate(
+    search: Trials, ladder: Sequence[tuple[float, Scene]], allowed: float, finer: str
+) -> tuple[int, float]:
+    """Index of the first of successively finer scenes whose error is allowed, and its error.
 
-    What two of them differ by shows what is left beyond the finer one; infinite if these two could not be compared.
+    The difference of two scenes shows the error of the finer one; it is infinite if two cannot be compared.
+
+    Parameters
+    ----------
+    ladder : fineness and scene, coarsest first
+    finer : name of the refinement, for notes
     """
     error = math.inf
     for k, ((fine, now), (next_fine, better)) in enumerate(pairwise(ladder)):
@@ -168,13 +174,13 @@ def first_enough(search: Trials, ladder: Sequence[tuple[float, Scene]], allowed:
 
 
 def _segmented(scene: Scene, most: Mapping[str, int], count: int) -> Scene:
-    """Links in segments, each in at most as many as do not soften it."""
+    """The scene with links in segments, each in no more than do not soften it."""
     links = {name: {"segments": min(count, least)} for name, least in most.items()}
     return with_links(scene, {n: scene.links[n].model_copy(update=x) for n, x in links.items()})
 
 
 def stubby_warning(model: Model) -> tuple[str, ...]:
-    """A warning of links with segments shorter than the link is wide, which soften it."""
+    """A warning if links have segments shorter than the link is wide, which make it too soft."""
     stubby = []
     for name, parts in segments(model).items():
         if len(parts) > 1 and parts[0].meshed:
@@ -191,9 +197,9 @@ def stubby_warning(model: Model) -> tuple[str, ...]:
 
 
 def with_simpler_links(search: Trials, scene: Scene, left_open: list[str], allowed: float) -> tuple[Scene, float]:
-    """The scene with links made rigid, beams or plane as far as that changes little, and the change.
+    """The scene with links as rigid, beams or plane as far as the results change little, and the change.
 
-    Allowed is what the mesh left of both shares: a simpler link is compared with the one on that mesh.
+    `allowed` is the error that the mesh leaves of both shares: a simpler link is compared with that on the mesh.
     """
     reference, error = scene, 0.0
     for name in left_open:
@@ -201,7 +207,7 @@ def with_simpler_links(search: Trials, scene: Scene, left_open: list[str], allow
             trial = with_links(scene, {name: simpler})
             try:
                 change = search.difference(trial, reference)
-            except SceneError:  # such a model makes no sense, as one without any elastic link
+            except SceneError:  # such a model is refused, as one without any elastic link
                 continue
             except KedfemError as fault:
                 search.notes.append(f"{name}: not {simpler.model}, {str(fault).splitlines()[0]}")

@@ -1,9 +1,9 @@
 """The cheapest model of a scene with a required accuracy: `analysis.accuracy`.
 
-Everything is found by short trial runs of the scene itself, with reduced links: the frames from how far links bend,
- beams by elements of few and many nodes against a fine one, the step from the order that three steps show,
-meshes of hexahedra and quadrilaterals from their indicator, segments of links with co-rotational frames by taking more,
-simpler links by putting them in. What the scene states stays; what it leaves open is chosen.
+Everything is chosen by short trial runs of the scene itself with reduced links: frames from the bending of links, beams
+by comparison with fine ones, the step from the differences between levels in time, meshes of solid and plane links from
+their indicator, segments of links with co-rotational frames and simpler models of links by comparison. What the scene
+states is kept; what it leaves open is chosen.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -40,15 +40,15 @@ from kedfem.links.record import Link
 from kedfem.scene import LinkScene, Scene, refuse_unsupported
 from kedfem.store import itself, kept
 
-STEP, MESH, MODEL, REDUCTION = 0.3, 0.4, 0.2, 0.1  # shares of the error asked for
-SEGMENTS = 0.2  # of the mesh's share, where links with co-rotational frames leave their number open
-VAIN = 0.1  # error of the step beyond which finer meshes would be in vain
-ROUGH = "beam5", 2  # elements of beams for the first search of the step of a motion without a drive
+STEP, MESH, MODEL, REDUCTION = 0.3, 0.4, 0.2, 0.1  # shares of the required accuracy
+SEGMENTS = 0.2  # part of the mesh's share for segments, if links leave their number open
+VAIN = 0.1  # error of the step above which finer meshes are useless
+ROUGH = "beam5", 2  # elements of beams in the first search for the step of a motion without a drive
 
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """One part of the error: its source, its size (relative, worst channel), and the size allowed."""
+    """One part of the error: its source, its size in the worst channel [-], and the size allowed [-]."""
 
     what: str
     error: float
@@ -60,11 +60,11 @@ class Plan:
     """The choices for a scene with `analysis.accuracy`, with their reasons.
 
     scene : the scene with everything chosen
-    asked : the required accuracy
+    asked : the required accuracy [-]
     finer : factor by which elements are smaller than those of default meshes
-    shares : parts of the error; the reduction's is what it may cause
+    shares : parts of the error; that of the reduction is the allowed one
     notes : trials, omissions, and limits of the accuracy
-    links : of its trials, those that the scene has; not kept between runs
+    links : links of the trials that the scene has too; not kept between runs
     """
 
     scene: Scene
@@ -86,15 +86,15 @@ class Plan:
 
 
 def plan_for(scene: Scene, stage: Stage = lambda name: None) -> Plan | None:
-    """The plan of a scene that leaves something open; None for a scene with plain defaults.
+    """The plan of a scene that leaves something open; None if it does not, or if accuracy = "quick".
 
-    Of solid and plane links that move freely the step alone, and how finely fillets are divided: they are not reduced;
-    each trial is as dear as a run. The plan of a steady motion is that of the motion from the start on, over its period.
+    For solid and plane links that move freely only the step and the fineness of fillets are chosen: they cannot be
+    reduced, and each trial costs as much as a run. A steady motion has the plan of the transient motion over its period.
 
     Raises
     ------
     MotionError, MeshError, SceneError, SolveError
-        If the scene cannot be run even as it stands.
+        The scene cannot be run even as it is.
     """
     if scene.analysis.accuracy == "quick" or not anything_open(scene):
         return None
@@ -112,12 +112,12 @@ def plan_for(scene: Scene, stage: Stage = lambda name: None) -> Plan | None:
 def ready_to_step(
     scene: Scene, stage: Stage = lambda name: None, ends: Sequence[Scene] = ()
 ) -> tuple[Plan | None, Prepared, Reduction | None]:
-    """A scene prepared for a run: its plan, and all that does not need a time step (`accuracy.reduction.prepared`).
+    """A scene prepared for a run: its plan, its model, and its reduction (`accuracy.reduction.prepared`).
 
     Raises
     ------
     KedfemError
-        As `plan_for` and `prepared`; at once where nothing constrains links that are to be in static balance.
+        As `plan_for` and `prepared`; at once if nothing constrains links that are to be in static balance.
     """
     refuse_unsupported(scene)
     plan = plan_for(scene, stage)
@@ -143,16 +143,16 @@ def planned(scene: Scene, stage: Stage = lambda name: None) -> Plan:
         return replace(plan, links=search.links_of(plan.scene))
 
     plan: Plan = kept("plan", key(scene), made, lambda plan: replace(plan, links={}), itself)
-    return replace(plan, scene=with_models(scene, plan.scene))  # kept ones are of a scene with other outputs
+    return replace(plan, scene=with_models(scene, plan.scene))  # a kept plan may have other outputs
 
 
 def found_plan(search: Trials, scene: Scene) -> Plan:
-    """The cheapest model of a scene with the required accuracy, by trial runs, without any kept plan."""
+    """The plan of a scene by trial runs; no kept plan is used."""
     asked, stage = search.asked, search.stage
     if not scene.driven_joints and not beams_only(scene):
         return _step_alone(search, scene)
     left_open = [name for name, link in scene.links.items() if link.model == "auto"]
-    functions = open_modes(scene)
+    unreduced = open_modes(scene)
     scene = _opened(scene, left_open)
     shares: list[Share] = []
     stage("plan: frames")
@@ -166,7 +166,7 @@ def found_plan(search: Trials, scene: Scene) -> Plan:
             return Plan(scene, asked, 1.0, tuple(shares), tuple(search.notes))
     stage("plan: beams")
     free, analysis = open_step(scene) and not scene.driven_joints, scene.analysis
-    if free and open_beams(scene):  # beams are compared in a step that a rough model is given
+    if free and open_beams(scene):  # beams are compared in a step chosen for a rough model
         coarse = with_beams(scene, open_beams(scene), ROUGH)
         rough, _ = chosen_step(Trials(asked, stage), coarse, MESH / 2 * asked)
         scene = with_analysis(scene, step=rough.analysis.step)
@@ -185,7 +185,7 @@ def found_plan(search: Trials, scene: Scene) -> Plan:
         scene, segments = with_segments(search, scene, SEGMENTS * loose)
     stage("plan: simpler links")
     scene, model = with_simpler_links(search, scene, left_open, (MESH - cut + MODEL) * asked - mesh)
-    scene = with_modes(search, scene, functions)
+    scene = with_modes(search, scene, unreduced)
     if "reduction_tolerance" not in scene.analysis.model_fields_set:
         scene = with_analysis(scene, reduction_tolerance=REDUCTION * asked)
     scene = with_analysis(scene, accuracy="quick")
@@ -202,7 +202,7 @@ def found_plan(search: Trials, scene: Scene) -> Plan:
 
 
 def _step_alone(search: Trials, scene: Scene) -> Plan:
-    """A note on solid and plane links that move freely, which keep their meshes."""
+    """The plan of solid and plane links that move freely: only the step is chosen."""
     search.stage("plan: step")
     chosen, step = chosen_step(search, scene, STEP * search.asked)
     share = Share("time step", step, STEP * search.asked)
@@ -220,7 +220,7 @@ def _limits(plan: Plan) -> Iterator[str]:
 
 
 def _opened(scene: Scene, left_open: list[str]) -> Scene:
-    """Links that leave their model open, with the best model for their shape, reduced."""
+    """The scene whose links of open model have the most detailed model of their shape, reduced."""
     named = {name: scene.links[name] for name in left_open}
     best = {name: _remeshed(link, of_family(link, families(link)[-1], True)) for name, link in named.items()}
     return with_links(scene, best)

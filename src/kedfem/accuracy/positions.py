@@ -1,11 +1,11 @@
 """Estimate of the largest values between the positions of static and quasi-static analyses, for the error budget.
 
-A smooth curve with the second difference D about its highest point rises by at most D/8 above it between two points.
-Where a load comes or goes the curve jumps (the median of five second differences knows nothing of it), and what it has
-reached by then is open by half the step to the flatter side.
+A smooth curve with the second difference D at its highest point rises by at most D/8 above it between two points. Where
+a load starts or ends the curve jumps. The median of five second differences ignores the jump, and the uncertainty of the
+highest value is half the difference to its nearer neighbour.
 
-Meshes are compared in fewer positions than those of a run, which take as long as its own: in as few as show the largest
-values of all channels nearly.
+Meshes are compared in fewer positions than those of a run, which would take as much time as the run: in so few that they
+still show nearly the largest values of all channels.
 """
 
 from collections.abc import Mapping
@@ -20,8 +20,8 @@ from kedfem.arrays import Float
 from kedfem.scene import Scene, time_grid
 
 FEWEST = 24  # positions in which meshes are compared
-SHOWN = 0.9  # of the largest value of each channel, in them
-AROUND = 2  # positions on both sides of the highest one at which the curve's bend counts
+SHOWN = 0.9  # least part of the largest value of each channel that these positions show
+AROUND = 2  # positions on both sides of the highest one whose second differences count
 
 
 def positions_share(found: Histories, sizes: Mapping[str, float]) -> Share:
@@ -29,8 +29,8 @@ def positions_share(found: Histories, sizes: Mapping[str, float]) -> Share:
 
     Parameters
     ----------
-    found : channels, a row for each position
-    sizes : channel that counts → its largest value
+    found : channels, with a row for each position
+    sizes : largest value of each judged channel
     """
     lengths = {name: np.linalg.norm(found.channels[name][1], axis=1) for name in sizes}
     errors = {name: missed(lengths[name]) / size for name, size in sizes.items()}
@@ -39,7 +39,7 @@ def positions_share(found: Histories, sizes: Mapping[str, float]) -> Share:
 
 
 def missed(values: Float[np.ndarray, " n"]) -> float:
-    """Possible rise of a curve above its largest value between its points; 0 if that is at an end.
+    """Possible rise of a curve between its points above its largest value; 0 if that is at an end.
 
     Examples
     --------

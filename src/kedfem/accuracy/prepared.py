@@ -1,7 +1,7 @@
 """A scene prepared for its time steps: links, matrices and rigid-body motion, shared between similar scenes.
 
-What was found for it is kept under its `key`. Scenes that differ in the speed of their drive and in damping alone have
-links with the same modes.
+Plans and reductions are kept between runs under its `key`. Scenes that differ only in damping and in the speed of their
+drive share the modes of their links.
 """
 
 import json
@@ -40,8 +40,8 @@ from kedfem.scene import (
 from kedfem.store import contents
 
 BESIDE = ("title", "fatigue", "output")
-"""Sections of a scene on which no plan and no reduced model depends, probes of the output apart."""
-INSTANTS = 16  # at which the linkage is examined before the first run
+"""Tables of a scene on which no plan and no reduced model depends, except for probes of the output."""
+INSTANTS = 16  # at which loads and motion are evaluated for the modes
 
 T = TypeVar("T")
 
@@ -59,7 +59,7 @@ class Prepared:
 def meshed(
     scene: Scene, stage: Callable[[str], None] = lambda name: None, known: Mapping[str, Link] | None = None
 ) -> Prepared:
-    """Rigid path and elastic model of a scene with all its links unreduced; nothing is solved.
+    """Rigid-body path and elastic model of a scene with all links unreduced; nothing is solved.
 
     Parameters
     ----------
@@ -80,13 +80,13 @@ def moving(scene: Scene) -> tuple[Linkage, Path]:
 
 
 def with_models(scene: Scene, of: Scene) -> Scene:
-    """A scene with all of another of the same `key`, but for its own title, fatigue and output, and its folder."""
+    """A scene with everything from another one of the same `key`, but its own title, fatigue, output and folder."""
     every = {name: getattr(of, name) for name in Scene.model_fields if name not in BESIDE}
     return scene.model_copy(update=every)
 
 
 def key(scene: Scene) -> str:
-    """A digest of everything in a scene that a plan or a reduced model depends on, the contents of its files too."""
+    """A digest of all on which a plan or a reduced model of a scene depends, with the contents of its files."""
     described = scene.model_dump(mode="json", exclude={*BESIDE})
     described["probes"] = scene.output.model_dump(mode="json")["probes"]
     digest = sha256(json.dumps(described).encode())
@@ -109,14 +109,14 @@ class Neighbours:
 
 ALONE = Neighbours()
 _LAST: dict[str, Any] = {}
-"""The last reduction that scenes of this process share."""
+"""The reduction that scenes of this process share, by its key; at most one."""
 
 
 def alike(scene: Scene) -> str | None:
-    """The digest that scenes with common reduced links share; None for a scene that shares them with no other.
+    """The digest of scenes that can share reduced links; None for a scene that can share them with no other.
 
-    It covers everything but the damping and the speed of a drive with constant or ramped speed. Rigid links with
-    co-rotational frames depend on the step.
+    It covers everything except for the damping and the speed of a drive with constant or ramped speed. Scenes with
+    co-rotational frames cannot share, because their rigid links depend on the step.
     """
     if scene.drive is None or not any(link.reduced for link in scene.links.values()):
         return None
@@ -127,8 +127,8 @@ def alike(scene: Scene) -> str | None:
     return key(scene.model_copy(update={"drive": drive, "damping": None}))
 
 
-def last_of(name: str, made: Callable[[], T]) -> T:
-    """The entry of this process under a name; only the last one is kept."""
+def shared_reduction(name: str, made: Callable[[], T]) -> T:
+    """The reduction of this process under a key; only the last one is kept."""
     if name not in _LAST:
         _LAST.clear()
         _LAST[name] = made()
@@ -142,7 +142,7 @@ def damped_as(scene: Scene, model: Model) -> Model:
 
 
 def training_motion(full: Prepared) -> RigidMotion:
-    """Rigid motion at instants of the analysis for modes: over the whole time, more closely in the last revolution."""
+    """Rigid-body motion at the instants from which modes are computed: over the whole time, denser at the end."""
     scene, grid = full.scene, time_grid(full.scene)
     per_turn = revolution_steps(scene)
     half = INSTANTS // 2
@@ -155,7 +155,7 @@ def training_motion(full: Prepared) -> RigidMotion:
 
 
 def _loaded(full: Prepared, t: Float[np.ndarray, " T"]) -> Float[np.ndarray, " l"]:
-    """The time at which each load is greatest, so that short ones are not missed."""
+    """The time at which each load is greatest, so that short loads are not missed."""
     phi = drive_angle(full.scene.motion, t)[0]
     factors = [np.abs(load.factor(t, phi)) for loads in full.model.loads for load in loads]
     return np.array([t[f.argmax()] for f in factors if np.ptp(f) > 0.0])

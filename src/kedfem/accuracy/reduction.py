@@ -1,15 +1,15 @@
 """Links reduced as far as a tolerance allows, with an estimate of the reduction error.
 
-The estimate: the residual of the reduced run in the full equation, at some moments, is answered by static deflections of
-the full linkage; these are added to the modes, and the run is repeated. What changes, times a factor found on full
-runs, is the estimate: the residual measured in the norm dual to the energy's, integrated over time. If it is above the
-tolerance, the richer modes are kept and the same is done again.
+The residual of the reduced run in the unreduced equation is evaluated at some instants; the static deflections of the
+unreduced linkage under it are added to the modes, and the run is repeated. The change, times a factor measured on
+unreduced runs, is the estimate: the residual in the dual of the energy norm, integrated over time. If it exceeds the
+tolerance, the richer modes are kept, and the same is repeated.
 
-Scenes that differ in the speed of their drive and in damping alone can share one reduction (`shared_modes`): modes are
-found at the fastest, and those added that the estimate asks for at the slowest; the larger estimate of both counts.
+Scenes that differ only in damping and in the speed of their drive can share one reduction (`shared_modes`): modes are
+found for the fastest, the estimate for the slowest adds what it needs, and the larger estimate of both counts.
 
-Of links with co-rotational frames each segment is reduced, with modes that rigid-body frames give; the runs that estimate
-the error have co-rotational frames. Of the residual in their frames only what moments do in turning these is left out.
+Links with co-rotational frames have each segment reduced, with modes from rigid-body frames; the runs that estimate the
+error have co-rotational frames. Of the residual in these frames only the effect of moments on their rotation is left out.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -20,7 +20,7 @@ import numpy as np
 
 from kedfem.accuracy.histories import Histories, histories, relative_errors, worst
 from kedfem.accuracy.longer_steps import differs_alike, doubled
-from kedfem.accuracy.prepared import Prepared, damped_as, key, last_of, meshed, moving, training_motion
+from kedfem.accuracy.prepared import Prepared, damped_as, key, meshed, moving, shared_reduction, training_motion
 from kedfem.accuracy.variants import shortened, with_analysis
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Snapshot
@@ -39,25 +39,25 @@ from kedfem.store import kept
 
 Stage = Callable[[str], None]
 
-ROUNDS = 4  # of enriching
-MOMENTS = 16  # of a run where its residual is taken, evenly over it
-CLOSER = 0.25  # a round's share of the last one's tolerance, of segments, at most
-ADDED = 8  # modes that a round adds to a link, at most
-MINUTE = 60  # unknowns of a link that cannot gain from a reduction
-CAUTION = 1.6  # the richer run errs too: with this the estimate is 0.35 to 1.65 of the true error in 44 runs
-FIRST = 0.1  # of the tolerance: what the first modes leave out of the training deflections' energy norm
-SEGMENT = 0.1  # of the tolerance: the same of segments; stress errs by more, and another round costs more than modes
+ROUNDS = 4  # most enrichments
+MOMENTS = 16  # instants of a run at which its residual is evaluated
+CLOSER = 0.25  # most ratio of the tolerance of a round to that of the last one, for segments
+ADDED = 8  # most modes that a round adds to a link
+MINUTE = 60  # unknowns up to which a link cannot gain from a reduction
+CAUTION = 1.6  # factor for the error of the richer run: the estimate is then 0.35 to 1.65 of the true error in 44 runs
+FIRST = 0.1  # of the tolerance: energy norm of the training deflections that the first modes may leave out
+SEGMENT = 0.1  # the same for segments: stress errs by more, and another round costs more than modes
 
-Functions = list[Float[np.ndarray, "_ _"] | None]
+Modes = list[Float[np.ndarray, "_ _"] | None]
 
 
 @dataclass(frozen=True, slots=True)
 class Reduction:
     """A prepared scene with reduced links.
 
-    ready : its model reduced
-    estimate : relative error of every channel that counts, compared with the unreduced links
-    tolerance : that was asked for
+    ready : the scene with its reduced model
+    estimate : estimated relative error of every judged channel against unreduced links [-]
+    tolerance : the error asked for [-]
     """
 
     ready: Prepared
@@ -69,12 +69,12 @@ def prepared(
     scene: Scene, stage: Stage = lambda name: None, ends: Sequence[Scene] = (),
     known: Mapping[str, Link] | None = None,
 ) -> tuple[Prepared, Reduction | None]:  # fmt: skip
-    """Everything of a scene that does not depend on a time step, with links reduced as the scene says.
+    """A scene prepared for its time steps, with links reduced as it states, and the reduction if there is one.
 
     Parameters
     ----------
-    ends : scenes that share their modes with this one, as `alike` says; none: it has its own
-    known : links that are made already, by name: of this scene, or of all that share modes
+    ends : the scenes with the extreme speeds among those that share modes with this one (`alike`); none if it has its own
+    known : existing links by name, of this scene or of all that share modes
     """
     chosen = {name: link.modes for name, link in scene.links.items() if link.reduced}
     if not chosen:
@@ -91,7 +91,7 @@ def prepared(
 
     if not ends:
         return (found := found_for(scene)).ready, found
-    found = last_of(" ".join(map(key, ends)), lambda: found_for(*ends))
+    found = shared_reduction(" ".join(map(key, ends)), lambda: found_for(*ends))
     ready = Prepared(scene, *moving(scene), damped_as(scene, found.ready.model))
     found = replace(found, ready=ready)
     return found.ready, found
@@ -101,7 +101,7 @@ Stored = tuple[Linkage, Path, Model, dict[str, float]]
 
 
 def _packed(reduction: Reduction) -> Stored | None:
-    """A reduction in the form that is kept between runs; None if links are left unreduced."""
+    """A reduction in the form that is kept between runs; None if some links are unreduced."""
     ready, model = reduction.ready, stored_model(reduction.ready.model)
     return None if model is None else (ready.linkage, ready.path, model, reduction.estimate)
 
@@ -116,16 +116,16 @@ def reduced(
     full: Prepared, chosen: Collection[str], tolerance: float, counts: dict[str, int] | None = None,
     stage: Stage = lambda name: None, others: Sequence[Scene] = (),
 ) -> Reduction:  # fmt: skip
-    """Reduce some links of a prepared scene, as far as a tolerance allows.
+    """A prepared scene with some links reduced as far as a tolerance allows.
 
-    Links that are not chosen but large are reduced too while the error is estimated, and left unreduced at the end.
+    Other large links are reduced too while the error is estimated, but unreduced in the result.
 
     Parameters
     ----------
     chosen : names of links
     tolerance : relative error that the reduction may cause in probes, joint forces and the drive's torque [-]
-    counts : number of modes of links that have it given
-    others : scenes that are `alike`, and for which the modes must serve too
+    counts : given numbers of modes, by link
+    others : scenes that are `alike`, for which the modes must suffice too
     """
     stage("modes")
     parts = static_parts(full.model, full.linkage.mobility > 0)
@@ -136,7 +136,7 @@ def reduced(
     found = bases(full.model, training_motion(full), parts, needed)
     given = counts or {}
 
-    def first(share: float) -> Functions:
+    def first(share: float) -> Modes:
         shares = [share * (1.0 if link.fit is None else SEGMENT) for link in full.model.links]
         return [
             None if basis is None else basis.first(given.get(link.name, _count(link, basis, own * tolerance)))
@@ -154,34 +154,33 @@ def reduced(
 
 
 def _beginning(full: Prepared) -> Prepared:
-    """A prepared scene for the estimate of the reduction error: with vibration, short, in long steps where it may be."""
+    """A prepared scene for the estimate of the reduction error: with vibration, short, in long steps where possible."""
     scene = full.scene if without_vibration(full.scene) else with_analysis(full.scene, kind="transient")
     short = replace(full, scene=shortened(scene))
     return replace(short, scene=doubled(short.scene)) if differs_alike(short) else short
 
 
-def _same(Q: Functions, share: float) -> Functions:
+def _same(Q: Modes, share: float) -> Modes:
     """The given modes, for any share of a tolerance."""
     return Q
 
 
 def reducible(model: Model) -> set[str]:
-    """Names of the links that can be reduced: not beams with co-rotational frames, which are elements of few
-    functions."""
+    """Names of the links that can be reduced: all but beams with co-rotational frames, whose elements are small."""
     return {link.name for link in model.links if link.fit is None or link.meshed}
 
 
 def _count(link: Link, basis: Basis, tolerance: float) -> int:
-    """Initial number of modes for a tolerance; those of segments are sorted by their purpose."""
+    """Initial number of modes for a tolerance; the modes of segments are sorted differently."""
     return basis.count(FIRST * tolerance if link.fit is None else tolerance)
 
 
 def first_reduced(
     full: Prepared, tolerance: float, known: Sequence[Float[np.ndarray, "_ _"] | None] | None = None
 ) -> Prepared:
-    """All large links of a prepared scene reduced about as far as a tolerance allows, on known modes if there are any.
+    """A prepared scene with all large links reduced about as far as a tolerance allows, on known modes if there are any.
 
-    None is where the drive leaves motions free; the error is not examined.
+    No link is reduced if some motions are free. The error is not estimated.
     """
     links = full.model.links
     if full.linkage.mobility or all(link.unknowns <= SMALL and link.full is None for link in links):
@@ -196,14 +195,14 @@ def first_reduced(
 
 
 def _settled(
-    full: Prepared, parts: Sequence[Substructure], first: Callable[[float], Functions], tolerance: float,
+    full: Prepared, parts: Sequence[Substructure], first: Callable[[float], Modes], tolerance: float,
     chosen: Collection[str], fixed: Collection[str],
-) -> tuple[Functions, dict[str, float]]:  # fmt: skip
-    """Modes whose estimated error is below the tolerance, or the last ones, and the estimate.
+) -> tuple[Modes, dict[str, float]]:  # fmt: skip
+    """Modes whose estimated error is below the tolerance, or else the last ones, and the estimate.
 
     Parameters
     ----------
-    first : modes to begin with, for a share of the tolerance
+    first : function from a share of the tolerance to initial modes
     fixed : names of links whose number of modes is given
     """
     moments = set(np.linspace(1, time_grid(full.scene).steps, MOMENTS).astype(int).tolist())
@@ -225,22 +224,22 @@ def _settled(
     return Q, estimate
 
 
-def _closer(model: Model, now: Functions, next_ones: Functions, richer: Functions) -> Functions:
-    """The next modes of segments, which are few, as long as there are any; else those of the larger run."""
+def _closer(model: Model, now: Modes, next_ones: Modes, richer: Modes) -> Modes:
+    """The next modes of segments as long as there are any, else those of the richer run."""
     lengths = [[0 if Q is None else Q.shape[1] for Q in each] for each in (now, next_ones)]
     more = lengths[0] != lengths[1]
     every = zip(model.links, next_ones, richer, strict=True)
     return [some if more and link.fit is not None else other for link, some, other in every]
 
 
-def _run(full: Prepared, Q: Functions, moments: Collection[int]) -> tuple[Prepared, Histories]:
-    """The model on given modes, and its run."""
+def _run(full: Prepared, Q: Modes, moments: Collection[int]) -> tuple[Prepared, Histories]:
+    """The model with given modes, and its run."""
     small = replace(full, model=reduced_model(full.model, Q))
     return small, histories(small, moments)
 
 
-def _enriched(full: Prepared, parts: Sequence[Substructure], small: Prepared, kept: Sequence[Snapshot]) -> Functions:
-    """Modes with the responses to the residual at some instants added."""
+def _enriched(full: Prepared, parts: Sequence[Substructure], small: Prepared, kept: Sequence[Snapshot]) -> Modes:
+    """Modes with added responses to the residual at some instants."""
     answers = residual_deflections(full.model, parts, small.model, kept)
     links = zip(full.model.links, small.model.links, zip(*answers, strict=True), strict=True)
     return [None if link is whole else enriched(link, each, ADDED) for whole, link, each in links]

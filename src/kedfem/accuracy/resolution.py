@@ -1,4 +1,4 @@
-"""Checks of the time step: whether it resolves the motion, damps vibration in rotating links, and meets a resonance."""
+"""Checks of the time step and the drive's speed: resolution of the motion, stability in rotating links, resonances."""
 
 import math
 from dataclasses import dataclass, field
@@ -29,12 +29,12 @@ from kedfem.scene import (
     time_grid,
 )
 
-POSES = 8  # of the last revolution at which the linkage is frozen
-LARGE = 100_000  # unknowns of a model whose stiffness is not factored for this check
-FEWEST = 10  # steps in a period: the period is then 3 % too long
+POSES = 8  # positions of the last revolution at which the linkage is frozen
+LARGE = 100_000  # unknowns above which the stiffness is not factored for this check
+FEWEST = 10  # least number of steps in a period, which is then 3 % too long
 UNFOLLOWED = 0.01  # error of a step below which unresolved vibration is negligible
-HARMONICS = 5  # of the drive
-NEAR = 0.03  # of a frequency
+HARMONICS = 5  # of the drive's speed that are compared
+NEAR = 0.03  # relative distance of a harmonic from a frequency that counts as a resonance
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,12 +48,12 @@ class Resonance:
 
 @dataclass(frozen=True, slots=True)
 class Resolution:
-    """First frequencies of the linkage in some poses, with fixed drive, of the vibrations that its loads excite.
+    """First frequencies, in some poses with fixed drive, of the vibrations that the loads excite.
 
-    step : of the analysis [s]
+    step : time step of the analysis [s]
     first : (p,) frequency in each pose [Hz]
-    angles : (p,) drive angle there [rad]
-    resonances : with harmonics of the drive
+    angles : (p,) drive angle of each pose [rad]
+    resonances : those with harmonics of the drive
     """
 
     step: float
@@ -68,7 +68,7 @@ class Resolution:
 
 
 def resolution(ready: Prepared) -> Resolution | None:
-    """Frequencies of a prepared scene's linkage; None if it is free to move, nothing is excited or the model is large."""
+    """First frequencies of a prepared scene's linkage; None if it can move, nothing is excited or the model is large."""
     if ready.model.unknowns > LARGE or ready.linkage.mobility:
         return None
     scene, grid = ready.scene, time_grid(ready.scene)
@@ -104,9 +104,9 @@ def resonances(first: Float[np.ndarray, " p"], angles: Float[np.ndarray, " p"], 
 
 
 def local_error(scheme: Scheme) -> float:
-    """Constant of the error that one step makes in the displacement: (1 + 3 θ²)/12 · h² |δ1'' − δ0''|, θ = α_m − α_f.
+    """Factor (1 + 3 θ²)/12 h² [s²] of |δ1'' − δ0''| in the error of one step in the displacement, θ = α_m − α_f.
 
-    After Zienkiewicz and Xie (1991), whose (6 β − 1)/6 it is for Newmark's method, 1/12 with average acceleration;
+    After Zienkiewicz and Xie (1991): for Newmark's method it is their (6 β − 1)/6, 1/12 with average acceleration;
     δ'' of generalised-α belongs to the time θ h after the step's end.
     """
     return (1 + 3 * (scheme.alpha_m - scheme.alpha_f) ** 2) / 12 * scheme.h**2
@@ -116,8 +116,8 @@ def local_error(scheme: Scheme) -> float:
 class StepError:
     """The largest local error of the steps so far, in the mass norm, and the sum of local errors.
 
-    Vibration adds them up, step by step, for as long as damping at its frequency lets it: what is left of earlier errors
-    falls by exp(−h (α + β ω²)/2) in a step, ω² = |δ''|/|δ|.
+    Vibration accumulates them against damping at its frequency: earlier errors fall by exp(−h (α + β ω²)/2) in a step,
+    ω² = |δ''|/|δ|.
     """
 
     model: Model
@@ -159,7 +159,7 @@ class StepError:
         return min(1.0, self.constant * self.grown / self.peak) if self.peak else 0.0
 
     def _weighted(self, block: Block, name: str) -> Float[np.ndarray, "T k"]:
-        """√m times a field of all links; a full mass is taken for its diagonal."""
+        """√m times a field of all links; of a full mass matrix the diagonal is used."""
         both = zip(self.model.links, block.links, strict=True)
         every = ((getattr(history, name), c, m) for link, history in both for c, m in enumerate(link.mass))
         columns = [x[:, :, c] * np.sqrt(np.abs(m.diagonal())) for x, c, m in every]
@@ -175,18 +175,18 @@ def step_error(ready: Prepared) -> StepError:
 def resolution_warnings(found: Resolution | None, error: float | None = None) -> list[str]:
     """Warnings about the step and the drive's speed.
 
-    Few steps in a period are said where the error of the step shows that something vibrates: others follow what moves.
+    Too few steps in a period are reported only if the error of the step shows that something vibrates.
 
     Parameters
     ----------
-    error : of the step, if known
+    error : of the step [-], if known
     """
     out = []
     if found is not None and found.steps_per_period < FEWEST and (error is None or error > UNFOLLOWED):
         known = "" if error is None else f", and its error is estimated to be {percent(error)}"
         out.append(
             f"the step resolves the first frequency of the linkage, {found.first.max():.3g} Hz, by "
-            f"{found.steps_per_period:.2g} steps in a period{known}: vibration is not followed; take {FEWEST} or more, a "
+            f"{found.steps_per_period:.2g} steps in a period{known}: vibration is not resolved; take {FEWEST} or more, a "
             f"step of {1 / (FEWEST * found.first.max()):.2g} s"
         )
     if found is not None and found.resonances:
@@ -196,13 +196,13 @@ def resolution_warnings(found: Resolution | None, error: float | None = None) ->
         out.append(
             f"the drive's harmonic {numbers} ({speeds} Hz) meets the first frequency of the linkage, "
             f"{found.first.min():.3g} to {found.first.max():.3g} Hz over the revolution, near drive angle {angles} deg: "
-            "resonance, as far as damping and the passing lets it"
+            "resonance, as far as damping and the short passage allow"
         )
     return out
 
 
 def fewest_steps(scene: Scene) -> float:
-    """Steps of an analysis below which vibration may grow: the drive then rotates by more than 1 − ρ∞ in a step."""
+    """Least number of steps with which vibration cannot grow: the drive rotates by at most 1 − ρ∞ in a step."""
     rho_inf = scene.analysis.rho_inf
     if rayleigh(scene.damping)[1] == 0.0 and not corotational(scene) and not _moving(scene):
         return 0.0
@@ -217,8 +217,10 @@ def fewest_steps(scene: Scene) -> float:
 
 
 def _moving(scene: Scene) -> str | None:
-    """A joint enforced by constraint equations, from whose force vibration comes that grows alike, from twice
-    `stable_rotation` on (measured)."""
+    """A joint enforced by constraint equations, whose forces cause vibration that grows in the same way, if there is one.
+
+    It grows from twice `stable_rotation` on (measured).
+    """
     return next((name for name in scene.joints if enforced_by_equations(scene, name)), None)
 
 

@@ -1,7 +1,7 @@
-"""Displacements of rigid links with co-rotational frames under the forces that they transmit: an error of the step.
+"""Deformation of rigid links with co-rotational frames under the forces that they transmit: an error of the step.
 
-It falls with the square of the step, as other errors of the step do, and is part of the error that these make of a
-channel: marches in steps twice as long have such links four times as soft (`dynamics.rigid_links.for_steps`).
+It falls with the square of the step, as other errors of the step do, and is included in the estimates of these: in steps
+twice as long such links are four times as soft (`dynamics.rigid_links.for_steps`).
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.model import Model
 from kedfem.links.record import Link, in_space
 
-WARNED = 0.01  # of the largest displacement, where no accuracy is asked for
+WARNED = 0.01  # of the largest displacement: a warning unless an accuracy is required
 INSTANTS = 256  # of a block that are examined
 
 
@@ -24,8 +24,8 @@ INSTANTS = 256  # of a block that are examined
 class RigidLinkCompliance:
     """Largest deformation of each such link so far, and the largest displacement of joints and ends of all links.
 
-    displacement : (L,) change of the vector between two of a link's joints or outermost nodes [m]
-    moved : from the reference position [m]
+    displacement : (L,) largest change of the vector between two of a link's joints or outermost nodes [m]
+    moved : largest displacement from the reference position [m]
     """
 
     model: Model
@@ -63,7 +63,7 @@ class RigidLinkCompliance:
 
 
 def ends(link: Link, joint: Attachment) -> Float[np.ndarray, "p n"]:
-    """Weights of a rigid link's functions that give displacements at its joints and its outermost nodes."""
+    """Weights of a rigid link's functions for the displacements of its joints and its outermost nodes [-]."""
     full, dimensions = link.full or link, 2 if link.planar else 3
     nodes = full.X[full.one != 0.0]
     outermost = nodes[np.concatenate([nodes.argmin(axis=0), nodes.argmax(axis=0)])]
@@ -80,12 +80,12 @@ def compliance_warning(found: RigidLinkCompliance, asked: float | None = None) -
     k = int(found.displacement.argmax())
     limit, name = found.model.step_limits[k], found.model.links[k].name
     if limit is None:
-        raise ValueError("no link gives")
+        raise ValueError("no link deforms")
     turned, step = np.degrees(limit.turning * limit.step), limit.step * np.sqrt(allowed / found.relative)
-    cause = f"it rotates by up to {turned:.2g} deg in a step" if np.isfinite(turned) else "no drive leads it"
+    cause = f"it rotates by up to {turned:.2g} deg in a step" if np.isfinite(turned) else "no drive moves it"
     return (
         f"rigid link {name} deforms by up to {1e3 * found.displacement[k]:.2g} mm, {percent(found.relative)} of the "
-        f"largest displacement, under the forces that it transmits: {cause}, and steps of {limit.step:.2g} s let it be "
-        f"no stiffer. This falls with the square of the step: take {float(f'{step:.1g}'):g} s or less, or "
-        "analysis.extrapolation_levels = 2",
+        f"largest displacement, under the forces that it transmits: {cause}, and steps of {limit.step:.2g} s allow "
+        f"no stiffer link. The deformation falls with the square of the step: take {float(f'{step:.1g}'):g} s or less, "
+        "or analysis.extrapolation_levels = 2",
     )

@@ -1,17 +1,16 @@
 """The error by rounding: the forces that each link's matrices exert in a rigid motion, which should be zero.
 
-A link that is much stiffer than its neighbours moves as they let it, nearly as a rigid body. Its stiffness times that
-motion is zero only as far as its numbers go: what is left, some eps |K0| |δ|, is a force that nothing balances, and grows
-with the stiffness, while the forces of the linkage do not. Most of it comes from the stiffness condensed onto ports,
+A link that is much stiffer than its neighbours moves nearly as a rigid body. Its stiffness times that motion is zero only
+up to rounding: the residual of about eps |K0| |δ| is an unbalanced force that grows with the stiffness, while the forces
+of the linkage do not. Most of it comes from the stiffness condensed onto ports, which the condensed step uses,
 
-    S W Φ − c_M Yᵀ M Φ        zero but for rounding, Φ the rigid motions of the link: K0 Φ = 0 there
+    S W Φ − c_M Yᵀ M Φ        zero up to rounding, Φ the rigid motions of the link with K0 Φ = 0
 
-which the factored step uses; of the monolithic solver it is K0 Φ. Both are found once, as the march begins. Over a run
-they
-are multiplied with the link's rigid motion at each time; the largest, of the largest force at a port, is the estimate.
+For the monolithic solver it is K0 Φ. Both are computed once at the beginning of a run and multiplied with the link's
+rigid motion at each time. The estimate is the largest product over the largest force at a port.
 
-Co-rotational frames take the rigid motion away first, and with it all but eps of how far the link's points are from where
-they were: what is left of that is a deformation that is none, and max |S| times it a force.
+Co-rotational frames first remove the rigid motion up to eps times the displacement of the link's points. That remainder
+acts as a deformation; max |S| times it is the force.
 """
 
 from collections.abc import Sequence
@@ -32,16 +31,16 @@ from kedfem.links.record import Link, in_space, mass_times
 from kedfem.links.reduced import rigid_modes
 from kedfem.results import Peak
 
-REPORTED = 1e-5  # of the forces: what is less is not reported; scenes of links of one stiffness have 1e-9
+REPORTED = 1e-5  # relative force above which it is reported; scenes of equally stiff links have 1e-9
 LEFT = {"beam": 1.0, "plane": 4.0, "solid": 4.0, "spatial_beam": 4.0}
-"""Times what S leaves: in the mean of a two- or four-link scene errors are a tenth to ten times that (test_rounding)."""
-# of what K0 leaves: the monolithic solver's factor loses more than its matrix (measured, 5 to 17)
+"""Factors on the residual of S; errors of scenes of two or four links are a tenth to ten times that (test_rounding)."""
+# factor on the residual of K0: the factor of the monolithic solver loses more than its matrix (measured, 5 to 17)
 NODAL = 8.0
 IDLE = "no link is stressed at all: the scene has no gravity, load, spring or acceleration that acts on them"
-#: of the least E: more than rounding leaves where nothing acts (3e-14), less than a grain feels of its weight
+#: of the least E: more than rounding without loads (3e-14), less than the stress of a grain by its weight
 UNSTRESSED = 1e-12
 FOLLOWED = {"beam": 4.0, "plane": 4.0, "solid": 3.0, "spatial_beam": 0.5}
-"""Times eps · size · max |S| of co-rotational links: errors are a tenth to four times that (test_rounding)."""
+"""Factors on eps · size · max |S| of co-rotational links; errors are a tenth to four times that (test_rounding)."""
 EPSILON = float(np.finfo(float).eps)
 INSTANTS = 64  # of a block that are examined
 
@@ -54,7 +53,7 @@ def rigid_part(link: Link) -> Float[np.ndarray, "r N"]:
 
 
 def condensed_defect(link: Link, part: Part, c: Coefficients) -> Float[np.ndarray, "q r"]:
-    """Forces at ports that each rigid motion of a link leaves by rounding in its condensed stiffness [N/m, N/rad]."""
+    """Residual forces at ports (q, r) of a link's condensed stiffness in its rigid motions [N/m, N/rad]."""
     out = []
     for motion in rigid_modes(link).T.reshape(-1, link.n, link.d):
         if isinstance(part, SparsePart):
@@ -67,7 +66,7 @@ def condensed_defect(link: Link, part: Part, c: Coefficients) -> Float[np.ndarra
 
 
 def nodal_defect(link: Link) -> Float[np.ndarray, "r r"]:
-    """Sums of the nodal forces that each rigid motion leaves by rounding in K0, root of squares [N/m, N/rad]."""
+    """Norms, on a diagonal (r, r), of the residual nodal forces of K0 in a link's rigid motions [N/m, N/rad]."""
     forces = (link.K0 @ rigid_modes(link)).reshape(link.n, link.d, -1)
     forces = np.moveaxis(in_space(link, np.moveaxis(forces, 2, 0)), 0, 2)
     return np.diag(np.sqrt((forces**2).sum(axis=(0, 1))))
@@ -77,9 +76,10 @@ def nodal_defect(link: Link) -> Float[np.ndarray, "r r"]:
 class Rounding:
     """The residual force of rigid motions of each link, and its largest value so far [N].
 
-    defects, parts : of links with rigid-body frames, else None
+    defects, parts : residual forces and projections onto rigid motions, for links with rigid-body frames; else None
     stiffest : (L,) FOLLOWED · max |S| of co-rotational links, else 0 [N/m, N/rad]
-    forces : (L,) the largest of each link; largest : at any port of any link [N]
+    forces : (L,) largest residual force of each link [N]
+    largest : largest force at any port of any link [N]
     """
 
     model: Model
@@ -131,7 +131,7 @@ class Rounding:
 
     @property
     def relative(self) -> float:
-        """The largest such force of a link, relative to the largest force at a port [-]."""
+        """The largest residual force, relative to the largest force at a port [-]."""
         return float(self.forces.max(initial=0.0)) / self.largest if self.largest else 0.0
 
     def share(self, kinds: Sequence[str]) -> Share | None:
@@ -139,12 +139,12 @@ class Rounding:
         if not self.relative > REPORTED:
             return None
         link = self.model.links[int(self.forces.argmax())].name
-        how = f"link {link} is so stiff beside its neighbours that its numbers do not tell rigid motion from strain"
+        how = f"link {link} is so stiff compared with its neighbours that rounding in its rigid motion acts as strain"
         remedy = f'{how}; take model = "rigid" for it, or its true stiffness and larger elements'
         return Share("rounding", dict.fromkeys(kinds, self.relative), remedy)
 
 
 def unstressed(model: Model, peak: Peak | None) -> bool:
-    """Whether the highest stress of a run is rounding, beside its softest link: nothing acts on its links."""
+    """Whether the highest stress of a run is rounding by the modulus of its softest link, because nothing acts on it."""
     softest = min((link.E for link in model.links if not link.rigid), default=0.0)
     return peak is not None and peak.stress <= UNSTRESSED * softest

@@ -2,11 +2,11 @@
 
 The error of the step is not of order 2 there.
 
-A drive's path is searched before a run; what nothing drives goes where it goes. So the run's own positions are examined:
-the mean frames of the links put into the constraint equations, whose derivatives lose rank where two motions meet, as in
-a four-bar with equal links that folds. Links that hardly bend are then held with little leverage: joint forces of a kite
-of steel beams, 0.3 and 0.2 m, change by 120 % of their peak between 400 and 800 steps and still by 12 % between 3,200 and
-6,400, where its positions change by 1e-6 (measured).
+The path of a drive is searched before a run, but an undriven mechanism is known only from the run's own positions. The
+mean frames of its links are put into the constraint equations, whose derivatives lose rank where two motions meet, as in
+a folding four-bar with equal links. Links that hardly bend are held with little leverage there: joint forces of a kite of
+steel beams, 0.3 and 0.2 m, change by 120 % of their peak between 400 and 800 steps and still by 12 % between 3,200 and
+6,400, while its positions change by 1e-6 (measured).
 """
 
 from dataclasses import dataclass, field
@@ -22,18 +22,18 @@ from kedfem.motion.linkage import resting_poses
 from kedfem.motion.parts import Part, parts
 from kedfem.motion.values import Poses
 
-NEAR = 0.05  # of its largest value: singular value that vanishes at a singular position (others: 0.19 and more, measured)
-LOOKED_AT = 32  # of a block's time points at first; all of them around the smallest values
-CLOSER = 0.3  # of the largest value so far, below which all are examined
+NEAR = 0.05  # singular value near a singular position, over its largest one (elsewhere 0.19 and more, measured)
+EXAMINED = 32  # time points of a block that are examined first; then all around the smallest values
+CLOSER = 0.3  # of the largest value so far, below which all time points are examined
 
 
 @dataclass
 class LoopSingularity:
-    """The smallest singular value, relative to the largest one, of constraints of closed loops during a run.
+    """The smallest relative singular value of the constraints of closed loops during a run.
 
     part, rank : the loops, and the rank of their constraints in the reference position
-    least, when : the value there, and the time [s]
-    largest : over the run; the value means nothing by itself
+    least, when : smallest value, and its time [s]
+    largest : largest value over the run, with which the smallest is compared
     """
 
     part: Part
@@ -45,11 +45,11 @@ class LoopSingularity:
 
     @property
     def of_largest(self) -> float:
-        """The least value relative to the largest; 1 before anything was examined."""
+        """The smallest value relative to the largest; 1 before anything was examined."""
         return self.least / self.largest if self.largest else 1.0
 
     def add(self, values: Float[np.ndarray, " T"], t: Float[np.ndarray, " T"]) -> None:
-        """The values at some times."""
+        """Include the values at some times."""
         k = int(values.argmin())
         self.largest = max(self.largest, float(values.max()))
         if values[k] < self.least:
@@ -76,10 +76,10 @@ class SingularPasses:
             self.loops = [LoopSingularity(part, rank) for part, rank in every if rank < part.freedoms]
 
     def add(self, block: Block) -> None:
-        """Add the time points of the next block."""
+        """Examine the time points of a block."""
         if not self.loops:
             return
-        stride = max(1, len(block) // LOOKED_AT)
+        stride = max(1, len(block) // EXAMINED)
         which = np.arange(0, len(block), stride)
         poses = self._poses(block, which)
         for loop in self.loops:
@@ -95,7 +95,7 @@ class SingularPasses:
         return np.asarray(s[:, loop.rank - 1] / s[:, 0])
 
     def _poses(self, block: Block, which: np.ndarray) -> Poses:
-        """The mean frames of all bodies; the ground's is in the reference position."""
+        """The mean frames of all bodies; that of the ground stays in the reference position."""
         model, linkage = self.ready.model, self.ready.linkage
         R = np.tile(np.eye(3), (len(which), len(linkage.bodies), 1, 1))
         p = np.zeros((len(which), len(linkage.bodies), 3))
@@ -103,7 +103,7 @@ class SingularPasses:
             link, history = model.links[k], block.links[k]
             mass = link.m1[:, 0] / float(link.one @ link.m1[:, 0])
             drawn = mass @ link.X - linkage.centre
-            d = 2 if link.kind == "beam" else link.d  # its third is the slope
+            d = 2 if link.kind == "beam" else link.d  # the third component is the slope
             R[:, body, :d, :d] = history.R[which][:, :d, :d]
             moved = np.einsum("n,tnc->tc", mass, in_space(link, history.u[which]))
             p[:, body] = drawn + moved - R[:, body] @ drawn
@@ -115,7 +115,7 @@ class SingularPasses:
         return min(self.loops, key=lambda loop: loop.of_largest, default=None)
 
     def warnings(self) -> tuple[str, ...]:
-        """Warnings of such a pass."""
+        """A warning if the mechanism passes near a singular position."""
         if self.worst is None or self.worst.of_largest > NEAR:
             return ()
         return (

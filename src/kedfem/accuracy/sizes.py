@@ -1,4 +1,4 @@
-"""Sizes and masses of a scene's links, for a check of its units, and warnings where they are unlikely for a machine."""
+"""Sizes, masses and speeds of a scene, and warnings where they are so unlikely that a unit may be wrong."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -15,21 +15,21 @@ LENGTHS = 1e-4, 30.0  # m, of a link: watches, booms of cranes
 MASSES = 1e-9, 1e6  # kg, of a link
 MODULI = 1e6, 2e12  # Pa: soft rubber, diamond
 DENSITIES = 10.0, 3e4  # kg/m³: foam, osmium
-DOUBTED = (
+MATERIAL_LIMITS = (
     ("youngs_modulus", "Pa", MODULI, "softer than rubber (1e6)", "stiffer than diamond (1.2e12)",
      ((1e3, "MPa"), (0.0, "GPa"))),
     ("density", "kg/m^3", DENSITIES, "lighter than any foam", "heavier than any metal",
      ((1e-2, "g/cm^3"), (1e-7, "kg/mm^3"), (0.0, "t/mm^3"))),
 )  # fmt: skip
-"""Keys of materials: unit, range, what is beyond its ends, and from which value on another unit was probably meant."""
+"""Keys of materials: unit, range, words for values below and above it, and units that small values suggest."""
 GRAVITY = 100.0  # m/s²
-TURNS = 1e6  # rpm: beyond dental drills and turbochargers
-WIDE = 3.0, 2.0  # lengths of a link, and m, that its section may be wide
-TIP = 2000.0  # m/s of a driven link's end: beyond what any material bears in a rotor
-STRETCHED = 0.002  # strain of a long metal link by its own spin: a helicopter's blade has 0.001
-LONG = 3.0  # m, such a link
-METAL = 1e10  # Pa, its least modulus
-APART = 1e4  # longest of shortest link
+TURNS = 1e6  # rpm, above the speed of dental drills and turbochargers
+WIDE = 3.0, 2.0  # largest width of a section, in lengths of its link and in m
+TIP = 2000.0  # m/s at the end of a driven link, above what any material bears in a rotor
+STRETCHED = 0.002  # strain of a long metal link by its own rotation; a helicopter's blade has 0.001
+LONG = 3.0  # m, least length of such a link
+METAL = 1e10  # Pa, least modulus of a metal
+APART = 1e4  # largest ratio of the lengths of two links
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,10 +37,10 @@ class Sizes:
     """Sizes, masses and speeds of a scene, in SI.
 
     overall : largest extent of the linkage in the reference position [m]
-    lengths : of each link by name, but for sliders, which have no shape [m]
-    masses : of each link by name [kg]
-    moduli : Young's modulus of each material that elastic links are made of [Pa]
-    turns, speeds : of drives at a constant (final) speed [rpm, m/s]
+    lengths : length of each link by name, except for sliders, which have no shape [m]
+    masses : mass of each link by name [kg]
+    moduli : Young's modulus of each material of elastic links [Pa]
+    turns, speeds : final speeds of rotating and of sliding drives by name [rpm, m/s]
     """
 
     overall: float
@@ -56,7 +56,7 @@ def sizes(scene: Scene, model: Model) -> Sizes:
     nodes: dict[str, list[np.ndarray]] = {}
     masses: dict[str, float] = {}
     for link in [*model.links, *(prescribed.link for prescribed in model.prescribed)]:
-        if (of := scene.links[link.name]).shape or of.centre:  # else a slider, which has points of a model only
+        if (of := scene.links[link.name]).shape or of.centre:  # a slider has only the points of its model
             nodes.setdefault(link.name, []).append((link.full or link).nodes)
         masses[link.name] = masses.get(link.name, 0.0) + float(link.one @ link.m1[:, 0])
     every = {name: np.concatenate(parts) for name, parts in nodes.items()}
@@ -76,7 +76,7 @@ def sizes(scene: Scene, model: Model) -> Sizes:
 
 
 def size_warnings(scene: Scene, found: Sizes) -> tuple[str, ...]:
-    """Warnings of sizes that no machine has, each with the unit that was probably meant."""
+    """Warnings of sizes that no machine has, each with the unit that was probably intended."""
     lengths, others = _length_warnings(scene, found), _other_warnings(scene, found)
     return (*scene.unit_warnings, *lengths, *_material_warnings(scene), *others)
 
@@ -110,7 +110,7 @@ def _material_warnings(scene: Scene) -> Iterator[str]:
     every = {link.material for link in scene.links.values()}
     used = {name for name in every if name and not name.startswith(LINE)}
     for name, material in scene.materials.items():
-        for key, unit, (low, high), below, above, meant in DOUBTED if name in used else ():
+        for key, unit, (low, high), below, above, meant in MATERIAL_LIMITS if name in used else ():
             value, where = getattr(material, key), f"materials.{name}.{key}"
             if value < low:
                 other = next(each for least, each in meant if value >= least)
@@ -149,7 +149,7 @@ def _other_warnings(scene: Scene, found: Sizes) -> Iterator[str]:
 
 
 def _spun(scene: Scene, link: str, tip: float) -> float:
-    """Strain at the root of a uniform bar that spins about its end, of a metal; 0 of others."""
+    """Strain at the root of a uniform metal bar that rotates about its end [-]; 0 for other materials."""
     material = scene.materials.get(scene.links[link].material or "")
     if material is None or material.youngs_modulus < METAL:
         return 0.0

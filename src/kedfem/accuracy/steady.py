@@ -1,4 +1,4 @@
-"""Facts about the steady motion of a run: its period, how it was found, and whether vibrations about it decay."""
+"""The steady motion of a run: its period, its residual, and whether vibrations about it decay."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,29 +14,29 @@ from kedfem.dynamics.system.steps import Steps
 from kedfem.dynamics.vibration import Vibration, vibration
 from kedfem.scene import Scene, revolution_steps, time_grid
 
-# oscillations in a step, five steps each: of faster ones a step does not determine whether they grow
-RESOLVED = 0.2
-GROWS = 1e-6  # by which a period multiplies more than one: rounding and the step's error are less
-SLOW = 0.999  # a vibration that falls by less in a period is as good as undamped
-APART = 0.1  # of logarithms of growth, by which levels of a step that resolves what grows differ at most
-FALLEN = 0.5  # what falls to less in a period is stable, whatever its last digit
-KNOWN = 1e-3  # error of the state that needs no warning
-SETTLED = 0.01  # what is left of a vibration that has died away
+RESOLVED = 0.2  # most oscillations in a step (five steps each) for which a step determines whether they grow
+GROWS = 1e-6  # growth in a period above which a vibration is unstable: rounding and the step's error are less
+SLOW = 0.999  # factor of a vibration in a period above which it is practically undamped
+APART = 0.1  # most difference of the logarithms of growth between levels of a step that resolves it
+FALLEN = 0.5  # factor in a period below which a vibration is stable in any case
+KNOWN = 1e-3  # error of the state up to which there is no warning
+SETTLED = 0.01  # remainder of a vibration that has decayed
 
 
 @dataclass(frozen=True, slots=True)
 class Steady:
     """A steady motion.
 
-    period : [s]; revolutions : of the drive in it, 0 if it does not rotate continuously
-    marches : periods that were marched to find it, at all levels in time
-    residual : change of the state in a period, relative to its size, at worst of all levels
-    growth : by which a period multiplies the least damped vibration, combined of all levels; None if not asked for, or
-        if the levels do not agree: then it is the method's own
-    certain : whether that was found to the tolerance
-    levels : growth of each level
-    vibration : that one, of an unstable motion: how fast it is, and which link moves most, in words
-    passed : periods of that vibration in a step, if these are too many for its growth to be more than the method's doing
+    period : [s]
+    revolutions : revolutions of the drive in a period; 0 if it does not rotate continuously
+    marches : periods that were computed to find it, on all levels in time
+    residual : largest change of the state in a period on any level, relative to its size [-]
+    growth : factor by which a period multiplies the least damped vibration, combined from all levels; None if it was not
+        computed, or if the levels disagree because the method itself causes it
+    certain : whether the growth was found to the tolerance
+    levels : growth on each level
+    vibration : description of the growing vibration of an unstable motion: its frequency and the link that moves most
+    passed : oscillations of that vibration in a step, if there are too many to determine its growth; else 0
     """
 
     period: float
@@ -50,9 +50,9 @@ class Steady:
     passed: float = 0.0
 
     def reported(self, frequency: float, words: str, step: float) -> "Steady":
-        """With the vibration that grows; its growth is not known where steps [s] do not resolve its frequency [Hz].
+        """The motion with the description of its growing vibration.
 
-        Several levels in time that agree do resolve it.
+        Its growth is unknown if a single level's step [s] does not resolve its frequency [Hz].
         """
         passed = frequency * step
         if len(self.levels) > 1 or passed <= RESOLVED:
@@ -66,7 +66,7 @@ class Steady:
 
     @property
     def periods(self) -> int | None:
-        """Number of periods after which a vibration has fallen to SETTLED; None if none falls, or if it is unknown."""
+        """Number of periods after which vibration has decayed to SETTLED; None if it does not or this is unknown."""
         if self.growth is None or self.growth >= 1 - GROWS:
             return None
         return max(1, ceil(log(SETTLED) / log(max(self.growth, 1e-300))))
@@ -78,7 +78,7 @@ class Steady:
 
     @property
     def notes(self) -> dict[str, str | float]:
-        """As notes of a results file."""
+        """The attributes of a results file."""
         known: dict[str, str | float] = {}
         known |= {} if self.growth is None else {"steady growth in a period": self.growth}
         known |= {"steady vibration that grows": self.vibration} if self.vibration and not self.passed else {}
@@ -89,7 +89,7 @@ class Steady:
 
 
 def steady_of(scene: Scene, solvers: Sequence[Steps]) -> Steady | None:
-    """The steady motion that the solvers of all levels found; None for other motions."""
+    """The steady motion found by the solvers of all levels; None for other motions."""
     found = [x for x in (getattr(each, "steady", None) for each in solvers) if isinstance(x, Periodic)]
     if not found:
         return None
@@ -106,10 +106,10 @@ def steady_of(scene: Scene, solvers: Sequence[Steps]) -> Steady | None:
 
 
 def unstable(steady: Steady | None) -> str:
-    """The reason why a machine does not run in its steady motion; empty if it does, or if that is unknown."""
+    """The reason why a machine cannot run in its steady motion; empty if it can or if this is unknown."""
     if steady is None or steady.growth is None or not steady.unstable:
         return ""
-    sure = "; that the steps are short enough for this only extrapolation_levels = 2 shows"
+    sure = "; extrapolation_levels = 2 would show whether the steps are short enough for this"
     return (
         f"the steady motion is unstable: a vibration about it grows by {100 * (steady.growth - 1):.3g} % in each period "
         f"of {steady.period:.4g} s{steady.vibration and f', {steady.vibration}'}, until something else limits it"
@@ -125,17 +125,17 @@ def steady_warning(steady: Steady | None) -> tuple[str, ...]:
         return (
             "steady motion: whether it is stable cannot be determined with steps as long as these: a vibration "
             f"{steady.vibration}, is multiplied by {steady.levels[0]:.3g} in a period, but {steady.passed:.2g} of its "
-            "oscillations pass in a step, and the growth may be the method's doing; take smaller steps",
+            "oscillations pass in a step, and the method may cause the growth; take smaller steps",
         )
     if steady.growth is None and len(steady.levels) > 1:
         least, most = min(steady.levels), max(steady.levels)
         return (
             "steady motion: whether it is stable cannot be determined with steps as long as these: at the levels in time "
-            f"vibrations are multiplied by {least:.3g} and {most:.3g} in a period, which is the method's doing; "
+            f"vibrations are multiplied by {least:.3g} and {most:.3g} in a period, which the method causes; "
             "take smaller steps",
         )
     if steady.growth is None:
-        text = "steady motion: whether it is stable is not found out where joints have limits, which it may run against"
+        text = "steady motion: its stability is not determined if joints have limits, which it may meet"
         return () if steady.certain else (text,)
     if why := unstable(steady):
         return (f"{why}; take another speed, or more damping outside the moving links",)
@@ -160,7 +160,7 @@ def steady_warning(steady: Steady | None) -> tuple[str, ...]:
 
 
 def growing(ready: Prepared, solvers: Sequence[Steps]) -> tuple[Steady | None, Vibration | None]:
-    """What is known of a steady motion, and of one that is unstable the vibration that grows."""
+    """The steady motion, and the growing vibration of an unstable one."""
     steady, solver = steady_of(ready.scene, solvers), solvers[-1]
     if steady is None or not steady.unstable or solver.steady is None:
         return steady, None

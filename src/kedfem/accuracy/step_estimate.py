@@ -18,13 +18,13 @@ from kedfem.results.recorded import Recorded
 from kedfem.results.stresses.envelope import largest_row
 from kedfem.scene import time_grid
 
-IN_STEP = 0.3  # largest disagreement about the fastest motion at which orders 4 and 6 show
-ALIKE = 1e-6  # relative difference of work that means nothing
-LEAST_ORDER = 0.7  # at which an error must fall with the step, or no step will do
-SLOW = 1e-3  # |D''|/|D| of a difference without vibration: that of 200 steps to a period
-SURE = 0.7  # of the required accuracy, for which a step is chosen
-SINGLE = 2.0  # forces and stresses have more of fast motion, which is less exact, than displacements
-TWO, THREE = 0.8, 1.2  # docs/performance/levels.md has estimates beside the true errors
+IN_STEP = 0.3  # largest disagreement about the fastest motion at which orders 4 and 6 are reached
+ALIKE = 1e-6  # relative difference within which work is the same
+LEAST_ORDER = 0.7  # least order with which an error must fall for a step to be predicted
+SLOW = 1e-3  # |D''|/|D| up to which a difference D has no vibration: that of 200 steps in a period
+SURE = 0.7  # of the required accuracy: the error for which a step is chosen
+SINGLE = 2.0  # error of a channel over that of displacements: fast motion, which is less exact, has more weight
+TWO, THREE = 0.8, 1.2  # factors of the estimates, compared with true errors in docs/performance/levels.md
 Rows = Float[np.ndarray, "T c"]
 
 
@@ -32,16 +32,16 @@ Rows = Float[np.ndarray, "T c"]
 class StepEstimate:
     """The estimated error of the time step of a run.
 
-    h : step of the coarsest level, which is the analysis's own [s]
+    h : step of the coarsest level, which is that of the analysis [s]
     levels : 1, 2 or 3
-    errors : channel → estimated error of its values, at the worst time, relative to the channel's peak [-]
-    differences : channel → what successive levels differ by, at worst in time, of the peak, coarsest pair first; none of
-        a single level
-    fast : channel → by which share the finest pair of levels disagrees about its fastest motion, that with the largest
-        second differences in time: small where the order shows, 1 where that motion is out of step
-    running : what local errors of the steps add up to, of the largest displacement [-]; all that a single level knows
-        while it runs, which puts twice of it for the error of every channel; a march beside it, with steps twice as
-        long, shows more (`single_errors`)
+    errors : estimated error of each channel at the worst time, relative to its peak [-]
+    differences : largest differences of successive levels in each channel, relative to its peak, coarsest pair first [-];
+        none for a single level
+    fast : relative disagreement of the finest pair of levels about the fastest motion in each channel, by second
+        differences in time: small where the order of convergence shows, 1 where that motion is out of phase
+    running : sum of the local errors of the steps, relative to the largest displacement [-]. A single level takes twice
+        of it for the error of every channel while it runs; another run in steps twice as long shows more
+        (`single_errors`)
     """
 
     h: float
@@ -53,7 +53,7 @@ class StepEstimate:
 
     @property
     def notes(self) -> dict[str, str | float]:
-        """As notes of a results file."""
+        """The attributes of a results file."""
         errors = {f"step error of {name}": error for name, error in self.errors.items()}
         return {"levels in time": self.levels, "step error, running": self.running, **errors}
 
@@ -65,7 +65,7 @@ class StepEstimate:
 
 @dataclass(frozen=True, slots=True)
 class StepChoice:
-    """A step, a number of levels, the error that is expected, and the work: all marches' steps in a second of motion."""
+    """A step [s], a number of levels, the expected error [-], and the work: steps of all levels per second of motion."""
 
     h: float
     levels: int
@@ -79,18 +79,24 @@ def cheapest(
 ) -> StepChoice:  # fmt: skip
     """The step and the levels that reach an error in every channel with the least work, from a trial's differences.
 
-    D falls with h², what two levels leave, about q D, with h⁴, three, q² D, with h⁶, as long as the fastest motion stays
-    in step: q, which falls with h², no more than IN_STEP. Where it is more in the trial levels gain nothing: what the
-    finest one leaves falls as D did in the trial, by which another trial is found. D and q are those of the trial's
-    finest pair of levels. A single level has another march beside it, with steps twice as long, which shows its error.
+    D and q are the difference and the disagreement `fast` of the trial's finest pair of levels. D falls with h²; the
+    error of two levels, about q D, with h⁴; that of three, q² D, with h⁶. This holds as long as the fastest motion stays
+    in phase, q ≤ IN_STEP; q itself falls with h². If q is larger in the trial, levels gain nothing, and the error of the
+    finest one falls as D did in the trial, which predicts the next trial. The error of a single level is estimated from
+    another run in steps twice as long, whose work is included.
 
     Parameters
     ----------
-    found : of a run of two or three levels
-    wanted : relative error
-    channels : judged ones; all with an estimate if not given
-    levels : possible numbers of them
-    longest : step that may be chosen [s]
+    found : estimate of a trial with two or three levels
+    wanted : relative error [-]
+    channels : judged channels; default: all with an estimate
+    levels : possible numbers of levels
+    longest : largest step [s]
+
+    Raises
+    ------
+    ValueError
+        The trial has a single level.
     """
     names = [x for x in found.differences if channels is None or x in channels]
     if found.levels < 2:
@@ -129,12 +135,12 @@ def _orders(found: StepEstimate, names: Sequence[str]) -> Float[np.ndarray, " c"
 
 
 def _work(levels: int) -> float:
-    """Steps of all marches in one of the coarsest level's."""
+    """Steps of all levels, and of a run for comparison, per step of the coarsest level."""
     return 1.5 if levels == 1 else 2.0**levels - 1
 
 
-def watched(name: str) -> bool:
-    """Whether a channel's error is estimated: those of the budget, and moments of joints."""
+def has_step_error(name: str) -> bool:
+    """Whether a channel's step error is estimated: that of judged channels and of joint moments."""
     return kind_of_name(name) is not None or (name.startswith("joints/") and name.endswith("/moment"))
 
 
@@ -142,9 +148,10 @@ def watched(name: str) -> bool:
 class _Sizes:
     """Largest norms of one channel so far.
 
-    differences : of successive levels
-    next : of successive combinations of two levels
-    curved : second differences in time of the finest pair's difference, and of the values
+    peak : of the values
+    differences : of the differences of successive levels
+    next : of the difference of successive combinations of two levels
+    curved : of the second differences in time of the finest pair's difference, and of the values
     """
 
     peak: float = 0.0
@@ -155,16 +162,16 @@ class _Sizes:
 
     @property
     def fast(self) -> float:
-        """|D''|/|x''| of the finest pair's difference D, at most 1.
+        """|D''|/|x''| for the finest pair's difference D, at most 1.
 
-        Where D itself changes slowly, as what rigid links give under loads that stay, both are rounding: then |D|/|x|.
+        If D changes slowly, as the compliance of rigid links under steady loads, both are rounding; then it is |D|/|x|.
         """
         q = min(1.0, float(self.curved[0] / self.curved[1])) if self.curved[1] else 0.0
         slow = len(self.differences) and self.curved[0] < SLOW * self.differences[-1]
         return min(q, float(self.differences[-1]) / self.peak) if slow and self.peak else q
 
     def add(self, values: Rows, levels: Sequence[Rows]) -> None:
-        """Add time points, as combined and of each level."""
+        """Include time points: the combined values, and those of each level."""
         self.peak = max(self.peak, largest_row(values))
         steps = [b - a for a, b in pairwise(levels)]
         if not len(self.differences):
@@ -180,11 +187,11 @@ class _Sizes:
 
 
 @dataclass
-class StepWatch:
+class StepErrorMonitor:
     """Monitor of a run's step error, block after block.
 
     recorded : the run's channels
-    running : local errors of its steps, which another monitor sums
+    running : the monitor of local errors of the steps
     """
 
     ready: Prepared
@@ -194,10 +201,10 @@ class StepWatch:
     REMEMBERED: ClassVar = ("sizes",)
 
     def __post_init__(self) -> None:
-        self.recorded = [each for each in self.recorded if watched(each.channel.name)]
+        self.recorded = [each for each in self.recorded if has_step_error(each.channel.name)]
 
     def add(self, block: Block, values: Mapping[str, Rows]) -> None:
-        """Evaluate the time points of a block and their rows."""
+        """Evaluate the time points of a block and their values."""
         for each in self.recorded:
             name = each.channel.name
             if block.levels:
@@ -209,7 +216,7 @@ class StepWatch:
 
     @property
     def estimate(self) -> StepEstimate:
-        """The estimate for the time points so far."""
+        """The estimate from the time points so far."""
         analysis = self.ready.scene.analysis
         running, h = self.running.total, time_grid(self.ready.scene).step
         if (analysis.extrapolation_levels or 1) == 1:
@@ -229,9 +236,9 @@ class StepWatch:
 def _error(x: _Sizes) -> float:
     """Error of the combined values, in their unit.
 
-    Of two levels, D = x_{h/2} − x_h: fast motion goes wrong first, and second differences in time weigh it most. By
-    q = |D''|/|x''| of it the levels disagree; the next power of the step leaves about q D, and where q is near 1, D
-    itself. Of three, what the two pairs' combinations differ by, δ, is such a D, and δ/D another q.
+    With two levels D = x_{h/2} − x_h. Fast motion errs first, and has the most weight in second differences in time, of
+    which the share q = |D''|/|x''| differs between the levels. The combination leaves about q D, or D itself if q is
+    near 1. With three levels the difference δ of the combinations of both pairs takes the place of D, and δ/D that of q.
     """
     q = x.fast
     if len(x.differences) == 1:
@@ -241,10 +248,10 @@ def _error(x: _Sizes) -> float:
 
 
 def single_level(fast: float) -> tuple[float, float]:
-    """Factors of D for the errors of two marches by themselves, the finer one and that with steps twice as long.
+    """Factors on D for the errors of two single runs, the finer one and that in steps twice as long.
 
-    Of the finer one D/3 as long as the order shows; where the fastest motion is out of step, what two levels leave. Of
-    the other D more.
+    The error of the finer one is D/3 as long as the order of convergence shows, and that of two levels if the fastest
+    motion is out of phase. The other one errs by D more.
     """
     finer = max(1 / 3, min(1.0, TWO * fast))
     return finer, 1 + finer
@@ -253,14 +260,14 @@ def single_level(fast: float) -> tuple[float, float]:
 def single_errors(
     fine: Histories, coarse: Histories, stops: bool, zeros: set[str] | None = None
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Channel → error of two marches by themselves: of the finer one, and of that with steps twice as long.
+    """Errors of two single runs in each channel: of the finer one, and of that in steps twice as long.
 
     Parameters
     ----------
-    fine, coarse : from the same time on, both with all their time points
-    stops : whether there are limits, which may be met between two times of the coarse one. Elsewhere values that jump
+    fine, coarse : runs from the same time on, with all time points
+    stops : whether there are joint limits, which may be met between two times of the coarse one. Jumps of other values
         are those of loads and drives.
-    zeros : to which the names of channels are added that are zero beside others
+    zeros : set to which the names of channels that are zero beside others are added
     """
     errors: list[dict[str, float]] = [{}, {}]
     peaks: dict[str, tuple[str, float]] = {}
@@ -282,9 +289,9 @@ def single_errors(
 
 
 def _jolt(x: Rows) -> float:
-    """How far values are from cubics through those beside them, at most: far where a stop is met within a step.
+    """Largest distance of values from cubics through their neighbours: large where a limit is met within a step.
 
-    Of a vibration at ω in steps of h, (3/8) (ω h)⁴ of its amplitude.
+    For a vibration at ω in steps of h it is (3/8) (ω h)⁴ of the amplitude.
     """
     beside = (9 * (x[2:-4] + x[4:-2]) - x[:-6] - x[6:]) / 16
     return largest_row(x[3:-3] - beside)

@@ -19,8 +19,8 @@ from kedfem.scene import (
     time_grid,
 )
 
-TRIAL_STEPS = 20_000  # of a trial run: of longer analyses only the beginning is run
-TURNS = 2  # of a trial run
+TRIAL_STEPS = 20_000  # most steps of a trial run; only the beginning of a longer analysis is run
+TURNS = 2  # revolutions of a trial run
 Family = Literal["solid", "plane", "beam", "rigid"]
 CHOSEN = {"element", "mesh", "model", "reduction"}
 
@@ -36,12 +36,12 @@ def with_analysis(scene: Scene, **keys: Any) -> Scene:
 
 
 def moved(scene: Scene) -> Scene:
-    """The scene whose drive moves its links as rigid bodies over time: a static analysis would stand still.
+    """The scene as a transient analysis, in which the drive moves its links over time.
 
     Raises
     ------
     MotionError
-        It has no drive.
+        The scene has no drive.
     """
     if scene.driven is None:
         raise MotionError(
@@ -61,7 +61,7 @@ def with_steps(scene: Scene, steps: int) -> Scene:
 
 
 def shortened(scene: Scene) -> Scene:
-    """The beginning of an analysis that is too long for trials: TURNS of a rotating drive, after its run-up."""
+    """The beginning of an analysis that is too long for trials: TURNS revolutions of a drive, after its run-up."""
     grid, turn = time_grid(scene), revolution_steps(scene)
     span = grid.end
     if turn is not None:
@@ -74,7 +74,7 @@ def shortened(scene: Scene) -> Scene:
 
 
 def of_family(link: LinkScene, family: Family, reduced: bool = False) -> LinkScene:
-    """The link meshed by another method, with the usual element and mesh of that method."""
+    """The link as a model of another family, with the default element and mesh of that family."""
     gone = CHOSEN if family in {"plane", "solid"} else CHOSEN | {"segments"}
     given = {key: getattr(link, key) for key in link.model_fields_set - gone}
     reduction = "modal" if reduced and family != "rigid" else "none"
@@ -83,7 +83,7 @@ def of_family(link: LinkScene, family: Family, reduced: bool = False) -> LinkSce
 
 
 def filleted(link: LinkScene, angle: float) -> LinkScene:
-    """The link with fillets divided by an angle [rad]; its mesh is as open or as stated as it was."""
+    """The link with an angle of elements along fillets [rad]; a mesh that it leaves open stays open."""
     changed = link.model_copy(update={"mesh": link.mesh.model_copy(update={"fillet_angle": angle})})
     if "mesh" not in link.model_fields_set:
         changed.model_fields_set.discard("mesh")
@@ -91,7 +91,7 @@ def filleted(link: LinkScene, angle: float) -> LinkScene:
 
 
 def families(link: LinkScene) -> tuple[Family, ...]:
-    """How a link's shape can be meshed, cheapest first; a rigid slider only as what it is."""
+    """The families that a link's shape allows, cheapest first; none for a slider without a shape."""
     match link.shape:
         case None:
             return ()
@@ -106,7 +106,7 @@ def families(link: LinkScene) -> tuple[Family, ...]:
 
 
 def refined(link: LinkScene, factor: float) -> LinkScene:
-    """The link with elements smaller by a factor, never fewer; a rigid link or a mesh from a file as it is."""
+    """The link with elements smaller by a factor, never fewer; rigid links and meshes from files are unchanged."""
     mesh = link.mesh
     if link.model == "rigid" or isinstance(link.shape, MeshFile | None):
         return link

@@ -1,4 +1,4 @@
-"""A study as a table for spreadsheets and as a plot of time against error."""
+"""Files of a study: a table for spreadsheets, and a plot of time against error."""
 
 import csv
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ MARKERS = "osD^vP*X<>"
 
 
 def written(row: MeasuredVariant) -> tuple[str, ...]:
-    """One variant; numbers have the digits that give back the same float."""
+    """One variant as texts; numbers have all digits of the float."""
     v, s = row.variant, row.seconds
     tolerance = "" if v.tolerance is None else repr(v.tolerance)
     model = (v.model_kind.name, repr(v.fineness), str(v.steps), tolerance)
@@ -30,7 +30,7 @@ def written(row: MeasuredVariant) -> tuple[str, ...]:
 
 
 def write_study(study: Study, path: Path, machine: str) -> None:
-    """Write all variants as comma-separated values, below the machine's name and the reference's own error."""
+    """Write all variants as comma-separated values, after the machine's name and the reference's own error."""
     with text_file(path) as file:
         file.write(f"# measured on: {machine}\n")
         file.write(f"# reference: {study.reference.variant.name}; its own error about {study.floor!r}\n")
@@ -40,7 +40,7 @@ def write_study(study: Study, path: Path, machine: str) -> None:
 
 
 def write_study_plot(study: Study, path: Path, machine: str) -> None:
-    """Time against error, one marker for each kind of model; the front is drawn and its points are named."""
+    """Write a plot of time against error, with a marker for each kind of model and names on the Pareto front."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -70,7 +70,7 @@ def write_study_plot(study: Study, path: Path, machine: str) -> None:
 
 
 def _least(study: Study, ran: Sequence[MeasuredVariant]) -> float:
-    """Where errors that are not known are drawn."""
+    """The error at which unknown errors are drawn."""
     known = [row.error for row in ran if row.error > 0.0]
     return study.floor or (0.5 * min(known) if known else 1e-6)
 
@@ -82,7 +82,7 @@ def _point(row: MeasuredVariant, least: float) -> tuple[float, float]:
 
 
 def _name_points(axes: Any, front: Sequence[tuple[tuple[float, float], MeasuredVariant]]) -> None:
-    """Numbers at the points of the front, their names in a list beside the axes."""
+    """Number the points of the front, and list their names beside the axes."""
     lines = []
     for number, (point, row) in enumerate(front, start=1):
         beside = {"xytext": (-6, -6), "textcoords": "offset points", "ha": "right", "va": "top"}

@@ -1,4 +1,4 @@
-"""Speed against error: a scene in many variants, measured and compared with its own finest one."""
+"""Speed against error: runs of a scene in many variants, compared with the finest one."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -25,14 +25,14 @@ from kedfem.motion.assembly import assembled
 from kedfem.scene import Scene, time_grid
 
 Watch = Callable[[str, int, int], None]
-SHORT = 0.02  # of the budget: runs that take less are repeated
-PREFERRED = 3.0  # the scene's own mesh and step come before others that take a third of its time
-FOR_REFERENCE = 0.75  # of what is left of the budget: the reference and its two coarser neighbours
+SHORT = 0.02  # of the time limit: shorter runs are repeated
+PREFERRED = 3.0  # factor by which a variant with the scene's own mesh and step may take longer and still comes first
+FOR_REFERENCE = 0.75  # of the remaining time: most for the reference and its two coarser neighbours
 
 
 @dataclass(frozen=True, slots=True)
 class Seconds:
-    """Medians over several runs: preparation, stepping, both together."""
+    """Medians over several runs [s]: preparation, stepping, both together; and the number of runs."""
 
     preparation: float
     stepping: float
@@ -42,12 +42,12 @@ class Seconds:
 
 @dataclass(frozen=True, slots=True)
 class MeasuredVariant:
-    """One variant of a study, as measured.
+    """A measured variant of a study.
 
-    steps, unknowns : how many
-    seconds : None where it was not run; then the note says why
-    errors : relative error of every channel that counts, against the reference
-    front : whether no other variant is both faster and nearer
+    steps, unknowns : their numbers
+    seconds : None if it was not run; then `note` has the reason
+    errors : relative error of every judged channel against the reference [-]
+    front : whether no other variant is both faster and more accurate
     """
 
     variant: Variant
@@ -73,9 +73,9 @@ class MeasuredVariant:
 class Study:
     """All variants of a scene.
 
-    reference : with which all are compared
-    shares : parts of the reference's own error, estimated: mesh, step, reduction (worst channel each)
-    rows : in the order in which they were run; those that were not run at the end
+    reference : the variant with which all are compared
+    shares : estimated parts of the reference's own error in the worst channel: mesh, step, reduction [-]
+    rows : variants in the order in which they were run, then those that were not run
     """
 
     title: str
@@ -85,12 +85,12 @@ class Study:
 
     @property
     def floor(self) -> float:
-        """Estimated error of the reference: errors below it are not known."""
+        """Estimated error of the reference, below which errors are unknown [-]."""
         return sum(self.shares.values())
 
 
 class _LateError(Exception):
-    """The budget is spent."""
+    """The time limit is reached."""
 
 
 @dataclass
@@ -112,7 +112,7 @@ class _Bench:
         return self.most - (perf_counter() - self.since)
 
     def tick(self) -> None:
-        """Raise when the budget is spent."""
+        """Raise an error if the time limit is reached."""
         if self.left < 0.0:
             raise _LateError
 
@@ -120,7 +120,7 @@ class _Bench:
         self.tick()
 
     def run(self, variant: Variant) -> bool:
-        """Measure a variant, or note why it cannot be; whether it ran."""
+        """Measure a variant, or note why it fails; whether it ran."""
         if variant not in self.rows:
             self.watch(variant.name, int(self.most - self.left), int(self.most))
             try:
@@ -128,12 +128,12 @@ class _Bench:
             except KedfemError as error:
                 self.rows[variant] = MeasuredVariant(variant, note=str(error).splitlines()[0])
             except _LateError:
-                self.rows[variant] = MeasuredVariant(variant, note="left out: the time was spent while it ran")
+                self.rows[variant] = MeasuredVariant(variant, note="left out: it exceeded the time limit")
         return self.rows[variant].seconds is not None
 
     def leave_out(self, variant: Variant, expected: float) -> None:
-        """Note that a variant does not fit the budget."""
-        known = f": would take about {expected:.0f} s" if expected < float("inf") else " with its like"
+        """Note that a variant would exceed the time limit."""
+        known = f": would take about {expected:.0f} s" if expected < float("inf") else ", as was the same kind of model"
         self.rows[variant] = MeasuredVariant(variant, note=f"left out{known}")
 
     def _measured(self, variant: Variant) -> MeasuredVariant:
@@ -149,7 +149,7 @@ class _Bench:
         return MeasuredVariant(variant, time_grid(scene).steps, int(unknowns), seconds)
 
     def _once(self, scene: Scene, variant: Variant) -> tuple[float, float, int]:
-        """Seconds to prepare and to step, unknowns."""
+        """Seconds of preparation and of stepping, and the number of unknowns."""
         begun = perf_counter()
         ready = meshed(scene, self.stage)
         if variant.tolerance is not None:
@@ -164,7 +164,7 @@ class _Bench:
         return prepared - begun, perf_counter() - prepared, ready.model.unknowns
 
     def expected(self, variant: Variant) -> float:
-        """Expected seconds of a variant, from the most similar one that ran; infinite without one."""
+        """Expected duration of a variant from the most similar one that ran [s]; infinite without one."""
         ran = (row for row in self.rows.values() if row.seconds)
         alike = [row for row in ran if row.variant.model_kind == variant.model_kind]
         if not alike:
@@ -182,25 +182,26 @@ def studied(
     scene: Scene, most: float = 60.0, repeats: int = 3, quick: bool = False,
     watch: Watch = lambda stage, done, total: None,
 ) -> Study:  # fmt: skip
-    """Run a scene in many variants and compare them with the finest that fits the budget.
+    """Run a scene in many variants and compare them with the finest within the time limit.
 
     Parameters
     ----------
-    most : seconds that the study may take; variants that do not fit are left out
-    repeats : runs of short variants, whose medians are taken
-    quick : a small reference and few variants
+    most : time limit [s]; variants that would exceed it are left out
+    repeats : number of runs of short variants, for medians
+    quick : whether to take a small reference and few variants
+    watch : called with each variant's name, the seconds passed and the time limit
 
     Raises
     ------
     KedfemError
-        If no variant can be run, with the reason of the first.
+        No variant can be run; the message has the reason of the first.
     """
     scene, _ = assembled(scene)
     bench = _Bench(scene, most, repeats, watch)
     first = first_variants(scene)
     if not first:
         raise SceneError("links: must hold an elastic link with a shape, got rigid ones only")
-    bench.run(first[0])  # libraries are loaded and the inner loop compiled before the clock runs
+    bench.run(first[0])  # not measured: libraries are loaded and loops compiled
     bench.rows.clear()
     for variant in first:
         reduced_one = replace(variant.model_kind, reduced=True)
@@ -219,13 +220,13 @@ def studied(
 
 
 def _unbuildable(bench: _Bench, variant: Variant) -> bool:
-    """Whether the same kind of model failed already: one row says why."""
+    """Whether the same kind of model failed already, which is reported once."""
     failed = [row for row in bench.rows.values() if not row.seconds and not row.note.startswith("left out")]
     return any(row.variant.model_kind == variant.model_kind for row in failed)
 
 
 def _reference(bench: _Bench, quick: bool) -> Variant:
-    """Run the finest variant that fits the budget, and its coarser neighbours; if it fails the next."""
+    """Run the finest variant within the time limit and its coarser neighbours; if it fails, the next one."""
     finest = [(f, STEPS[-1]) for f in FINENESS[:0:-1]] if not quick else []
     for fineness, steps in (*finest, (1.5, 2), (1.0, STEPS[-1]), (1.0, 2)):
         variant = reference_variant(bench.scene, fineness, steps)
@@ -245,7 +246,7 @@ def _reference(bench: _Bench, quick: bool) -> Variant:
 
 
 def _compared(bench: _Bench, reference: Variant) -> Study:
-    """Errors of all that ran, and the reference's own."""
+    """The study: errors of all variants that ran, and of the reference itself."""
     finest = bench.runs[reference]
     shares = {}
     for direction, factor, variant in coarser(reference):

@@ -1,4 +1,4 @@
-"""Variants of a study of speed against error: kinds of models, finenesses of the mesh, tolerances of modes, steps."""
+"""Variants of a study of speed against error: kinds of models, meshes, tolerances of the reduction, steps."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -12,11 +12,11 @@ TIGHT = 3e-5  # tolerance of a reduced reference
 
 @dataclass(frozen=True, slots=True)
 class ModelKind:
-    """How the links of a variant are modelled.
+    """The models of the links of a variant.
 
-    family : of all links that have a shape and are not rigid in the scene
-    reduced : whether they move in the span of a few modes
-    rigid : the link that is rigid besides
+    family : that of all links that have a shape and are not rigid in the scene
+    reduced : whether these links are reduced to a few modes
+    rigid : a link that is rigid in addition
     """
 
     family: Family
@@ -25,17 +25,17 @@ class ModelKind:
 
     @property
     def name(self) -> str:
-        """In words."""
+        """Its description."""
         return f"{'reduced ' if self.reduced else ''}{self.family}{', rigid crank' if self.rigid else ''}"
 
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """One way to run a scene.
+    """One variant of a scene.
 
-    fineness : elements are smaller by this factor than the scene's (or the usual ones)
-    steps : so many times the scene's
-    tolerance : of the reduction, if there is one
+    fineness : factor by which elements are smaller than the scene's
+    steps : factor on the scene's number of steps
+    tolerance : of the reduction, if there is one [-]
     """
 
     model_kind: ModelKind
@@ -45,13 +45,13 @@ class Variant:
 
     @property
     def name(self) -> str:
-        """In words."""
-        functions = "" if self.tolerance is None else f", reduction {self.tolerance:.0e}"
-        return f"{self.model_kind.name}, mesh × {self.fineness:g}, steps × {self.steps}{functions}"
+        """Its description."""
+        reduction = "" if self.tolerance is None else f", reduction {self.tolerance:.0e}"
+        return f"{self.model_kind.name}, mesh × {self.fineness:g}, steps × {self.steps}{reduction}"
 
 
 def model_kinds(scene: Scene) -> list[ModelKind]:
-    """Those that all links' shapes allow, cheapest family first; the best one also with the driven link rigid."""
+    """The kinds that all links' shapes allow, cheapest family first; the last one also with the driven link rigid."""
     each = [families(link) for link in _shaped(scene)]
     kinds: tuple[Family, ...] = ("beam", "plane", "solid")
     common = [family for family in kinds if each and all(family in f for f in each)]
@@ -68,7 +68,7 @@ def _shaped(scene: Scene) -> list[LinkScene]:
 
 
 def varied(scene: Scene, variant: Variant) -> Scene:
-    """The scene as a variant has it, checked like any other."""
+    """The scene of a variant, validated."""
     model_kind = variant.model_kind
     links = {
         name: of_family(link, "rigid") if name == model_kind.rigid else _modelled(link, variant)
@@ -82,7 +82,7 @@ def varied(scene: Scene, variant: Variant) -> Scene:
 
 
 def _modelled(link: LinkScene, variant: Variant) -> LinkScene:
-    """A link of a family, with its own mesh where it is of that family already."""
+    """A link modelled as a variant says; it keeps its own mesh if it is of that family already."""
     family, reduced = variant.model_kind.family, variant.model_kind.reduced
     if link.model != family:
         link = of_family(link, family, reduced)
@@ -96,7 +96,7 @@ def first_variants(scene: Scene) -> list[Variant]:
 
 
 def reference_variant(scene: Scene, fineness: float, steps: int) -> Variant:
-    """The best that is run: the last family; reduced very closely where that helps."""
+    """The most accurate variant: the last family, with a small tolerance of the reduction if that is faster."""
     best = [each for each in model_kinds(scene) if each.rigid is None][-1]
     return _with_tolerance(Variant(best, fineness, steps), TIGHT)
 
@@ -106,7 +106,7 @@ def _with_tolerance(variant: Variant, tolerance: float) -> Variant:
 
 
 def coarser(variant: Variant) -> Iterator[tuple[str, float, Variant]]:
-    """The next coarser one in each direction: (direction, factor, variant)."""
+    """The next coarser variant in each direction: its name, the factor, and the variant."""
     mesh = [f for f in FINENESS if f < variant.fineness]
     if mesh:
         yield "mesh", variant.fineness / mesh[-1], replace(variant, fineness=mesh[-1])
@@ -115,7 +115,7 @@ def coarser(variant: Variant) -> Iterator[tuple[str, float, Variant]]:
 
 
 def further_variants(scene: Scene, reference: Variant) -> list[Variant]:
-    """One thing changed at a time, from the scene's own and from the reference, and all together (the diagonal)."""
+    """Variants that change one thing of the scene's own or of the reference, and those that refine all together."""
     out: list[Variant] = []
     more = [s for s in STEPS if 1 < s <= reference.steps]
     for first in first_variants(scene):
@@ -137,6 +137,6 @@ def further_variants(scene: Scene, reference: Variant) -> list[Variant]:
 
 
 def exponent(scene: Scene, model_kind: ModelKind) -> float:
-    """How the unknowns of a variant grow with the fineness of its mesh."""
+    """Power of the fineness with which the unknowns of a variant grow."""
     fixed = all(isinstance(link.shape, MeshFile) for link in _shaped(scene))
     return 0.0 if fixed else {"beam": 1.0, "plane": 2.0, "solid": 3.0}.get(model_kind.family, 0.0)
