@@ -1,4 +1,4 @@
 """Output: ParaView animation, plots, a picture, and files for other programs.
 
-What writes a file raises an OutputError where it cannot be written; the old one is then left as it was.
+A function that cannot write its file raises an OutputError and leaves an older file unchanged.
 """

@@ -7,7 +7,7 @@ import numpy as np
 
 from kedfem.arrays import Float
 
-TICKS = (1, 2, 5, 10, 15, 30, 45, 60, 90, 180)  # steps of degrees that read well; beyond, whole revolutions
+TICKS = (1, 2, 5, 10, 15, 30, 45, 60, 90, 180)  # distances of ticks [deg]; larger ones are whole revolutions
 MOST_TICKS = 13
 
 
@@ -16,7 +16,7 @@ class Abscissa:
     """Values of the horizontal axis.
 
     values : (n,) [deg], [mm] over the travel of a drive, or [s] over time
-    degrees : (n,) the drive angle, when the curves are over time and there is one that moves [deg]
+    degrees : (n,) the drive angle if the curves are over time and the drive moves [deg]; else None
     over_time : whether the curves are over time
     travel : whether they are over the travel of a drive
     """
@@ -28,7 +28,7 @@ class Abscissa:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Left and right end; also for a drive that rotates backwards, time runs from left to right."""
+        """Left and right end; time runs from left to right, also for a drive that rotates backwards."""
         steps = np.diff(self.values)
         if steps.size and (steps >= 0).all() | (steps <= 0).all():
             return float(self.values[0]), float(self.values[-1])
@@ -38,8 +38,8 @@ class Abscissa:
 def abscissa(time: Float[np.ndarray, " n"], angle: Float[np.ndarray, " n"]) -> Abscissa:
     """The drive angle in degrees if it is monotonic, else time.
 
-    It keeps on when it never turns back and stands still (a thousandth of its greatest speed) for less than a tenth
-    of the steps.
+    It is monotonic if it never reverses and rests, with less than a thousandth of its greatest speed, for less than a
+    tenth of the steps.
     """
     degrees = np.degrees(angle)
     steps = np.diff(degrees) * (np.sign(degrees[-1] - degrees[0]) or 1.0)
@@ -50,12 +50,12 @@ def abscissa(time: Float[np.ndarray, " n"], angle: Float[np.ndarray, " n"]) -> A
 
 
 def over_positions(angle: Float[np.ndarray, " n"], slides: bool) -> Abscissa | None:
-    """The drive's position, by which static positions differ; None if the drive rests.
+    """The drive's position as abscissa of static positions; None if the drive rests.
 
     Parameters
     ----------
-    angle : of the drive [rad], or its travel [m]
-    slides : which of both it is
+    angle : angle of the drive [rad], or its travel [m]
+    slides : whether it is a travel
     """
     if not np.ptp(angle) > 0:
         return None
@@ -63,11 +63,11 @@ def over_positions(angle: Float[np.ndarray, " n"], slides: bool) -> Abscissa | N
 
 
 def draw_abscissa(top: Any, bottom: Any, along: Abscissa) -> None:
-    """Label, ticks and limits; above, revolutions if there is more than one.
+    """Draw label, ticks and limits, and revolutions at the top if there is more than one.
 
     Parameters
     ----------
-    top, bottom : axes of matplotlib that share the abscissa
+    top, bottom : the first and the last of matplotlib's axes that share the abscissa
     """
     first, last = along.ends
     over = "time (s)" if along.over_time else "drive travel (mm)" if along.travel else "drive angle (°)"

@@ -21,13 +21,13 @@ TAIL = b"  </Collection>\n</VTKFile>\n"  # of a PVD file
 
 
 class AnimationWriter:
-    """Writes frames one by one; each frame and the list of frames are complete at any time.
+    """Writer of frames; each frame and the list of frames are complete at any time.
 
-    The first frame removes the frames that an earlier run left under the same stem, and nothing else.
+    The first frame removes the frames of an earlier run with the same stem, and nothing else.
 
-    folder : where ``STEM.pvd`` goes, and the folder ``STEM`` with ``NAME_0000.vtu``, ``NAME_0001.vtu``, … of each link
-    stem : beginning of the names
-    drive : what the drive's position is called, with its unit; empty without one
+    folder : folder of ``STEM.pvd``, and of the folder ``STEM`` with ``NAME_0000.vtu``, ``NAME_0001.vtu``, … of each link
+    stem : first part of the names
+    drive : name of the drive's position with its unit; empty without a drive
     """
 
     REMEMBERED = ("entries", "count")
@@ -44,7 +44,7 @@ class AnimationWriter:
         return next((path for _, _, name in self.entries if not (path := self.folder / name).is_file()), None)
 
     def add(self, time: float, fields: Sequence[Block], angle: float = 0.0) -> list[Path]:
-        """Write the next frame, at a time and a position of the drive; its VTU files."""
+        """Write the next frame, at a time [s] and a position of the drive [rad or m]; returns its VTU files."""
         if not self.count:
             remove_animation(self.folder, self.stem)
         now = {"TimeValue": float(time)} | ({self.drive: float(angle)} if self.drive else {})
@@ -54,20 +54,20 @@ class AnimationWriter:
             with replacing(self.folder / files[k]) as part:
                 write_blocks(part, now, [fields[k]], k)
 
-        # most of it is compression, which lets other threads go on
+        # most of the time goes into compression, which releases Python's lock
         with ThreadPoolExecutor(threads()) as pool:
             list(pool.map(write, range(len(fields))))
         blocks = [(float(time), field.name, name) for field, name in zip(fields, files, strict=True)]
         self.entries += blocks
         self.count += 1
         path = self.folder / f"{self.stem}.pvd"
-        if not self._extended(path, _rows(blocks)):  # each of n frames written anew would take n² rows
+        if not self._extended(path, _rows(blocks)):  # writing the whole list for each of n frames would take n² rows
             write_collection(self.folder, self.stem, self.entries)
         self._listed = path.stat().st_size
         return [self.folder / name for name in files]
 
     def _extended(self, path: Path, more: bytes) -> bool:
-        """Insert rows before the end of this writer's list, if it is unchanged; whether that was possible."""
+        """Insert rows before the end of this writer's list if it is unchanged; returns whether that was possible."""
         with suppress(OSError), path.open("r+b", buffering=0) as file:
             if file.seek(0, os.SEEK_END) == self._listed:
                 end = file.seek(-len(TAIL), os.SEEK_END)
@@ -82,15 +82,18 @@ Entry = tuple[float, str, str]  # of a list of frames: time [s], name of the blo
 
 
 def write_collection(folder: Path, stem: str, entries: Sequence[Entry]) -> None:
-    """The PVD file ``STEM.pvd`` that lists VTU files at their times."""
+    """Write the PVD file ``STEM.pvd``, which lists VTU files with their times."""
     with replacing(folder / f"{stem}.pvd") as part:
         part.write_bytes(HEAD + _rows(entries) + TAIL)
 
 
 def read_collection(path: Path) -> list[tuple[float, list[Path]]]:
-    """Frames that a PVD file lists, in its order: time [s] and the files of its blocks that are there.
+    """Frames that a PVD file lists, in its order: time [s] and the existing files of its blocks.
 
-    An OutputError says that it is damaged.
+    Raises
+    ------
+    OutputError
+        The file is damaged.
     """
     import xml.etree.ElementTree as ET
 
@@ -106,7 +109,7 @@ def read_collection(path: Path) -> list[tuple[float, list[Path]]]:
 
 
 def _file_names(fields: Sequence[Block]) -> list[str]:
-    """Different names of files for all blocks, whatever letters their own names have."""
+    """Different file names for all blocks, whatever characters their own names have."""
     out: list[str] = []
     for field in fields:
         name = re.sub(r"[^A-Za-z0-9.-]", "_", field.name)
@@ -116,7 +119,7 @@ def _file_names(fields: Sequence[Block]) -> list[str]:
 
 
 def remove_animation(folder: Path, stem: str) -> None:
-    """Delete the animation of an earlier run: ``STEM.pvd``, the frames in folder ``STEM``, whole or not, no more.
+    """Delete the animation of an earlier run: ``STEM.pvd``, and complete or partial frames in the folder ``STEM``.
 
     Raises
     ------
@@ -140,7 +143,7 @@ def remove_animation(folder: Path, stem: str) -> None:
 
 
 def _rows(entries: Sequence[Entry]) -> bytes:
-    """Rows of the PVD file; parts are numbered within their time."""
+    """Rows of the PVD file; parts of one time are numbered."""
     rows, last, part = [], None, 0
     for time, name, file in entries:
         part, last = (part + 1 if time == last else 0), time

@@ -1,4 +1,4 @@
-"""Masses and springs on links in frames of the animation, and where they are attached."""
+"""Masses and springs attached to links, in frames of the animation."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from kedfem.scene import GROUND, Body, Flywheel, Scene
 from kedfem.vectors import cross
 
 STEEL = 7850.0  # kg/m³
-BALL = 0.01, 0.03  # least and largest radius of a mass that a link carries, of what is drawn
+BALL = 0.01, 0.03  # least and largest radius of an attached mass, in sizes of the mechanism
 
 Point = Float[np.ndarray, "3"]
 Points = Float[np.ndarray, "n 3"]
@@ -30,9 +30,9 @@ Points = Float[np.ndarray, "n 3"]
 class Carriers:
     """Links at one time point, which determine the positions of attached masses and springs.
 
-    fields : of all links of the model, prescribed ones last
-    X : (n, 3) the points of each in the reference position [m]
-    deformation_scale : by which the fields exaggerate displacements [-]
+    fields : fields of all links of the model, prescribed ones last
+    X : (n, 3) points of each link in the reference position [m]
+    deformation_scale : factor on the displacements in the fields [-]
     """
 
     model: Model
@@ -42,12 +42,12 @@ class Carriers:
     deformation_scale: float
 
     def place(self, name: str, at: Point) -> tuple[Point, Point] | None:
-        """Position and displacement of a reference point, by its link's nearest point; None for other links."""
+        """Position and displacement of a reference point, from its link's nearest point; None for unknown links."""
         found = self.pose(name, at)
         return None if found is None else found[:2]
 
     def pose(self, name: str, at: Point) -> tuple[Point, Point, Float[np.ndarray, "3 3"]] | None:
-        """As :meth:`place`, and the rotation of the link there from the reference position."""
+        """As :meth:`place`, and the link's rotation there from the reference position."""
         if name == GROUND:
             return at, np.zeros(3), np.eye(3)
         on = [i for i, link in enumerate(every_link(self.model)) if link.name == name]
@@ -69,7 +69,7 @@ class Carriers:
 
     @property
     def outlines(self) -> dict[str, Float[np.ndarray, "n 3"]]:
-        """Links in the reference position by their names, planar beams as wide and thick as they are [m]."""
+        """Points of links in the reference position by name, planar beams with their height and thickness [m]."""
         out: dict[str, list[np.ndarray]] = {}
         for link, X, field in zip(every_link(self.model), self.X, self.fields, strict=True):
             height, thickness, _ = field.section or (0.0, 0.0, False)
@@ -85,7 +85,7 @@ def every_link(model: Model) -> list[Link]:
 
 
 def balls(carriers: Carriers, bodies: Mapping[str, Body]) -> list[LinkField]:
-    """Masses that links carry."""
+    """Fields of the masses attached to links."""
     out = []
     size = _size([x.points for x in carriers.fields])
     for name, body in bodies.items():
@@ -108,7 +108,7 @@ def unstressed(
 
 
 def springs(carriers: Carriers, scene: Scene) -> list[LinkField]:
-    """Springs and dampers between two points, along slides and about hinges."""
+    """Fields of springs and dampers between two points, along slides and about hinges."""
     if not scene.springs:
         return []
     out, size, outlines = [], _size(carriers.X), carriers.outlines
@@ -133,7 +133,7 @@ def springs(carriers: Carriers, scene: Scene) -> list[LinkField]:
 
 
 def rigidly_moved(motion: RigidMotion, k: int, body: int, X: Points) -> tuple[Points, Points, Points]:
-    """Places, velocities and accelerations of points of a body at one time point."""
+    """Positions, velocities and accelerations of points of a body at one time point."""
     arms = X @ motion.R[k, body].T
     velocity = motion.v[k, body] + cross(np.broadcast_to(motion.omega[k, body], arms.shape), arms)
     return motion.p[k, body] + arms, velocity, motion.p2[k, body] + X @ motion.R2[k, body].T
@@ -142,11 +142,11 @@ def rigidly_moved(motion: RigidMotion, k: int, body: int, X: Points) -> tuple[Po
 def rigid_springs(
     scene: Scene, linkage: Linkage, motion: RigidMotion, k: int, seen: Mapping[str, Float[np.ndarray, "n 3"]]
 ) -> list[RigidField]:
-    """Springs of rigid links at one time point.
+    """Fields of springs between rigid links at one time point.
 
     Parameters
     ----------
-    seen : where links are drawn in the reference position, by their names [m]
+    seen : points of the drawn links in the reference position, by name [m]
     """
     if not scene.springs:
         return []
@@ -180,6 +180,6 @@ def ball_words(name: str, body: Body) -> str:
 
 
 def ball(mass: float, size: float) -> Float[np.ndarray, "27 3"]:
-    """Nodes of a ball as large as one of steel, unless that is too small or too large beside what is drawn."""
+    """Nodes of a steel ball of a mass, with limits on its radius relative to the size of the mechanism."""
     radius = np.clip(np.cbrt(0.75 * mass / (np.pi * STEEL)), BALL[0] * size, BALL[1] * size)
     return np.asarray(radius * HEX27 / np.maximum(np.linalg.norm(HEX27, axis=1, keepdims=True), 1.0))

@@ -1,4 +1,4 @@
-"""Beams, which are lines in a frame, drawn with their sections."""
+"""Surfaces of beams, which are lines in a frame, from their sections."""
 
 from typing import Any
 
@@ -6,9 +6,9 @@ import numpy as np
 
 from kedfem.arrays import Float, Int
 
-SECTION = "height, thickness, round"  # the cell array of a frame that has the sections of beams
-THINNEST = 0.004  # least height and thickness of a beam in the picture, as part of the diagonal
-JOINED = 1e-6  # corners nearer than this part of the diagonal are one
+SECTION = "height, thickness, round"  # cell array of a frame with the sections of beams
+THINNEST = 0.004  # least height and thickness of a beam in the picture, in diagonals
+JOINED = 1e-6  # distance within which corners are joined, in diagonals
 LINES = {3: 2, 21: 3}  # VTK's numbers of the line and the quadratic line, and their nodes
 # sections of height and thickness 2
 RECTANGLE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -24,7 +24,7 @@ def heights(grid: Any) -> Float[np.ndarray, "e 2"]:
 
 
 def bars(lines: Any, sizes: Float[np.ndarray, "e 2"]) -> Any:
-    """Beams in the xy plane with their sections, curved as they are bent; mitred where two elements of one meet."""
+    """Surfaces of beams in the xy plane, curved as they are bent, mitred where two elements of a link meet."""
     import pyvista
 
     points, faces, values = rims(lines, sizes)
@@ -36,9 +36,9 @@ def bars(lines: Any, sizes: Float[np.ndarray, "e 2"]) -> Any:
 def rims(
     lines: Any, sizes: Float[np.ndarray, "e 2"]
 ) -> tuple[Float[np.ndarray, "k 3"], list[int], Float[np.ndarray, " k"]]:
-    """Points of the sections along beams, faces between them in VTK's order, and the stress "MPa" there.
+    """Points of the sections along beams, the faces between them in VTK's form, and the stress "MPa" of the points.
 
-    Lines of the same elements have the same faces, however they are bent.
+    The faces do not depend on the deformation.
     """
     round_ = lines.cell_data[SECTION][:, 2] > 0 if SECTION in lines.cell_data else np.zeros(len(sizes), bool)
     tangents, elements = end_tangents(lines)
@@ -65,7 +65,7 @@ def rims(
 
 
 def end_tangents(lines: Any) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, " n"]]:
-    """Directions at the ends of elements, the mean where elements of one link meet; how many meet at each node."""
+    """Unit tangents at the ends of elements, the mean where elements meet, and the number of elements at each node."""
     out, count = np.zeros((lines.n_points, 3)), np.zeros(lines.n_points, int)
     for kind, nodes in LINES.items():
         for cell in lines.cells_dict.get(kind, np.zeros((0, nodes), int)):
@@ -78,7 +78,7 @@ def end_tangents(lines: Any) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, 
 
 
 def swept(stations: int, corners: int, closed: list[bool], start: int) -> list[int]:
-    """Faces of a prism through rims of so many corners from a point on, closed at its first end, its last or both."""
+    """Faces in VTK's form of a prism through `stations` rims of `corners` points, from point `start`; `closed` ends."""
     stop = start + (stations - 1) * corners
     first, last = range(start, start + corners), range(stop, stop + corners)
     sides = [
@@ -91,7 +91,7 @@ def swept(stations: int, corners: int, closed: list[bool], start: int) -> list[i
 
 
 def shape_functions(nodes: int, r: Float[np.ndarray, " k"]) -> Float[np.ndarray, "k m"]:
-    """Lagrange's polynomials on a line, ends first, then the middle."""
+    """Lagrange polynomials on a line: ends, then the middle."""
     if nodes == 2:
         return np.column_stack([(1 - r) / 2, (1 + r) / 2])
     return np.column_stack([r * (r - 1) / 2, r * (r + 1) / 2, 1 - r * r])

@@ -48,15 +48,15 @@ WHOLE = (
     GROWN, TABLE, ONE_FILE, PARQUET, PICTURE, MESH, WORST, ENVELOPE, POINTS, TOP, REPORT, DAMAGE, SPOTS, DAMAGE_POINTS,
     STATE,
 )  # fmt: skip
-"""Files of a run that the next one replaces."""
+"""Files of a run that the next run replaces."""
 
 
 def peak_warning(peak: Peak | None, since: float) -> tuple[str, ...]:
-    """Warnings if the highest stress is at a singular place, with the highest one elsewhere, or not of all steps.
+    """Warnings if the highest stress is at a singular place, or is not that of all steps.
 
     Parameters
     ----------
-    since : time [s] before which stresses do not count
+    since : time before which stresses are not counted [s]
     """
     if peak is None:
         return ()
@@ -78,12 +78,12 @@ def fatigue_warning(found: Fatigue | None) -> tuple[str, ...]:
         out.append(f"fatigue: no data of {', '.join(found.without)}, which were left out")
     if left := found.left_out_words:
         points = f"points of the surface near {AWAY} were left out, {left}"
-        out.append(f"fatigue: {points}: fatigue.near_joints takes them in")
+        out.append(f"fatigue: {points}: fatigue.near_joints includes them")
     worst = found.worst
     if worst is not None and worst.utilisation > 1:
         life = f"{found.hours(worst):.3g} h at a safety factor of 1"
         where = f"link {worst.link} at {place_of(worst.place)} in the reference position"
-        loaded = f"is loaded to {worst.utilisation:.3g} times of what it may be"
+        loaded = f"is loaded to {worst.utilisation:.3g} times what is allowed"
         out.append(f"fatigue: {where} {loaded}; life {life}")
     return tuple(out)
 
@@ -98,7 +98,7 @@ def _scale(scene: Scene) -> float:
 
 
 def refuse_foreign(folder: Path) -> None:
-    """OutputError if a folder has files with names that a run replaces, but no results of kedfem."""
+    """Raise an OutputError if a folder has files with names that a run replaces, but no results of kedfem."""
     file = folder / "results.h5"
     names = [*WHOLE, f"{STEM}.pvd"]
     found = [] if file.exists() else [name for name in names if (folder / name).exists()]
@@ -120,12 +120,12 @@ def remove_derived(folder: Path) -> None:
 def write_stresses(
     scene: Scene, model: Model, envelope: Envelope, singular: Sequence[Sequence[str]], drive: str, folder: Path
 ) -> None:
-    """The envelope of stresses, the top ten of each link, and the frame of the highest of all.
+    """Write the envelope of stresses, the ten highest of each link, and the frame of the highest of all.
 
     Parameters
     ----------
-    singular : per link what each point is near to, in words; empty where stress is what it seems
-    drive : the drive's position with its unit
+    singular : for each point of each link a description of the singular place that it is near to, or empty
+    drive : name of the drive's position with its unit
     """
     extremes = Extremes(envelope.links(), singular, drive)
     write_envelope(folder, extremes, scene.output.csv)
@@ -137,7 +137,7 @@ def write_stresses(
 def write_damage(
     scene: Scene, model: Model, envelope: Envelope, singular: Sequence[Sequence[str]], period: float, folder: Path
 ) -> Fatigue:
-    """Damage over the last period, in its files and in that of the results; parameters as of `write_stresses`."""
+    """Write the damage over the last period into its files and the results; parameters as of `write_stresses`."""
     found, points = fatigue_of(scene, model, envelope, singular, period)
     write_fatigue(folder, found, points, scene.output.csv)
     add_fatigue(folder / "results.h5", found)
@@ -145,7 +145,7 @@ def write_damage(
 
 
 def write_mesh_errors(model: Model, indicators: Mapping[int, Indicator], folder: Path) -> None:
-    """The mesh's indicator in each element of solid and plane links, for ParaView."""
+    """Write the error indicator of each element of solid and plane links for ParaView."""
     parts = [((link.full or link), each.elements) for link, each in ((model.links[k], x) for k, x in indicators.items())]
     if parts:
         cells = [(link.X, (link.cell_type, link.cells)) for link, _ in parts]
@@ -155,7 +155,7 @@ def write_mesh_errors(model: Model, indicators: Mapping[int, Indicator], folder:
 def write_vibration(
     scene: Scene, model: Model, recoveries: Sequence[StressRecovery], found: Vibration, folder: Path
 ) -> tuple[str, ...]:
-    """Write a growing vibration as animation and picture, if the scene asks for them; a failure to draw is a warning."""
+    """Write a growing vibration as animation and picture if the scene asks for them; returns failures to draw."""
     if scene.output.animation is None and not scene.output.picture:
         return ()
 
@@ -172,7 +172,7 @@ def write_vibration(
 
 
 def write_derived(scene: Scene, results: Results, peak: Peak | None, folder: Path) -> tuple[str, ...]:
-    """Table, plots and picture; a picture that cannot be drawn is a warning."""
+    """Write table, plots and picture; returns a warning if the picture cannot be drawn."""
     if scene.output.csv:
         write_csv(results, folder / TABLE)
     if scene.output.parquet:

@@ -1,4 +1,4 @@
-"""Contents of frames: links, rigid links and joints, with values at their points."""
+"""Contents of animation frames: links, rigid links and joints, with values at their points."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,14 +7,14 @@ import numpy as np
 
 from kedfem.arrays import Float, Int
 
-# names of arrays, each with its unit
+# names of arrays, with their units
 STRESS, VON_MISES, DISPLACEMENT = "stress [Pa]", "von Mises [Pa]", "displacement [m]"
 LARGEST, SMALLEST = "largest principal stress [Pa]", "smallest principal stress [Pa]"
 VELOCITY, ACCELERATION = "velocity [m/s]", "acceleration [m/s^2]"
 FORCE, MOMENT = "force [N]", "moment [N m]"
 DRIVE_FORCE, DRIVE_TORQUE = "drive force [N]", "drive torque [N m]"
-LINK, BODY, SPRING = "link ", "body ", "spring "  # how names of blocks begin
-JOINTS = "joints"  # the block of points with what joints exert
+LINK, BODY, SPRING = "link ", "body ", "spring "  # first words of the names of blocks
+JOINTS = "joints"  # name of the block of points with the forces of joints
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,15 +24,14 @@ class LinkField:
     name : the link's name
     cell_type : meshio's name: ``hexahedron27``, ``hexahedron20``, ``hexahedron``, ``line``, ``line3``
     cells : (e, k) node numbers in VTK's order [-]
-    points : (n, 3) where the nodes are drawn: rigid motion plus the exaggerated elastic displacement [m]
-    displacement : (n, 3) elastic displacement δ, world components, not exaggerated [m]
-    stress : (n, 6) xx, yy, zz, xy, yz, zx in the world's axes [Pa]; nan of beams, whose stress is known along their
-        axis
+    points : (n, 3) drawn positions of the nodes: rigid-body motion plus the scaled elastic displacement [m]
+    displacement : (n, 3) elastic displacement δ, world components, not scaled [m]
+    stress : (n, 6) xx, yy, zz, xy, yz, zx in the world's axes [Pa]; nan for beams, which have only axial stress
     von_mises : (n,) [Pa]
     principal : (n, 2) smallest and largest principal stress [Pa]
-    section : height and thickness [m] of a beam that is drawn as a line, and whether they are diameters of an ellipse
-    label : what stands beside a mass that a link carries, drawn as a ball; empty of a link
-    spring : whether it is one, or a damper, and no link
+    section : height and thickness [m] of a planar beam, which is a line, and whether they are diameters of an ellipse
+    label : text beside an attached mass, which is a ball; empty for a link
+    spring : whether it is a spring or damper instead of a link
     """
 
     name: str
@@ -48,7 +47,7 @@ class LinkField:
     spring: bool = False
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """What each node has, by names with units."""
+        """Values of each node, by names with units."""
         least, most = self.principal.T
         principal = {LARGEST: most, SMALLEST: least}
         return {DISPLACEMENT: self.displacement, VON_MISES: self.von_mises, STRESS: self.stress} | principal
@@ -73,7 +72,7 @@ class RigidField:
     spring: bool = False
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """What each node has, by names with units."""
+        """Values of each node, by names with units."""
         return {VELOCITY: self.velocity, ACCELERATION: self.acceleration}
 
 
@@ -81,9 +80,9 @@ class RigidField:
 class JointField:
     """Forces of joints and drives in one frame, at points for arrows.
 
-    names : of the joints
-    points : (n, 3) where they are in the rigid-body motion [m]
-    vectors : (n, 3) by names with units: world components
+    names : names of the joints
+    points : (n, 3) their positions in the rigid-body motion [m]
+    vectors : (n, 3) vectors in world components, by names with units
     """
 
     names: tuple[str, ...]
@@ -94,7 +93,7 @@ class JointField:
 
     @property
     def cells(self) -> Int[np.ndarray, "n 1"]:
-        """Each point is one."""
+        """Each point is a cell."""
         return np.arange(len(self.points))[:, None]
 
     def arrays(self) -> dict[str, np.ndarray]:
@@ -106,7 +105,7 @@ Block = LinkField | RigidField | JointField
 
 
 def numbered(field: Block) -> str:
-    """Name of a block's number in a file."""
+    """Name of the field that has a block's number in a file."""
     if isinstance(field, JointField):
         return field.name
     if field.spring:

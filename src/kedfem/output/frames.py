@@ -27,7 +27,7 @@ Rows = Mapping[str, Float[np.ndarray, "T c"]]
 
 
 def _joined(fields: Sequence[LinkField]) -> list[LinkField]:
-    """Segments of one link as one field; at a cut both sides keep their own nodes and stresses."""
+    """The fields with all segments of a link joined; both sides of a cut keep their own nodes and stresses."""
     out: dict[str, list[LinkField]] = {}
     for field in fields:
         out.setdefault(field.name, []).append(field)
@@ -49,13 +49,13 @@ def link_fields(
     deformation_scale: float,
     scene: Scene | None = None,
 ) -> list[LinkField]:
-    """All links at one time point: R' = R + f, [KED, eqs. (2)(3)], f times the exaggeration; and what they carry.
+    """All links at one time point, with attached masses and springs: R' = R + f, [KED, eqs. (2)(3)], f scaled.
 
     Parameters
     ----------
-    recoveries : per link, then per prescribed link
-    deformation_scale : factor on the elastic displacement where nodes are drawn, not on the displacement itself [-]
-    scene : whose masses and springs are drawn too
+    recoveries : one for each link, then one for each prescribed link
+    deformation_scale : factor on the elastic displacement in the drawn positions, not on the displacement itself [-]
+    scene : the scene whose masses and springs are drawn too; None for links alone
     """
     motion, k = snapshot.motion, snapshot.k
     elastic = zip(model.links, model.bodies, recoveries[: len(model.links)], snapshot.states, strict=True)
@@ -107,7 +107,7 @@ def _in_world(link: Link, moment: LinkMoment, stress: Float[np.ndarray, "p 6"]) 
 
 
 def _section(link: Link) -> tuple[float, float, bool] | None:
-    """Of a planar beam, which is a line."""
+    """The section of a planar beam, which is drawn as a line; None for other links."""
     of = (link.full or link).section
     if link.kind != "beam" or of is None:
         return None
@@ -118,9 +118,9 @@ def _section(link: Link) -> tuple[float, float, bool] | None:
 class DrawnBody:
     """Visible geometry of a link, or of a mass attached to it.
 
-    body : its number
+    body : number of the body in the linkage
     points : (n, 3) in the reference position [m]
-    cells : (e, k) and meshio's name of them
+    cells, cell_type : (e, k) node numbers, and meshio's name of the cells
     label : as of :class:`LinkField`
     """
 
@@ -172,7 +172,7 @@ def _seen(link: Link) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e k"],
 
 
 def _sticks(scene: Scene, name: str) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e k"], str]:
-    """Lines between all joints of a link; a dot where all are at one place."""
+    """Lines between all joints of a link; a point if all are at one place."""
     at = [joint.at for joint in scene.joints.values() if name in joint.links]
     points = np.array(list(dict.fromkeys(at)))
     if len(points) == 1:
@@ -185,7 +185,7 @@ def joint_field(scene: Scene, linked: Linkage, motion: RigidMotion, rows: Rows, 
 
     Parameters
     ----------
-    rows : of all channels over the times of the motion
+    rows : values of all channels at the times of the motion
     """
     names = [name for name in scene.joints if f"joints/{name}/force" in rows]
     if not names:
@@ -198,7 +198,7 @@ def joint_field(scene: Scene, linked: Linkage, motion: RigidMotion, rows: Rows, 
         points[n] = motion.p[k, i] + motion.R[k, i] @ joint.at
         force[n] = rows[f"joints/{name}/force"][k]
         moment[n] = rows.get(f"joints/{name}/moment", np.zeros((k + 1, 3)))[k]
-        on = ""  # the link on which the first of the joint's drives acts, and the arrow shows all
+        on = ""  # the link on which the joint's first drive acts: the arrow shows all efforts on it
         for driven, drive in scene.all_drives.items():
             key, what, _ = drive_effort(scene, driven)
             if drive.joint == name and (found := rows.get(key)) is not None:

@@ -1,4 +1,4 @@
-"""Shapes of springs of a joint in pictures: coils along slides, windings about hinges."""
+"""Shapes of a joint's springs in pictures: coils along slides, windings about hinges."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,20 +10,20 @@ from kedfem.motion.joint_equations import coordinate_axis, ordered
 from kedfem.output.springs import WIDTH, Shape, spring_shape, winding_shape
 from kedfem.scene import Joint, LineSpring, Scene, SpringEnd, TorsionSpring
 
-# of what is drawn: length of a coil along a slide in the reference position, largest radius of what coils go round,
-# and from how far a link reaches along a hinge's axis it is taken for a shaft
+# in sizes of the mechanism: length of a coil along a slide in the reference position, largest radius inside a coil,
+# and length along a hinge's axis from which a link is taken as a shaft
 ALONG, ROUND, SHAFT = 0.2, 0.03, 0.25
-MARGIN = 1.2  # length of such a coil, of the way to the stop that presses it together
+MARGIN = 1.2  # length of such a coil over the travel to the limit that compresses it
 
 Points = Float[np.ndarray, "n 3"]
 
 
 @dataclass(frozen=True, slots=True)
 class DrawnSpring:
-    """A spring or damper from one point to another.
+    """A spring or damper between two points.
 
-    ends : where it is fixed
-    shape : as of :func:`spring_shape`
+    ends : the points at which it is attached
+    shape : its shape by :func:`spring_shape`
     """
 
     ends: tuple[SpringEnd, SpringEnd]
@@ -31,16 +31,16 @@ class DrawnSpring:
 
     @property
     def line(self) -> Float[np.ndarray, "3"]:
-        """From one end to the other in the reference position [m]."""
+        """Vector from the first end to the second in the reference position [m]."""
         return np.subtract(self.ends[1].at, self.ends[0].at)
 
 
 @dataclass(frozen=True, slots=True)
 class DrawnWinding:
-    """A spring or damper about a hinge, which rotates with the link whose angle it is over.
+    """A spring or damper about a hinge, which rotates with one of its links.
 
     link, at : that link, and the joint's point
-    shape : around that point, in the reference position
+    shape : its shape around that point, in the reference position
     """
 
     link: str
@@ -49,12 +49,12 @@ class DrawnWinding:
 
 
 def line_springs(scene: Scene, X: Mapping[str, Points], size: float) -> dict[str, DrawnSpring]:
-    """Springs between two points, and along slides.
+    """Springs between two points and along slides, by name.
 
     Parameters
     ----------
-    X : where links are drawn in the reference position, by their names [m]
-    size : of what is drawn [m]
+    X : points of the drawn links in the reference position, by name [m]
+    size : of the mechanism [m]
     """
     out = {}
     for name, spring in scene.springs.items():
@@ -71,8 +71,8 @@ def _along(
 ) -> tuple[tuple[SpringEnd, SpringEnd], float]:
     """Ends of a spring along a slide, and the radius of what is inside it [m].
 
-    One end is on the moving link, of a slot that with the pin, at the joint; the other on the link that it moves
-    against, on that side from which a pressed spring pushes as this one does.
+    One end is on the moving link (of a slot that with the pin) at the joint. The other end is on the other link, on the
+    side from which a compressed spring would push as this one does.
     """
     joint = scene.joints[spring.joint or ""]
     link, other = ordered(joint)
@@ -88,7 +88,7 @@ def _along(
 
 
 def hinge_springs(scene: Scene, X: Mapping[str, Points], size: float) -> dict[str, DrawnWinding]:
-    """Springs about hinges; parameters as of :func:`line_springs`."""
+    """Springs about hinges, by name; parameters as of :func:`line_springs`."""
     out = {}
     for name, spring in scene.springs.items():
         if isinstance(spring, TorsionSpring):
@@ -107,13 +107,13 @@ def hinge_springs(scene: Scene, X: Mapping[str, Points], size: float) -> dict[st
 def _around(
     joint: Joint, axis: Float[np.ndarray, "3"], X: Mapping[str, Points], low: float, high: float, within: float = np.inf
 ) -> tuple[float, float]:
-    """How far the links of a joint reach along an axis, and across it, from its point between two places on the axis.
+    """Reach of a joint's links along an axis, and across it between two places on the axis, from the joint's point [m].
 
     Parameters
     ----------
     axis : (3,) unit vector
-    low, high : the places; what is beyond them is taken there for the first, and is left out for the second [m]
-    within : how far from the axis what counts for the first is, unless the nearest is farther [m]
+    low, high : the places; points beyond them are moved to them for the first result, and ignored for the second [m]
+    within : largest distance from the axis of points for the first result, unless the nearest is farther [m]
     """
     points = np.concatenate([np.asarray(joint.at)[None], *(X[name] for name in joint.links if name in X)])
     arms = points - np.asarray(joint.at)

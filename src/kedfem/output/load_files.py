@@ -19,7 +19,7 @@ Columns = dict[str, Float[np.ndarray, " T"]]
 
 
 def write_joint_load(path: Path, load: JointLoad, results: Results, rows: Bool[np.ndarray, " T"]) -> None:
-    """A joint's load over time as CSV: in the world's axes, in each link's, magnitude, axial and bearing load, speed."""
+    """Write a joint's load over time as CSV: in the world's and the links' axes, magnitude, axial and bearing load, speed."""
     first, second = load.links
     columns: Columns = {f"on {first}, world {c} [N]": load.world[:, k] for k, c in enumerate(XYZ)}
     for link, inside in zip(load.links, load.inside, strict=False):
@@ -32,7 +32,7 @@ def write_joint_load(path: Path, load: JointLoad, results: Results, rows: Bool[n
 
 
 def write_drive_load(path: Path, load: DriveLoad, results: Results, rows: Bool[np.ndarray, " T"]) -> None:
-    """A drive's torque or force, rate and power over time as CSV."""
+    """Write a drive's torque or force, rate and power over time as CSV."""
     torque = load.unit == "N m"
     columns: Columns = {f"{'torque' if torque else 'force'} [{load.unit}]": load.effort}
     if load.rate is not None and load.power is not None:
@@ -47,14 +47,14 @@ def _write(path: Path, columns: Columns, results: Results, rows: Bool[np.ndarray
 
 
 def write_summary(path: Path, what: str, every: Mapping[str, Mapping[str, float]]) -> None:
-    """One line per joint or drive; unknown numbers are empty."""
+    """Write a line for each joint or drive; unknown numbers are empty."""
     names = list(dict.fromkeys(name for found in every.values() for name in found))
     rows = ([key, *(found.get(name, np.nan) for name in names)] for key, found in every.items())
     write_rows(path, [what, *names], rows)
 
 
 def write_polar(path: Path, load: JointLoad, rows: Bool[np.ndarray, " T"]) -> bool:
-    """Polar diagram of a hinge's radial load on each of its links, in the link's axes; whether there is one."""
+    """Write a polar diagram of a hinge's radial load on each link, in its axes; returns whether there is one."""
     if not has_polar(load):
         return False
     with figure_saved(path, polar_title(load, rows)) as figure:
@@ -77,7 +77,7 @@ def _polar_unit(load: JointLoad, rows: Bool[np.ndarray, " T"]) -> tuple[float, s
 
 
 def draw_polar(figure: Any, load: JointLoad, rows: Bool[np.ndarray, " T"]) -> None:
-    """The diagram of a hinge: the load on each of its links."""
+    """Draw the diagram of a hinge: the load on each of its links."""
     e1, e2 = facing(np.asarray(load.axis))
     divisor, unit = _polar_unit(load, rows)
     sides = figure.subplots(1, 2, subplot_kw={"projection": "polar"})

@@ -1,4 +1,4 @@
-"""Pictures of meshes: elements coloured by their quality, with a histogram."""
+"""Pictures of meshes: elements coloured by quality, with a histogram."""
 
 import tempfile
 from collections.abc import Sequence
@@ -13,18 +13,18 @@ from kedfem.mesh import SolidMesh, mesh_quality
 from kedfem.mesh.cad.sides import owned_sides
 from kedfem.mesh.elements.shape_functions import QUAD9, TRI6, shape_functions
 from kedfem.mesh.elements.tetrahedra import FORMS
-from kedfem.output.picture import draw_apart
+from kedfem.output.picture import draw_in_process
 
 FINENESS = 4  # straight segments for a side of an element
 
 
 @dataclass(frozen=True, slots=True)
 class MeshSurface:
-    """The surface of a mesh as VTK takes it.
+    """The surface of a mesh for VTK.
 
     points : (n, 3) [m]
     patches : (p, 4) small quadrilaterals
-    values : (p,) scaled Jacobian of the element that each belongs to
+    values : (p,) scaled Jacobian of each patch's element [-]
     lines : (l, FINENESS + 1) edges of elements
     """
 
@@ -35,7 +35,7 @@ class MeshSurface:
 
 
 def mesh_surface(mesh: SolidMesh) -> MeshSurface:
-    """Outer sides of the elements in small patches, curved as the elements are; those of triangles end in a point."""
+    """The curved outer sides of the elements in small patches; those of triangular sides end in a point."""
     full = FORMS["hex27"](mesh)
     quality = mesh_quality(mesh).scaled_jacobian
     sides, owners = owned_sides(full.cells)
@@ -59,12 +59,12 @@ def mesh_surface(mesh: SolidMesh) -> MeshSurface:
 def write_mesh_picture(
     meshes: Sequence[tuple[str, SolidMesh]], png: Path, title: str, found: Sequence[PartCandidate] = ()
 ) -> None:
-    """Draw meshes side by side, one alone with the histogram of its quality.
+    """Draw meshes side by side, or a single one with the histogram of its quality.
 
     Parameters
     ----------
-    meshes : words and mesh of each
-    found : faces of the first that are numbered
+    meshes : caption and mesh of each
+    found : faces of the first mesh that get numbers
 
     Raises
     ------
@@ -81,11 +81,11 @@ def write_mesh_picture(
     with tempfile.TemporaryDirectory() as folder:
         given = Path(folder) / "meshes.npz"
         np.savez(given, allow_pickle=False, **arrays)
-        draw_apart("mesh_rendering.py", (given, Path(png)), (len(meshes),), "the mesh: must be one")
+        draw_in_process("mesh_rendering.py", (given, Path(png)), (len(meshes),), "the mesh: must be one")
 
 
 def _numbers(mesh: SolidMesh, found: Sequence[PartCandidate]) -> dict[str, np.ndarray]:
-    """Possible positions of the numbers of faces, with normals: one on a plane, else on any side of an element."""
+    """Possible positions and normals of the numbers of faces: one on a plane, else one on each element side."""
     places, numbers, normals = [], [], []
     for each in found:
         plane = each.kind == "plane"

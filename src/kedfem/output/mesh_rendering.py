@@ -1,6 +1,6 @@
 """The drawing process of :func:`kedfem.output.mesh_picture.write_mesh_picture`.
 
-It is run by its path; of kedfem it imports only `kedfem.processes`, which imports no other module of it.
+It is run by its path; of kedfem it imports only `kedfem.processes`, which imports no other module of kedfem.
 """
 
 import math
@@ -14,15 +14,15 @@ from kedfem.processes import end_with_parent
 
 SIZE = 1500  # pixels of the picture of one mesh, each way, before its margin is cut off
 COLOURS = ("#a50026", "#f46d43", "#fee08b", "#d9ef8b", "#8cc665")
-"""From bad to good; the good ones light enough for black edges."""
+"""Colours from bad to good; the good ones are light enough for black edges."""
 
-# how far edges are drawn before the surface, as part of the diagonal, so that it does not cover them
+# distance of edges before the surface, in diagonals, so that it does not cover them
 LIFT = 2e-3
 BINS = 20  # of the histogram, from 0 to 1
 
 
 def render(npz: str, png: str, count: str) -> None:
-    """Draw so many meshes of a file of arrays."""
+    """Draw `count` meshes from a file of arrays."""
     import matplotlib as mpl
 
     mpl.use("Agg")
@@ -70,7 +70,7 @@ def draw_several(given: Any, count: int) -> Any:
 
 
 def image(given: Any, i: int) -> Any:
-    """Pixels of one mesh, seen at a slant from above its flat side."""
+    """Pixels of one mesh, seen obliquely from above its flat side."""
     import pyvista
 
     points, patches, lines = (given[f"{key}{i}"] for key in ("points", "patches", "lines"))
@@ -96,7 +96,7 @@ def image(given: Any, i: int) -> Any:
 
 
 def add_numbers(plotter: Any, given: Any, direction: Any) -> None:
-    """Numbers of faces, each at its place nearest to the viewer; those on planes that face away are grey."""
+    """Draw numbers of faces, each at its place nearest to the viewer; those on planes that face away are grey."""
     places, numbers, normals = (given[f"label_{key}"] for key in ("places", "numbers", "normals"))
     several = [np.flatnonzero(numbers == number) for number in np.unique(numbers)]
     near = np.array([own[(places[own] @ direction).argmax()] for own in several])
@@ -118,7 +118,7 @@ def colours() -> Any:
 
 
 def sight(points: Any) -> tuple[Any, Any]:
-    """From where a part is seen, and what is up: its longest direction to the right."""
+    """The direction to the viewer, and the upward one; the longest side of a part runs to the right."""
     low, high = points.min(axis=0), points.max(axis=0)
     order = np.argsort(high - low)
     normal, up, right = np.eye(3)[order]

@@ -22,11 +22,11 @@ QUANTITIES = (
 
 
 def write_motion(path: Path, scene: Scene, linkage: Linkage, blocks: Iterable[RigidMotion]) -> int:
-    """Write the motion of all links as comma-separated values, one row per time point; the number of rows.
+    """Write the motion of all links as comma-separated values, a row for each time point; returns their number.
 
     Parameters
     ----------
-    blocks : the motion, one part of the time after the other
+    blocks : the motion, in consecutive parts of the time
     """
     names = ["time [s]", drive_heading(drive_channel(scene)), *_columns(list(scene.links))]
     last: dict[int, Float[np.ndarray, "4"]] = {}
@@ -54,11 +54,11 @@ def reference_point(scene: Scene, name: str) -> Float[np.ndarray, "3"]:
 def continuous_quaternions(
     R: Float[np.ndarray, "T 3 3"], before: Float[np.ndarray, "4"] | None = None
 ) -> Float[np.ndarray, "T 4"]:
-    """Unit quaternions w, x, y, z of rotations, each with the sign nearer to the previous one.
+    """Unit quaternions w, x, y, z of rotations, each with the sign that is nearer to the previous one.
 
     Parameters
     ----------
-    before : of the time point before the first; without it the first has w ≥ 0
+    before : quaternion of the time point before the first; without it the first has w ≥ 0
     """
     from scipy.spatial.transform import Rotation
 

@@ -1,4 +1,4 @@
-"""A state for ParaView that opens a run's files: a Python script, which File > Load State takes."""
+"""A state for ParaView that opens a run's files: a Python script for File > Load State."""
 
 from pathlib import Path
 from string import Template
@@ -12,7 +12,7 @@ from kedfem.results.table import drive_heading
 from kedfem.scene import Scene, driven_travel
 
 STATE = "paraview.py"
-ARROW = 0.2  # of the mechanism's size: the longest arrow
+ARROW = 0.2  # length of the longest arrow, in sizes of the mechanism
 TEXT = Template('''"""Opens the results beside this file in ParaView 5.11 or later.
 
 File > Load State, or paraview --script=$state
@@ -84,11 +84,11 @@ COLOURS = ([0.8, 0.1, 0.1], [0.1, 0.2, 0.8], [0.1, 0.6, 0.2])
 
 
 def write_state(scene: Scene, results: Results, peak: Peak | None, folder: Path) -> None:
-    """Write the state beside the animation.
+    """Write the state into the animation's folder.
 
     Parameters
     ----------
-    peak : highest stress, where the colours end
+    peak : highest stress, which is the upper end of the colours
     """
     text = TEXT.substitute(
         state=STATE, folder=repr(str(folder.resolve())), stress=VON_MISES, highest=peak.stress if peak else 1.0,
@@ -100,7 +100,7 @@ def write_state(scene: Scene, results: Results, peak: Peak | None, folder: Path)
 
 
 def _arrows(scene: Scene, results: Results) -> str:
-    """Arrows of forces of joints and of efforts of drives, the longest of each a share of the mechanism's size."""
+    """Script of the arrows of joint forces and drive efforts, the longest of each a share of the mechanism's size."""
     forces = [f"joints/{name}/force" for name in scene.joints]
     slides = {driven_travel(scene, name) for name in scene.all_drives}
     drives = {

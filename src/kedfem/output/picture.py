@@ -1,4 +1,4 @@
-"""One rendered picture of a frame of the animation, by VTK in a process of its own."""
+"""Pictures of frames of the animation, rendered by VTK in a separate process."""
 
 import subprocess
 import sys
@@ -8,7 +8,7 @@ from pathlib import Path
 from kedfem.errors import OutputError, PictureError
 from kedfem.results import replacing
 
-TIMEOUT = 300  # seconds after which rendering is given up, e.g. with a display that does not answer
+TIMEOUT = 300  # seconds after which rendering is ended, e.g. if the display does not answer
 ADVICE = "picture: must be drawn by VTK, for which Linux without a display needs libEGL (package libegl1)"
 
 
@@ -20,16 +20,16 @@ def write_picture(
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
     meanwhile: Callable[[], object] | None = None,
 ) -> None:
-    """Draw the links of a VTU file, deformed as they are there, coloured by von Mises stress.
+    """Draw the links of a VTU file, deformed as in the frame, coloured by von Mises stress.
 
     Parameters
     ----------
     vtu : a frame of :class:`~kedfem.output.animation.AnimationWriter`
     png : the picture
-    title : written above; long ones are wrapped
-    deformation_scale : exaggeration of the deformation in the frame, written below
-    gravity : (3,) points down in the picture, unless it is looked along [m/s²]
-    meanwhile : what is done here while VTK draws
+    title : text above the picture; long ones are wrapped
+    deformation_scale : factor on the deformation in the frame, written below
+    gravity : (3,) it points down in the picture, unless that is the direction of view [m/s²]
+    meanwhile : function that is called while VTK draws
 
     Raises
     ------
@@ -42,27 +42,27 @@ def write_picture(
     if not vtu.is_file():
         raise OutputError(f"{vtu}: must be a frame of the animation, got no such file")
     words = (title, deformation_scale, *gravity)
-    draw_apart("rendering.py", (vtu, Path(png)), words, f"{vtu}: must be a frame", meanwhile)
+    draw_in_process("rendering.py", (vtu, Path(png)), words, f"{vtu}: must be a frame", meanwhile)
 
 
-def draw_apart(
+def draw_in_process(
     script: str,
     files: tuple[Path, Path],
     words: Sequence[object],
     wanted: str,
     meanwhile: Callable[[], object] | None = None,
 ) -> None:
-    """Run VTK in a process of its own.
+    """Run VTK in a separate process.
 
-    Without any way to open a window VTK ends by a segmentation fault, and graphics drivers talk on the terminal.
+    If it cannot open a window VTK ends with a segmentation fault, and graphics drivers write to the terminal.
 
     Parameters
     ----------
-    script : a file beside this one
-    files : what is drawn, and the PNG
-    words : the script's further arguments
-    wanted : what a message says of the subject of the picture
-    meanwhile : what is done here at the same time
+    script : a file in this folder
+    files : the file to draw, and the PNG
+    words : further arguments of the script
+    wanted : first words of the message about a file that cannot be drawn
+    meanwhile : function that is called at the same time
 
     Raises
     ------

@@ -17,17 +17,14 @@ from kedfem.output.fields import SPRING, VON_MISES
 from kedfem.output.views import LIFT, View, hiding, labels, view
 from kedfem.processes import end_with_parent
 
-WIDTHS, HEIGHTS = (1000, 1600), (700, 1100)  # least and most pixels; in between as the linkage asks
-LEFT, RIGHT, TOP, BOTTOM = 60, 260, 130, 60  # pixels kept free: title above, colour bar and axes on the right
-
-
+WIDTHS, HEIGHTS = (1000, 1600), (700, 1100)  # least and most pixels; the linkage's proportions decide
+LEFT, RIGHT, TOP, BOTTOM = 60, 260, 130, 60  # margins in pixels: title above, colour bar and axes on the right
 BALL, COIL = "steelblue", "#4d6b57"
-LETTER, BESIDE = 11.5, 190  # pixels: of a letter; from the right side, where axes and colour bar begin
-NAMED = 6  # most springs whose names stand beside them
-THROUGH = 0.12  # opacity of what lies before the highest stress where it would be hidden from both sides
-# quadratic faces are halved so many times, unless that makes more triangles than this
-FINEST, TRIANGLES = 4, 200_000
-SHARP = 35.0  # degrees between faces from which an edge is drawn
+LETTER, BESIDE = 11.5, 190  # pixels: width of a letter; distance of axes and colour bar from the right side
+NAMED = 6  # most springs that are named
+THROUGH = 0.12  # opacity of what hides the highest stress from both sides
+FINEST, TRIANGLES = 4, 200_000  # halvings of quadratic faces, and most triangles that these may make
+SHARP = 35.0  # least angle between faces at an edge that is drawn [deg]
 QUADRILATERAL = 28  # VTK's number of the biquadratic quadrilateral, of plane links
 FLAT_CELLS = {QUADRILATERAL, *LINES}
 
@@ -37,7 +34,7 @@ def render(vtu: str, png: str, title: str, deformation_scale: str = "1", *gravit
     import pyvista
 
     grid: Any = pyvista.read(vtu)
-    grid.point_data["MPa"] = np.asarray(grid.point_data[VON_MISES], float) / 1e6  # as of bars, to merge
+    grid.point_data["MPa"] = np.asarray(grid.point_data[VON_MISES], float) / 1e6  # the name in bars, for merging
     shown = view(grid, np.array([float(x) for x in gravity or (0, 0, 0)]))
     plotter: Any = pyvista.Plotter(off_screen=True, window_size=window(shown.size))
     plotter.set_background("white")
@@ -55,7 +52,7 @@ def render(vtu: str, png: str, title: str, deformation_scale: str = "1", *gravit
 
 
 def mark(plotter: Any, grid: Any) -> None:
-    """A ring and a name at the highest stress, in front of all links so that nothing hides it."""
+    """Draw a ring and a number at the highest stress, in front of all links."""
     stress = grid.point_data["MPa"]
     if not np.nanmax(stress, initial=0.0) > 0:
         return
@@ -78,7 +75,7 @@ def mark(plotter: Any, grid: Any) -> None:
 
 
 def _flat(lines: Any, width: float, colour: str) -> Any:
-    """Lines in pixels of the picture."""
+    """An actor of lines in pixel coordinates."""
     from vtkmodules.vtkCommonColor import vtkNamedColors
     from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D
 
@@ -91,14 +88,14 @@ def _flat(lines: Any, width: float, colour: str) -> Any:
 
 
 def window(size: Float[np.ndarray, " 2"]) -> list[int]:
-    """Window size in pixels for a linkage of that width and height, without much empty space."""
+    """Window size in pixels for a linkage of some width and height, without much empty space."""
     aspect = size[0] / size[1]
     high = int(np.clip((WIDTHS[1] - LEFT - RIGHT) / aspect + TOP + BOTTOM, *HEIGHTS))
     return [int(np.clip((high - TOP - BOTTOM) * aspect + LEFT + RIGHT, *WIDTHS)), high]
 
 
 def draw_links(plotter: Any, grid: Any, shown: View) -> None:
-    """All links with their edges on one colour scale; what hides the highest stress is translucent."""
+    """Draw all links with their edges on one colour scale; what hides the highest stress is translucent."""
     stress = grid.point_data["MPa"]
     look = {
         "scalars": "MPa", "cmap": "turbo",
@@ -130,7 +127,7 @@ def draw_links(plotter: Any, grid: Any, shown: View) -> None:
 
 
 def draw_balls(plotter: Any, grid: Any, words: Mapping[int, str], shown: View) -> None:
-    """Masses that links carry, translucent so that they hide nothing, with their names."""
+    """Draw attached masses, translucent so that they hide nothing, with their names."""
     for cell in range(grid.n_cells):
         ball = grid.extract_cells([cell])
         look = {"color": BALL, "opacity": 0.5, "smooth_shading": True}
@@ -139,7 +136,7 @@ def draw_balls(plotter: Any, grid: Any, words: Mapping[int, str], shown: View) -
 
 
 def draw_springs(plotter: Any, grid: Any, words: Mapping[int, str], shown: View) -> None:
-    """Springs and dampers, with their names where these are few."""
+    """Draw springs and dampers, with their names if they are few."""
     for number, word in words.items():
         cells = grid.extract_cells(grid.cell_data["link"] == number)
         spring = cells.extract_surface(algorithm="dataset_surface")
@@ -149,7 +146,7 @@ def draw_springs(plotter: Any, grid: Any, words: Mapping[int, str], shown: View)
 
 
 def name(plotter: Any, place: Any, word: str, shown: View) -> None:
-    """A label in front of everything, to the right of its point, or to the left if it would cover the axes."""
+    """Draw a label in front of everything, right of its point, or left of it if it would cover the axes."""
     wide, high = plotter.window_size
     pixel = np.max(shown.size / [wide - LEFT - RIGHT, high - TOP - BOTTOM])
     begins = LEFT + (wide - LEFT - RIGHT) / 2 + (np.asarray(place) @ shown.across - shown.middle[0]) / pixel
@@ -162,7 +159,7 @@ def name(plotter: Any, place: Any, word: str, shown: View) -> None:
 
 
 def lifted(grid: Any) -> Any:
-    """The links with planar ones moved apart along z, so that their faces do not flicker through each other."""
+    """The links, planar ones moved apart along z so that faces in one plane are not mixed."""
     out = grid.copy()
     for kind in FLAT_CELLS:
         numbers = grid.cell_data["link"][grid.celltypes == kind]
@@ -172,7 +169,7 @@ def lifted(grid: Any) -> Any:
 
 
 def curved_surface(solids: Any) -> Any:
-    """Outer faces, quadratic ones divided until they look curved."""
+    """Outer faces, with quadratic ones divided until they look curved."""
     import pyvista
     from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
 
@@ -185,7 +182,7 @@ def curved_surface(solids: Any) -> Any:
 
 
 def draw_words(plotter: Any, title: str, deformation_scale: float, cut: bool) -> None:
-    """Title, scale of the deformation, and axes."""
+    """Draw title, scale of the deformation, and axes."""
     import matplotlib as mpl
 
     font = f"{mpl.get_data_path()}/fonts/ttf/DejaVuSans.ttf"  # VTK's own has no Greek
@@ -203,7 +200,7 @@ def draw_words(plotter: Any, title: str, deformation_scale: float, cut: bool) ->
 
 
 def draw_bar(plotter: Any, links: Any) -> None:
-    """Colour bar of links that were drawn."""
+    """Draw the colour bar of links."""
     wide, high = plotter.window_size
     bar = plotter.add_scalar_bar(
         "von Mises\nstress (MPa)\n", mapper=links.mapper, n_labels=6, fmt="%.3g", color="black",
@@ -214,7 +211,7 @@ def draw_bar(plotter: Any, links: Any) -> None:
 
 
 def aim(plotter: Any, grid: Any, shown: View) -> None:
-    """Parallel projection in which the whole linkage lies in the free part of the picture."""
+    """Set a parallel projection with the whole linkage inside the margins of the picture."""
     wide, high = plotter.window_size
     pixel = np.max(shown.size / [wide - LEFT - RIGHT, high - TOP - BOTTOM])
     centre = shown.middle + pixel / 2 * np.array([RIGHT - LEFT, TOP - BOTTOM])

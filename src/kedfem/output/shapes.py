@@ -1,4 +1,4 @@
-"""Mode shapes: a cycle of each for ParaView, and a picture at the largest displacement."""
+"""Files of mode shapes: a cycle of each for ParaView, and a picture at the largest displacement."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,10 +12,10 @@ from kedfem.output.fields import LinkField
 from kedfem.output.picture import write_picture
 from kedfem.output.vtu import write_frame
 
-FRAMES = 24  # over a cycle
-AMPLITUDE = 1e-3  # m: largest displacement of a shape, for which its stresses are
-DRAWN = 0.08  # of the size of what is drawn: largest displacement in pictures and animations
-MOSTLY = 0.9  # of the squares of all displacements: a shape along one axis
+FRAMES = 24  # of a cycle
+AMPLITUDE = 1e-3  # m, largest displacement of a shape, to which its stresses belong
+DRAWN = 0.08  # largest drawn displacement, in sizes of the mechanism
+MOSTLY = 0.9  # least share of one axis in the squares of all displacements of a shape along this axis
 STEM, GROWING = "shape", "growing"
 Fields = Callable[[float, float], Sequence[LinkField]]
 Gravity = tuple[float, float, float]
@@ -26,8 +26,8 @@ class Shape:
     """A mode shape.
 
     frequency : [Hz]
-    title : of its picture
-    fields : of all links with displacements and stresses times the first number, drawn exaggerated by the second
+    title : title of its picture
+    fields : function of a factor on displacements and stresses and of the deformation scale: fields of all links
     """
 
     frequency: float
@@ -36,9 +36,9 @@ class Shape:
 
 
 def write_shapes(folder: Path, shapes: Sequence[Shape], gravity: Gravity = (0, 0, 0)) -> None:
-    """Write ``shape_1.pvd`` with its frames over a cycle, ``shape_1.png``, ...; files of an earlier command are removed.
+    """Write ``shape_1.pvd`` with its frames over a cycle, ``shape_1.png``, …; earlier files of shapes are removed.
 
-    Shapes are written with a largest displacement of AMPLITUDE, stresses with it.
+    The largest displacement of a shape is AMPLITUDE, to which its stresses belong.
     """
     for old in folder.glob(f"{STEM}_*.pvd"):
         remove_animation(folder, old.stem)
@@ -53,11 +53,11 @@ def write_shapes(folder: Path, shapes: Sequence[Shape], gravity: Gravity = (0, 0
 
 
 def write_growing(folder: Path, title: str, frames: Sequence[tuple[float, Fields]], gravity: Gravity = (0, 0, 0)) -> None:
-    """A vibration about a moving mechanism: ``growing.pvd``, and ``growing.png`` of the frame where it is largest.
+    """Write a vibration about a moving mechanism: ``growing.pvd``, and ``growing.png`` of the largest frame.
 
     Parameters
     ----------
-    frames : time [s], and the fields of all links as a `Shape` has them, of one and the same amplitude
+    frames : times [s], and fields as of `Shape`, all of the same amplitude
     """
     k = int(np.argmax([_largest(fields(1.0, 0.0)) for _, fields in frames]))
     _write(folder, GROWING, title, frames, k, gravity)
@@ -68,12 +68,12 @@ def _times(fields: Fields, factor: float) -> Fields:
 
 
 def _largest(fields: Sequence[LinkField]) -> float:
-    """Of all displacements [m]."""
+    """The largest of all displacements [m]."""
     return max(float(np.linalg.norm(each.displacement, axis=1).max(initial=0.0)) for each in fields)
 
 
 def _write(folder: Path, name: str, title: str, frames: Sequence[tuple[float, Fields]], k: int, gravity: Gravity) -> None:
-    """An animation of frames of one amplitude, and a picture of the k-th, where displacements are largest."""
+    """Write an animation of frames, and a picture of the k-th, in which displacements are largest."""
     still = frames[k][1](1.0, 0.0)
     size = float(np.linalg.norm(np.ptp(np.concatenate([each.points for each in still]), axis=0)))
     exaggeration = float(f"{DRAWN * size / AMPLITUDE:.2g}")
@@ -89,7 +89,7 @@ def _write(folder: Path, name: str, title: str, frames: Sequence[tuple[float, Fi
 
 
 def _along(fields: Sequence[LinkField]) -> str:
-    """The world's axis along which nearly everything moves, which may be the view direction of a picture."""
+    """Words for the world's axis along which nearly everything moves, which a picture may not show; else empty."""
     parts = sum((each.displacement**2).sum(axis=0) for each in fields)
     k = int(np.argmax(parts))
     return f", along {'xyz'[k]}" if np.asarray(parts)[k] > MOSTLY * np.sum(parts) else ""

@@ -1,4 +1,4 @@
-"""Shapes of springs and dampers: coils and cylinders from one end to the other, windings about hinges."""
+"""Shapes of springs and dampers: coils and cylinders between two ends, windings about hinges."""
 
 import math
 
@@ -9,33 +9,32 @@ from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.newton import cross_matrix
 from kedfem.scene import LineSpring
 
-WIDTH = 0.012  # radius of a coil, of what is drawn
-SLENDER = 0.15  # most that it is of the length between the two points in the reference position
-WIRE = 0.2  # radius of its wire, of the coil's
-# turns, points on each, part of the length at each end that is straight
-TURNS, AROUND, STRAIGHT = 6, 12, 0.15
+WIDTH = 0.012  # radius of a coil, in sizes of the mechanism
+SLENDER = 0.15  # largest ratio of that radius to the distance of the ends in the reference position
+WIRE = 0.2  # radius of the wire, in radii of the coil
+TURNS, AROUND, STRAIGHT = 6, 12, 0.15  # turns, points on each, share of the straight part at each end
 RIM = 5  # points around a wire
-# along a damper: parts of its length, and radii there as parts of the coil's
+# places along a damper in lengths, and radii there in radii of the coil
 DAMPER = np.array([[0, 0.2], [0.3, 0.2], [0.3, 0.65], [0.65, 0.65], [0.65, 0.12], [1, 0.12]])
 SIDES = 12
-# about a hinge: least and most turns, how far one goes along the axis in radii, turns of the spirals at both ends
+# about a hinge: least and most turns, pitch in radii, turns of the spirals at both ends
 WINDINGS, PITCH, CLOSING = (3, 12), 1.2, 1.5
 
 Shape = tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e 4"]]
 
 
 def spring_shape(spring: LineSpring, size: float, inner: float = 0.0) -> Shape:
-    """Points of a spring's surface and its quadrilaterals.
+    """Points and quadrilaterals of a spring's surface.
 
     Parameters
     ----------
-    size : of what is drawn [m]
-    inner : least inner radius, so that the coil goes round what is inside it [m]
+    size : of the mechanism [m]
+    inner : least inner radius of the coil [m]
 
     Returns
     -------
-    points : x and y across [m], z along from the first end (0) to the second (1)
-    cells : quadrilaterals
+    points : (n, 3) x and y across [m], z from the first end (0) to the second (1) [-]
+    cells : (e, 4) quadrilaterals
     """
     length = math.dist(*(end.at for end in spring.between)) if spring.between else 0.0
     radius = min(WIDTH * size, SLENDER * length) if length else WIDTH * size
@@ -57,7 +56,8 @@ def stretched(
 
     Parameters
     ----------
-    drawn : from the first end to the second in the reference position [m]; where a coil begins turns with it
+    drawn : (3,) vector from the first end to the second in the reference position [m], from which the coil is rotated
+    ends : (2, 3) the ends [m]
     """
     a, b = ends
     z = _direction(drawn, np.array([0.0, 0.0, 1.0]))
@@ -72,7 +72,7 @@ def _direction(d: Float[np.ndarray, "3"], otherwise: Float[np.ndarray, "3"]) -> 
 
 
 def _least_rotation(z: Float[np.ndarray, "3"], d: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
-    """The rotation about an axis across both that takes one unit vector to another."""
+    """The smallest rotation that takes one unit vector to another."""
     c, v = float(z @ d), np.cross(z, d)
     if c < -1.0 + 1e-9:  # opposite: half a turn about any axis across
         e = perpendiculars(z)[0]
@@ -82,14 +82,13 @@ def _least_rotation(z: Float[np.ndarray, "3"], d: Float[np.ndarray, "3"]) -> Flo
 
 
 def winding_shape(radius: float, half: float, axis: Float[np.ndarray, "3"]) -> Shape:
-    """A spring about a hinge, around its point: a wire that winds along the axis, and at both ends inwards to it.
-
-    Seen along the axis it is a spiral, on either side of the links.
+    """A spring about a hinge, around its point: a wire that winds along the axis, with a spiral at either end.
 
     Parameters
     ----------
     radius : of its middle line [m]
-    half : its length along the axis to either side [m]
+    half : half of its length along the axis [m]
+    axis : (3,) unit vector
     """
     count, turns = int(AROUND * CLOSING), int(np.clip(2 * half / (PITCH * radius), *WINDINGS))
     grows, whole = np.linspace(0.2, 1, count, endpoint=False), np.ones(AROUND * turns + 1)
@@ -102,7 +101,7 @@ def winding_shape(radius: float, half: float, axis: Float[np.ndarray, "3"]) -> S
 
 
 def _coil(radius: float, length: float) -> Shape:
-    """A wire that winds about the axis, its ends on the axis."""
+    """A wire that winds about the z axis, with its ends on the axis."""
     r, wire = radius * (1 - WIRE), WIRE * radius
     t = np.linspace(0, 1, TURNS * AROUND + 1)
     turn = 2 * np.pi * TURNS * t
@@ -113,7 +112,7 @@ def _coil(radius: float, length: float) -> Shape:
 
 
 def _wire(line: Float[np.ndarray, "w 3"], wire: float) -> Shape:
-    """The surface of a wire of that radius about a line, which winds about z and has its ends on it or near it [m]."""
+    """The surface of a wire of radius `wire` [m] about a line that winds about z and ends on or near z."""
     along = np.gradient(line, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     outwards, far = line * [1, 1, 0], np.linalg.norm(line[:, :2], axis=1)
@@ -126,7 +125,7 @@ def _wire(line: Float[np.ndarray, "w 3"], wire: float) -> Shape:
 
 
 def _damper(radius: float) -> Shape:
-    """A cylinder with its rod, about the axis."""
+    """A cylinder with its rod, about the z axis."""
     angle = 2 * np.pi * np.arange(SIDES) / SIDES
     ring = np.column_stack([np.cos(angle), np.sin(angle)])
     rims = [np.column_stack([radius * r * ring, np.full(SIDES, z)]) for z, r in DAMPER]
@@ -134,7 +133,7 @@ def _damper(radius: float) -> Shape:
 
 
 def _sides(rims: int, corners: int) -> Int[np.ndarray, "e 4"]:
-    """Quadrilaterals between rims of so many corners."""
+    """Quadrilaterals between rims of `corners` points."""
     i, j = (x.ravel() for x in np.meshgrid(np.arange(rims - 1), np.arange(corners), indexing="ij"))
     a, b = i * corners + j, i * corners + (j + 1) % corners
     return np.column_stack([a, b, b + corners, a + corners])

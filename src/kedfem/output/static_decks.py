@@ -1,7 +1,7 @@
-"""Load cases of one part as a deck for Abaqus and CalculiX, its mesh with them; and as VTU and a table.
+"""Load cases of one part with its mesh as a deck for Abaqus and CalculiX, and as VTU files and a table.
 
-A deck has one step for each instant. Forces stand at nodes, all of them in balance; six supports, as many as hold a body
-and no more, keep it from drifting off: their reactions are what the balance leaves.
+A deck has one step for each instant. The nodal forces are in balance. Six statically determinate supports prevent rigid
+motion; their reactions are the residual of the balance.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -21,33 +21,33 @@ from kedfem.scene import Material
 from kedfem.vectors import cross
 
 Forces = Float[np.ndarray, "n 3"]
-# by meshio's names, nodes in the same order; CalculiX has no 27-node hexahedra
+# Abaqus' names by meshio's, with the same order of nodes; CalculiX has no 27-node hexahedra
 ELEMENTS = {"hexahedron": "C3D8", "hexahedron20": "C3D20", "tetra10": "C3D10"}
-LINE = 15  # numbers after the first on a line
+LINE = 15  # numbers on a line after the first
 
 
 def supports(link: Link) -> list[tuple[int, int]]:
-    """Six (node, component) that hold a link against all rigid motions, and against each as well as can be."""
+    """Six supports (node, component) that constrain all rigid motions of a link, well conditioned."""
     _, _, order = scipy.linalg.qr(_rigid(link).T, mode="economic", pivoting=True)
     return sorted((int(k // 3), int(k % 3)) for k in order[:6])
 
 
 def reactions(link: Link, held: Sequence[tuple[int, int]], forces: Forces) -> Float[np.ndarray, "6"]:
-    """What supports bear under forces at a link's nodes, by statics [N]."""
+    """Reactions of the supports to forces at a link's nodes, by statics [N]."""
     modes = _rigid(link)
     rows = [3 * node + component for node, component in held]
     return np.asarray(-np.linalg.solve(modes[rows].T, modes.T @ forces.ravel()))
 
 
 def _rigid(link: Link) -> Float[np.ndarray, "c 6"]:
-    """Small rigid motions at all components of the nodes: three ways, and about the middle, over the link's size."""
+    """Small rigid motions of the nodes: translations, and rotations about the middle over the link's size."""
     X = link.X - link.X.mean(axis=0)
     turns = [np.cross(axis, X / np.abs(X).max()).ravel() for axis in np.eye(3)]
     return np.column_stack([*(np.tile(e, len(X)) for e in np.eye(3)), *turns])
 
 
 def write_deck(path: Path, link: Link, material: Material, cases: Sequence[LoadCase], comments: Iterable[str]) -> None:
-    """The deck, with lines of comment at its head."""
+    """Write the deck, with lines of comment at its beginning."""
     held = supports(link)
     with text_file(path) as file:
         file.writelines(f"** {line}\n" for line in comments)
@@ -63,7 +63,7 @@ def write_deck(path: Path, link: Link, material: Material, cases: Sequence[LoadC
         elastic = f"{material.youngs_modulus:.9e}, {material.poisson_ratio:.9e}"
         file.write(f"*MATERIAL, NAME=LINK\n*ELASTIC\n{elastic}\n")
         file.write(f"*DENSITY\n{material.density:.9e}\n*SOLID SECTION, ELSET=EALL, MATERIAL=LINK\n")
-        file.write("** six supports, statically determinate: their reactions are what the balance leaves\n")
+        file.write("** six supports, statically determinate: their reactions are the residual of the balance\n")
         file.write("*BOUNDARY\n")
         file.writelines(f"{node + 1}, {component + 1}, {component + 1}\n" for node, component in held)
         for case in cases:
@@ -82,7 +82,7 @@ def _numbers(x: Float[np.ndarray, " k"]) -> str:
 
 
 def write_case(path: Path, link: Link, case: LoadCase) -> None:
-    """A load case for ParaView: the undeformed link; forces by kind, displacement, acceleration and stress at nodes."""
+    """Write a load case for ParaView: the undeformed link; forces by kind, displacement, acceleration and stress."""
     fields = {f"{name} [N]": x for name, x in case.parts.items()} | {
         "all forces [N]": case.total, "displacement [m]": case.displacement,
         "acceleration [m/s^2]": case.acceleration, "von Mises [Pa]": case.von_mises,
@@ -97,7 +97,7 @@ def write_case(path: Path, link: Link, case: LoadCase) -> None:
 def resultants(
     X: Forces, case: LoadCase, about: Mapping[str, Float[np.ndarray, "3"]]
 ) -> dict[str, tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"], Float[np.ndarray, "3"]]]:
-    """Point, force [N] and moment about it [N m] of each kind of force; the point is the origin where none is named."""
+    """Point [m], force [N] and moment about the point [N m] of each kind of force; the point is the origin by default."""
     out = {}
     for name, forces in case.parts.items():
         at = np.asarray(about.get(name, np.zeros(3)))
@@ -108,7 +108,7 @@ def resultants(
 def write_resultants(
     path: Path, X: Forces, cases: Sequence[LoadCase], about: Mapping[str, Float[np.ndarray, "3"]], drive: str
 ) -> None:
-    """Force and moment of each kind at each instant as CSV."""
+    """Write force and moment of each kind at each instant as CSV."""
     vectors = ("point", "m"), ("force", "N"), ("moment", "N m")
     columns = [f"{what} {c} [{unit}]" for what, unit in vectors for c in "xyz"]
     every = ((case, each) for case in cases for each in resultants(X, case, about).items())

@@ -1,4 +1,4 @@
-"""Files of the highest stresses over all steps and of damage: at every point, and where they are highest."""
+"""Files of the highest stresses over all steps and of damage: fields, tables, and lists of the highest values."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,17 +19,17 @@ ENVELOPE, POINTS, TOP = "envelope.vtu", "envelope.csv", "peaks.csv"
 DAMAGE, DAMAGE_POINTS, SPOTS = "fatigue.vtu", "fatigue_points.csv", "fatigue.csv"
 KINDS = ("highest von Mises", "largest principal", "smallest principal")
 PLACE = tuple(f"reference {c} [m]" for c in "xyz")
-MOST = 300.0  # of powers of ten: life without damage
+MOST = 300.0  # power of ten that stands for an endless life
 Columns = dict[str, Float[np.ndarray, " p"]]
 
 
 @dataclass(frozen=True, slots=True)
 class Extremes:
-    """The envelope as files have it.
+    """The envelope for its files.
 
-    found : per link or segment
-    near : per link or segment what each point is near to, in words; empty where stress is what it seems
-    drive : the drive's position with its unit, e.g. "drive angle [rad]"
+    found : envelope of each link or segment
+    near : for each of its points a description of the singular place that it is near to, or empty
+    drive : name of the drive's position with its unit, e.g. "drive angle [rad]"
     """
 
     found: Sequence[LinkEnvelope]
@@ -37,7 +37,7 @@ class Extremes:
     drive: str
 
     def columns(self) -> Columns:
-        """Of all points of all links: stresses, time and drive of each; nan of rigid links."""
+        """Stresses of all points of all links, with their times and drive positions; nan for rigid links."""
         stress = np.concatenate([each.stress for each in self.found], axis=1)
         when = np.concatenate([each.when for each in self.found], axis=2)
         what, _, unit = self.drive.partition(" [")
@@ -52,7 +52,7 @@ class Extremes:
 
 
 def write_envelope(folder: Path, extremes: Extremes, table: bool) -> None:
-    """Highest stresses at every point and when they occur, on the undeformed links: for ParaView, and as CSV if asked."""
+    """Write the highest stresses of every point with their times, undeformed: for ParaView, and optionally CSV."""
     near = [word for each in extremes.near for word in each]
     singular = {"depends on mesh or joint": np.array([float(bool(word)) for word in near])}
     recoveries, columns = [each.recovery for each in extremes.found], extremes.columns()
@@ -62,7 +62,7 @@ def write_envelope(folder: Path, extremes: Extremes, table: bool) -> None:
 
 
 def write_top(folder: Path, every: Mapping[str, Sequence[Peak]], drive: str) -> None:
-    """The highest stresses of each link at places apart as CSV; nothing where no link has stress."""
+    """Write the highest stresses of each link at separate places as CSV; nothing if no link has stress."""
     header = ["link", "rank", "von Mises stress [Pa]", *PLACE, "time [s]", drive, "node", "near"]
     ranked = ((link, *each) for link, peaks in every.items() for each in enumerate(peaks, start=1))
     rows = [[link, k, x.stress, *x.place, x.time, x.angle, x.node, x.near] for link, k, x in ranked]
@@ -71,7 +71,7 @@ def write_top(folder: Path, every: Mapping[str, Sequence[Peak]], drive: str) -> 
 
 
 def write_fatigue(folder: Path, found: Fatigue, fields: Sequence[LinkFatigue], table: bool) -> None:
-    """Damage at every point on the undeformed links for ParaView, hot spots as CSV, all points as CSV if asked."""
+    """Write damage on undeformed links for ParaView, hot spots as CSV, and optionally all points as CSV."""
     recoveries, columns = [each.recovery for each in fields], _damage_columns(found, fields)
     _write_field(folder / DAMAGE, recoveries, columns)
     _write_spots(folder / SPOTS, found)
@@ -80,7 +80,7 @@ def write_fatigue(folder: Path, found: Fatigue, fields: Sequence[LinkFatigue], t
 
 
 def _damage_columns(found: Fatigue, fields: Sequence[LinkFatigue]) -> Columns:
-    """Of all points of all links; nan where there is nothing."""
+    """Values of all points of all links; nan where there are none."""
     damage = np.concatenate([each.damage for each in fields])
     with np.errstate(divide="ignore"):
         periods = np.minimum(-np.log10(damage), MOST)
@@ -96,7 +96,7 @@ def _damage_columns(found: Fatigue, fields: Sequence[LinkFatigue]) -> Columns:
 
 
 def _write_spots(path: Path, found: Fatigue) -> None:
-    """The places of the highest damage of each link."""
+    """Write the places of the highest damage of each link."""
     header = [
         "link", "rank", *PLACE, "node", "criterion", "damage in a period", "life [periods]", "life [revolutions]",
         "life [h]", "utilisation", "amplitude [Pa]", "mean stress [Pa]", "disproportion", "support factor",
@@ -116,7 +116,7 @@ def _write_spots(path: Path, found: Fatigue) -> None:
 
 
 def _write_field(path: Path, recoveries: Sequence[StressRecovery], columns: Columns) -> None:
-    """Values at all points of all links, undeformed, for ParaView."""
+    """Write values at all points of all links, undeformed, for ParaView."""
     parts = [(x.link.name, drawn_points(x), (x.cell_type, x.cells)) for x in recoveries]
     write_points(path, parts, columns)
 
@@ -124,7 +124,7 @@ def _write_field(path: Path, recoveries: Sequence[StressRecovery], columns: Colu
 def _write_table(
     path: Path, recoveries: Sequence[StressRecovery], columns: Columns, words: Mapping[str, Sequence[str]]
 ) -> None:
-    """The same as CSV, with words for each point."""
+    """Write the same values as CSV, with texts for each point."""
     names = [(x.link.name, node) for x in recoveries for node in range(x.points)]
     numbers = np.column_stack([np.concatenate([drawn_points(x) for x in recoveries]), *columns.values()])
     rows = zip(names, numbers.tolist(), *words.values(), strict=True)

@@ -1,4 +1,4 @@
-"""The direction of view in which a picture shows a linkage."""
+"""The direction from which a picture shows a linkage."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -10,20 +10,19 @@ from kedfem.arrays import Float
 from kedfem.output.bars import LINES, THINNEST, heights
 from kedfem.output.fields import BODY, SPRING, VON_MISES
 
-# how far planar links that lie in one plane are drawn apart, as part of the diagonal: each covers those before it
-LIFT = 1e-3
-RAISED = 0.6  # how far up the eye is beside one along a horizontal axis: 27° above the horizon
-FLAT = 0.35  # a linkage whose least extent is below this part of its second is seen from that side
+LIFT = 1e-3  # distance between drawn planar links of one plane, in diagonals; each covers those before it
+RAISED = 0.6  # slope of the direction to the viewer: 27° above the horizon
+FLAT = 0.35  # ratio of the least extent to the second one below which a linkage is seen from its flat side
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """From where a linkage is drawn, and what it takes up there.
+    """The view of a linkage.
 
-    direction, across, up : (3,) unit vectors towards the eye, to the right and upwards in the picture [-]
-    cut : (3,) the highest stress, where it is hidden: of links that hide it what is before it is drawn translucent [m];
-        else None
-    middle, size : (2,) centre, width and height of the linkage in the picture [m]
+    direction, across, up : (3,) unit vectors towards the viewer, to the right and upwards in the picture [-]
+    cut : (3,) place of the highest stress if links hide it, whose parts in front of it are drawn translucent [m]; else
+        None
+    middle, size : (2,) centre, and width and height of the linkage in the picture [m]
     """
 
     direction: Float[np.ndarray, " 3"]
@@ -35,7 +34,7 @@ class View:
 
 
 def labels(grid: Any, what: str = BODY) -> dict[int, str]:
-    """Numbers of masses that links carry, or of springs, and what stands beside them."""
+    """Labels of attached masses, or of springs, by their numbers."""
     names = [name for name in grid.field_data.keys() if name.startswith(what)]  # noqa: SIM118
     return {int(grid.field_data[name][0]): name.removeprefix(what) for name in names}
 
@@ -58,14 +57,14 @@ def hiding(grid: Any, direction: Float[np.ndarray, " 3"]) -> set[int]:
 def _opaque(grid: Any) -> Any:
     """The cells that may hide the highest stress; None without any, or without stress."""
     before = ~np.isin(grid.celltypes, list(LINES))
-    if apart := labels(grid) | labels(grid, SPRING):  # translucent, and thin
+    if apart := labels(grid) | labels(grid, SPRING):  # translucent or thin
         before &= ~np.isin(grid.cell_data["link"], list(apart))
     stressed = np.isfinite(grid.point_data[VON_MISES]).any()
     return grid.extract_cells(before) if before.any() and stressed else None
 
 
 def _meets(grid: Any, solids: Any, direction: Float[np.ndarray, " 3"]) -> bool:
-    """Whether a ray from the highest stress towards the eye meets some cells."""
+    """Whether a ray from the highest stress towards the viewer meets some cells."""
     place = grid.points[int(np.nanargmax(grid.point_data[VON_MISES]))]
     surface = solids.extract_surface(nonlinear_subdivision=1, algorithm=None).triangulate()
     ends = place + LIFT * grid.length * direction, place + 2 * grid.length * direction
@@ -73,7 +72,7 @@ def _meets(grid: Any, solids: Any, direction: Float[np.ndarray, " 3"]) -> bool:
 
 
 def view(grid: Any, gravity: Float[np.ndarray, " 3"]) -> View:
-    """The view of a linkage, all of it in the picture; from another side where only so the highest stress is seen."""
+    """The view of a linkage, from the best side that shows the highest stress."""
     direction, upwards = sight(np.ptp(grid.points, axis=0), gravity)
     seen = next((each for each in sides(direction, upwards) if not hidden(grid, each)), None)
     cut = grid.points[int(np.nanargmax(grid.point_data[VON_MISES]))] if seen is None else None
@@ -88,12 +87,12 @@ def view(grid: Any, gravity: Float[np.ndarray, " 3"]) -> View:
 def picture_axes(
     direction: Float[np.ndarray, " 3"], upwards: Float[np.ndarray, " 3"], gravity: Float[np.ndarray, " 3"]
 ) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
-    """Unit vectors to the right and upwards in a picture: against gravity, unless it is looked along or unknown.
+    """Unit vectors to the right and upwards in a picture: against gravity, unless it is along the view or unknown.
 
     Parameters
     ----------
-    direction : towards the eye
-    upwards : about so where gravity does not determine it
+    direction : towards the viewer
+    upwards : approximate upward direction if gravity does not determine it
     """
     if np.linalg.norm(np.cross(gravity, direction)) > 0.5 * np.linalg.norm(gravity) > 0:
         upwards = -gravity
@@ -103,7 +102,7 @@ def picture_axes(
 
 
 def sides(direction: Float[np.ndarray, " 3"], upwards: Float[np.ndarray, " 3"]) -> list[Float[np.ndarray, " 3"]]:
-    """A direction to look from, then that from behind, then those mirrored at other axes, from below last."""
+    """A direction, then that from behind, then those mirrored at other axes, directions from below last."""
     mirrored = [direction * signs for signs in product((1.0, -1.0), repeat=3)]
     main = int(np.abs(direction).argmax())
     turned = [
@@ -118,9 +117,9 @@ def sides(direction: Float[np.ndarray, " 3"], upwards: Float[np.ndarray, " 3"]) 
 def sight(
     extents: Float[np.ndarray, " 3"], gravity: Float[np.ndarray, " 3"]
 ) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
-    """Unit vectors to the eye that sees a linkage best, and upwards: flat ones slightly tilted from their flat side.
+    """Unit vectors towards the viewer of a linkage, and upwards: a flat linkage is seen from its flat side, tilted.
 
-    What is as thick as high is seen from one corner, where gravity is known from not far above.
+    A linkage with similar extents is seen from a corner; if gravity is known, from slightly above.
     """
     x, y, z = np.eye(3)
     least, second, most = np.sort(extents)

@@ -1,7 +1,7 @@
-"""The ParaView animation as one file: VTKHDF, an unstructured grid over time whose mesh is stored once.
+"""The ParaView animation as one VTKHDF file: an unstructured grid over time whose mesh is stored once.
 
-Points are where the rigid motion takes them, so that Warp By Vector by ``displacement [m]`` draws the deflection as
-large as its user likes. Each frame is appended, and the file is whole after it.
+Points have their rigid-body positions, so that Warp By Vector with ``displacement [m]`` draws the deflection at any
+scale. Each frame is appended, after which the file is complete.
 """
 
 from collections.abc import Iterator, Sequence
@@ -29,8 +29,8 @@ SPARE = 1_000_000  # bytes for HDF5's own tables
 class AnimationFile:
     """Frames of a run in one file.
 
-    path : the file; the first frame replaces an older one
-    drive : what the drive's position is called, with its unit: a field of each frame
+    path : the file; the first frame replaces an older file
+    drive : name of the drive's position with its unit, a field of each frame
     """
 
     REMEMBERED = ("written",)
@@ -41,7 +41,7 @@ class AnimationFile:
 
     @property
     def missing(self) -> Path | None:
-        """The file, if frames that were written are not there any more."""
+        """The file if it lacks frames that were written; else None."""
         import h5py
 
         if not self.written:
@@ -59,8 +59,8 @@ class AnimationFile:
         Parameters
         ----------
         time : [s]
-        angle : of the drive [rad], or travel [m]
-        fields : the links in this frame, not exaggerated: points are those of the rigid motion; what joints exert
+        angle : angle of the drive [rad], or its travel [m]
+        fields : the links in this frame, points at their rigid-body positions; and the forces of joints
         """
         import h5py
 
@@ -79,7 +79,7 @@ class AnimationFile:
         self.written += 1
 
     def _append(self, root: Any, time: float, angle: float, arrays: dict[str, np.ndarray]) -> None:
-        """A frame after those that count; what else is there is of a run that was killed."""
+        """Append a frame after `written` ones; it overwrites frames that a killed run left."""
         k, n = self.written, len(arrays["Points"])
         for name, x in arrays.items():
             root[name].resize((k + 1) * n, axis=0)
@@ -91,7 +91,7 @@ class AnimationFile:
         steps |= {f"Steps/PointDataOffsets/{name}": k * n for name in root["PointData"]}
         steps |= {f"Steps/CellDataOffsets/{name}": 0 for name in root["CellData"]}
         steps |= {f"Steps/FieldDataOffsets/{self.drive}": k}
-        for name in (name for name in root["FieldData"] if name != self.drive):  # which number is which link
+        for name in (name for name in root["FieldData"] if name != self.drive):  # the numbers of links
             steps |= {f"Steps/FieldDataOffsets/{name}": 0, f"Steps/FieldDataSizes/{name}": (1, 1)}
         for name, value in steps.items():
             root[name].resize(k + 1, axis=0)
@@ -104,7 +104,7 @@ def _in(group: str, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def _point_data(fields: Blocks) -> dict[str, np.ndarray]:
-    """What each node has in a frame, all links one after the other; vectors that a block does not have are zero there."""
+    """Values of each node of all links in a frame; vectors that a block lacks are zero, scalars nan."""
     every = [field.arrays() for field in fields]
     shapes = {name: x.shape[1:] for each in every for name, x in each.items()}
     out = {}
@@ -117,7 +117,7 @@ def _point_data(fields: Blocks) -> dict[str, np.ndarray]:
 
 
 def _laid_out(file: Any, fields: Blocks, arrays: dict[str, np.ndarray], drive: str) -> Any:
-    """The file without frames: the mesh, and empty arrays that grow."""
+    """Lay out the file without frames: the mesh, and empty arrays that grow."""
     root = file.create_group("VTKHDF")
     root.attrs["Version"] = np.array(VERSION)
     root.attrs.create("Type", np.bytes_("UnstructuredGrid"))
@@ -151,12 +151,12 @@ def _laid_out(file: Any, fields: Blocks, arrays: dict[str, np.ndarray], drive: s
 
 
 def _numbers(fields: Blocks) -> Iterator[tuple[str, int]]:
-    """Field data that show which number of the cell data is which link; "/" would begin a group."""
+    """Names and numbers of links for the field data; "/" is replaced, because it would begin a group."""
     return ((numbered(field).replace("/", "_"), k) for k, field in enumerate(fields))
 
 
 def _growing(group: Any, name: str, kind: Any, shape: tuple[int, ...] = (), rows: int = 256) -> None:
-    """An empty array to which rows are appended."""
+    """Create an empty array to which rows are appended."""
     packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
     whole = {"maxshape": (None, *shape), "chunks": (rows, *shape)}
     group.create_dataset(name, (0, *shape), kind, **whole, **packed)

@@ -1,4 +1,4 @@
-"""VTU files: meshes, links with values, frames of an animation."""
+"""VTU files of meshes, of links with values, and of animation frames."""
 
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -20,7 +20,7 @@ Cells = tuple[str, Int[np.ndarray, "e m"]]  # elements of one type: its name in 
 
 
 def write_vtu(path: Path, points: Points, cells: Sequence[Cells], **values: Any) -> None:
-    """Points and elements with `point_data` and `cell_data` as meshio takes them: binary, compressed by zlib."""
+    """Write points and elements with meshio's `point_data` and `cell_data`: binary, compressed by zlib."""
     import meshio
     from meshio import vtu
 
@@ -29,7 +29,7 @@ def write_vtu(path: Path, points: Points, cells: Sequence[Cells], **values: Any)
 
 
 def complete(path: Path, fields: str = "") -> None:
-    """Put in what meshio leaves out: field data, and the names of the components of stresses."""
+    """Add to a file what meshio does not write: field data, and names of stress components."""
     stress = f'Name="{STRESS}" NumberOfComponents="{len(STRESS_COMPONENTS)}"'
     named = "".join(f' ComponentName{i}="{name}"' for i, name in enumerate(STRESS_COMPONENTS))
     head = GRID + f"<FieldData>{fields}</FieldData>".encode() if fields else GRID
@@ -38,7 +38,7 @@ def complete(path: Path, fields: str = "") -> None:
 
 
 def write_mesh(mesh: SolidMesh, path: Path) -> None:
-    """A mesh as a VTU file, with the scaled Jacobian of its elements."""
+    """Write a mesh as a VTU file, with the scaled Jacobian of its elements."""
     quality = mesh_quality(mesh).scaled_jacobian
     with replacing(path) as part:
         cells = [(mesh.cell_type, mesh.cells)]
@@ -46,12 +46,12 @@ def write_mesh(mesh: SolidMesh, path: Path) -> None:
 
 
 def write_points(path: Path, parts: Sequence[tuple[str, Points, Cells]], values: Mapping[str, np.ndarray]) -> None:
-    """Links in the reference position with values at their points.
+    """Write links in the reference position with values at their points.
 
     Parameters
     ----------
-    parts : name, points and elements of each
-    values : of all points of all parts, one after the other
+    parts : name, points and elements of each link
+    values : values of all points, part after part, by name
     """
     names = list(dict.fromkeys(name for name, *_ in parts))
     link = [np.full(len(of), names.index(name), np.int32) for name, _, (_, of) in parts]
@@ -63,30 +63,30 @@ def write_points(path: Path, parts: Sequence[tuple[str, Points, Cells]], values:
 
 
 def write_cells(path: Path, parts: Sequence[tuple[Points, Cells]], name: str, values: Sequence[np.ndarray]) -> None:
-    """Elements in the reference position, points and cells of each part, with one value each, called `name`."""
+    """Write elements in the reference position, with a value `name` for each; `parts` are points and cells."""
     with replacing(path) as part:
         write_vtu(part, *_together(parts), cell_data={name: [x.astype(np.float32) for x in values]})
 
 
 def _together(parts: Sequence[tuple[Points, Cells]]) -> tuple[Points, list[Cells]]:
-    """All points one after the other, and elements by their numbers there."""
+    """Points of all parts in one array, and elements with their numbers there."""
     first = np.cumsum([0, *(len(points) for points, _ in parts)])
     cells = [(kind, of + n) for (_, (kind, of)), n in zip(parts, first, strict=False)]
     return np.concatenate([points for points, _ in parts]), cells
 
 
 def write_frame(path: Path, time: float, fields: Sequence[Block]) -> None:
-    """One frame on its own, all links in one grid."""
+    """Write a single frame, with all links in one grid."""
     with replacing(path) as part:
         write_blocks(part, {"TimeValue": float(time)}, fields)
 
 
 def write_blocks(path: Path, now: Mapping[str, float], fields: Sequence[Block], first: int = 0) -> None:
-    """A frame, or one block of it.
+    """Write a frame, or some blocks of it.
 
     Parameters
     ----------
-    now : the frame's time, and the drive's position if there is one
+    now : the frame's time, and the drive's position if there is one, by name
     first : number of the first block
     """
     points, cells = _together([(field.points, (field.cell_type, field.cells)) for field in fields])
@@ -100,7 +100,7 @@ def write_blocks(path: Path, now: Mapping[str, float], fields: Sequence[Block], 
 
 
 def _sections(fields: Sequence[Block]) -> dict[str, list[np.ndarray]]:
-    """Of beams drawn as lines height, thickness [m] and whether they are round; 0 elsewhere."""
+    """Height and thickness [m] of planar beams, and whether they are round; 0 for other elements."""
     every = [getattr(field, "section", None) for field in fields]
     if not any(every):
         return {}
@@ -109,7 +109,7 @@ def _sections(fields: Sequence[Block]) -> dict[str, list[np.ndarray]]:
 
 
 def _field_data(now: Mapping[str, float], fields: Sequence[Block], first: int) -> str:
-    """The frame's time and drive, and which number in the cell data is which link, or which point which joint."""
+    """The frame's time and drive, and the numbers of links in the cell data and of joints among the points."""
     out = [_number(name, x, "Float64") for name, x in now.items()]
     for number, field in enumerate(fields, start=first):
         if isinstance(field, JointField):

@@ -1,4 +1,4 @@
-"""Numbers in words, with SI prefixes; those of axes too."""
+"""Numbers as text with SI prefixes; places, instants and stresses in words."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -11,19 +11,19 @@ from kedfem.scene import Scene, drive_angle, driven_travel, time_grid
 
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
 
-PLAIN = frozenset({"", "-", "1", "rad", "deg", "°", "°/s", "°/s²", "kg", "%"})  # units that take no prefix
-NOTHING = 1e-9  # of the largest value of the same unit: rounding errors
-SAMPLES = 500  # of a drive's motion, that show whether it turns back
+PLAIN = frozenset({"", "-", "1", "rad", "deg", "°", "°/s", "°/s²", "kg", "%"})  # units without prefixes
+NOTHING = 1e-9  # of the largest value of the same unit: smaller values are rounding errors
+SAMPLES = 500  # of a drive's motion, to see whether it reverses
 UNITS = tuple((10.0**k, prefix) for k, prefix in reversed(PREFIXES.items()) if abs(k) <= 9)
 
 
 def prefixed(peak: float, unit: str) -> tuple[float, str]:
-    """Divisor, and the unit with the prefix, that bring a peak to 1 … 1000.
+    """Divisor and prefixed unit with which a peak is between 1 and 1000.
 
     Parameters
     ----------
     peak : largest absolute value, in `unit`
-    unit : the prefix goes before its first letter
+    unit : it gets the prefix before its first letter
 
     Examples
     --------
@@ -42,12 +42,12 @@ def prefixed(peak: float, unit: str) -> tuple[float, str]:
     power = 3 * math.floor(math.log10(peak) / 3 + 1e-12)
     power = min(max(power, min(PREFIXES)), max(PREFIXES))
     if power > 0 and pretty.startswith("m"):
-        power = 0  # nobody reads kilometres per second off a linkage
+        power = 0  # kilometres per second are unusual for a linkage
     return 10.0**power, PREFIXES[power] + pretty
 
 
 def number_in(row: Mapping[str, float], name: str) -> str:
-    """A number of a row with the unit of its name; values that are rounding beside others of that unit are ≈ 0.
+    """A number of a row with the unit of its name; a value that is rounding compared with others of that unit is ≈ 0.
 
     >>> number_in({"force [N]": 2e3, "moment [N m]": 3.0, "axial [N]": 1e-8}, "axial [N]")
     '≈ 0'
@@ -76,11 +76,11 @@ def with_prefix(value: float, unit: str) -> str:
 
 
 def clock(scene: Scene, frozen: bool = False) -> str:
-    """The clock of a run: the angle or travel of a single drive if it is monotonic, else the time.
+    """The quantity that counts the instants of a run: the position of a single monotonic drive, else the time.
 
     Parameters
     ----------
-    frozen : whether the mechanism is frozen at positions of its drive, wherever that goes from there
+    frozen : whether the mechanism is frozen at positions of its drive, whose motion need not be monotonic then
     """
     if len(scene.all_drives) != 1 or not (frozen or _keeps_on(scene)):
         return "time"
@@ -89,7 +89,7 @@ def clock(scene: Scene, frozen: bool = False) -> str:
 
 
 def _keeps_on(scene: Scene) -> bool:
-    """Whether the drive has each position only once, so that it determines the time; static positions have no time."""
+    """Whether the drive has each position only once, so that it determines the instant; always for static positions."""
     if scene.analysis.kind == "static":
         return True
     t = np.linspace(0.0, time_grid(scene).end, SAMPLES)
@@ -107,15 +107,15 @@ def moment(scene: Scene, time: float, angle: float, frozen: bool = False) -> str
 
 
 def place_of(point: Iterable[float]) -> str:
-    """A point in words, rounded to a micrometre: no 2.8e-19."""
+    """A point as text [m], rounded to a micrometre."""
     return f"({', '.join(f'{round(x, 6) + 0.0:g}' for x in point)}) m"
 
 
 def stress_at(peak: Peak) -> str:
-    """Highest stress in words, with link and place."""
+    """The highest stress in words, with its link and place."""
     return f"{with_prefix(peak.stress, 'Pa')} in link {peak.link} at {place_of(peak.place)} in the reference position"
 
 
 def percent(x: float) -> str:
-    """A part of one in percent."""
+    """A ratio in percent."""
     return f"{100 * x:.2g} %"

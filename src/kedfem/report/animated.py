@@ -1,4 +1,4 @@
-"""The surfaces of all links over the frames of an animation."""
+"""The surfaces of all links in the frames of an animation."""
 
 import logging
 import warnings
@@ -26,10 +26,10 @@ FRAMES = 120
 class Animated:
     """The surfaces of all links in the frames of a run.
 
-    times : (f,) of the frames [s]
-    surfaces : of all links
-    seen_from : the view of the picture of the highest stress; None where that is not known
-    thinned : what was left out to keep the page small, in words; empty if nothing was
+    times : (f,) times of the frames [s]
+    surfaces : surfaces of all links
+    seen_from : the view of the picture of the highest stress; None if there is none
+    thinned : descriptions of what was left out to keep the page small
     """
 
     times: Float[np.ndarray, " f"]
@@ -41,18 +41,18 @@ class Animated:
 def animated(
     folder: Path, deformation_scale: float, gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
 ) -> Animated | None:
-    """The surfaces of a run's links in all its frames; of a run without animation undeformed; None without either.
+    """The surfaces of a run's links in all frames, or only undeformed without an animation; None without links.
 
     Parameters
     ----------
-    folder : of the results
-    deformation_scale : by which the frames exaggerate the elastic displacement [-]
-    gravity : (3,) by which the picture's view is chosen [m/s²]
+    folder : folder of the results
+    deformation_scale : factor on the elastic displacement in the frames [-]
+    gravity : (3,) gravity, from which the view follows [m/s²]
 
     Raises
     ------
     OutputError
-        A file is not one that kedfem wrote.
+        A file was not written by kedfem, or is damaged.
     """
     listed = folder / f"{STEM}.pvd"
     frames = read_collection(listed) if listed.exists() else []
@@ -83,7 +83,7 @@ def animated(
 
 
 def _read(paths: Sequence[Path]) -> Any:
-    """The links of one or several VTU files as one grid; OutputError of damaged ones and others."""
+    """The links of some VTU files as one grid; an OutputError if one is damaged or not kedfem's."""
     import pyvista
 
     grids = []
@@ -133,7 +133,7 @@ def extent(surfaces: Sequence[Surface]) -> Float[np.ndarray, "3"]:
 def bounds(
     surfaces: Sequence[Surface], axes: Float[np.ndarray, "3 3"]
 ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
-    """Lowest and highest coordinates of all links along axes, the rows, at the reference and in all frames [m]."""
+    """Lowest and highest coordinates of all links along axes (rows), in the reference position and in all frames [m]."""
     every = [points @ axes.T for each in surfaces for points in each.world()]
     low, high = [x.min(axis=0) for x in every], [x.max(axis=0) for x in every]
     return np.asarray(np.min(low, axis=0)), np.asarray(np.max(high, axis=0))

@@ -1,4 +1,4 @@
-"""Curves of a run as SVG, with the data for a cursor on them."""
+"""Curves of a run as SVG, with the positions of a cursor on them."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ GROUPS = {
 }  # fmt: skip
 """Headings for the first part of channel names, in the order of the page."""
 
-# pictures of several channels: to which group they belong, and that they come before the others there
+# groups of pictures of several channels, which come first in them
 FIRST = {"joint_angles": "joints", "joint_travels": "joints", "energies": "energy"}
 
 
@@ -27,8 +27,8 @@ FIRST = {"joint_angles": "joints", "joint_travels": "joints", "energies": "energ
 class Curve:
     """A picture of the page.
 
-    title, svg : what it shows, and how
-    box : left, right, top and bottom of the axes, as parts of the picture's width and height; None of a polar diagram
+    title, svg : its title and drawing
+    box : left, right, top and bottom of the axes, in widths and heights of the picture; None for a polar diagram
     """
 
     title: str
@@ -74,5 +74,5 @@ def cursor_places(results: Results, times: Float[np.ndarray, " f"]) -> list[floa
 
 
 def _alone(svg: str) -> str:
-    """The drawing without the file's head, as HTML has it."""
+    """The drawing without the header of its file, for HTML."""
     return svg[svg.index("<svg") :]

@@ -1,4 +1,4 @@
-"""Tables of a report, from results and their scene."""
+"""Tables and key figures of a report, from results and their scene."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -11,8 +11,8 @@ from kedfem.output.words import number_in, place_of, with_prefix
 from kedfem.results import Fatigue, Peak, Results
 from kedfem.results.frequencies import Summary
 
-STEADY = "steady "  # what notes of a steady motion begin with
-ENDLESS = 1e15  # revolutions, hours: as good as for ever
+STEADY = "steady "  # first word of the notes of a steady motion
+ENDLESS = 1e15  # revolutions, taken as endless
 SPOTS = 3  # places of the highest damage of each link
 
 Rows = list[tuple[str, ...]]
@@ -22,9 +22,10 @@ Rows = list[tuple[str, ...]]
 class Table:
     """A table of the page.
 
-    title, head : what it shows; names of its columns, empty of a table of names and values
+    title : its title
+    head : names of its columns; empty for a table of names and values
     rows : texts; the first of each is a name
-    note : below it
+    note : text below it
     """
 
     title: str
@@ -35,7 +36,7 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Fact:
-    """A key figure: its name, its value in words, more about it."""
+    """A key figure: its name, its value as text, and details."""
 
     name: str
     value: str
@@ -73,7 +74,7 @@ def facts(results: Results, highest: Peak | None, moment: Callable[[float, float
 def _largest(
     results: Results, beginning: str, endings: tuple[str, ...]
 ) -> tuple[str, float, str, tuple[float, float]] | None:
-    """Name, largest magnitude, unit, time and drive of the largest channel of elastic links, or of rigid ones."""
+    """Description, largest magnitude, unit, and time and drive position of the largest of some channels."""
     found = None
     for name in results.channels:
         if not (name.startswith(beginning) and name.endswith(endings)) or "rigid_" in name:
@@ -130,11 +131,11 @@ def peaks_table(results: Results, moment: Callable[[float, float], str]) -> Tabl
 
 
 def peak_rows(peaks: Mapping[str, Peak], moment: Callable[[float, float], str]) -> Rows:
-    """Link, stress, place, when and near what, of each link's peak, and of that away from where it is not what it seems.
+    """Link, stress, place, instant and nearby singular place of each link's peak, and of its peak away from these.
 
     Parameters
     ----------
-    moment : a time [s] and the drive's position there [rad or m] in words
+    moment : function from a time [s] and the drive's position [rad or m] to words
     """
     every = (row for name, x in peaks.items() for row in ((name, x), ("  away from it", x.away)))
     return [
@@ -144,7 +145,7 @@ def peak_rows(peaks: Mapping[str, Peak], moment: Callable[[float, float], str]) 
 
 
 def frequencies_table(found: Summary) -> Table:
-    """Range of each natural frequency over the positions, and where harmonics of the drive meet it."""
+    """Range of each natural frequency over the positions, and the speeds at which harmonics of the drive meet it."""
     head = ("mode", "lowest", "highest", "met by harmonics of the drive")
     rows: Rows = []
     for mode, (low, high) in enumerate(zip(found.lowest, found.highest, strict=True), start=1):
@@ -177,12 +178,12 @@ def loads_tables(joints: Mapping[str, Mapping[str, float]], drives: Mapping[str,
         note = "Equivalent bearing loads: mean by the power 3 (ball) or 10/3 (roller), ISO 281, over the whole run."
         out.append(_numbers("Joint forces", "joint", joints, note))
     if drives:
-        out.append(_numbers("Drive", "joint", drives, "Power is positive where the drive drives."))
+        out.append(_numbers("Drive", "joint", drives, "Power is positive when the drive supplies it."))
     return out
 
 
 def _numbers(title: str, what: str, reported: Mapping[str, Mapping[str, float]], note: str) -> Table:
-    """A line per name; columns without any entry are left out."""
+    """A table with a row for each name; columns without any number are left out."""
     every = dict.fromkeys(key for numbers in reported.values() for key in numbers)
     keys = [key for key in every if any(np.isfinite(x.get(key, np.nan)) for x in reported.values())]
     rows: Rows = [(name, *(number_in(x, key) for key in keys)) for name, x in reported.items()]
@@ -190,7 +191,7 @@ def _numbers(title: str, what: str, reported: Mapping[str, Mapping[str, float]],
 
 
 def budget_table(notes: Mapping[str, str | float]) -> list[Table]:
-    """Estimated errors: a line for each source, a column for each kind of channel."""
+    """Estimated errors: a row for each source, a column for each kind of channel."""
     of_sources = {key: x for key, x in _noted(notes, OF_SOURCE).items() if ", " in key}
     cells = {tuple(key.split(", ", 1)): x for key, x in of_sources.items()}
     cells |= {("together", kind): x for kind, x in _noted(notes, TOGETHER).items()}
@@ -207,7 +208,7 @@ def budget_table(notes: Mapping[str, str | float]) -> list[Table]:
 
 
 def _noted(notes: Mapping[str, str | float], beginning: str) -> dict[str, float]:
-    """Numbers with a common prefix of their names, by the rest of the name."""
+    """Numbers whose names have a common beginning, by the rest of the name."""
     return {key.removeprefix(beginning): float(x) for key, x in notes.items() if key.startswith(beginning)}
 
 
@@ -218,15 +219,15 @@ def steady_table(notes: Mapping[str, str | float]) -> list[Table]:
     keys = "period [s]", "revolutions", "marches", "residual"
     period, turns, marches, residual = (float(notes[STEADY + key]) for key in keys)
     growth = notes.get(f"{STEADY}growth in a period")
-    left = "not found out" if growth is None else f"{100 * float(growth):.4g} %"
+    left = "not determined" if growth is None else f"{100 * float(growth):.4g} %"
     rows: Rows = [
         ("period", with_prefix(period, "s")),
         ("revolutions of the drive in it", f"{turns:g}" if turns else "–"),
-        ("vibration that is left after a period, at worst", left),
-        ("what a period changes of its state", f"{residual:.1e}"),
-        ("periods marched to find it", f"{marches:g}"),
+        ("least damped vibration after a period", left),
+        ("relative change of the state in a period", f"{residual:.1e}"),
+        ("periods computed to find it", f"{marches:g}"),
     ]
-    return [Table("Steady motion", (), rows, "More than 100 % left: unstable, the vibration grows.")]
+    return [Table("Steady motion", (), rows, "Above 100 % the vibration grows: the motion is unstable.")]
 
 
 def notes_table(notes: Mapping[str, str | float]) -> Table:
@@ -243,14 +244,14 @@ def named_table(title: str, items: Iterable[tuple[str, str | float]]) -> Table:
 
 
 def life_of(damage: float, found: Fatigue) -> str:
-    """Life in revolutions of the drive, or periods, and in hours, by the damage in a period."""
+    """Life in revolutions of the drive, or in periods, and in hours, from the damage in a period."""
     turns, what = (found.revolutions, "revolutions") if found.revolutions else (1.0, "periods")
     hours = found.period / 3600
     return "endless" if damage * ENDLESS < turns else f"{turns / damage:.3g} {what}, {hours / damage:.3g} h"
 
 
 def fatigue_notes(found: Fatigue) -> list[str]:
-    """Notes below the table, in words."""
+    """Notes below the table."""
     turns = f", {found.revolutions:.6g} revolutions" if found.revolutions else ""
     lines = [f"Period {with_prefix(found.period, 's')}{turns}; stresses repeat to {percent(found.repeats)}."]
     lines += [f"UNRELIABLE: {found.unreliable}."] if found.unreliable else []
@@ -258,7 +259,7 @@ def fatigue_notes(found: Fatigue) -> list[str]:
     if left := found.left_out_words:
         lines.append(f"Left out near corners, point forces and joints: {left} points.")
     empty = [name for name, spots in found.spots.items() if not spots]
-    lines += [f"No point of {', '.join(empty)} is left to look at."] if empty else []
+    lines += [f"No point of {', '.join(empty)} is left to examine."] if empty else []
     lines += [f"No data of {', '.join(found.without)}."] if found.without else []
     return lines
 

@@ -1,7 +1,7 @@
-"""The mechanism in motion as one glTF file, which browsers, office programs and 3-D tools show.
+"""The moving mechanism as one glTF file, which browsers, office programs and 3-D tools display.
 
-Links move as rigid bodies, in their reference shape, coloured by the highest stress of the whole run. glTF has y
-upwards and lengths in metres: a mechanism under gravity is turned so that this points down.
+Links move as rigid bodies in their reference shape, coloured by the highest stress of the whole run. glTF has y upwards
+and lengths in metres; a mechanism is rotated so that gravity points down.
 """
 
 import json
@@ -21,7 +21,7 @@ from kedfem.report.viewer import EXTRA, scale
 from kedfem.results import read_results, replacing, results_file
 from kedfem.results.files import of_extra
 
-STRETCHED = 1e-4  # of a spring's size: less is the rounding of frames
+STRETCHED = 1e-4  # of a spring's size: smaller changes are rounding of the frames
 GREY = (0.6, 0.6, 0.6)
 ENDING = ".glb"
 KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
@@ -30,7 +30,7 @@ GENERATOR = "kedfem"
 
 @dataclass(frozen=True, slots=True)
 class Mechanism:
-    """A glTF file that was written: its links, its frames, and what was left out, in words."""
+    """A written glTF file: its links, its number of frames, and descriptions of what was left out."""
 
     path: Path
     links: tuple[str, ...]
@@ -49,7 +49,7 @@ def write_gltf(given: Path, path: Path) -> Mechanism:
     Raises
     ------
     OutputError
-        The results cannot be read or have no links, the file cannot be written, or what is needed is not installed.
+        The results cannot be read or have no links, the file cannot be written, or a package is missing.
     """
     of_extra("pygltflib", "--gltf", EXTRA)
     if path.suffix != ENDING:
@@ -65,9 +65,9 @@ def write_gltf(given: Path, path: Path) -> Mechanism:
     scene: Mapping[str, Any] = json.loads(results.scene_json)
     gravity = np.array(scene.get("gravity") or (0.0, 0.0, 0.0), float)
     highest = max((peak.stress for peak in results.peaks.values()), default=0.0)
-    made = _Made(highest)
-    links = [made.link(surface, found.times) for surface in found.surfaces]
-    whole = made.whole(links, _upwards(gravity), str(scene.get("title") or ""))
+    builder = _Builder(highest)
+    links = [builder.link(surface, found.times) for surface in found.surfaces]
+    whole = builder.whole(links, _upwards(gravity), str(scene.get("title") or ""))
     with replacing(path) as part:
         part.write_bytes(b"".join(whole.save_to_bytes()))
     names = tuple(surface.name for surface in found.surfaces)
@@ -75,7 +75,7 @@ def write_gltf(given: Path, path: Path) -> Mechanism:
 
 
 def _upwards(gravity: Float[np.ndarray, "3"]) -> Float[np.ndarray, "4"]:
-    """The quaternion x, y, z, w that turns up to y; none without gravity."""
+    """The quaternion x, y, z, w of the rotation that takes the upward direction to y; identity without gravity."""
     size = np.linalg.norm(gravity)
     if size == 0:
         return np.array([0.0, 0.0, 0.0, 1.0])
@@ -85,10 +85,10 @@ def _upwards(gravity: Float[np.ndarray, "3"]) -> Float[np.ndarray, "4"]:
 
 
 @dataclass
-class _Made:
-    """Arrays of the file while they are collected: one buffer, with views and accessors of it.
+class _Builder:
+    """The file while it is built: one buffer of arrays, with its views and accessors.
 
-    highest : stress at which the colours end [Pa]
+    highest : stress at the upper end of the colours [Pa]
     """
 
     highest: float
@@ -132,7 +132,7 @@ class _Made:
         return node
 
     def whole(self, links: list[Any], up: Float[np.ndarray, "4"], title: str) -> Any:
-        """The file: node 0 turns up, links are its children."""
+        """The file: node 0 has the rotation to y, and links are its children."""
         import pygltflib as g
 
         root = g.Node(name=title or GENERATOR, children=list(range(1, len(links) + 1)), rotation=up.tolist())
@@ -151,7 +151,7 @@ class _Made:
         return out
 
     def array(self, x: np.ndarray, bounded: bool = False) -> int:
-        """Append an array, of integers for indices; the number of its accessor."""
+        """Append an array, of integers for indices; returns the number of its accessor."""
         import pygltflib as g
 
         whole = np.issubdtype(x.dtype, np.integer)
@@ -169,7 +169,7 @@ class _Made:
         return len(self.accessors) - 1
 
     def colours(self, stress: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n 3"]:
-        """Of the highest stresses, grey where there is none; linear light, as glTF has it."""
+        """Colours of stresses, grey without stress; in linear light, as glTF requires."""
         parts, colours = (np.array(x) for x in zip(*scale(), strict=True))
         share = np.clip(np.nan_to_num(stress) / (self.highest or 1.0), 0.0, 1.0)
         shown = np.stack([np.interp(share, parts, c) for c in colours.T], axis=1)
@@ -188,7 +188,7 @@ class PlacedShape:
 
 
 def placed_shape(surface: Surface) -> PlacedShape:
-    """Shape and motion of a surface: of a rigid link its placements; a spring is stretched along z of its own axes."""
+    """Shape and motion of a surface: the placements of a link; a spring is stretched along the z axis of its frame."""
     X, count = surface.points[0], len(surface.placements)
     p = np.array([placed.p for placed in surface.placements]).reshape(count, 3)
     R = np.array([placed.R for placed in surface.placements]).reshape(count, 3, 3)
@@ -204,9 +204,9 @@ def placed_shape(surface: Surface) -> PlacedShape:
 
 
 def _along(every: Sequence[Float[np.ndarray, "n 3"]]) -> Float[np.ndarray, "3"]:
-    """The direction in which a spring stretches; the longest of one that does not, whichever is as good then.
+    """The direction in which a spring stretches; for one that does not stretch, its longest direction.
 
-    A short coil about a thick rod is longer across.
+    The longest direction would be wrong for a short coil about a thick rod.
     """
     X, *later = (points - points.mean(axis=0) for points in every)
     stretched = max((points - X for points in later), key=lambda x: float(np.abs(x).max(initial=0.0)), default=X)
@@ -215,7 +215,7 @@ def _along(every: Sequence[Float[np.ndarray, "n 3"]]) -> Float[np.ndarray, "3"]:
 
 
 def normals(X: Float[np.ndarray, "n 3"], triangles: Int[np.ndarray, "t 3"]) -> Float[np.ndarray, "n 3"]:
-    """Unit normals at points, means of their triangles' by area."""
+    """Unit normals at points: area-weighted means of those of the triangles."""
     a, b, c = (X[triangles[:, k]] for k in range(3))
     area = np.cross(b - a, c - a)
     out = np.zeros_like(X)

@@ -1,4 +1,4 @@
-"""One HTML file about a run, with model, animation, curves, loads and warnings; it needs no network."""
+"""One HTML file about a run, with model, animation, curves, loads and warnings, which needs no network."""
 
 import json
 from base64 import b64encode
@@ -40,10 +40,10 @@ from kedfem.scene import scene_from
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A report that was written.
+    """A written report.
 
-    path : of the HTML file
-    warnings : what is missing in it, and why
+    path : path of the HTML file
+    warnings : descriptions of what is missing in it, with reasons
     """
 
     path: Path
@@ -51,7 +51,7 @@ class Report:
 
 
 def require_report(where: str) -> None:
-    """OutputError unless the packages for a report are installed."""
+    """Raise an OutputError unless the packages for a report are installed; `where` is for the message."""
     for package in ("jinja2", "k3d"):
         of_extra(package, where, EXTRA)
 
@@ -67,7 +67,7 @@ def write_report(given: Path, path: Path | None = None) -> Report:
     Raises
     ------
     OutputError
-        The results cannot be read, the file cannot be written, or what is needed is not installed.
+        The results cannot be read, the file cannot be written, or a package is missing.
     """
     require_report("kedfem report")
     file = results_file(Path(given))
@@ -88,14 +88,13 @@ def _template() -> Any:
 
 
 def _content(results: Results, folder: Path, missing: list[str]) -> dict[str, Any]:
-    """The contents of the template; missing parts are listed in words."""
+    """The contents of the template; descriptions of missing parts are appended to `missing`."""
     scene: Mapping[str, Any] = json.loads(results.scene_json)
     highest = max(results.peaks.values(), key=lambda peak: peak.stress, default=None)
     if not len(results.time):
         missing.append("no time step was written: there are no curves")
     elif results.status in {"interrupted", "abandoned", "running"}:
-        late = "highest stresses, estimated errors and timing are found at the end of a run"
-        missing.append(f"{late}, which this is not")
+        missing.append("highest stresses, estimated errors and timing are known only at the end of a run")
     if results.every > 1 and len(results.time) and not results.largest:
         missing.append(f"largest values are those of rows, of one step in {results.every}, as the run was killed")
 
@@ -122,7 +121,7 @@ def _content(results: Results, folder: Path, missing: list[str]) -> dict[str, An
 
 
 def _frequencies(results: Results, folder: Path, missing: list[str]) -> dict[str, Any] | None:
-    """Table and plots of `kedfem frequencies`, if they are of the same text of the scene."""
+    """Table and plots of `kedfem frequencies`, if they belong to the same text of the scene."""
     known = beside(folder, FREQUENCIES)
     found = read_summary(known)
     if found is None:
@@ -139,7 +138,7 @@ def _frequencies(results: Results, folder: Path, missing: list[str]) -> dict[str
 
 
 def instant_in_words(scene: Mapping[str, Any], results: Results, time: float, angle: float) -> str:
-    """A time, with the drive's position if there is one drive; of several drives, results have the first one's alone."""
+    """A time, with the drive's position if there is a single drive; results have only the first of several drives."""
     caption = f"t = {with_prefix(time, 's')}"
     if bool(scene.get("drive")) + len(scene.get("drives") or ()) != 1 or np.isnan(angle):
         return caption
@@ -149,7 +148,7 @@ def instant_in_words(scene: Mapping[str, Any], results: Results, time: float, an
 def _moving(
     scene: Mapping[str, Any], results: Results, folder: Path, highest: Peak | None, missing: list[str]
 ) -> dict[str, Any] | None:
-    """The viewer, captions and cursor positions of the frames, the first frame shown, numbers at the colour bar."""
+    """The viewer, captions and cursor positions of the frames, the first frame, numbers at the colour bar."""
     animation = scene.get("output", {}).get("animation") or {}
     scale = float(animation.get("deformation_scale", 1.0))
     gravity = tuple(scene.get("gravity") or (0.0, 0.0, 0.0))
@@ -187,7 +186,7 @@ def _frames(scene: Mapping[str, Any], results: Results, shown: Animated, highest
 
 
 def _angles(results: Results, times: Float[np.ndarray, " f"]) -> Float[np.ndarray, " f"]:
-    """The drive's position in each frame; nan between rows, where some were left out."""
+    """The drive's position in each frame; nan between recorded steps if not all were recorded."""
     if not len(results.time):
         return 0 * times
     angles = np.asarray(np.interp(times, results.time, results.angle))
@@ -198,7 +197,7 @@ def _angles(results: Results, times: Float[np.ndarray, " f"]) -> Float[np.ndarra
 
 
 def _marks(scene: Mapping[str, Any], highest: Peak | None) -> list[Mark]:
-    """Joints, on a link that is not the ground, and the highest stress."""
+    """Marks of the joints, each on a link other than the ground, and of the highest stress."""
     marks = [
         Mark(name, next(x for x in joint["links"] if x != "ground"), np.array(joint["at"], float))
         for name, joint in scene["joints"].items()
@@ -210,7 +209,7 @@ def _marks(scene: Mapping[str, Any], highest: Peak | None) -> list[Mark]:
 
 
 def _loads(raw: Mapping[str, Any], results: Results, folder: Path, missing: list[str]) -> tuple[list[Table], list[Curve]]:
-    """Tables of loads, and polar diagrams of those of bearings."""
+    """Tables of loads, and polar diagrams of bearing loads."""
     if not len(results.time):
         return [], []
     if left := thinned(results):

@@ -1,4 +1,4 @@
-"""The surfaces of a mechanism's links over an animation, from its frames, for drawing in a browser."""
+"""The surfaces of a mechanism's links in the frames of an animation, for a browser."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from kedfem.output.rendering import QUADRILATERAL, SHARP
 from kedfem.output.stress_files import KINDS
 from kedfem.output.views import LIFT
 
-NODES = 20_000  # most frames, and most nodes on the surfaces of all links: what a browser draws at once
+NODES = 20_000  # most nodes on the surfaces of all links that a browser draws quickly
 HIGHEST = f"{KINDS[0]} stress [Pa]"
 Places = Float[np.ndarray, "n 3"]
 
@@ -34,12 +34,11 @@ class Placement:
 class Surface:
     """One link's surface.
 
-    name : of the link
-    triangles : (t, 3) of its points
-    points : (n, 3) each, first in the reference position [m], then one a frame: in the link's axes, elastic displacement
-        exaggerated
-    stress : (n,) each, first the highest over all steps, then one a frame: von Mises [Pa]; nan where there is none
-    placements : one a frame
+    name : name of the link
+    triangles : (t, 3) numbers of its points
+    points : (n, 3) in the reference position [m], then in the link's axes for each frame, elastic displacement scaled
+    stress : (n,) highest von Mises stress over all steps [Pa], then that of each frame; nan without stress
+    placements : rigid-body position for each frame
     spring : whether it is a spring, which stretches
     """
 
@@ -52,24 +51,24 @@ class Surface:
 
     @property
     def stressed(self) -> bool:
-        """Whether it has stress anywhere."""
+        """Whether any point has a stress."""
         return any(np.isfinite(each).any() for each in self.stress)
 
     def world(self) -> Iterator[Places]:
-        """(n, 3) its points in the reference position, and their positions in each frame [m]."""
+        """Its points (n, 3) in the reference position, then in each frame [m]."""
         yield self.points[0]
         for points, placed in zip(self.points[1:], self.placements, strict=True):
             yield placed.p + points @ placed.R.T
 
 
 class _Source:
-    """A link's surface in the frames: its points there, and the relation of surface points to them.
+    """The source of a link's surface: its points in the frames, and the relation of surface points to them.
 
-    name : as :func:`links_of` has it
+    name : name by :func:`links_of`
     part : its elements
-    ids : (m,) which points of a frame are its own
-    X : (m, 3) where these are in the reference position [m]
-    lift : along z, so that planar links that lie in one plane do not flicker through each other [m]
+    ids : (m,) numbers of its points in a frame
+    X : (m, 3) these points in the reference position [m]
+    lift : displacement along z that separates planar links of one plane [m]
     """
 
     def __init__(self, name: str, part: Any, ids: Int[np.ndarray, " m"], X: Places, lift: float) -> None:
@@ -83,14 +82,14 @@ class _Source:
         self.surface = Surface(plain, np.zeros((0, 3), int), spring=name.startswith(SPRING))
 
     def outline(self, halvings: int) -> int:
-        """Find the surface, faces of quadratic elements halved so many times; how many points it has."""
+        """Determine the surface, quadratic faces halved `halvings` times; returns its number of points."""
         outer = self._outer(halvings).triangulate()
         if not outer.n_cells:
             return 0
         return self._keep(outer.compute_normals(cell_normals=False, split_vertices=True, feature_angle=SHARP))
 
     def _outer(self, halvings: int) -> Any:
-        """The surface in the reference position, with the numbers of the points that it is made of; empty of a point."""
+        """The surface in the reference position, with the numbers of its source points; empty for a single point."""
         import pyvista
 
         part = self.part.copy()
@@ -102,7 +101,7 @@ class _Source:
         else:
             part.point_data["id"] = np.arange(part.n_points)
             outer = part.extract_surface(nonlinear_subdivision=halvings, algorithm="dataset_surface")
-            if outer.n_lines:  # of a rigid link that has no section
+            if outer.n_lines:  # a rigid link without a section
                 outer = outer.tube(radius=THINNEST * part.length, capping=True)
                 self.tube = np.asarray(outer.points, float)
         if self.beams or self.tube is not None:
@@ -111,7 +110,7 @@ class _Source:
         return outer
 
     def thin(self, share: float) -> int:
-        """Leave out points where the surface is flat, so that about a share of them stays."""
+        """Leave out points of flat parts until about a share of all is left; returns their number."""
         import pyvista
 
         faces = np.column_stack([np.full(len(self.surface.triangles), 3), self.surface.triangles])
@@ -126,18 +125,18 @@ class _Source:
         return len(self.kept)
 
     def drawn(self, highest: Float[np.ndarray, " n"]) -> None:
-        """The link in the reference position, with the highest stresses over all steps."""
+        """Add the link in the reference position, with the highest stresses over all steps."""
         self._add(self.X, highest[self.ids])
 
     def frame(self, grid: Any, scale: float) -> None:
-        """The link in a frame, whose displacements are exaggerated."""
+        """Add the link in a frame with scaled displacements."""
         x = np.asarray(grid.points)[self.ids]
         moved, stress = np.zeros_like(x), np.full(len(x), np.nan)
         if self.elastic:
             moved = scale * np.asarray(grid.point_data[DISPLACEMENT])[self.ids]
             stress = np.asarray(grid.point_data[VON_MISES])[self.ids]
         placed = placement(self.X, x - moved, flat=self.beams)
-        # a spring is as long as there, not as in the reference position
+        # a spring has its length in the frame, not that of the reference position
         self._add((x - placed.p) @ placed.R if self.surface.spring else self.X + moved @ placed.R, stress)
         self.surface.placements.append(placed)
 
@@ -163,7 +162,7 @@ def placement(X: Places, x: Places, flat: bool = False) -> Placement:
 
     Parameters
     ----------
-    flat : whether they stay in a plane z = constant; points on a line do not determine how they turn about it
+    flat : whether they stay in a plane z = constant, since points on a line do not determine the rotation about it
     """
     if flat:
         up = np.array([0.0, 0.0, float(np.ptp(X, axis=0).max()) or 1.0])
@@ -175,7 +174,7 @@ def placement(X: Places, x: Places, flat: bool = False) -> Placement:
 
 
 def sources_of(first: Any, reference: Any) -> tuple[list[_Source], tuple[str, ...]]:
-    """The links of a frame with surfaces that are small enough, and what was left out."""
+    """The links of a frame with sufficiently small surfaces, and descriptions of what was left out."""
     X = np.array(first.points, float)
     highest = np.full(first.n_points, np.nan)
     if reference is not None and reference.n_points <= first.n_points:
@@ -198,7 +197,7 @@ def sources_of(first: Any, reference: Any) -> tuple[list[_Source], tuple[str, ..
 
 
 def _thinned(sources: Sequence[_Source]) -> tuple[str, ...]:
-    """Make surfaces small enough for a browser; what was left out, in words."""
+    """Make surfaces small enough for a browser; returns descriptions of what was left out."""
     total = sum(len(source.kept) for source in sources)
     if total <= NODES:
         return ()
@@ -209,7 +208,7 @@ def _thinned(sources: Sequence[_Source]) -> tuple[str, ...]:
 
 
 def links_of(grid: Any) -> Iterator[tuple[str, Int[np.ndarray, " e"]]]:
-    """Names of the links, masses and springs in a file with what they begin with there, and their elements."""
+    """Names of links, masses and springs in a file, with their first word there, and their elements."""
     for key in grid.field_data.keys():  # noqa: SIM118
         if key.startswith((LINK, BODY, SPRING)):
             cells = np.flatnonzero(grid.cell_data["link"] == int(grid.field_data[key][0]))

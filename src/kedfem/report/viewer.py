@@ -1,4 +1,4 @@
-"""The moving mechanism as a self-contained document for a browser: a full snapshot of k3d."""
+"""The moving mechanism as a self-contained document for a browser, made by k3d."""
 
 import json
 import warnings
@@ -15,11 +15,11 @@ from kedfem.report.animated import Animated, bounds, extent
 from kedfem.report.surfaces import Placement, Surface
 from kedfem.results.files import of_extra
 
-EXTRA = "report"  # the extra with what a report needs
-FINE = 1e-4  # of the mechanism's size: to what places are rounded, so that the document packs well
+EXTRA = "report"  # the extra with the packages of a report
+FINE = 1e-4  # of the mechanism's size: rounding of coordinates, so that the document compresses well
 SHADES = 400  # steps of the colour scale
-COMPRESSION = 6  # of zlib; 9 takes much longer for a hundredth
-LEAST = 0.08  # where the colour scale begins on matplotlib's turbo, whose lowest end is nearly black
+COMPRESSION = 6  # of zlib; 9 takes much longer and saves one percent
+LEAST = 0.08  # start of the colour scale on matplotlib's turbo, whose lower end is nearly black
 GREY, DARK, HOT = 0xB8BEC6, 0x1F2933, 0xC01030
 FIELD_OF_VIEW = 25.0  # degrees
 
@@ -41,16 +41,16 @@ look();
 K3DInstance.setTime(flat.first);
 window.parent.postMessage({ready: true}, '*');
 """
-"""Reaction of the viewer to messages of its page: a frame, or the first view again."""
+"""Script by which the viewer obeys messages of its page: show a frame, or restore the first view."""
 
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A point fixed in a link, with its name.
+    """A named point of a link.
 
-    name, link : the link is None for a point of the ground
+    name, link : its name; its link, None for the ground
     at : (3,) in the reference position [m]
-    hot : whether it is the highest stress
+    hot : whether it is the place of the highest stress
     """
 
     name: str
@@ -60,12 +60,16 @@ class Mark:
 
 
 def viewer(shown: Animated, highest: float, marks: Sequence[Mark], gravity: Float[np.ndarray, "3"], first: int) -> str:
-    """An HTML document that messages give the frame; after the last one links are undeformed, with highest stresses.
+    """An HTML document that shows the frame which its page asks for.
+
+    The frame after the last one has undeformed links with their highest stresses.
 
     Parameters
     ----------
     highest : stress at the upper end of the colour scale [Pa]
-    first : the frame that is shown at first
+    marks : points that are drawn with their names
+    gravity : (3,) [m/s²]
+    first : the frame that is shown first
     """
     k3d = of_extra("k3d", "kedfem report", EXTRA)
     taken = extent(shown.surfaces)
@@ -92,7 +96,7 @@ def gradient() -> str:
 
 
 def scale() -> list[tuple[float, tuple[float, ...]]]:
-    """Parts of the highest stress and their red, green and blue."""
+    """Shares of the highest stress, and their red, green and blue."""
     from matplotlib import colormaps
 
     parts = np.linspace(0.0, 1.0, 41)
@@ -101,7 +105,7 @@ def scale() -> list[tuple[float, tuple[float, ...]]]:
 
 
 def _mesh(k3d: Any, surface: Surface, highest: float, fine: float) -> Any:
-    """A link over the frames; after the last one in the reference position, with the highest stresses."""
+    """A link in all frames, then in the reference position with the highest stresses."""
     count = len(surface.placements)
     order = [*range(1, count + 1), 0]
     vertices = _series([(np.round(surface.points[k] / fine) * fine).astype(np.float32) for k in order])
@@ -119,7 +123,7 @@ def _mesh(k3d: Any, surface: Surface, highest: float, fine: float) -> Any:
 
 
 def _mark(k3d: Any, mark: Mark, shown: Animated, size: float) -> list[Any]:
-    """A ball and a name at the position of a link's point in each frame."""
+    """A ball and a name at a link's point in all frames."""
     of = next((each for each in shown.surfaces if each.name == mark.link), None)
     if mark.link is not None and of is None:
         return []
@@ -151,7 +155,7 @@ def _matrix(placed: Placement) -> Float[np.ndarray, "4 4"]:
 def first_view(
     shown: Animated, taken: Float[np.ndarray, "3"], gravity: Float[np.ndarray, "3"]
 ) -> Float[np.ndarray, "3 3"]:
-    """Unit vectors to the right, upwards and towards the eye as the picture has them: gravity downwards, if known."""
+    """Unit vectors to the right, upwards and towards the viewer, as in the picture; gravity points down if known."""
     if shown.seen_from is not None:
         return np.array([shown.seen_from.across, shown.seen_from.up, shown.seen_from.direction])
     towards, up = sight(taken, gravity)
@@ -159,7 +163,7 @@ def first_view(
 
 
 def _listens(shown: Animated, taken: Float[np.ndarray, "3"], gravity: Float[np.ndarray, "3"], first: int) -> str:
-    """The script with the first view, that of the picture of the highest stress: all links in all frames."""
+    """The script with the first view: that of the picture of the highest stress, wide enough for all frames."""
     axes = first_view(shown, taken, gravity)
     low, high = bounds(shown.surfaces, axes)
     wide, tall, deep = (high - low) / 2

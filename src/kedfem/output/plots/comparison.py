@@ -1,4 +1,4 @@
-"""The same curves of several runs over each other, as PNG, and their differences as CSV."""
+"""Comparison of runs: the same curves in one picture, as PNG, and their differences as CSV."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,11 +21,11 @@ def write_comparison(
     found: Sequence[Difference], names: Sequence[str], over: Over, along: Float[np.ndarray, " T"], drive: Channel,
     folder: Path,
 ) -> None:  # fmt: skip
-    """A picture of each channel, runs over each other, below the difference from the first; and `differences.csv`.
+    """Write a picture of each channel with all runs and their difference from the first, and `differences.csv`.
 
     Parameters
     ----------
-    along : (T,) [s], or [rad], [m] of the drive
+    along : (T,) time [s], or position of the drive [rad or m]
     """
     remove_plots(ready_folder(folder))
     factor, label = 1.0, "time (s)" if over == "time" else "drive travel (m)"
@@ -45,7 +45,7 @@ def write_comparison(
 def _write_picture(
     each: Difference, names: Sequence[str], along: Float[np.ndarray, " T"], label: str, folder: Path
 ) -> None:
-    """Curves above, what the others are off by below."""
+    """Write the picture of a channel: curves above, differences from the first run below."""
     channel = each.channel
     scale, unit = prefixed(float(each.peaks.max()), channel.unit)
     if unit == "rad":

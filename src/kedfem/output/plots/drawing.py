@@ -1,4 +1,4 @@
-"""Drawing of curves over the drive angle; the pictures are those of `groups`."""
+"""Drawing of the pictures of `groups`: curves over the drive angle or time."""
 
 import io
 import json
@@ -27,21 +27,20 @@ SIZE = (11.0, 6.2)  # inches, at DPI dots each
 PAGE_SIZE = (8.4, 4.8)  # inches of a figure that is one of many on a page
 DPI = 120
 
-# groups of points in a long curve, about one per pixel; each keeps its smallest and largest value
+# groups of points of a long curve, about one per pixel, of which the smallest and the largest value are drawn
 BINS = 1500
-COMPARABLE = 0.1  # of the widest scale of a quantity: panels that span as much share it
-NAMED = 48  # letters that name curves too small to be drawn; where they are more, these are counted
+COMPARABLE = 0.1  # of the widest span of a quantity: panels with at least this span share its scale
+NAMED = 48  # most letters of the names of curves too small to be drawn; otherwise only their number is given
 LETTERS = 16  # in a line of a legend
-COMPRESSION = 3  # of PNGs: files a fifth larger than with the usual 6, written in a third of the time
-# what a PNG of this room says of itself, so that stale ones are distinguished from a user's own
-MARK = "kedfem plot"
-DARKER = 0.5  # what is left of a color in the curve of rigid links
+COMPRESSION = 3  # of PNGs: files are a fifth larger than with the default 6, but written in a third of the time
+MARK = "kedfem plot"  # note in PNGs that distinguishes them from a user's own
+DARKER = 0.5  # factor on the colour of a curve of rigid links
 
 
 def worth_drawing(results: Results) -> list[Picture]:
-    """All pictures except those of rounding, which the table of a run reports as ≈ 0.
+    """All pictures except those of rounding errors, which the table of a run reports as ≈ 0.
 
-    Channels that are faint in a picture of several have no picture of their own. Panels of one quantity have one scale.
+    Channels that are faint in a picture of several have no picture of their own. Panels of one quantity share a scale.
     """
     least, every = rounding(results), list(pictures(results))
     beside = {path: each for each in every for path in each.together}
@@ -65,7 +64,7 @@ def _peak(panel: Panel) -> float:
 
 
 def _on_one_scale(every: Sequence[Picture]) -> list[Picture]:
-    """Pictures whose panels of one quantity have common limits, except panels that would be illegible with them."""
+    """The pictures with common limits of panels of one quantity, except for panels that would be illegible."""
     spans: dict[tuple[str, str, str, int], list[tuple[float, float]]] = {}
     for key, panel in ((key, panel) for each in every for key, panel in _keyed(each)):
         spans.setdefault(key, []).append(_span(panel))
@@ -93,15 +92,15 @@ def _keyed(picture: Picture) -> Iterator[tuple[tuple[str, str, str, int], Panel]
 
 
 def _span(panel: Panel) -> tuple[float, float]:
-    """Lowest and highest value, zero among them."""
+    """Lowest and highest value, including zero."""
     finite = [y[np.isfinite(y)] for y in panel.curves.values()]
     return min(y.min(initial=0.0) for y in finite), max(y.max(initial=0.0) for y in finite)
 
 
 def drawn_over(results: Results) -> Abscissa:
-    """The drive angle or time; time alone where channels are of a drive that slides, or of several.
+    """The abscissa of a run: the drive angle or time; always time with a sliding drive or several drives.
 
-    Static positions are drawn over the position of the only drive.
+    Static positions have the position of the only drive.
     """
     of_drives = [name.split("/")[1:] for name in results.channels if name.startswith("drive/")]
     slides = results.drive.unit == "m"
@@ -116,12 +115,12 @@ def drawn_over(results: Results) -> Abscissa:
 
 
 def envelope(values: Float[np.ndarray, " n"], bins: int = BINS) -> Int[np.ndarray, " k"]:
-    """Numbers of the points that draw the same curve as all of them: the extremes of each group.
+    """Indices of the points that give the same drawn curve as all points: the extremes of each group.
 
     Parameters
     ----------
     values : (n,) [any unit]
-    bins : groups; a curve of no more than two points a group is kept whole
+    bins : number of groups; a curve of at most two points per group is kept whole
 
     Returns
     -------
@@ -143,9 +142,9 @@ def envelope(values: Float[np.ndarray, " n"], bins: int = BINS) -> Int[np.ndarra
 
 
 def draw_panels(figure: Any, along: Abscissa, panels: list[Panel]) -> Any:
-    """The panels one above the other on one abscissa; below, where needed, the drive angle over time.
+    """Draw panels above each other on one abscissa, and the drive angle below if they are over time.
 
-    The axes of matplotlib, from top to bottom.
+    Returns matplotlib's axes from top to bottom.
     """
     strip = 0 if along.degrees is None else 1
     ratios = [3, 2, 2][: len(panels)] + [1] * strip
@@ -160,19 +159,19 @@ def draw_panels(figure: Any, along: Abscissa, panels: list[Panel]) -> Any:
 
 
 def draw_drive(ax: Any, along: Abscissa) -> None:
-    """The drive's angle over time."""
+    """Draw the drive's angle over time."""
     ax.plot(along.values, along.degrees, color="0.35", linewidth=1.2)
     ax.set_ylabel("drive (°)")
     ax.grid(alpha=0.3)
 
 
 def draw_legend(ax: Any, **look: Any) -> None:
-    """Names of curves, beside the axes."""
+    """Draw the names of curves beside the axes."""
     ax.legend(loc="upper left", **{"bbox_to_anchor": (1.005, 1.02), "frameon": False, **look})
 
 
 def draw_curves(ax: Any, along: Abscissa, panel: Panel) -> None:
-    """Curves of one unit, with a legend where there is more than one."""
+    """Draw curves of one unit, with a legend if there is more than one."""
     from matplotlib.colors import to_rgb
 
     curves = panel.curves
@@ -184,7 +183,7 @@ def draw_curves(ax: Any, along: Abscissa, panel: Panel) -> None:
     styles = ("-", ":") if stiff else ("-", "--", ":")
     every = cycle([(f"C{c}", style) for style in styles for c in range(10) if c != 7])
     looks = dict(zip(dict.fromkeys(name.removesuffix(STIFF) for name in curves), every, strict=False))
-    # what stands back behind its components
+    # the magnitude is drawn behind its components
     beside = "magnitude" if f"magnitude{STIFF}" not in curves else ""
     marker = "o" if len(along.values) == 1 else ""
     for name, y in curves.items():
@@ -198,7 +197,7 @@ def draw_curves(ax: Any, along: Abscissa, panel: Panel) -> None:
         words = None if rigid and name.removesuffix(STIFF) in curves else _lines(name)
         (line,) = ax.plot(along.values[kept], y[kept] / divisor, marker=marker, label=words)
         line.set(color=look[0], linestyle=look[1], linewidth=look[2], zorder=2 + (name != beside))
-        if rigid:  # often along the elastic one: darker, and above it
+        if rigid:  # often close to the elastic curve: darker and above it
             line.set(color=[DARKER * c for c in to_rgb(color)], linewidth=0.8 * width, zorder=4)
     if stiff:
         ax.plot([], [], color="0.2", linestyle="--", label="rigid links")
@@ -218,7 +217,7 @@ def draw_curves(ax: Any, along: Abscissa, panel: Panel) -> None:
 
 
 def _lines(name: str) -> str:
-    """Text in lines that a legend has room for, broken after underscores where one word is too long."""
+    """Text in lines of a legend, broken after underscores if one word is too long."""
     whole = name.replace(" %", "\1%").replace("< ", "<\1")
     words = re.sub(rf"\S{{{LETTERS + 1},}}", lambda word: word[0].replace("_", "_\0 "), whole)
     broken = "\n".join(textwrap.wrap(words, LETTERS + 1, break_on_hyphens=False)) or name
@@ -226,7 +225,7 @@ def _lines(name: str) -> str:
 
 
 def heading(text: str, channel: Channel | None, results: Results) -> str:
-    """The title, then the channel with its axes, which steps have rows, and the status of a run that did not end."""
+    """The title, then the channel with its axes, the recorded steps, and the status of an incomplete run."""
     below = [channel.name] if channel else []
     if channel and channel.frame:
         below.append(f"{channel.frame} axes")
@@ -239,7 +238,7 @@ def heading(text: str, channel: Channel | None, results: Results) -> str:
 
 
 def _plain(text: str) -> str:
-    """Text escaped for matplotlib, which would read it as a formula."""
+    """Text escaped for matplotlib, which would take dollar signs as formulas."""
     return text.replace("$", r"\$")
 
 
@@ -247,7 +246,7 @@ def _plain(text: str) -> str:
 def figure_saved(
     path: Path, title: str, size: tuple[float, float] = SIZE, layout: Literal["constrained"] | None = "constrained"
 ) -> Iterator[Any]:
-    """A figure of its own (no global state), written to a PNG when it is drawn."""
+    """A figure without global state, which is saved as PNG at the end of the context."""
     figure = _figure(size, layout)
     yield figure
     with replacing(path) as part:
@@ -255,7 +254,7 @@ def figure_saved(
 
 
 def figure_svg(title: str, draw: Callable[[Any], T]) -> tuple[str, T]:
-    """A figure as SVG for a page, and the result of drawing it, when the positions of its axes are final."""
+    """A figure as SVG for a page, and the result of drawing it, whose axes have their final positions."""
     figure = _figure(PAGE_SIZE)
     drawn = draw(figure)
     file = io.BytesIO()
@@ -276,7 +275,7 @@ def _save(figure: Any, file: Path | io.BytesIO, title: str, kind: str) -> None:
     figure.suptitle(title, x=0.01, ha="left", fontsize=12)
     if figure.get_layout_engine() is not None:
         figure.get_layout_engine().execute(figure)
-        # it stays: saving would find it anew, by drawing all of it once more
+        # the layout is fixed, because saving would compute it again by another drawing
         figure.set_layout_engine("none")
     metadata = {"Software": MARK} if kind == "png" else {"Creator": MARK, "Date": None}
     packed = {"pil_kwargs": {"compress_level": COMPRESSION}} if kind == "png" else {}

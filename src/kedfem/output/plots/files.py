@@ -1,4 +1,4 @@
-"""The plots of a run as PNG files: all curves on one page, every picture on its own."""
+"""The plots of a run as PNG files: an overview of all curves, and every picture on its own."""
 
 import json
 from collections.abc import Sequence
@@ -22,22 +22,21 @@ from kedfem.output.plots.drawing import (
 from kedfem.output.plots.groups import ALL, CURVES, FAINT, STIFF, Panel, Picture, largest
 from kedfem.results import Results, ready_folder
 
-COLUMNS, MOST = 2, 14  # of panels on a page, and how many it takes
-WIDTH, HEIGHT = 7.2, 2.0  # inches of a panel with all that belongs to it
-# inches beside the axes of a panel (labels, legend), above the first, between two, below the last
+COLUMNS, MOST = 2, 14  # columns of panels on a page, and most panels
+WIDTH, HEIGHT = 7.2, 2.0  # inches of a panel with labels and legend
+# inches left and right of the axes of a panel, above the first, between two, below the last
 LEFT, RIGHT, ABOVE, BETWEEN, BELOW = 0.85, 1.45, 0.85, 0.42, 0.5
-FONT = 7.5  # points of the small print
+FONT = 7.5  # points
 
 
 def write_plots(results: Results, folder: Path, each: bool = False) -> list[Path]:
-    """Plot all channels on one page, ``overview.png``, several pages where there are many.
+    """Plot all channels on one page, ``overview.png``, or on several pages; returns the files.
 
-    Returns the files written; none without rows. What the table of a run calls ≈ 0 is left out. What there is of rigid
-    links too is drawn with it, dashed. Angles are in degrees.
+    Nothing is written without rows. Channels that the table of a run reports as ≈ 0 are left out. Curves of rigid links
+    are dashed. Angles are in degrees.
 
-    Curves are over the drive angle in degrees; where the drive stands still or turns back they are over time,
-    with the drive angle below; over time alone where the drive slides, or there are several. Plots that an earlier run
-    left in the folder are removed.
+    Curves are over the drive angle. If the drive rests or reverses they are over time, with the drive angle below; if it
+    slides, or there are several drives, over time alone. Plots of an earlier run in the folder are removed.
 
     Parameters
     ----------
@@ -72,9 +71,9 @@ def remove_plots(folder: Path) -> None:
 
 
 def _overview(results: Results, along: Abscissa, pictures: Sequence[Picture], folder: Path) -> list[Path]:
-    """Pages ``overview.png``, ``overview-2.png``, …: the first panels of these pictures, in two columns on one abscissa.
+    """Write ``overview.png``, ``overview-2.png``, …: the first panel of each picture, in two columns on one abscissa.
 
-    What one picture has side by side, as forces of joints, is left out of others.
+    Pictures of channels that another one compares, such as joint forces, are left out.
     """
     from matplotlib import rc_context
 
@@ -129,7 +128,7 @@ def _draw_panel(ax: Any, along: Abscissa, title: str, panel: Panel | None) -> No
 
 
 def shown(picture: Picture) -> tuple[str, Panel]:
-    """Short title of a panel, and its curves, at most as many as its legend has room for."""
+    """Short title of a panel, and the panel with at most as many curves as its legend can hold."""
     title = picture.channel.name if picture.channel else picture.title
     panel = picture.panels[0]
     for first, words in ALL.items() if len(picture.panels) > 1 else ():

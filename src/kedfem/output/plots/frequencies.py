@@ -13,7 +13,7 @@ def write_over_drive(
     path: Path, t: Float[np.ndarray, " P"], angle: Float[np.ndarray, " P"], values: Float[np.ndarray, "P f"],
     revolutions: bool,
 ) -> None:  # fmt: skip
-    """Natural frequencies [Hz] over the drive angle, of a drive that does not rotate continuously over time."""
+    """Plot natural frequencies [Hz] over the angle of a continuously rotating drive, else over time."""
     x = np.degrees(angle) if revolutions else t
     with figure_saved(path, "Natural frequencies of the linkage frozen at positions") as figure:
         ax = figure.subplots()
@@ -30,11 +30,11 @@ def write_campbell(
     path: Path, speeds: Float[np.ndarray, " x"], lowest: Float[np.ndarray, "f x"],
     highest: Float[np.ndarray, "f x"], speed: float, harmonics: int,
 ) -> None:  # fmt: skip
-    """Bands of the natural frequencies over a revolution [Hz], and the drive's harmonics, over its speeds [rad/s].
+    """Plot bands of the natural frequencies over a revolution [Hz] and the drive's harmonics over its speed [rad/s].
 
     Parameters
     ----------
-    speed : that of the scene
+    speed : the scene's speed of the drive [rad/s]
     """
     rpm = RPM * speeds
     title = "Campbell plot: natural frequencies over a revolution, harmonics of the drive"

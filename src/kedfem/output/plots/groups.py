@@ -1,4 +1,4 @@
-"""Which channels are drawn in one picture, and as which curves."""
+"""The division of channels into pictures, panels and curves."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -12,20 +12,19 @@ from kedfem.results.channels import XYZ
 from kedfem.results.records import rounding
 
 Curves = Mapping[str, Float[np.ndarray, " n"]]
-SEVERAL = ("drive", "joints", "motors", "springs", "limits", "gears")  # how names of things of one kind begin
-CURVES = 9  # in one panel: so many its legend has room for
-SIGNED = {"position", "travel"}  # vectors that are drawn by their components alone
-ALONE = 1.05  # times the largest component: up to there the magnitude tells nothing beside it
-FAINT = 1e-4  # of the largest of their kind: curves that are named in a legend instead of drawn
+SEVERAL = ("drive", "joints", "motors", "springs", "limits", "gears")  # first parts of names that are compared
+CURVES = 9  # most curves of a panel, for which its legend has room
+SIGNED = {"position", "travel"}  # vectors that are drawn without magnitude
+ALONE = 1.05  # ratio to the largest component up to which a magnitude is not drawn
+FAINT = 1e-4  # of the largest curve of its kind: a smaller curve is only named in the legend
 ENERGY = "energy/"
-RIGID = "rigid_"  # how the name of a channel begins that has the same of rigid links
-# what is added to the name of a curve of rigid links; it is drawn dashed, in the colour of the elastic one
-STIFF = ", rigid"
+RIGID = "rigid_"  # first part of the last name of a channel of rigid links
+STIFF = ", rigid"  # ending of the name of a curve of rigid links, which is dashed in the colour of the elastic one
 MOTIONS = {
     "motion": ("position", "velocity", "acceleration"),
     "rotation": ("rotation", "angular_velocity", "angular_acceleration"),
 }
-"""Channels of one object that are drawn above each other."""
+"""Channels of one object that are panels of one picture."""
 
 ALL = {"position": "position, velocity and acceleration", "rotation": "rotation and its rates"}
 """Title of such a picture, by its first channel."""
@@ -37,7 +36,7 @@ COORDINATES = {"angle": "Rotations of the joints", "travel": "Travels of the joi
 class Panel:
     """Curves on one pair of axes.
 
-    limits : ends of the scale, where it is that of other panels too; else as the curves ask
+    limits : ends of the scale if other panels share it; else None
     """
 
     quantity: str
@@ -50,10 +49,10 @@ class Panel:
 class Picture:
     """One picture.
 
-    name : of its file
-    channel : if it is of one
+    name : name of its file
+    channel : the channel of a picture with a single one
     panels : from top to bottom
-    together : channels of several things that it has side by side; each has a picture of its own too
+    together : channels of several objects that it compares; each also has a picture of its own
     """
 
     name: str
@@ -80,7 +79,7 @@ def pictures(results: Results) -> Iterator[Picture]:
                 grouped |= set(names)
                 every = [channels[name] for name in names]
                 if all(largest(values) <= least.get(channel.unit, 0.0) for channel, values in every):
-                    continue  # a slide that turns by rounding
+                    continue  # a slide whose rotation is rounding
                 panels = [panel for each in every for panel in _single(*each)]
                 yield Picture(_file(f"{prefix}/{what}"), _shared(every[0][0], kinds[0]), None, panels)
     for kind, title in COORDINATES.items():
@@ -98,7 +97,7 @@ def pictures(results: Results) -> Iterator[Picture]:
         prefix, _, what = name.rpartition("/")
         elastic, rigid = f"{prefix}/{what.removeprefix(RIGID)}", f"{prefix}/{RIGID}{what}"
         if what.startswith(RIGID) and elastic in channels:
-            continue  # beside that
+            continue  # drawn with the elastic one
         both = rigid in channels
         panels = _paired(channel, values, *channels[rigid]) if both else _single(channel, values)
         yield Picture(_file(name), channel.description or name, channel, panels)
@@ -108,9 +107,9 @@ def pictures(results: Results) -> Iterator[Picture]:
 
 
 def _side_by_side(results: Results, others: set[str]) -> dict[str, list[Picture]]:
-    """First channel → pictures of one quantity of several joints, drives, ...: of vectors the magnitudes.
+    """Pictures of one quantity of several joints, drives, …, by their first channel; of vectors the magnitudes.
 
-    More than CURVES joints are in one picture for each kind of joint; faint ones are named in the first.
+    More than CURVES joints have a picture for each kind of joint; faint ones are named in the first.
     """
     kinds = {name: each["kind"] for name, each in json.loads(results.scene_json).get("joints", {}).items()}
     least, families = rounding(results), dict[tuple[str, str, str], dict[str, list[str]]]()
@@ -170,7 +169,7 @@ def _file(name: str) -> str:
 
 
 def _shared(channel: Channel, kind: str) -> str:
-    """Common description, from that of the first: ``position of the joint …`` → ``motion of the joint …``."""
+    """Common description, from that of the first channel: ``motion of the joint …`` from ``position of the joint …``."""
     title = channel.description
     for beginning in ("rotation vector", "turn", kind):
         if title.startswith(beginning):
@@ -184,7 +183,7 @@ def _single(channel: Channel, values: Float[np.ndarray, "n c"]) -> list[Panel]:
     quantity = channel.name.rsplit("/", 1)[-1].replace("_", " ")
     if channel.columns == XYZ:
         size = np.linalg.norm(values, axis=1)
-        # how far off the origin means nothing, and a travel is read with its sign
+        # the distance from the origin has no meaning, and a travel has a sign
         if quantity not in SIGNED and largest(size) > ALONE * largest(values):
             curves["magnitude"] = size
         return [readable(quantity, channel.unit, curves)]
@@ -197,7 +196,7 @@ def _single(channel: Channel, values: Float[np.ndarray, "n c"]) -> list[Panel]:
 def _paired(
     channel: Channel, values: Float[np.ndarray, "n c"], rigid: Channel, there: Float[np.ndarray, "n r"]
 ) -> list[Panel]:
-    """A channel with its counterpart of rigid links; of a vector the magnitudes, and below the components."""
+    """Panels of a channel and its counterpart of rigid links; of vectors the magnitudes, then the components."""
     quantity = channel.name.rsplit("/", 1)[-1]
     both = dict(zip(channel.columns, values.T, strict=True))
     both |= {f"{name}{STIFF}": y for name, y in zip(rigid.columns, there.T, strict=True)}
@@ -219,7 +218,7 @@ def _energies(results: Results) -> Curves:
 
 
 def _of_joints(results: Results, ending: str) -> Curves:
-    """Joint → the only column of its channel of that kind."""
+    """The only column of each joint's channel of that kind."""
     every = results.channels.items()
     found = {name: x for name, (_, x) in every if x.shape[1] == 1 and name.endswith(ending)}
     joints = {name: x[:, 0] for name, x in found.items() if name.startswith("joints/")}
