@@ -236,7 +236,7 @@ def test_a_steady_motion_has_its_table() -> None:
     assert [row[1] for row in table.rows] == ["20 ms", "1", "125 %", "2.0e-09", "11"]
     assert [row[0] for row in notes_table(notes).rows] == ["unknowns"]
     notes.pop("steady growth in a period")
-    assert steady_table(notes)[0].rows[2][1] == "not found out"
+    assert steady_table(notes)[0].rows[2][1] == "not determined"
     assert steady_table({"unknowns": 7.0}) == []
 
 
@@ -272,7 +272,7 @@ def test_what_is_missing_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     with contextlib.suppress(KeyboardInterrupt), stopped as writer:
         writer.append(before.time[:3], before.angle[:3], rows)
         raise KeyboardInterrupt
-    assert "found at the end of a run, which this is not" in told(folder)
+    assert "known only at the end of a run" in told(folder)
     assert "Not a whole run: interrupted" in page(folder)
     with ResultsWriter(folder / "results.h5", channels, before.scene_json, None, {}):
         pass

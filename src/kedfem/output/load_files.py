@@ -19,7 +19,7 @@ Columns = dict[str, Float[np.ndarray, " T"]]
 
 
 def write_joint_load(path: Path, load: JointLoad, results: Results, rows: Bool[np.ndarray, " T"]) -> None:
-    """Write a joint's load over time as CSV: in the world's and the links' axes, magnitude, axial and bearing load, speed."""
+    """Write a joint's load over time as CSV: in the axes of world and links, magnitude, axial and bearing load, speed."""
     first, second = load.links
     columns: Columns = {f"on {first}, world {c} [N]": load.world[:, k] for k, c in enumerate(XYZ)}
     for link, inside in zip(load.links, load.inside, strict=False):
