@@ -1,4 +1,4 @@
-"""The scene: what a user describes, validated completely; SI units, points as coordinates."""
+"""The scene: a user's description of a mechanism, completely validated, in SI units, with points as coordinates."""
 
 from kedfem.scene.questions.curves import Pieces, pieces
 from kedfem.scene.questions.enforced import enforced_by_equations

@@ -1,6 +1,6 @@
-"""What a scene must satisfy beyond its records: tables that refer to each other, and what is combined in it.
+"""Checks of a scene beyond its single records: references between tables, and combinations of options.
 
-The checks look at what was given, not only at good records, so that a fault in one key hides no fault in another.
+The checks examine the given keys and not only valid records, so that a fault of one key hides no fault of another.
 """
 
 from __future__ import annotations
@@ -22,5 +22,5 @@ CHECKS = (
 
 
 def cross_faults(parts: Parts) -> list[Fault]:
-    """The faults that only show when parts of the scene are seen together."""
+    """The faults of combinations of keys in different parts of the scene."""
     return [fault for check in CHECKS for fault in check(parts)]

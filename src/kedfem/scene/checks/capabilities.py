@@ -1,7 +1,7 @@
-"""The table of capabilities: combinations of options that are refused, with the reason and what to take instead.
+"""The table of capabilities: combinations of options that are refused, with the reason and an alternative.
 
-What no line of `REFUSALS` meets is allowed. The checks of scenes, docs/capabilities.md (`capability_page`) and tests read
-this one table: a refusal that is lifted is a line taken out.
+A combination that no line of `REFUSALS` describes is allowed. The checks of scenes, docs/capabilities.md
+(`capability_page`) and tests read this one table; a refusal is lifted by removing its line.
 """
 
 from __future__ import annotations
@@ -15,36 +15,36 @@ from kedfem.scene.records.analysis import WITHOUT_VIBRATION
 from kedfem.scene.records.joints import JointKind
 
 Facts = Mapping[str, str]
-"""Level of each factor that is known of a part of a scene."""
+"""Known factors of a part of a scene, and their levels."""
 
 KINDS: tuple[str, ...] = get_args(JointKind)
-TURNED = ("revolute", "cylindrical", "screw", "planar", "universal")  # kinds with angles, which torques act on
-SLID = ("prismatic", "cylindrical", "screw", "planar", "slot")  # and with travels, which forces act along
-DRIVEN = tuple(kind for kind in KINDS if kind in TURNED + SLID)  # with one or the other, which a drive may prescribe
-GEARED = ("revolute", "cylindrical", "screw", "planar")  # with one angle, which gears couple
-RACKED = ("prismatic", "cylindrical", "screw")  # with one travel, along which a rack is
+TURNED = ("revolute", "cylindrical", "screw", "planar", "universal")  # kinds with angles, on which torques act
+SLID = ("prismatic", "cylindrical", "screw", "planar", "slot")  # kinds with travels, along which forces act
+DRIVEN = tuple(kind for kind in KINDS if kind in TURNED + SLID)  # kinds with either, which a drive may prescribe
+GEARED = ("revolute", "cylindrical", "screw", "planar")  # kinds with a single angle, which gears couple
+RACKED = ("prismatic", "cylindrical", "screw")  # kinds with a single travel, along which a rack may slide
 ON_ANGLE, ON_TRAVEL, ON_DRIVE, ON_GEAR, ON_RACK = (
     f"{', '.join(kinds[:-1])} or {kinds[-1]}" for kinds in (TURNED, SLID, DRIVEN, GEARED, RACKED)
 )
 NO_ANGLE = "no other joint has an angle about an axis of its links"
 NO_TRAVEL = "no other joint has a travel along a direction, or a line, of a link"
-CONSTRAINED = "constraint equations"  # how a joint is enforced that moves with both of its links
-SHARED = "shared points"  # and one whose links share points
+CONSTRAINED = "constraint equations"  # a joint that moves with both of its links
+SHARED = "shared points"  # a joint whose links share points
 
 
 def others(*kinds: str) -> tuple[str, ...]:
-    """All kinds of joint but these."""
+    """All other kinds of joint."""
     return tuple(kind for kind in KINDS if kind not in kinds)
 
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """A combination that is refused; its texts may hold {words} of the part of a scene that meets it.
+    """A combination that is refused; its texts may contain {words} of the part of a scene that has it.
 
-    of : section of the scene whose parts may meet it
-    when : levels of factors, all of which are met
+    of : section of the scene whose parts may have it
+    when : levels of factors that must all apply
     where : place that the message names
-    must, why, got, take : what is required, the reason, what was given, what to take instead
+    must, why, got, take : the requirement, the reason, what was given, an alternative
     """
 
     of: str
@@ -56,11 +56,11 @@ class Refusal:
     take: str
 
     def meets(self, facts: Facts) -> bool:
-        """Whether a part of a scene is such a combination."""
+        """Whether a part of a scene has this combination."""
         return all(facts.get(factor) in levels for factor, levels in self.when.items())
 
     def fault(self, where: Where, words: Mapping[str, str]) -> Fault:
-        """What is wrong with a part of a scene at a place."""
+        """The fault of a part of a scene at a place."""
         named = {**words, "where": place(where)}
         keys = (key.format_map(named) for key in self.where.removeprefix("{where}").split(".") if key)
         text = f"must {self.must} ({self.why}), got {self.got}: {self.take}".format_map(named)
@@ -193,5 +193,5 @@ REFUSALS = (
 
 
 def refusals(of: str, facts: Facts) -> Iterator[Refusal]:
-    """All lines of the table that a part of a section of the scene meets."""
+    """All lines of the table that apply to a part of a section of the scene."""
     return (each for each in REFUSALS if each.of == of and each.meets(facts))

@@ -1,4 +1,4 @@
-"""What a scene combines, in the factors of the table of capabilities: what it refuses of them."""
+"""Combinations of options in a scene that the table of capabilities refuses."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from kedfem.scene.records.joints import Bushing
 from kedfem.scene.records.wording import NOUNS, shown
 
 Reported = tuple[str, Facts, Where, Mapping[str, str]]
-"""Section, factors, place and words of a part of a scene."""
+"""Section of a part of a scene, its factors, its place, and words for messages."""
 
 
 def combination_faults(parts: Parts) -> Iterator[Fault]:
@@ -28,19 +28,18 @@ def combination_faults(parts: Parts) -> Iterator[Fault]:
 
 
 def frames_of(parts: Parts, link: Entry | None = None) -> str:
-    """Frames of a link, or of the analysis, as given or left open."""
+    """Frames of a link, or of the analysis: as given, else the default."""
     own = None if link is None else link.word("frames")
     return own or parts.analysis.word("frames") or default_frames(parts.driven)
 
 
 def common_facts(parts: Parts) -> dict[str, str]:
-    """What the whole scene says."""
+    """Factors of the whole scene."""
     record = parts.analysis.record
     every = [frames_of(parts, link) == "co-rotational" for link in parts.links.values()]
-    following = any(every)
     return {
         "every link": "co-rotational" if all(every) else "",
-        "frames": "co-rotational" if following else "rigid-body",
+        "frames": "co-rotational" if any(every) else "rigid-body",
         "stiffening": "on" if parts.analysis.raw.get("stiffening") is True else "off",
         "drive": "given" if parts.driven else "none",
         "rho_inf": "1" if record is not None and record.rho_inf == 1.0 else "below 1",
@@ -49,37 +48,33 @@ def common_facts(parts: Parts) -> dict[str, str]:
 
 
 def joints(parts: Parts) -> Iterator[Reported]:
-    """Good joints: how each is enforced."""
-    moving = {name for name in parts.good.joints if enforced_by_equations(parts.good, name)}
-    slots = (joint for joint in parts.joints.values() if joint.word("kind") == "slot")
-    spatial = spatial_beams(parts.good) if any(x.has("bushing") for x in slots) else frozenset[str]()
+    """Valid joints: how each is enforced, and its bushing."""
     for joint in parts.joints.values():
-        kind, held = str(joint.word("kind")), [parts.links[x] for x in link_names(joint) if x in parts.links]
-        facts = {"joint": kind}
-        words = {"kind": kind, "key": "kind"}
-        if joint.record is None:
-            yield "joints", facts, joint.where, words
-            continue
-        facts["enforced"] = CONSTRAINED if joint.name in moving else SHARED
-        driven = "driven " if joint.name in parts.driven_joints else ""
-        words["noun"] = f"a {driven}{kind} joint"
-        if joint.record.bushing is not None:
-            words |= {"key": "bushing", "noun": "one"}
-            turns = joint.record.bushing.rotational_stiffness is not None
-            facts["bushing"] = "against rotations" if turns else "given"
-            if kind == "slot" and not turns and unlike_across(joint.record.bushing):
-                planar = all(category(x) == "plane" or (category(x) == "beam" and x.name not in spatial) for x in held)
-                facts["bushing"] = "given" if planar else "unlike across the line"
-        yield "joints", facts, joint.where, words
+        if joint.record is not None:
+            kind, bushing = joint.record.kind, joint.record.bushing
+            facts = {"joint": kind, "bushing": "none"}
+            facts["enforced"] = CONSTRAINED if enforced_by_equations(parts.good, joint.name) else SHARED
+            if bushing is not None and bushing.rotational_stiffness is not None:
+                facts["bushing"] = "against rotations"
+            elif bushing is not None and kind == "slot" and unlike_across(bushing) and in_space(parts, joint):
+                facts["bushing"] = "unlike across the line"
+            yield "joints", facts, joint.where, {"kind": kind}
+
+
+def in_space(parts: Parts, joint: Entry) -> bool:
+    """Whether a link of a joint is neither a plane link nor a planar beam."""
+    links = [parts.links[name] for name in link_names(joint) if name in parts.links]
+    planar = {"plane"} if spatial_beams(parts.good).intersection(link_names(joint)) else {"plane", "beam"}
+    return any(category(link) not in planar for link in links)
 
 
 def unlike_across(bushing: Bushing) -> bool:
-    """Whether a bushing gives way across its axis in one direction more than in another."""
+    """Whether stiffness or damping of a bushing differs between the directions across its axis."""
     return any(each is not None and each[0] != each[1] for each in (bushing.stiffness, bushing.damping))
 
 
 def on_joint(parts: Parts, name: str | None) -> tuple[dict[str, str], dict[str, str]]:
-    """What a drive, gear, motor or spring is on."""
+    """Factors and words of the joint of a drive, gear, motor, spring or limit."""
     joint = parts.joints.get(name or "")
     if joint is None:
         return {}, {}
@@ -88,7 +83,7 @@ def on_joint(parts: Parts, name: str | None) -> tuple[dict[str, str], dict[str, 
 
 
 def drives(parts: Parts) -> Iterator[Reported]:
-    """Drives, the coordinates that they prescribe and their shafts."""
+    """Drives, the coordinates that they prescribe, and their shafts."""
     for drive in parts.all_drives:
         facts, words = on_joint(parts, drive.word("joint"))
         shaft = "given" if drive.has("shaft_stiffness") else "none"
@@ -97,7 +92,7 @@ def drives(parts: Parts) -> Iterator[Reported]:
 
 
 def driven(parts: Parts) -> dict[str, str]:
-    """What the only drive prescribes, whose angle or travel a factor may be over."""
+    """The coordinate that the only drive prescribes, on which a factor may depend."""
     if len(parts.all_drives) != 1:
         return {"driven": "several" if parts.all_drives else "nothing"}
     drive = parts.all_drives[0]
@@ -106,20 +101,19 @@ def driven(parts: Parts) -> dict[str, str]:
 
 
 def gears(parts: Parts) -> Iterator[Reported]:
-    """Gears as a whole, and their joints."""
+    """The joints of gears."""
     for gear in parts.gears.values():
-        yield "gears", {}, gear.where, {}
         names = gear.raw.get("joints")
         if not isinstance(names, (list, tuple)) or len(names) != 2:
             continue
         for i, name in enumerate(names):
             facts, words = on_joint(parts, name if isinstance(name, str) else None)
             element = "rack" if gear.has("radius") and i == 1 else "gear"
-            yield "gears", {**facts, "element": element, "stiffening": ""}, (*gear.where, "joints", i), words
+            yield "gears", {**facts, "element": element}, (*gear.where, "joints", i), words
 
 
 def elements(parts: Parts) -> Iterator[Reported]:
-    """Motors, springs on joints, and limits of these."""
+    """Motors, springs and limits on joints."""
     for motor in parts.motors.values():
         facts, words = on_joint(parts, motor.word("joint"))
         element = next((key for key in ("torque", "force") if motor.has(key)), "")
@@ -138,7 +132,7 @@ def elements(parts: Parts) -> Iterator[Reported]:
 
 
 def analysis(parts: Parts) -> Iterator[Reported]:
-    """The analysis with its start and times."""
+    """The analysis: its kind, frames, start and times."""
     entry = parts.analysis
     at = entry.where
     if parts.limits:
@@ -167,7 +161,7 @@ def analysis(parts: Parts) -> Iterator[Reported]:
 
 
 def kinds(parts: Parts) -> Iterator[Reported]:
-    """What a steady motion, and positions without vibration, are combined with."""
+    """Steady motions and positions without vibration: their solver, levels and start."""
     entry = parts.analysis
     kind = entry.word("kind") or "transient"
     if kind == "transient":
@@ -191,19 +185,19 @@ def fatigue(parts: Parts) -> Iterator[Reported]:
 
 
 def only(**facts: str) -> dict[str, str]:
-    """Factors of one key of the analysis, beside which those of others were reported already."""
+    """Factors of one key of the analysis, without those of others, which are reported with these."""
     return {"frames": "", "stiffening": "", "solver": "", **facts}
 
 
 def links(parts: Parts) -> Iterator[Reported]:
-    """Links with frames of their own."""
+    """Links with their own frames."""
     for link in parts.links.values():
         if link.word("frames") and not slider(link):
             yield "links", {"frames": str(link.word("frames"))}, link.where, {}
 
 
 def loads(parts: Parts) -> Iterator[Reported]:
-    """Loads on kinds of links, and their factors."""
+    """Loads, the links on which they act, and their factors."""
     for load in parts.loads.values():
         link = parts.links.get(load.word("link") or "")
         if link is None:

@@ -1,4 +1,4 @@
-"""Cross checks of drives and gears, of the analysis with them, and of what starts without one."""
+"""Cross checks of drives and gears, of the analysis with them, and of scenes without a drive."""
 
 from __future__ import annotations
 
@@ -25,24 +25,19 @@ from kedfem.scene.records.drives import (
 )
 from kedfem.scene.records.units import Quantity, si_number
 
-ROUGH = 0.05  # share of a curve's acceleration that may be noise
-AXES = {"revolute": TURNING, "prismatic": SLIDING}  # joints with one motion, and its speed
-SEVERAL = {  # joints with several coordinates: the key of a drive that says which, and what there is
+ROUGH = 0.05  # largest share of noise in a curve's acceleration
+AXES = {"revolute": TURNING, "prismatic": SLIDING}  # joints with a single coordinate, and its rate
+SEVERAL = {  # joints with several coordinates: the key of a drive that selects one, and the choices
     "cylindrical": ("coordinate", "it has two, 'angle' and 'travel'"),
     "universal": ("about", "it has two, an angle about the axis of either link"),
     "planar": ("along", "it has three, the angle, for which along is left out, and travels along two directions"),
 }
-PARALLEL = 1e-3  # rad between travels in a plane, which are one below it: their drives would push against each other
-STARTED = {
-    **AXES,
-    "cylindrical": SLIDING,
-    "screw": TURNING,
-    "slot": SLIDING,
-}  # joints that a speed at the start may be of
+PARALLEL = 1e-3  # [rad], angle between two driven travels in a plane below which they count as one
+STARTED = {**AXES, "cylindrical": SLIDING, "screw": TURNING, "slot": SLIDING}  # joints that may have a speed at the start
 
 
 def drive_faults(parts: Parts) -> Iterator[Fault]:
-    """Drives on joints that cannot be driven, or of one coordinate twice, or with a law for another kind of joint."""
+    """Drives of a coordinate that has one already, or with keys for another kind of joint."""
     if parts.drive.where and parts.drives:
         yield Fault(("drives",), "cannot be combined with drive, got both")
     met: dict[str, list[Entry]] = {}
@@ -59,7 +54,7 @@ def drive_faults(parts: Parts) -> Iterator[Fault]:
 
 
 def shared_joint_faults(joint: Entry, kind: str, before: list[Entry], drive: Entry) -> Iterator[Fault]:
-    """A further drive on a joint, of a coordinate that those before it prescribe already."""
+    """A further drive of a coordinate that earlier drives of the joint prescribe."""
     others = ", ".join(place(each.where) for each in before)
     if kind not in SEVERAL:
         why = "its travel is one lead for each of its turns" if kind == "screw" else f"a {kind} joint has one coordinate"
@@ -74,7 +69,7 @@ def shared_joint_faults(joint: Entry, kind: str, before: list[Entry], drive: Ent
 
 
 def same_coordinate(kind: str, one: Entry, other: Entry) -> bool:
-    """Whether two drives on one joint prescribe the same; of a plane travels whose directions are parallel."""
+    """Whether two drives on one joint prescribe the same coordinate; parallel travels of a planar joint are the same."""
     if len({(driven_coordinate(each, kind), each.word("about")) for each in (one, other)}) > 1:
         return False
     a, b = (getattr(each.record, "along", None) for each in (one, other))
@@ -82,7 +77,7 @@ def same_coordinate(kind: str, one: Entry, other: Entry) -> bool:
 
 
 def coordinate_of_drive_faults(drive: Entry, kind: str) -> Iterator[Fault]:
-    """A coordinate that is asked for of a joint with one alone, or of a planar one, which `along` says."""
+    """The key `coordinate` on a joint with a single coordinate, or on a planar joint, which has `along`."""
     if drive.has("coordinate") and kind not in {"cylindrical", "screw"}:
         wanted = "must be given on a cylindrical or screw joint only"
         instead = "; take along for a travel" if kind == "planar" else ""
@@ -95,7 +90,7 @@ def driven_coordinate(drive: Entry, kind: str) -> str:
 
 
 def law_faults(drive: Entry, kind: str) -> Iterator[Fault]:
-    """A law of motion that is one of angles where the drive prescribes a travel, or of travel where it is an angle."""
+    """A law of motion of angles for a travel, or of travels for an angle."""
     motion = drive.raw.get("motion")
     if not isinstance(motion, Mapping):
         return
@@ -125,7 +120,7 @@ def gear_faults(parts: Parts) -> Iterator[Fault]:
 
 
 def analysis_faults(parts: Parts) -> Iterator[Fault]:
-    """An analysis whose end or step is missing, given twice or impossible with the drive."""
+    """An end or step of the analysis that is missing, given twice or impossible with the drive."""
     analysis = parts.analysis
     if not analysis.raw and analysis.record is None:
         return
@@ -153,9 +148,7 @@ def analysis_faults(parts: Parts) -> Iterator[Fault]:
 
 
 def _repeats(parts: Parts) -> bool:
-    """Whether the end need not be given: of a structure in static balance, or where the drive's law says after which time
-    it repeats itself, and the motion of one period is asked for.
-    """
+    """Whether the end need not be given: for static balance without a drive, or for one period of a repeating drive."""
     if not parts.all_drives:
         return parts.analysis.word("kind") == "static"
     if len(parts.all_drives) > 1 or parts.analysis.word("kind") not in {"steady", *WITHOUT_VIBRATION}:
@@ -167,7 +160,7 @@ def _repeats(parts: Parts) -> bool:
 
 
 def drive_and_analysis_faults(parts: Parts, drive: Entry) -> Iterator[Fault]:
-    """An analysis that does not suit the law of motion of the only drive."""
+    """Revolutions or steps of the analysis that do not suit the only drive."""
     motion, joint = drive.record.motion, parts.joints.get(drive.record.joint)
     kind = "" if joint is None else str(joint.word("kind"))
     if driven_coordinate(drive, kind) == "travel":
@@ -181,7 +174,7 @@ def steps_faults(
     parts: Parts, got: str, wanted: str = "a drive that rotates continuously",
     doing: str = "a drive that does not rotate continuously",
 ) -> Iterator[Fault]:  # fmt: skip
-    """Turns that are asked for where there are none, and a step that is not given."""
+    """Revolutions without a drive that makes any, and a missing step."""
     analysis = parts.analysis
     for key, instead in (("revolutions", "end_time"), ("steps_per_revolution", "step")):
         if analysis.has(key):
@@ -192,7 +185,7 @@ def steps_faults(
 
 
 def drive_curve_faults(parts: Parts, drive: Entry) -> Iterator[Fault]:
-    """A curve of motion that does not cover the analysis or is too rough for it; a dwell without a return."""
+    """A curve of motion that does not cover the analysis or is too rough; a dwell without a return."""
     motion = drive.record.motion
     stays = isinstance(motion, (Cycloidal, Polynomial)) and motion.return_time is None
     if stays and motion.dwell_after > 0.0:
@@ -218,7 +211,7 @@ def drive_curve_faults(parts: Parts, drive: Entry) -> Iterator[Fault]:
 
 
 def initial_faults(parts: Parts) -> Iterator[Fault]:
-    """Speeds at the start of joints that have none of their own."""
+    """Speeds at the start of joints that cannot have one."""
     given = parts.analysis.raw.get("initial_speeds")
     for name, speed in given.items() if isinstance(given, Mapping) else ():
         if name in parts.joints:
@@ -226,7 +219,7 @@ def initial_faults(parts: Parts) -> Iterator[Fault]:
 
 
 def speed_faults(parts: Parts, joint: Entry, given: Any) -> Iterator[Fault]:
-    """A speed of a joint that has none, that the drive moves, or in a unit of another kind."""
+    """A speed of a joint that has no single speed or is driven, or a speed in a unit of another kind."""
     kind = joint.word("kind")
     if joint.record is not None and kind not in STARTED:
         got = f"got {joint.name!r}, a {kind} joint"
@@ -241,13 +234,13 @@ def speed_faults(parts: Parts, joint: Entry, given: Any) -> Iterator[Fault]:
 
 
 def in_unit(text: str, quantity: Quantity) -> bool:
-    """Whether a text is a number with a unit of one kind; one that is no number at all has its fault already."""
+    """Whether a text may be a number with a unit of one kind; a text that is no number has a fault elsewhere."""
     others = [other for other in AXES.values() if other != quantity]
     return readable(text, quantity) or not any(readable(text, other) for other in others)
 
 
 def readable(text: str, quantity: Quantity) -> bool:
-    """Whether a text is a number with a unit."""
+    """Whether a text is a number with a unit of a kind."""
     try:
         si_number(text, quantity.unit)
     except ValueError:
@@ -256,7 +249,7 @@ def readable(text: str, quantity: Quantity) -> bool:
 
 
 def undriven_faults(parts: Parts) -> Iterator[Fault]:
-    """What only makes sense with a drive, in a scene without one."""
+    """Keys in a scene without a drive that need one."""
     if parts.driven:
         return
     drawn = parts.animation.record

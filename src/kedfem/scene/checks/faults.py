@@ -1,4 +1,4 @@
-"""What pydantic found wrong, as faults of a scene: what was wanted, what was got."""
+"""Errors of pydantic as faults of a scene: what is required, what was given."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ WANTED = {
 
 
 def record_faults(error: ValidationError, hint: Any, raw: Any, prefix: Where = ()) -> list[Fault]:
-    """The faults that pydantic found in raw input for a record or another type, which stands at a place in the scene."""
+    """Faults that pydantic found in raw input of a type at a place in the scene."""
     found = (described(detail, hint, raw).under(*prefix) for detail in error.errors(include_url=False))
     return list(dict.fromkeys(found))  # missing values of one list are one fault
 
 
 def described(detail: ErrorDetails, hint: Any, raw: Any) -> Fault:
-    """One of pydantic's errors."""
+    """The fault for one of pydantic's errors."""
     where, here, _ = walked(detail["loc"], hint, raw)
     _, _, holder = walked(detail["loc"][:-1], hint, raw)
     if where and isinstance(where[-1], int) and isinstance(holder, (str, int, float)):
-        where = where[:-1]  # one number given for each of several
+        where = where[:-1]  # one number stands for several
     if where and detail["type"] == "missing" and isinstance(where[-1], int):
         _, above, _ = walked(detail["loc"][:-1], hint, raw)
         return Fault(where[:-1], f"must hold {length_of(above)} values, got {len(detail['input'])}")
@@ -50,7 +50,7 @@ def described(detail: ErrorDetails, hint: Any, raw: Any) -> Fault:
 
 
 def message(detail: ErrorDetails, hint: Any) -> str:
-    """The message of one of pydantic's errors about something of a given type."""
+    """The message for one of pydantic's errors about input of a type."""
     ctx, got = detail.get("ctx", {}), detail["input"]
     match detail["type"]:
         case "kedfem":
@@ -72,7 +72,7 @@ def message(detail: ErrorDetails, hint: Any) -> str:
 
 
 def kind_message(hint: Any, got: Any) -> str:
-    """The message about the `kind` of something that is one of several records."""
+    """The message about the `kind` of input that may be one of several records."""
     kinds = [kind for model in models(hint) if (kind := kind_of(model))]
     if isinstance(got, dict) and "kind" in got:
         return one_of(kinds, got["kind"])
@@ -80,7 +80,7 @@ def kind_message(hint: Any, got: Any) -> str:
 
 
 def choice(hint: Any) -> str:
-    """The words to choose from, or the unit, as it stands after 'is required'."""
+    """The words to choose from, or the unit, as they follow 'is required'."""
     if options(hint):
         return f", {either(options(hint))}"
     brackets = {quantity.bracket for quantity in marks(hint, Quantity)}

@@ -1,4 +1,4 @@
-"""The types of the scene's keys, looked up by place: for messages and for the reference of keys."""
+"""The types of the scene's keys, by place, for messages and for the reference of keys."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from kedfem.scene.records.units import Quantity
 
 
 def members(hint: Any) -> tuple[Any, ...]:
-    """The alternatives of a type: unions taken apart, annotations taken off.
+    """The alternatives of a type, without annotations.
 
-    Not kept by type: to Python choices of the same words in another order are equal.
+    They are not cached: to Python, choices of the same words in another order are equal.
     """
     if get_origin(hint) is Annotated:
         return members(get_args(hint)[0])
@@ -35,13 +35,13 @@ def models(hint: Any) -> tuple[type[BaseModel], ...]:
 
 
 def options(hint: Any) -> list[Any]:
-    """The values among the alternatives of a type that is a choice of fixed words or numbers."""
+    """The fixed words or numbers among the alternatives of a type."""
     return [word for part in members(hint) if get_origin(part) is Literal for word in get_args(part)]
 
 
 @cache
 def kind_of(model: type[BaseModel]) -> str | None:
-    """The word in the `kind` key of a record that is one of several."""
+    """The value of the `kind` key of a record that is one of several; else None."""
     field = model.model_fields.get("kind")
     one = field is not None and len(get_args(field.annotation)) == 1
     return str(field.default) if field is not None and one and isinstance(field.default, str) else None
@@ -62,26 +62,26 @@ def field_hint(field: FieldInfo) -> Any:
 
 @cache
 def keys(model: type[BaseModel]) -> dict[str, FieldInfo]:
-    """The keys of a record as they are written in a scene, and their fields."""
+    """The keys of a record as written in a scene, and their fields."""
     return {field.alias or name: field for name, field in model.model_fields.items()}
 
 
 @cache
 def key_hints(model: type[BaseModel]) -> dict[str, Any]:
-    """The types of its keys."""
+    """The types of a record's keys."""
     return {key: field_hint(field) for key, field in keys(model).items()}
 
 
 @cache
 def marks(hint: Any, kind: Any) -> frozenset[Any]:
-    """What a type says of one kind beside what pydantic knows: quantities, or what it is the name of."""
+    """Annotations of one class in a type, such as its quantities, or the table whose entry it names."""
     own = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
     found = frozenset(extra for extra in own if isinstance(extra, kind))
     return found.union(*(marks(part, kind) for part in get_args(hint) if not isinstance(part, (str, int))))
 
 
 def construction(hint: Any, raw: Mapping[str, Any]) -> type[BaseModel] | None:
-    """The record of a table that stands for a point or an axis; None if it stands for neither."""
+    """The record of a table that constructs a point or an axis; None if it constructs neither."""
     if not marks(hint, Quantity) or (models(hint) and not is_construction(raw)):
         return None
     tuples = (part for part in members(hint) if get_origin(part) is tuple)
@@ -92,7 +92,7 @@ def construction(hint: Any, raw: Mapping[str, Any]) -> type[BaseModel] | None:
 
 
 def below(hint: Any, part: str | int, raw: Any) -> Any:
-    """The type of one key or item of something of a given type; None if it has none."""
+    """The type of a key or item of input of a type; None if it has no such key."""
     if hint is None:
         return None
     for member in members(hint):
@@ -111,7 +111,7 @@ def below(hint: Any, part: str | int, raw: Any) -> Any:
 
 
 def walk(raw: Any, hint: Any, where: Where = ()) -> Iterator[tuple[Where, Any, Any]]:
-    """Raw input, and all that is in it: place, value and type of each, tables and lists before what they hold."""
+    """Place, value and type of raw input and of all that it contains, tables and lists before their contents."""
     yield where, raw, hint
     items = raw.items() if isinstance(raw, Mapping) else enumerate(raw) if isinstance(raw, list) else ()
     for key, value in items:
@@ -119,7 +119,7 @@ def walk(raw: Any, hint: Any, where: Where = ()) -> Iterator[tuple[Where, Any, A
 
 
 def replaced(raw: Any, hint: Any, of: Callable[[Where, Any, Any], Any], where: Where = ()) -> Any:
-    """A copy of raw input with something in place of its values, by place, value and type; what stays is looked into."""
+    """A copy of raw input with values replaced by a function of place, value and type; unchanged values are searched."""
     made = of(where, raw, hint)
     if made is raw and isinstance(raw, Mapping):
         return {key: replaced(x, below(hint, key, raw), of, (*where, key)) for key, x in raw.items()}
@@ -129,7 +129,7 @@ def replaced(raw: Any, hint: Any, of: Callable[[Where, Any, Any], Any], where: W
 
 
 def walked(loc: Where, hint: Any, raw: Any) -> tuple[Where, Any, Any]:
-    """Where an error of pydantic is: the place without names of union members, the type and the raw input."""
+    """Place of an error of pydantic without names of union members, and the type and the raw input there."""
     where: list[str | int] = []
     for part in loc:
         known = {kind_of(model) for model in models(hint)} - {None}
@@ -137,7 +137,7 @@ def walked(loc: Where, hint: Any, raw: Any) -> tuple[Where, Any, Any]:
             continue
         hint = below(hint, part, raw)
         if isinstance(part, int) and isinstance(raw, Mapping):
-            continue  # one table given for a list of one
+            continue  # a table stands for a list of one
         where.append(part)
         try:
             raw = raw[part]
@@ -147,7 +147,7 @@ def walked(loc: Where, hint: Any, raw: Any) -> tuple[Where, Any, Any]:
 
 
 def known_keys(hint: Any, raw: Any) -> list[str]:
-    """The keys that a record of a given type may have, for raw input of one kind if there are several."""
+    """The keys that raw input of a type may have; if there are several kinds, those of its own kind."""
     kind = with_kind(raw).get("kind") if isinstance(raw, dict) else None
     made = construction(hint, raw) if isinstance(raw, Mapping) else None
     hint = made or hint
@@ -155,5 +155,5 @@ def known_keys(hint: Any, raw: Any) -> list[str]:
 
 
 def kinds_with(key: str, hint: Any) -> list[str]:
-    """The kinds, of several records that a type may be, that have a key."""
+    """The kinds, among several records of a type, that have a key."""
     return [kind for model in models(hint) if (kind := kind_of(model)) and key in keys(model)]

@@ -1,4 +1,4 @@
-"""Cross checks of joints, and of what plane links and planar beams move in."""
+"""Cross checks of joints, and of the planes of plane links and planar beams."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from kedfem.scene.records.wording import NOUNS, unknown_name
 
 
 def joint_faults(parts: Parts) -> Iterator[Fault]:
-    """Joints that join nothing, and links that nothing joins."""
+    """Joints without two different parts, and links without a connection to the ground."""
     for joint in parts.joints.values():
         names = link_names(joint)
         if names == [GROUND, GROUND]:
@@ -35,7 +35,7 @@ def joint_faults(parts: Parts) -> Iterator[Fault]:
             yield joint.fault("links", f"must be two different links, got {names[0]!r} twice")
         yield from surface_faults(joint, parts)
         yield from direction_faults(joint)
-    held = parts.joints.values() if parts.driven else ()  # else links may fly
+    held = parts.joints.values() if parts.driven else ()  # without a drive links may be free
     pairs = [link_names(joint) for joint in held]
     reached = connected(GROUND, pairs)
     for link in parts.links.values() if pairs else ():
@@ -46,7 +46,7 @@ def joint_faults(parts: Parts) -> Iterator[Fault]:
 
 
 def direction_faults(joint: Entry) -> Iterator[Fault]:
-    """Joints without the directions or the lead that they need, or with those of other kinds."""
+    """Directions or a lead that a joint lacks, or that belong to other kinds of joint."""
     kind = joint.word("kind")
     if kind in DIRECTED and not joint.has("axis"):
         yield joint.fault("axis", f"is required for a {kind} joint: 'x', 'y', 'z' or a vector, got nothing")
@@ -69,7 +69,7 @@ def direction_faults(joint: Entry) -> Iterator[Fault]:
 
 
 def surface_faults(joint: Entry, parts: Parts) -> Iterator[Fault]:
-    """Ports and faces of links that the joint does not join, and faces of links that have none."""
+    """Couplings and faces of links that the joint does not have, and faces of links without faces."""
     names = link_names(joint)
     for key in ("coupling", "faces"):
         given = joint.raw.get(key)
@@ -84,7 +84,7 @@ def surface_faults(joint: Entry, parts: Parts) -> Iterator[Fault]:
 
 
 def coordinate_faults(parts: Parts) -> Iterator[Fault]:
-    """Drives, motors, springs and limits that do not say which coordinate of a joint is theirs, or wrongly."""
+    """Drives, motors, springs and limits whose choice of a joint's coordinate is missing or wrong."""
     elements = (*parts.motors.values(), *parts.springs.values(), *parts.limits.values())
     turning = [(x, x.has("torque") or x.word("kind") in {"torsion", "angle"}) for x in elements]
     turning += [(x, not x.has("along")) for x in parts.all_drives]
@@ -113,7 +113,7 @@ def coordinate_faults(parts: Parts) -> Iterator[Fault]:
 
 
 def connected(start: str, pairs: list[list[str]]) -> set[str]:
-    """The names that pairs connect with a first one."""
+    """The names that pairs connect with `start`."""
     reached = {start}
     while more := {name for pair in pairs if reached & set(pair) for name in pair} - reached:
         reached |= more
@@ -121,7 +121,7 @@ def connected(start: str, pairs: list[list[str]]) -> set[str]:
 
 
 def planar_faults(parts: Parts) -> Iterator[Fault]:
-    """Axes, gravity, loads and points that are not in the plane of a scene with plane links."""
+    """Axes, gravity, loads and points outside of the plane of a scene with plane links."""
     if all(category(link) != "plane" for link in parts.links.values()):
         return
     scene, here = parts.good, f"a scene of {NOUNS['plane']}s"
@@ -135,7 +135,7 @@ def planar_faults(parts: Parts) -> Iterator[Fault]:
 
 
 def _beside_plane(scene: Scene) -> Iterator[Placed]:
-    """Joints, plane and rigid links and what is on them; points of other links may be anywhere."""
+    """Joints, plane and rigid links and what is attached to them; points of other links may be anywhere."""
     others = {name for name, link in scene.links.items() if link.category in {"solid", "beam"}}
     for name, joint in scene.joints.items():
         yield ("joints", name), joint
@@ -147,7 +147,7 @@ def _beside_plane(scene: Scene) -> Iterator[Placed]:
 
 
 def beam_faults(parts: Parts) -> Iterator[Fault]:
-    """What leaves the plane of beams that are said to be planar."""
+    """What moves beams out of a plane that are stated to be planar."""
     spatial = spatial_beams(parts.good)
     for link in parts.links.values():
         if category(link) != "beam":

@@ -1,7 +1,4 @@
-"""Cross checks of links, their meshes, frames and segments: keys that must suit each other.
-
-They look at what was given, not only at good records, so that a fault in one key hides no fault in another.
-"""
+"""Cross checks of the keys of links, their meshes, frames and segments."""
 
 from __future__ import annotations
 
@@ -28,7 +25,7 @@ ELEMENTS = {
 
 
 def link_faults(parts: Parts) -> Iterator[Fault]:
-    """Links whose keys do not suit their model."""
+    """Keys of links that do not suit the model."""
     for link in parts.links.values():
         if link.name == GROUND:
             yield Fault(link.where, "must have another name, got that of the frame")
@@ -41,11 +38,11 @@ def link_faults(parts: Parts) -> Iterator[Fault]:
 
 
 def rigid_faults(link: Entry, parts: Parts) -> Iterator[Fault]:
-    """A rigid link without a shape that is not a slider, or keys of an elastic one."""
+    """Missing or unsuitable keys of a rigid link."""
     on = [joint for joint in parts.joints.values() if link.name in link_names(joint)]
     riding = [joint for joint in on if joint.word("kind") == "prismatic"]
     slides = riding or link.record is None or link.name in moving_grounds(parts.good)
-    if link.has("inertia") or link.has("centre"):  # a body by numbers, with a fault that its record shows
+    if link.has("inertia") or link.has("centre"):  # given by mass, centre and inertia, which its record checks
         return
     if link.has("shape"):
         if not link.has("material"):
@@ -76,7 +73,7 @@ def elastic_faults(link: Entry, sketch: bool) -> Iterator[Fault]:
     """Missing or unsuitable keys of an elastic link."""
     kind, shape, element = category(link), link.word("shape", "kind"), link.word("element")
     noun, by_numbers = NOUNS[kind], any(map(link.has, ("mass", "centre", "inertia")))
-    if by_numbers and not any(map(link.has, ("model", "shape", "material"))):  # a rigid link, as its record says
+    if by_numbers and not any(map(link.has, ("model", "shape", "material"))):  # a rigid link, which its record requires
         return
     for key in () if sketch else ("shape", "material"):
         if not link.has(key):
@@ -125,7 +122,7 @@ def meshing_faults(link: Entry) -> Iterator[Fault]:
 
 
 def count_faults(link: Entry, counted: str) -> Iterator[Fault]:
-    """Numbers of elements that are not as many as needed."""
+    """A wrong count of numbers of elements."""
     elements = link.record.mesh.elements if link.record is not None else None
     if counted == "beam" and isinstance(elements, tuple):
         wanted = "must be one number, per segment, for a beam"
@@ -152,7 +149,7 @@ def frame_faults(parts: Parts) -> Iterator[Fault]:
 
 
 def segment_faults(parts: Parts, link: Entry) -> Iterator[Fault]:
-    """A number of segments where there is nothing to cut."""
+    """Segments of a link that cannot have them."""
     if not link.has("segments"):
         return
     got = f"got {shown(link.raw['segments'])}"

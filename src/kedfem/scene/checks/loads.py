@@ -1,4 +1,4 @@
-"""Cross checks of loads, bodies, probes and springs, and of [fatigue]: links that must have what these ask for."""
+"""Cross checks of loads, bodies, probes, springs and fatigue with the links to which they belong."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def load_faults(parts: Parts) -> Iterator[Fault]:
 
 
 def line_faults(load: Entry, link: Entry) -> Iterator[Fault]:
-    """A load along a line of a rigid link that has no line of its own."""
+    """A load along a line of a rigid link without a line."""
     own = link.word("shape", "kind") in {"bar", "polyline"} and not (link.word("material") or "").startswith(LINE)
     if category(link) == "rigid" and link.has("shape") and not own and not load.has("between"):
         wanted = "is required [m] on a rigid link that is no bar or polyline: two points of a line, got nothing"
@@ -46,7 +46,7 @@ def line_faults(load: Entry, link: Entry) -> Iterator[Fault]:
 
 
 def flywheel_faults(body: Entry, parts: Parts) -> Iterator[Fault]:
-    """A flywheel away from the hinges of its link."""
+    """A flywheel that is not at a hinge of its link."""
     link_name = body.word("link")
     if body.record is None or body.word("kind") != "flywheel" or link_name not in parts.links:
         return
@@ -72,7 +72,7 @@ def spring_faults(parts: Parts) -> Iterator[Fault]:
 
 
 def fatigue_faults(parts: Parts) -> Iterator[Fault]:
-    """Links without stress, and data of nothing that the scene has."""
+    """Fatigue data of rigid links, or without any link in the scene."""
     entry = parts.fatigue
     materials, links = (named(entry.raw.get(key)) for key in ("materials", "links"))
     for name in links:
@@ -88,5 +88,5 @@ def fatigue_faults(parts: Parts) -> Iterator[Fault]:
 
 
 def named(table: object) -> list[str]:
-    """Names in a table, as given."""
+    """Names in a table."""
     return [str(name) for name in table] if isinstance(table, Mapping) else []

@@ -1,4 +1,4 @@
-"""A scene under validation: its tables as given, and the records of those that are valid."""
+"""A scene under validation: its tables as given, and the records of valid ones."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ TABLES = ("links", "joints", "loads", "bodies", "motors", "springs", "limits", "
 
 @cache
 def adapter(*keys: str) -> TypeAdapter[Any]:
-    """The check of what stands at a place of the scene."""
+    """Pydantic's check of the input at a place of the scene."""
     hint: Any = Scene
     for key in keys:
         hint = below(hint, key, {})
@@ -30,7 +30,7 @@ def adapter(*keys: str) -> TypeAdapter[Any]:
 
 
 def record_of(raw: Any, *keys: str) -> Any:
-    """The record of what stands at a place, or None if it has a fault."""
+    """The record of the input at a place; None if it has a fault."""
     try:
         return adapter(*keys).validate_python(raw)
     except ValidationError:
@@ -39,7 +39,7 @@ def record_of(raw: Any, *keys: str) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A part of the scene: its place, what was given, and the record if that is good."""
+    """A part of the scene: its place, the given keys, and its record; None if that has a fault."""
 
     where: tuple[str | int, ...]
     raw: Mapping[str, Any]
@@ -51,7 +51,7 @@ class Entry:
         return str(self.where[-1])
 
     def word(self, *path: str) -> str | None:
-        """What a key holds, as given, if it is a word."""
+        """The given value of a key if it is a word; else None."""
         value = self.given(*path)
         return value if isinstance(value, str) else None
 
@@ -60,7 +60,7 @@ class Entry:
         return self.given(*path) is not None
 
     def given(self, *path: str) -> Any:
-        """What a key holds, as given; None of one that is not there."""
+        """The given value of a key; None if it is absent."""
         value: Any = self.raw
         for key in path:
             value = value.get(key) if isinstance(value, Mapping) else None
@@ -72,7 +72,7 @@ class Entry:
 
 
 NONE = Entry((), {}, None)
-"""What is not there."""
+"""An absent part."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +90,6 @@ class Parts:
     drive: Entry
     drives: dict[str, Entry]
     gears: dict[str, Entry]
-    damping: Entry
     analysis: Entry
     animation: Entry
     fatigue: Entry
@@ -99,11 +98,11 @@ class Parts:
     folder: Path
     sketch: bool
     good: Scene
-    """the scene of those of them that are good already"""
+    """the scene of the valid ones"""
 
     @property
     def driven(self) -> bool:
-        """Whether the scene has a drive, be it a good one or not."""
+        """Whether the scene has a drive, valid or not."""
         return bool(self.all_drives)
 
     @property
@@ -113,16 +112,18 @@ class Parts:
 
     @property
     def driven_joints(self) -> set[str]:
-        """Names of the joints that are to be driven."""
+        """Names of the driven joints."""
         return {name for drive in self.all_drives if (name := drive.word("joint")) is not None}
 
 
 def scene_parts(raw: Mapping[str, Any], scene: Scene | None, folder: Path, sketch: bool = False) -> Parts:
-    """The parts of a raw scene; to be called where the names of its points are known.
+    """The parts of a raw scene; called within `known_points`.
 
     Parameters
     ----------
-    scene : the record of it all; None if it has a fault: then each part is validated by itself
+    scene : the record of the whole scene; None if it has a fault, and each part is validated by itself
+    folder : folder of the files that it names
+    sketch : whether elastic links may lack shape and material
     """
 
     def found(*keys: str) -> tuple[Any, Any]:
@@ -150,7 +151,7 @@ def scene_parts(raw: Mapping[str, Any], scene: Scene | None, folder: Path, sketc
     tables = {name: entries(name) for name in TABLES} | {"probes": entries("output", "probes")}
     drive, analysis = single("drive") if raw.get("drive") is not None else NONE, single("analysis")
     return Parts(
-        **tables, drive=drive, damping=single("damping"), analysis=analysis,
+        **tables, drive=drive, analysis=analysis,
         animation=single("output", "animation"),
         fatigue=single("fatigue") if raw.get("fatigue") is not None else NONE,
         materials=[*(own if isinstance(own, Mapping) else ()), *BUILT_IN], raw=raw, folder=folder,
@@ -159,7 +160,7 @@ def scene_parts(raw: Mapping[str, Any], scene: Scene | None, folder: Path, sketc
 
 
 def good_scene(tables: Mapping[str, Mapping[str, Entry]], drive: Entry, analysis: Entry, gravity: XYZ | None) -> Scene:
-    """The scene of all records without a fault, for questions about it; an analysis with one says its frames alone."""
+    """The scene of all valid records, for questions about it; an invalid analysis only has its frames."""
     good: dict[str, Any] = {
         section: {name: entry.record for name, entry in table.items() if entry.record is not None}
         for section, table in tables.items()
@@ -171,7 +172,7 @@ def good_scene(tables: Mapping[str, Mapping[str, Entry]], drive: Entry, analysis
 
 
 def category(link: Entry) -> str:
-    """What a link is, as given; of one that leaves it open what it is meshed as."""
+    """The model of a link as given; if it is left open, the model with which it is meshed."""
     given = link.word("model")
     if given not in {None, "auto"}:
         return str(given)
@@ -179,6 +180,6 @@ def category(link: Entry) -> str:
 
 
 def link_names(joint: Entry) -> list[str]:
-    """The names of the links that a joint joins, as given."""
+    """The names of a joint's links as given."""
     names = joint.raw.get("links")
     return [name for name in names if isinstance(name, str)] if isinstance(names, (list, tuple)) else []

@@ -1,4 +1,4 @@
-"""What the types of keys say of their values: names that must exist, bare numbers probably meant in another unit."""
+"""Checks by the types of keys: names that must exist, and numbers without a unit that may be in a wrong one."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from kedfem.scene.records.wording import unknown_name
 
 
 def reference_faults(parts: Parts) -> Iterator[Fault]:
-    """Names of links, joints and materials that do not exist; where a table is not there at all that is the fault."""
+    """Names of links, joints and materials that do not exist; a missing table is a fault of its own."""
     known = {"links": [*parts.links], "joints": [*parts.joints], "materials": parts.materials}
     for where, value, hint in walk(parts.raw, Scene):
         names = [(where, value, hint)] if isinstance(value, str) and str in members(hint) else []
@@ -36,12 +36,11 @@ def key_hint(hint: Any) -> Any:
 
 
 TURN = 2.0 * math.pi
-# rad/s, from which a round number is rather one of rpm, or m/s, from which it is rather one of mm/s
-FAST = 60.0
+FAST = 60.0  # rad/s or m/s from which a round number is probably in rpm or mm/s
 
 
 def bare_numbers(raw: Any, hint: Any) -> Iterator[str]:
-    """Doubts about numbers without a unit in raw input of a type that was found good, but for lists of numbers."""
+    """Warnings about numbers without a unit in valid raw input, except for those in lists."""
     for where, value, inner in walk(raw, hint):
         if isinstance(value, (int, float)) and abs(value) < 1e300 and isinstance(where[-1], str):
             units = {quantity.unit for quantity in marks(inner, Quantity)}
@@ -49,13 +48,13 @@ def bare_numbers(raw: Any, hint: Any) -> Iterator[str]:
 
 
 def unit_warnings(where: str, value: float, units: set[str]) -> Iterator[str]:
-    """Warnings about a number without a unit that was probably meant in another one."""
+    """Warnings about a number without a unit that is probably in another one."""
     fast = abs(value) >= FAST and value % 10 == 0
-    for unit, doubtful, read, what, other in (
+    for unit, suspicious, read, what, other in (
         ("rad", abs(value) > TURN, f"in radians, {math.degrees(value):.4g}°", "degrees", "deg"),
         ("rad/s", fast, f"in rad/s, {value * RPM:.4g} rpm", "rpm", "rpm"),
         ("m/s", fast, "in m/s", "mm/s", "mm/s"),
     ):
-        if units == {unit} and doubtful:
+        if units == {unit} and suspicious:
             instead = f"if {what} are meant write '{value:g} {other}', else '{value:g} {unit}'"
             yield f"{where}: {value:g} without a unit is {read}; {instead}"

@@ -1,1 +1,1 @@
-"""What can be asked of a scene: frames, timing, laws of motion, planes, joints that move."""
+"""Questions about a scene: frames, timing, laws of motion, planes, joints enforced by equations."""

@@ -14,11 +14,11 @@ Values = Float[np.ndarray, " t"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pieces:
-    """A curve as cubics: piece k from at[k] on, the last one beyond; held before the first, or repeated.
+    """A curve as cubics: piece k starts at at[k]; constant before the first, or periodic.
 
-    at : (n,) where they begin
+    at : (n,) starts of the pieces
     coefficients : (n, 4) of powers of x − at, the constant first
-    period : after which the curve repeats itself; 0: not
+    period : period of the curve; 0 without one
     """
 
     at: Float[np.ndarray, " n"] = field(default_factory=lambda: np.zeros(0))
@@ -27,18 +27,18 @@ class Pieces:
 
     @property
     def negative(self) -> Pieces:
-        """The same with the opposite sign, as of a pull along a distance, which it shortens."""
+        """The curve with the opposite sign: a pull acts against its distance."""
         return replace(self, coefficients=-self.coefficients)
 
     @property
     def steepest(self) -> float:
-        """The largest slope, either way, at the ends and middles of its pieces; 0 of a constant."""
+        """Largest absolute slope at the ends and middles of the pieces."""
         ends = np.append(self.at[1:], self.at[:1] + self.period if self.period else self.at[-1:])
         places = np.concatenate([self.at, (self.at + ends) / 2, np.nextafter(ends, self.at)])
         return float(np.abs(self(places)[1]).max(initial=0.0))
 
     def __call__(self, x: Values) -> tuple[Values, Values]:
-        """Values and slopes at places."""
+        """Values (t,) and slopes (t,) at places x (t,)."""
         held = x <= self.at[0]
         if self.period:
             x, held = self.at[0] + np.mod(x - self.at[0], self.period), np.zeros_like(held)
@@ -49,15 +49,17 @@ class Pieces:
 
 
 def pieces(curve: Curve) -> Pieces:
-    """A curve's polynomials: straight, or the monotone cubics of F. N. Fritsch and J. Butland (SIAM J. Sci. Stat. Comput.
-    5, 1984), which nowhere pass beyond the values and have no corners, where it repeats itself neither.
+    """A curve's polynomials: straight lines, or monotone cubics, which do not overshoot and have no corners.
+
+    The cubics are those of F. N. Fritsch and J. Butland (SIAM J. Sci. Stat. Comput. 5, 1984); periodic curves have no
+    corner at the period either.
     """
     at, value = np.array(curve.at, float), np.array(curve.value, float)
     period = curve.period or 0.0
     c = np.zeros((len(at), 4))
     c[:, 0] = value
     ends, heights = (np.append(at, at[0] + period), np.append(value, value[0])) if period else (at, value)
-    wide = np.flatnonzero(np.diff(ends) > 0.0)  # not the last of a table that ends where it begins anew
+    wide = np.flatnonzero(np.diff(ends) > 0.0)  # not the last of a table that includes the end of its period
     c[wide, 1] = np.diff(heights)[wide] / np.diff(ends)[wide]
     if curve.interpolation == "smooth" and len(at) > 1:
         c[wide] = _smooth(ends, heights, period)[wide]
@@ -65,7 +67,7 @@ def pieces(curve: Curve) -> Pieces:
 
 
 def _smooth(at: Values, value: Values, period: float) -> Float[np.ndarray, "n 4"]:
-    """Coefficients of monotone cubics between points, those of a curve that repeats itself over three periods."""
+    """Coefficients of monotone cubics between points; for a periodic curve the middle one of three periods."""
     n = len(at) - 1
     if not period:
         return _monotone(at, value)
@@ -80,5 +82,5 @@ def _smooth(at: Values, value: Values, period: float) -> Float[np.ndarray, "n 4"
 def _monotone(at: Values, value: Values) -> Float[np.ndarray, "n 4"]:
     from scipy.interpolate import PchipInterpolator
 
-    with np.errstate(over="ignore"):  # of 1/slope, where values all but vanish: the slope is zero
+    with np.errstate(over="ignore"):  # 1/slope of nearly equal values, where the slope is zero
         return np.asarray(PchipInterpolator(at, value).c[::-1].T)

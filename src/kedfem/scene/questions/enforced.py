@@ -1,11 +1,11 @@
-"""Which joints of a scene are enforced by constraint equations, and which by points that their links share."""
+"""Whether a joint of a scene is enforced by constraint equations or by points that its links share."""
 
 from kedfem.scene.questions.modelling import by_constraint_equations, link_frames, masses_alone
 from kedfem.scene.questions.planes import plane_scene, spatial_beams
 from kedfem.scene.records.links import GROUND
 from kedfem.scene.records.scene import Scene
 
-TURNED = ("revolute", "weld")  # joints by shared points that make links rotate together
+TURNED = ("revolute", "weld")  # joints by shared points that couple rotations of links
 
 
 def enforced_by_equations(scene: Scene, name: str) -> bool:
@@ -18,9 +18,9 @@ def enforced_by_equations(scene: Scene, name: str) -> bool:
 
 
 def _unlike(scene: Scene, name: str) -> bool:
-    """Whether it makes links rotate together of which one alone has a co-rotational frame, and not by their angle.
+    """Whether a joint couples rotations of links of which only one has a co-rotational frame, other than by an angle.
 
-    A rotation ψ stretches the cross-section of the other by ψ²/2, so that points which both share would resist it.
+    A rotation ψ stretches the cross-section of the other link by ψ²/2, so that shared points would resist it.
     """
     joint = scene.joints[name]
     if joint.kind not in TURNED or len({scene.links[each].frames for each in joint.links if each in scene.links}) < 2:
@@ -35,7 +35,7 @@ def _unlike(scene: Scene, name: str) -> bool:
 
 
 def _displaced(scene: Scene, name: str) -> bool:
-    """Whether a link has displacements of its own that may turn it: no drive and no guide on the ground says how."""
+    """Whether displacements may rotate a link: no drive prescribes it, and no guide on the ground does."""
     link = scene.links[name]
     if link.category != "rigid":
         return True

@@ -1,4 +1,4 @@
-"""The drives' angles or travels and the factors of loads and springs over time, in closed form."""
+"""Angles or travels of drives, and factors of loads and springs, over time."""
 
 from __future__ import annotations
 
@@ -23,14 +23,13 @@ def drive_angle(motion: MotionLaw | None, t: Times) -> Law:
 
     Parameters
     ----------
-    motion : law of motion of the drive; None where nothing is driven: the angle is zero
-    t : (t,) [s]
-        Times, from 0 on.
+    motion : law of motion of the drive; None without a drive, for which the angle is zero
+    t : (t,) times from 0 [s]
 
     Returns
     -------
-    phi, dphi, ddphi : (t,) each [rad, rad/s, rad/s²; of a slide m, m/s, m/s²]
-        Relative to the reference position; right-hand derivatives where a law has a jump.
+    phi, dphi, ddphi : (t,) each [rad, rad/s, rad/s²; for a travel m, m/s, m/s²]
+        Relative to the reference position; right-hand derivatives at jumps of a law.
 
     Raises
     ------
@@ -56,9 +55,10 @@ def drive_angle(motion: MotionLaw | None, t: Times) -> Law:
 
 
 def path_parameter(scene: Scene, t: Times) -> Law:
-    """Place on the linkage's path and its derivatives: the drive's angle or travel; of several drives the time.
+    """Parameter of the linkage's path and its derivatives (t,) each: the only drive's angle or travel, else the time.
 
-    In a static analysis the mechanism stands still in each place: the derivatives are zero.
+    In a static analysis the mechanism rests at each place, and the derivatives are zero.
+
     Raises
     ------
     MotionError
@@ -73,7 +73,7 @@ def path_parameter(scene: Scene, t: Times) -> Law:
 
 
 def ramp(motion: Ramp, t: Times) -> Law:
-    """A speed that rises from 0 to ω in T: linearly, or as ω/2 (1 − cos πt/T)."""
+    """A motion whose speed rises from 0 to ω in T: linearly, or as ω/2 (1 − cos πt/T)."""
     w, T = motion.speed, motion.time
     up = np.minimum(t, T)
     k = np.pi / T
@@ -86,30 +86,30 @@ def ramp(motion: Ramp, t: Times) -> Law:
 
 
 def spline(motion: MotionCurve, t: Times) -> Law:
-    """The cubic spline through a curve of motion; with smoothing the smoothest quintic one that passes so close."""
+    """The cubic spline through a curve of motion; with smoothing the smoothest quintic spline within that distance."""
     from scipy.interpolate import BSpline, CubicSpline, splrep
 
     at, value, period = motion.at, motion.value, motion.period
     if period is None:
         _refuse_beyond(at, t)
     else:
-        last = None if at[-1] < at[0] + period * (1.0 - 1e-12) else -1  # it may end where it begins anew
+        last = None if at[-1] < at[0] + period * (1.0 - 1e-12) else -1  # it may include the end of its period
         at, value = (*at[:last], at[0] + period), (*value[:last], value[0])
         t = at[0] + np.mod(t - at[0], period)
     if motion.smoothing is None:
         curve = CubicSpline(at, value, bc_type="periodic" if period else "not-a-knot")
         return curve(t), curve(t, 1), curve(t, 2)
-    repeats = period is not None  # its last value is its first again, and counts once
+    repeats = period is not None  # the last value equals the first and counts once
     bound, k = (len(at) - repeats) * motion.smoothing**2, min(5, len(at) - 1)
     knots, *_ = splrep(
         at, value, k=k, s=bound, per=repeats, full_output=True, quiet=True
-    )  # as near to the bound as it comes
+    )  # warnings that the bound is not reached exactly are suppressed
     smooth = BSpline(*knots)
     return smooth(t), smooth(t, 1), smooth(t, 2)
 
 
 def _refuse_beyond(at: tuple[float, ...], t: Times) -> None:
-    """MotionError where a curve of motion does not reach a time."""
+    """Raise a MotionError if a curve of motion does not reach a time."""
     first, last = at[0], at[-1]
     slack = 1e-9 * (last - first)
     if t.size and (t.min() < first - slack or t.max() > last + slack):
@@ -119,17 +119,17 @@ def _refuse_beyond(at: tuple[float, ...], t: Times) -> None:
 
 
 def curve_noise(motion: MotionCurve) -> tuple[float, float]:
-    """How far the values of a curve are out of a smooth curve, and what that makes of its acceleration.
+    """Standard deviation of the noise in a curve of motion, and its share in the acceleration.
 
-    Divided differences of growing order take away what is smooth; of independent errors of standard deviation σ a
-    difference whose weights have unit norm keeps σ. The least of those of orders 4 to 8 is the estimate (R. W. Hamming,
-    Numerical Methods for Scientists and Engineers, 1962, on the noise in a table). A second difference then has an
-    error of √6 σ/h², to be compared with the mean square of all of them. A harmonic motion sampled six times in a
-    period still counts as smooth; one of 30 deg amplitude at every degree of its phase, rounded to 0.01 deg, does not.
+    Divided differences of growing order remove the smooth part; a difference whose weights have unit norm keeps the
+    standard deviation σ of independent errors. The least of orders 4 to 8 is the estimate (R. W. Hamming, Numerical
+    Methods for Scientists and Engineers, 1962, on the noise in a table). A second difference has the error √6 σ/h²,
+    which is compared with the mean square of all second differences. A harmonic motion sampled six times in a period
+    still counts as smooth; one of 30 deg amplitude at every degree of its phase, rounded to 0.01 deg, does not.
 
     Returns
     -------
-    σ [rad or m], and the share of the acceleration that is noise [-]; zeros of a curve of fewer than 12 times
+    σ [rad or m], and the share of noise in the acceleration [-]; zeros for a curve of fewer than 12 times
     """
     t, y = np.array(motion.at), np.array(motion.value)
     if len(t) < 12:
@@ -155,7 +155,7 @@ def _left_by_differences(t: Times, y: Times, order: int) -> float:
 
 
 def rise_dwell(motion: Cycloidal | Polynomial, t: Times) -> Law:
-    """Rise, dwell, return and dwell, repeated; without a return time only the rise."""
+    """Rise, dwell, return and dwell, periodically; without a return time only the rise."""
     rise, back = motion.rise, motion.return_time
     if back is None:
         s, ds, dds = unit_rise(motion, np.clip(t / rise, 0.0, 1.0))
@@ -182,11 +182,11 @@ def unit_rise(motion: Cycloidal | Polynomial, x: Times) -> Law:
 
 
 FactorLaw = Callable[[Times, Times], Times]
-"""Times [s] and places of the drive [rad or m], each (t,), to what something is multiplied by."""
+"""A function from times [s] and positions of the drive [rad or m], each (t,), to factors (t,)."""
 
 
 def factor_law(factor: Factor) -> FactorLaw:
-    """A factor as a function, its curve worked out once."""
+    """A factor as a function; its polynomials are computed once."""
     return partial(_factor_there, pieces(factor), factor.over == "time")
 
 
@@ -195,19 +195,19 @@ def _factor_there(curve: Pieces, timed: bool, t: Times, phi: Times) -> Times:
 
 
 def load_factor(factor: Factor, t: Times, phi: Times | None = None) -> Times:
-    """A factor at times t (t,) [s] and angles or travels phi (t,) of the drive [rad or m]."""
+    """Values (t,) of a factor at times t (t,) [s] and angles or travels phi (t,) of the drive [rad or m]."""
     return factor_law(factor)(t, t if phi is None else phi)
 
 
 def factors(scene: Scene) -> Iterator[tuple[str, Factor]]:
-    """All tables of a scene that multiply something, each with where it stands: of loads, of springs."""
+    """All factors of a scene, of loads and springs, each with its place."""
     yield from ((f"loads.{name}.factor", load.factor) for name, load in scene.loads.items())
     for name, spring in scene.springs.items():
         yield f"springs.{name}.stiffness_factor", spring.stiffness_factor
 
 
 def curves(scene: Scene) -> Iterator[tuple[str, Curve]]:
-    """All curves of a scene, each with where it stands: factors, torques and forces of motors and springs."""
+    """All curves of a scene, each with its place: factors, and torques and forces of motors and springs."""
     yield from factors(scene)
     for name, spring in scene.springs.items():
         if spring.curve is not None:
@@ -217,12 +217,12 @@ def curves(scene: Scene) -> Iterator[tuple[str, Curve]]:
 
 
 def is_constant(curve: Curve) -> bool:
-    """Whether it is the same always."""
+    """Whether a curve has a single value."""
     return len(set(curve.value)) < 2
 
 
 def factor_table(factor: Factor, end: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Times from 0 to an end, and the factors there of one over time, linear between, its periods written out."""
+    """Times up to an end and the values there of a factor over time, with its periods written out."""
     at, value = np.array(factor.at), np.array(factor.value)
     if factor.period is None:
         return factor.at, factor.value

@@ -1,4 +1,4 @@
-"""How links and joints are modelled: frames of links, joints enforced by equations, moving parts of the ground."""
+"""Modelling of links and joints: frames, joints enforced by equations, moving parts of the ground, sliders."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def link_frames(scene: Scene, name: str) -> Frames:
 
 
 def default_frames(driven: bool) -> Frames:
-    """Frames where none are asked for: rigid-body ones with a drive; without one nothing prescribes them."""
+    """Frames by default: rigid-body ones with a drive; without one there is no rigid-body motion."""
     return "rigid-body" if driven else "co-rotational"
 
 
@@ -28,18 +28,18 @@ def corotational_links(scene: Scene) -> frozenset[str]:
 
 
 def corotational(scene: Scene) -> bool:
-    """Whether any link has co-rotational frames: the equation is then not linear."""
+    """Whether any link has co-rotational frames, so that the equation is not linear."""
     return bool(corotational_links(scene))
 
 
 def driven_travel(scene: Scene, name: str) -> bool:
-    """Whether one of `Scene.all_drives` prescribes a travel of its joint, not an angle."""
+    """Whether one of `Scene.all_drives` prescribes a travel of its joint and not an angle."""
     drive = scene.all_drives[name]
     return prescribes_travel(scene.joints[drive.joint].kind, drive.coordinate, drive.along)
 
 
 def unsupported(scene: Scene) -> tuple[str, ...]:
-    """Names of the links that neither joints nor springs connect with the ground, over others or directly."""
+    """Names of the links that neither joints nor springs connect with the ground, directly or by other links."""
     pairs = [set(joint.links) for joint in scene.joints.values()]
     springs = [x for x in scene.springs.values() if isinstance(x, LineSpring)]
     pairs += [{end.link for end in spring.between} for spring in springs if spring.between is not None]
@@ -49,16 +49,16 @@ def unsupported(scene: Scene) -> tuple[str, ...]:
     return tuple(name for name in scene.links if name not in reached)
 
 
-SHARED = ("revolute", "spherical", "weld")  # kinds that hold points together, wherever these go
+SHARED = ("revolute", "spherical", "weld")  # kinds whose links can share points permanently
 
 
 def by_constraint_equations(joint: Joint, drives: Sequence[Drive] = (), kinds: frozenset[str] = frozenset()) -> bool:
-    """Whether a joint cannot be said of points that its links share for good.
+    """Whether a joint cannot be enforced by points that its links share permanently.
 
-        Parameters
-        ----------
-    drives : of the joint
-    kinds : what its links are meshed as, but for rigid ones: a plane link has no rotation that it could share with a beam
+    Parameters
+    ----------
+    drives : drives of the joint
+    kinds : models of its elastic links: a plane link has no rotation that it could share with a beam
     """
     if joint.kind == "weld" and kinds == {"plane", "beam"}:
         return True
@@ -70,14 +70,16 @@ def by_constraint_equations(joint: Joint, drives: Sequence[Drive] = (), kinds: f
 
 
 def moving_grounds(scene: Scene) -> dict[str, str]:
-    """Rigid links without a shape that drives alone move: parts of the ground. Each with its driven joint."""
+    """Moving parts of the ground (rigid links without a shape that drives alone move) with their driven joints."""
     shapeless = {name for name, link in scene.links.items() if link.model == "rigid" and link.shape is None}
     return dict(_moved_by_drives(shapeless, scene)) if shapeless else {}
 
 
 def masses_alone(scene: Scene) -> dict[str, str]:
-    """Sliders: rigid links without a shape that a guide keeps from rotating. Each with that joint, of several one on the
-    ground."""
+    """Sliders, which are rigid links without a shape that a guide keeps from rotating, with that joint.
+
+    Of several guides it is one on the ground.
+    """
     guides = [(key, joint) for key, joint in scene.joints.items() if joint.kind == "prismatic"]
     guides.sort(key=lambda each: GROUND not in each[1].links)
     bare = [name for name, link in scene.links.items() if link.model == "rigid" and link.shape is None]
@@ -87,7 +89,7 @@ def masses_alone(scene: Scene) -> dict[str, str]:
 
 
 def mass_place(scene: Scene, name: str) -> XYZ:
-    """Where a rigid link without a shape has its mass: at its driven joint, on a guide at its first other joint."""
+    """Place of the mass of a rigid link without a shape [m]: its driven joint, or the first joint that is not a guide."""
     if drive_joint := moving_grounds(scene).get(name):
         return scene.joints[drive_joint].at
     on = [joint for joint in scene.joints.values() if name in joint.links]
@@ -95,7 +97,7 @@ def mass_place(scene: Scene, name: str) -> XYZ:
 
 
 def _moved_by_drives(shapeless: set[str], scene: Scene) -> Iterator[tuple[str, str]]:
-    """Links that are held by one driven joint, on the ground or on another such link, nearest to the ground first."""
+    """Links with one driven joint to the ground or another such link, nearest to the ground first, and that joint."""
     known, left = {GROUND}, dict.fromkeys(shapeless)
     while left:
         found = [(name, drive_joint) for name in left if (drive_joint := _drive_joint(name, known, scene))]
@@ -108,7 +110,7 @@ def _moved_by_drives(shapeless: set[str], scene: Scene) -> Iterator[tuple[str, s
 
 
 def _drive_joint(name: str, known: set[str], scene: Scene) -> str:
-    """The driven joint that moves a link without a shape, "" if other joints constrain it or there is none."""
+    """The driven joint that moves a link without a shape; empty without one, or if other joints constrain the link."""
     drives, joints = scene.driven_joints, scene.joints.items()
     own = {key: joint for key, joint in joints if name in joint.links}
     inner = [key for key, joint in own.items() if known & (set(joint.links) - {name})]

@@ -1,6 +1,6 @@
-"""Which beams are planar: those that nothing in the scene moves out of a plane z = constant.
+"""Planar beams: those that nothing in the scene moves out of a plane z = constant.
 
-What moves one out of it is reported as faults, each with its place, as a beam may be said to be planar.
+The obstacles are faults with their places, for beams that are stated to be planar.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from kedfem.scene.records.scene import Scene
 from kedfem.scene.records.shapes import Bar, Polyline
 from kedfem.scene.records.wording import NOUNS
 
-FLAT = 1e-9  # how far from the plane, relative to the size of the scene
+FLAT = 1e-9  # largest distance from the plane, in sizes of the scene
 Placed = tuple[Where, Any]
 """A record and its place in the scene."""
 
 
 def spatial_beams(scene: Scene) -> frozenset[str]:
-    """Names of the beams that move in space; all others are planar, rows (u, v, ψ)."""
+    """Names of the beams that move in space; all others are planar, with unknowns (u, v, ψ)."""
     lines = {name: x for name, x in scene.links.items() if x.category == "beam" or x.rigid_line}
     kinds = {name: link.beam for name, link in lines.items()}
     open_ones = [name for name, kind in kinds.items() if kind is None]
@@ -40,7 +40,7 @@ def spatial_beams(scene: Scene) -> frozenset[str]:
 
 
 def plane_scene(scene: Scene) -> bool:
-    """Whether no link moves out of a plane z = constant: planar beams, plane links, what drives and joints carry."""
+    """Whether all links move in a plane z = constant: planar beams, plane links, and rigid links with them."""
     spatial, flat = spatial_beams(scene), False
     for name, link in scene.links.items():
         in_plane = link.category == "plane" or ((link.category == "beam" or link.rigid_line) and name not in spatial)
@@ -60,7 +60,7 @@ def rigid_in_space(scene: Scene, name: str) -> bool:
 
 
 def welded(scene: Scene, name: str) -> set[str]:
-    """What is welded to a link."""
+    """Names of what is welded to a link."""
     pairs = [joint.links for joint in scene.joints.values() if joint.kind == "weld"]
     return {other for pair in pairs if name in pair for other in pair} - {name}
 
@@ -72,7 +72,7 @@ def obstacles(scene: Scene, name: str) -> Iterator[Fault]:
 
 
 def _common_obstacles(scene: Scene, whose: str) -> Iterator[Fault]:
-    """What moves any beam of the scene out of the plane: axes of joints, gravity, loads."""
+    """Obstacles for all planar beams: axes of joints, gravity, loads."""
     for name, joint in scene.joints.items():
         where: Where = ("joints", name)
         yield from tilted(where, joint, whose, {"revolute", "cylindrical", "screw", "planar"})
@@ -83,7 +83,7 @@ def _common_obstacles(scene: Scene, whose: str) -> Iterator[Fault]:
 
 
 def _own_obstacles(scene: Scene, name: str, around: Iterable[Placed]) -> Iterator[Fault]:
-    """What moves one beam out of the plane: its shape, and what is around it."""
+    """Obstacles for one planar beam: its shape, and what is attached to it."""
     whose, around, place = f"for the planar beam {name!r}", list(around), ("links", name, "shape")
     shape = scene.links[name].shape
     if isinstance(shape, Polyline):
@@ -117,7 +117,7 @@ def leaving(scene: Scene, whose: str) -> Iterator[Fault]:
 
 
 def _vectors(scene: Scene) -> Iterator[tuple[Where, XYZ | None, bool]]:
-    """What acts on links and moves them at the start, and whether it turns them."""
+    """Vectors of loads and of motions at the start, and whether each is a torque or a rotation."""
     for name, load in scene.loads.items():
         for key in ("vector", "end_vector"):
             yield ("loads", name, key), getattr(load, key, None), load.kind == "torque"
@@ -130,7 +130,7 @@ def _vectors(scene: Scene) -> Iterator[tuple[Where, XYZ | None, bool]]:
 
 
 def tilted(where: Where, joint: Joint, whose: str, upright: Collection[str]) -> Iterator[Fault]:
-    """A joint of a kind that must be upright and is not, or one that slides out of the plane."""
+    """A joint whose axis must be along z and is not, or that slides out of the plane."""
     axis, kind = joint.axis, joint.kind
     if kind in upright and axis is not None and math.hypot(*axis[:2]) > FLAT:
         yield Fault((*where, "axis"), f"must be along z {whose}, got {vector(axis)}")
@@ -151,7 +151,7 @@ def vector(parts: tuple[float, ...]) -> str:
 
 
 def off_plane(records: Iterable[Placed], of: str) -> Iterator[Fault]:
-    """Points of records that are not in the z plane of the first; `of` says what lies in it."""
+    """Points of records outside of the z plane of the first point; `of` names what lies in it."""
     every = (((*where, *key), point) for where, record in records for key, point in _points(record))
     placed = [(where, point) for where, point in every if all(map(math.isfinite, point))]
     if not placed:
@@ -165,7 +165,7 @@ def off_plane(records: Iterable[Placed], of: str) -> Iterator[Fault]:
 
 
 def _by_link(scene: Scene) -> dict[str, list[Placed]]:
-    """Each link, its joints and what acts on it or reads it."""
+    """The records of each link: its own, its joints, loads, bodies, probes and springs."""
     out: dict[str, list[Placed]] = {name: [(("links", name), link)] for name, link in scene.links.items()}
     for name, joint in scene.joints.items():
         for link in dict.fromkeys(joint.links):
@@ -201,7 +201,7 @@ def _points(record: Any) -> Iterator[tuple[Where, XYZ]]:
     for key in ("between", "points"):
         for i, point in enumerate(getattr(shape, key, ())):
             yield ("shape", key, i), point
-    for i, item in enumerate(getattr(shape, "outline", ())[:1]):  # the others are level with it
+    for i, item in enumerate(getattr(shape, "outline", ())[:1]):  # the others have the same z
         yield ("shape", "outline", i), getattr(item, "to", item)
     at = getattr(record, "at", None)
     for name, point in at.points.items() if isinstance(at, Apart) else ():

@@ -14,12 +14,12 @@ from kedfem.scene.records.drives import ConstantSpeed, Cycloidal, Harmonic, Moti
 from kedfem.scene.records.scene import Scene
 
 STEPS_PER_REVOLUTION = 720
-POSITIONS = 72  # in a revolution where the mechanism does not vibrate
+POSITIONS = 72  # in a revolution of an analysis without vibration
 
 
 @dataclass(frozen=True, slots=True)
 class TimeGrid:
-    """Equal time steps [s] from t = 0, and their number; the analysis has one time point more."""
+    """Equal time steps [s] from t = 0, and their number; there is one more time point."""
 
     step: float
     steps: int
@@ -42,9 +42,9 @@ def scene_speed(scene: Scene) -> float:
 
 
 def cycle(motion: MotionLaw | None) -> float | None:
-    """Time [s] after which a drive's law repeats itself, a whole revolution apart or not; None if it does not.
+    """Period of a drive's law [s], up to whole revolutions; None without one.
 
-    A ramp repeats itself once it has sped up.
+    A ramp has the period of its final speed.
     """
     if isinstance(motion, (ConstantSpeed, Ramp)):
         return 2.0 * math.pi / abs(motion.speed) if motion.speed else None
@@ -57,12 +57,18 @@ def cycle(motion: MotionLaw | None) -> float | None:
 
 
 def without_vibration(scene: Scene) -> bool:
-    """Whether each position is found by itself, static or quasi-static: there are no time steps then."""
+    """Whether each position is computed by itself, static or quasi-static, without time steps."""
     return scene.analysis.kind in WITHOUT_VIBRATION
 
 
 def time_of_revolutions(motion: MotionLaw, revolutions: float) -> float:
-    """Time [s] at which a drive that rotates continuously has made so many revolutions."""
+    """Time at which a continuously rotating drive has made a number of revolutions [s].
+
+    Raises
+    ------
+    ValueError
+        The drive does not rotate continuously.
+    """
     angle, speed = 2.0 * math.pi * revolutions, continuous_speed(motion)
     if isinstance(motion, ConstantSpeed):
         return angle / speed
@@ -81,9 +87,14 @@ def time_of_revolutions(motion: MotionLaw, revolutions: float) -> float:
 def time_grid(scene: Scene) -> TimeGrid:
     """Step and number of steps of a scene's analysis.
 
-    With ``steps_per_revolution`` the step is the turn at the drive's final speed, divided, and the last step may
+    With ``steps_per_revolution`` the step is that part of a revolution at the drive's final speed, and the last step may
     pass the end; ``step`` is shortened so that a whole number reaches the end. A steady motion has an even number of
-    steps, shortened so. Where the mechanism does not vibrate one revolution is enough, and a structure needs no time.
+    steps. Analyses without vibration end after one revolution by default, and a structure needs no end.
+
+    Raises
+    ------
+    ValueError
+        The analysis has no end.
     """
     analysis, motion = scene.analysis, scene.motion
     steady = analysis.kind == "steady"
@@ -115,7 +126,7 @@ def _grid(scene: Scene, end: float) -> TimeGrid:
 
 
 def states_step(scene: Scene) -> bool:
-    """Whether a scene states how long its steps are."""
+    """Whether a scene states the length of its steps."""
     return scene.analysis.step is not None or scene.analysis.steps_per_revolution is not None
 
 

@@ -1,1 +1,1 @@
-"""From files and dictionaries to a scene: parsed, placed, validated, checked, all faults raised at once."""
+"""Reading of scenes from files and dictionaries: parsing, placing, validation and checks, with all faults at once."""

@@ -1,4 +1,4 @@
-"""Files beside the scene: TOML text, parts and motion tables."""
+"""Files of a scene: TOML texts, parts, and the files that it names."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from kedfem.scene.records.points import known_points
 from kedfem.scene.records.shapes import Cad, MeshFile, Part, PartGeometry
 
 MOST_TEXT = 50_000_000  # bytes of a scene, part or table
-DEEPEST = 100  # tables in tables
+DEEPEST = 100  # nesting of tables
 DOTTED = re.compile(rf"\s*\[*\s*(?:[\w\-]+\s*\.\s*){{{DEEPEST},}}")
 
 
 def file_text(path: Path) -> str:
-    """Text of a file, UTF-8 with or without a byte order mark; a SceneError says why it cannot be read."""
+    """Text of a file in UTF-8, with or without a byte order mark; a SceneError if it cannot be read."""
     try:
         found = path.stat()
         if not (stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)):
@@ -47,14 +47,14 @@ def file_text(path: Path) -> str:
 
 
 def outside(raw: Any, folder: Path) -> list[Fault]:
-    """Faults of all names of files and folders in a raw scene that lead out of its own folder, links followed."""
+    """Faults of all names of files and folders in a raw scene that are outside of its folder, with links resolved."""
     wanted = "must be within the scene's folder (--within)"
     named = ((where, x) for where, x, _ in walk(raw, None) if names_file(where, x))
     return [Fault(where, f"{wanted}, got {x!r}") for where, x in named if not inside(folder, x)]
 
 
 def renamed(raw: Mapping[str, Any], beside: Path) -> dict[str, Any]:
-    """A raw scene with its names of files made relative to the folder that its own is `beside` of."""
+    """A raw scene with names of files relative to another folder, from which its own has the path `beside`."""
     changed: dict[str, Any] = replaced(
         raw, None, lambda where, x, _: str(beside / x) if x and names_file(where, x) else x
     )
@@ -67,15 +67,15 @@ def names_file(where: Where, value: Any) -> bool:
 
 
 def inside(folder: Path, name: str | Path) -> bool:
-    """Whether a file is in a folder, links followed."""
+    """Whether a file is in a folder, with links resolved."""
     try:
         return (folder / name).resolve().is_relative_to(folder.resolve())
-    except (ValueError, OSError, RuntimeError):  # no name of a file at all, or links in a circle
+    except (ValueError, OSError, RuntimeError):  # not a file name, or circular links
         return False
 
 
 def toml_table(path: Path) -> tuple[dict[str, Any], str]:
-    """Content and text of a TOML file; a SceneError names the line that is not TOML."""
+    """Content and text of a TOML file; a SceneError names the line that is not valid."""
     text = file_text(path)
     for k, line in enumerate(text.splitlines(), start=1):
         if DOTTED.match(line):
@@ -94,9 +94,9 @@ def toml_table(path: Path) -> tuple[dict[str, Any], str]:
 
 
 def part_geometry(path: Path) -> PartGeometry:
-    """The geometry of a part from its TOML file; may hold a table of `points` of its own, like a scene.
+    """The geometry of a part from its TOML file, which may have its own table of `points`, like a scene.
 
-    A SceneError has all faults of the file, each preceded by its name.
+    A SceneError has all faults of the file, each preceded by the file's name.
     """
     raw, _ = toml_table(path)
     placement = Placement(raw.get("points"), {})
@@ -114,7 +114,7 @@ def part_geometry(path: Path) -> PartGeometry:
 
 
 def file_faults(parts: Parts) -> Iterator[Fault]:
-    """Files of shapes that are missing, and parts that do not fit between their points."""
+    """Missing files of shapes, and parts that do not fit between their points."""
     for link in parts.links.values():
         shape = link.record.shape if link.record is not None else None
         if isinstance(shape, Cad | MeshFile) and not (parts.folder / shape.file).is_file():

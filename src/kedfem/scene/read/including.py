@@ -1,4 +1,4 @@
-"""`include`: the tables of other scene files, in those of a scene."""
+"""`include`: the tables of other scene files, merged with those of a scene."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from kedfem.scene.records.base import FileName
 from kedfem.scene.records.wording import shown
 
 KEY = "include"
-MOST_FILES = 100  # read for one scene; each of two files that include the next two would be 2**n
+MOST_FILES = 100  # read for one scene: nested includes may grow exponentially
 FILES: TypeAdapter[list[str]] = TypeAdapter(list[FileName])
 
 
@@ -25,20 +25,25 @@ def with_includes(
 ) -> dict[str, Any]:
     """A raw scene with the tables of the files that it includes.
 
-    Tables are joined key by key; what the scene has itself stands, and of several files the later stands. A table of
-    another `kind` takes the place of the whole one. Names of files in an included one become relative to this folder.
+    Tables are merged key by key; the scene's own keys come first, then those of later files. A table of another `kind`
+    replaces the whole one. Names of files in an included file become relative to this folder.
 
     Parameters
     ----------
     raw : keys and values of the scene
-    folder : what its file names are relative to
-    file : the scene's own
+    folder : folder to which its file names are relative
+    file : the scene's own file
     allowed : whether a file may be read
+
+    Raises
+    ------
+    SceneError
+        A file cannot be read or must not be, includes itself, or there are too many.
     """
     read = 0
 
     def of(raw: Mapping[str, Any], beside: Path, within: tuple[Path, ...]) -> dict[str, Any]:
-        """A table of keys, in a file of a folder `beside` the scene's, with all that it includes."""
+        """A table of keys from a file in the folder `beside`, relative to the scene's, with all that it includes."""
         nonlocal read
         base: dict[str, Any] = {}
         for name in named_files(raw.get(KEY)):
@@ -73,7 +78,7 @@ def named_files(given: object) -> list[str]:
 
 
 def joined(base: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
-    """Two tables in one, key by key; of anything else, and of tables of two kinds, the second."""
+    """Two tables merged key by key; of other values, and of tables of different kinds, the second."""
     if "kind" in own and own["kind"] != base.get("kind", own["kind"]):
         return dict(own)
     out = {**base, **own}
@@ -99,5 +104,5 @@ def _value(x: Any) -> str:
 
 
 def toml_string(text: str) -> str:
-    """A text as TOML writes it."""
+    """A text in TOML's notation."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007F")

@@ -1,4 +1,4 @@
-"""`[parameters]` of a scene, and the numbers that are expressions of them."""
+"""`[parameters]` of a scene, and numbers that are expressions of them."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from kedfem.scene.records.units import NUMBER, OVERFLOW, UNIT, Evaluated, unit_r
 from kedfem.scene.records.wording import shown
 
 SIGN = "="
-"""What expressions begin with."""
-MOST_CHAINED = 30  # parameters that are defined by each other
+"""First character of an expression."""
+MOST_CHAINED = 30  # parameters that depend on each other
 
 
 class FollowsError(ValueError):
-    """A fault that follows from another one, which is reported where it is."""
+    """A fault that follows from another one, which is reported at its own place."""
 
 
 class Parameters(Mapping[str, Any]):
-    """Quantities of parameters by name, worked out when they are asked for; each fault is reported once, where it is.
+    """Quantities of parameters by name, evaluated on access; each fault is reported once, at its own place.
 
     Parameters
     ----------
-    raw : the scene's `parameters` as they were given
+    raw : the given `parameters` of the scene
     """
 
     def __init__(self, raw: object) -> None:
@@ -88,12 +88,12 @@ WANTED = "a number, a text of a number and a unit, or an expression"
 
 
 def with_expressions(raw: Mapping[str, Any], hint: Any) -> tuple[dict[str, Any], list[Fault], set[Where]]:
-    """A raw scene with its expressions worked out by the types of its keys, and faults.
+    """A raw scene with its expressions evaluated, and faults.
 
     Returns
     -------
-    A changed copy: plain numbers where an expression has no unit, else texts that carry their quantity; what has a fault
-    is left as it was. The faults, and where others follow from those of parameters.
+    A changed copy: numbers in place of expressions without a unit, `Evaluated` texts in place of others; expressions with
+    a fault are unchanged. The faults. The places of faults that follow from those of parameters.
     """
     echoes: set[Where] = set()
     known = Parameters(raw.get("parameters"))

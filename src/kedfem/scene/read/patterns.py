@@ -1,4 +1,4 @@
-"""`patterns` of a scene: links, joints, loads and others that are repeated, rotated about an axis or shifted."""
+"""`patterns` of a scene: tables that are repeated, rotated about an axis or shifted, written out."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from kedfem.scene.records.points import XYZ
 from kedfem.scene.records.shapes import STEEP, Bar, Polyline, with_kind
 from kedfem.scene.records.units import Quantity
 
-BY_LINK = ("at", "coupling", "faces")  # keys of joints that may hold a table by links
+BY_LINK = ("at", "coupling", "faces")  # keys of joints that may have a table by links
 FLAT = ("plate_link", "extrusion", "part")  # shapes whose thickness is along z
 LEVEL = {"angle": "an angle", "distances": "distances", "offset": "an offset"}  # of points, in the xy plane
 PLACED, LINES = ("cad", "mesh"), ("bar", "polyline")
@@ -33,7 +33,7 @@ Tables = dict[str, Any]
 
 @dataclass(frozen=True)
 class _Copy:
-    """One copy of a pattern's tables: its number from 0, and names of the pattern's own."""
+    """One copy of a pattern's tables: the pattern, and the copy's number from 0."""
 
     pattern: Pattern
     number: int
@@ -47,7 +47,7 @@ class _Copy:
         return np.asarray(np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * K @ K)
 
     def called(self, section: str, name: str) -> str:
-        """The name of an entry; unchanged if it is none of the pattern's."""
+        """The name of an entry in this copy; unchanged if it is not one of the pattern's entries."""
         return f"{name}_{self.number + 1}" if name in getattr(self.pattern, section) else name
 
     def of(self, value: Any, hint: Any, key: str) -> Any:
@@ -96,7 +96,7 @@ class _Copy:
         return (centre + self.R @ (x - centre) + self.number * np.array(self.pattern.shift)).tolist()
 
     def completed(self, section: str, raw: Any, made: Any) -> Any:
-        """An entry with what it leaves open and does not move by itself; what cannot be moved is a ValueError."""
+        """An entry with defaults that must move with the copy; a ValueError if it cannot be moved."""
         if not isinstance(raw, Mapping):
             return made
         shape = with_kind(raw.get("shape")) if section == "links" else None
@@ -129,7 +129,7 @@ class _Copy:
 
 
 def _triple(hint: Any) -> str | None:
-    """The unit of a type that is three numbers: of points m, of axes 1; None of another type."""
+    """The unit of a type of three numbers: m for points, 1 for axes; None for other types."""
     for part in members(hint):
         inner = get_args(part) if get_origin(part) is tuple else ()
         if len(inner) == 3 and float in members(inner[0]):
@@ -139,9 +139,10 @@ def _triple(hint: Any) -> str | None:
 
 def with_patterns(raw: Mapping[str, Any], hint: Any) -> tuple[Tables, list[Fault], dict[Where, Where]]:
     """A raw scene of a type with its patterns written out.
+
     Returns
     -------
-    a changed copy without patterns; faults; and where each table that was made stands in a pattern, by its own place
+    A changed copy without patterns; faults; and the place in a pattern of each table that was made, by its own place.
     """
     given = raw.get("patterns")
     if not isinstance(given, Mapping):
@@ -174,14 +175,14 @@ def _phased(pattern: Pattern) -> bool:
 def _repeated(
     out: Tables, origins: dict[Where, Where], pattern: Pattern, where: Where, value: Any, hint: Any
 ) -> list[Fault]:
-    """All copies of one entry, into a scene's tables; faults."""
+    """Put all copies of one entry into a scene's tables; returns faults."""
     section, entry = str(where[-2]), str(where[-1])
     above = ("output", "probes") if section == "probes" else (section,)
     tables, kind = out, hint
     for key in above:
         inner = tables.get(key)
         if inner is not None and not isinstance(inner, Mapping):
-            return []  # which is a fault of its own
+            return []  # a fault of its own
         tables[key] = dict(inner or {})
         tables, kind = tables[key], below(kind, key, tables)
     kind = below(kind, entry, tables)
@@ -200,7 +201,7 @@ def _repeated(
 
 
 def in_pattern(fault: Fault, origins: Mapping[Where, Where]) -> Fault:
-    """A fault, at the place in the pattern that its table was made from, if it was."""
+    """The fault at the place in the pattern from which its table was made, if it was made from one."""
     for made, origin in origins.items():
         if fault.where[: len(made)] == made:
             return Fault((*origin, *fault.where[len(made) :]), fault.message)
@@ -208,7 +209,7 @@ def in_pattern(fault: Fault, origins: Mapping[Where, Where]) -> Fault:
 
 
 def steep_faults(links: Mapping[str, Any], given: object) -> list[Fault]:
-    """Lines whose section does not rotate with the copies of a pattern: steep ones, on which x is up unless given."""
+    """Steep lines of patterns without `up`: their sections would not rotate with the copies, as x is up by default."""
     found = []
     for name, each in given.items() if isinstance(given, Mapping) else ():
         pattern = Pattern.model_validate(each)

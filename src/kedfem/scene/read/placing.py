@@ -1,4 +1,4 @@
-"""The points of a scene, from coordinates and constructions that may refer to each other."""
+"""The points of a scene, from coordinates and from constructions that may refer to each other."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ POINT: TypeAdapter[XYZ] = TypeAdapter(Point)
 
 
 class Placement(Mapping[str, XYZ]):
-    """Points by name, constructed when they are asked for; those that cannot be are `UNPLACED`, with a fault.
+    """Points by name, constructed on access; those that cannot be constructed are `UNPLACED`, with a fault.
 
     Parameters
     ----------
-    points, joints : the scene's `points` and `joints` as they were given; joints are known as `joints.NAME`
+    points, joints : the given `points` and `joints` of the scene; joints have the names `joints.NAME`
     """
 
     def __init__(self, points: object, joints: object) -> None:
@@ -46,7 +46,7 @@ class Placement(Mapping[str, XYZ]):
         return self._unknown or name in self._raw
 
     def __getitem__(self, name: str) -> XYZ:
-        if self._unknown:  # the points are no table, which is a fault of its own
+        if self._unknown:  # the points are not a table, which is a fault of its own
             return UNPLACED
         where, value = self._raw[name]
         if where[0] == "joints" and isinstance(value, Mapping) and by_link(value.get("at")):
@@ -61,7 +61,7 @@ class Placement(Mapping[str, XYZ]):
         return self._placed[name]
 
     def place_all(self) -> None:
-        """Construct all points, so that all faults are known."""
+        """Construct all points, so that all faults are found."""
         for name in self:
             self[name]
 
@@ -80,7 +80,7 @@ class Placement(Mapping[str, XYZ]):
         return UNPLACED
 
     def _joint(self, value: Any) -> XYZ:
-        """Where a joint is; its faults are reported with the joint."""
+        """The point of a joint; its faults are reported with the joint."""
         try:
             with known_points(self):
                 return POINT.validate_python(value["at"])

@@ -1,4 +1,4 @@
-"""Rigid links without a shape, given by mass, centre and inertia: a rigid body on a line through their joints."""
+"""Rigid links given by mass, centre and inertia, turned into a rigid body on a line through their joints."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from kedfem.scene.records.loads import RigidBody, inertia_faults, inertia_tensor
 from kedfem.scene.records.materials import LINE
 from kedfem.scene.records.points import XYZ, Apart, Axis, JointPoint
 
-LIGHT = 1e-4  # of the mass: that of the line, whose own modes are made as stiff as they are heavy (1e-9: forces 10 % off)
-SLENDER = 0.05  # of the line's extent: its width
-SOUND = 5e3  # m/s: how fast waves would be in the line if it had the mass of the link, as in steel: so stiff is it made
-NOTHING = 1e-9  # of the extent: points that near are one
+LIGHT = 1e-4  # share of the line in the mass; its modes are as stiff as they are heavy (with 1e-9 forces err by 10 %)
+SLENDER = 0.05  # width of the line, in extents
+SOUND = 5e3  # m/s, speed of waves in the line with the mass of the link, as in steel, which determines its stiffness
+NOTHING = 1e-9  # distance, in extents, within which points are the same
 
 Tables = dict[str, Any]
 _JOINT_POINT: TypeAdapter[XYZ] = TypeAdapter(JointPoint)
@@ -29,7 +29,7 @@ _AXIS: TypeAdapter[XYZ] = TypeAdapter(Axis)
 def with_rigid_bodies(raw: Mapping[str, Any]) -> Tables:
     """A raw scene whose rigid links with `inertia` have a shape, a material and a rigid body instead.
 
-    Called where the names of points are known. A link with a fault stays as it is, for its own record to say so.
+    It is called within `known_points`. A link with a fault is unchanged, and its record reports the fault.
     """
     links, out = raw.get("links"), dict(raw)
     for name, link in links.items() if isinstance(links, Mapping) else ():
@@ -43,21 +43,19 @@ def with_rigid_bodies(raw: Mapping[str, Any]) -> Tables:
             })  # fmt: skip
         except (KeyError, ValidationError):
             continue
-        if all(map(math.isfinite, body.centre)):  # else the point that it names has a fault
+        if all(map(math.isfinite, body.centre)):  # otherwise the point that it names has a fault
             _carry(out, str(name), body)
     return out
 
 
 def _carry(out: Tables, name: str, body: RigidBody) -> None:
-    """Give a link of a raw scene the line through its points, and the body on it."""
+    """Give a link of a raw scene the line through its points, and the body on the line."""
     if not all(isinstance(out.get(section, {}), Mapping) for section in ("bodies", "materials", "links")):
         return
     held, slots = [body.centre, *_held(out, name)], [*_slots(out, name)]
     radius = math.sqrt(max(sum(body.inertia[:3]) / (2 * body.mass), 0.0)) or 1.0
     reach = max(math.dist(P, Q) for P in held for Q in held) or radius
-    along = [
-        _beyond(P, axis, reach) for P, axis in slots
-    ]  # a second point of each line, beside its pin's reference position
+    along = [_beyond(P, axis, reach) for P, axis in slots]  # a second point of each slot's line
     points = [*_different([*held, *along])]
     if len(points) == 1:
         points.append((points[0][0] + radius, *points[0][1:]))
@@ -75,9 +73,10 @@ def _carry(out: Tables, name: str, body: RigidBody) -> None:
 
 
 def _beside_line(body: RigidBody, points: Float[np.ndarray, "p 3"], width: float) -> RigidBody:
-    """The body that has mass, centre and inertia of another one together with the line.
+    """The body that, together with the line, has the mass, centre and inertia of a given body.
 
-    Where no body has what the line leaves of the inertia, as of a disc that it crosses, its share is left as well.
+    If the remainder of the inertia is impossible for a body, as for a disc across the line, the body has the line's share
+    less of the whole inertia.
     """
     a, e = points[:-1], np.diff(points, axis=0)
     length = np.linalg.norm(e, axis=1)
@@ -97,12 +96,12 @@ def _beside_line(body: RigidBody, points: Float[np.ndarray, "p 3"], width: float
 
 
 def _steiner(d: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
-    """Moments of inertia of a unit mass at a distance."""
+    """Inertia tensor of a unit mass at a vector d (Steiner)."""
     return np.asarray(d @ d * np.eye(3) - np.outer(d, d))
 
 
 def _held(raw: Mapping[str, Any], name: str) -> Iterator[XYZ]:
-    """Where joints and springs hold a link, as far as they are good."""
+    """Points of joints and springs on a link, as far as they are valid."""
     joints = [x.get("at") for x in _tables(raw.get("joints")) if name in _list(x.get("links"))]
     ends = [x for spring in _tables(raw.get("springs")) for x in _list(spring.get("between"))]
     springs = [x.get("at") for x in ends if isinstance(x, Mapping) and x.get("link") == name]
@@ -112,7 +111,7 @@ def _held(raw: Mapping[str, Any], name: str) -> Iterator[XYZ]:
 
 
 def _slots(raw: Mapping[str, Any], name: str) -> Iterator[tuple[XYZ, XYZ]]:
-    """Point and direction of the lines of a link along which pins slide, as far as they are good."""
+    """Point and direction of the slots of a link, as far as they are valid."""
     for joint in _tables(raw.get("joints")):
         if joint.get("kind") != "slot" or _list(joint.get("links"))[1:] != [name]:
             continue
@@ -149,7 +148,7 @@ def _tables(section: Any) -> list[Mapping[str, Any]]:
 
 
 def _different(points: list[XYZ]) -> list[XYZ]:
-    """Each point once; the first comes last, so that a line leads from joint to joint and ends at the centre."""
+    """Different points; the first comes last, so that the line runs from joint to joint and ends at the centre."""
     size = max((math.dist(P, Q) for P, Q in combinations(points, 2)), default=0.0)
     out: list[XYZ] = []
     for P in (*points[1:], points[0]):

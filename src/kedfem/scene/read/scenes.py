@@ -1,4 +1,4 @@
-"""Scenes from files and from dictionaries: expressions worked out, patterns written out, all checked at once."""
+"""Scenes from files and dictionaries: expressions evaluated, patterns written out, all faults reported at once."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from kedfem.scene.records.shapes import with_kind
 from kedfem.scene.records.wording import one_of
 
 T = TypeVar("T", bound=Record)
-MOST_STEPS = 1e9  # of an analysis: days of computing, and more rows than a disk holds
+MOST_STEPS = 1e9  # of an analysis: days of computing, and more rows than fit on a disk
 
 
 def read_scene(path: str | Path, *, sketch: bool = False, within: bool = False) -> Scene:
@@ -42,14 +42,14 @@ def read_scene(path: str | Path, *, sketch: bool = False, within: bool = False) 
 
     Parameters
     ----------
-    path : the scene file; file names in it are relative to its folder.
-    sketch : elastic links may lack shape and material: enough for their rigid motion, not for an analysis.
-    within : whether all files that it names, and its results, must be in its own folder: for scenes from others.
+    path : the scene file; file names in it are relative to its folder
+    sketch : whether elastic links may lack shape and material, which suffices for their rigid-body motion
+    within : whether all files that it names, and its results, must be in its own folder, for scenes from others
 
     Raises
     ------
     SceneError
-        With all faults: of the file, or of the scene in it.
+        All faults of the file or of the scene in it.
     """
     path = Path(path)
     raw, text = read_keys(path, within=within)
@@ -57,7 +57,7 @@ def read_scene(path: str | Path, *, sketch: bool = False, within: bool = False) 
 
 
 def read_keys(path: Path, *, within: bool = False) -> tuple[dict[str, Any], str]:
-    """Keys and values of a scene file as they are written, includes taken over, and their text; as `read_scene`."""
+    """Keys and values of a scene file, with its includes, and their text; parameters and errors as of `read_scene`."""
     folder = path.parent
     found, text = toml_table(path)
     raw = with_includes(found, folder, path, lambda each: not within or inside(folder, each.absolute()))
@@ -69,19 +69,19 @@ def read_keys(path: Path, *, within: bool = False) -> tuple[dict[str, Any], str]
 def scene_from(
     raw: Mapping[str, Any], folder: str | Path = ".", *, source: str | None = None, stem: str = "scene"
 ) -> Scene:
-    """A scene from a dictionary of the keys that a scene file has.
+    """A scene from a dictionary with the keys of a scene file.
 
     Parameters
     ----------
-    raw : keys and values; records of this package may stand for tables, units as in a file.
-    folder : what file names in it are relative to.
-    source : text of the file that it comes from.
-    stem : name of the scene, for its results.
+    raw : keys and values, units as in a file; records of this package may stand for tables
+    folder : folder to which file names are relative
+    source : text of the file from which it comes
+    stem : name of the scene, for its results
 
     Raises
     ------
     SceneError
-        With all faults.
+        All faults of the scene.
     """
     return _scene(raw, Path(folder), source=source, stem=stem)
 
@@ -102,9 +102,14 @@ def validated(given: Any, folder: Path, *, sketch: bool = False) -> Scene:
 
     Parameters
     ----------
-    given : as a file has them; records of this package may stand for tables
-    folder : what file names in it are relative to
+    given : keys and values as in a file; records of this package may stand for tables
+    folder : folder to which file names are relative
     sketch : whether elastic links may lack shape and material
+
+    Raises
+    ------
+    SceneError
+        All faults of the scene.
     """
     written = plain(given)
     if not isinstance(written, Mapping):
@@ -114,7 +119,7 @@ def validated(given: Any, folder: Path, *, sketch: bool = False) -> Scene:
     wrong, bare = wrong + more, raw
     placement = Placement(raw.get("points"), raw.get("joints"))
     points = {name: placement[name] for name in placement if not name.startswith("joints.")}
-    raw, faults = with_tables(_spelt_out(raw), folder, Scene)
+    raw, faults = with_tables(_completed(raw), folder, Scene)
     faults = placement.faults + faults
     if (raw.get("drive") is not None or raw.get("drives")) and raw.get("joints", {}) == {}:
         faults.append(Fault(("joints",), "is required with a drive, got nothing"))
@@ -131,12 +136,14 @@ def validated(given: Any, folder: Path, *, sketch: bool = False) -> Scene:
     if scene is None or wrong + faults:
         places = echoes.union(each.where for each in wrong)
         rest = [each for each in faults if each.where not in places]
-        if any(each.where[0] == "points" for each in rest):  # whose faults those that start from it would repeat
+        if any(each.where[0] == "points" for each in rest):  # faults of other points would repeat these
             rest = [each for each in rest if each.message != NO_PLACE]
         raise SceneError(in_pattern(each, origins) for each in [*wrong, *rest])
     if (steps := time_grid(scene).steps) > MOST_STEPS:
         raise SceneError([Fault(("analysis",), f"must end within {MOST_STEPS:.0e} steps, got {steps:.3g}")])
-    if states_step(scene) or without_vibration(scene) or scene.analysis.accuracy == "quick":  # else a plan chooses steps
+    if (
+        states_step(scene) or without_vibration(scene) or scene.analysis.accuracy == "quick"
+    ):  # otherwise a plan chooses the steps
         refuse_few_rows(scene)
     scene._unit_warnings, scene._as_given, scene._checked = tuple(bare_numbers(bare, Scene)), written, True
     if scene.analysis.frames is None:
@@ -145,13 +152,19 @@ def validated(given: Any, folder: Path, *, sketch: bool = False) -> Scene:
 
 
 def refuse_few_rows(scene: Scene) -> None:
-    """SceneError where rows are to be farther apart than the analysis has steps, stated or planned."""
+    """Raise a SceneError if `output.every` exceeds the number of steps, stated or planned."""
     if (every := scene.output.every) > (steps := time_grid(scene).steps):
         raise SceneError([Fault(("output", "every"), f"must be at most {steps}, the steps of the analysis, got {every}")])
 
 
 def refuse_unsupported(scene: Scene) -> None:
-    """SceneError where nothing constrains links that are to be in static balance; a search for one would be long."""
+    """Refuse a static scene with links that nothing connects with the ground; a search for their balance would be long.
+
+    Raises
+    ------
+    SceneError
+        A link of a static scene is not connected with the ground by joints or springs, directly or by other links.
+    """
     loose = unsupported(scene) if scene.analysis.kind == "static" else ()
     if loose:
         wanted = (
@@ -161,8 +174,8 @@ def refuse_unsupported(scene: Scene) -> None:
         raise SceneError([Fault(("links", name), wanted + remedy) for name in loose])
 
 
-def _spelt_out(raw: dict[str, Any]) -> dict[str, Any]:
-    """A raw scene whose links have the kinds of their shapes, and models where an accuracy is asked for."""
+def _completed(raw: dict[str, Any]) -> dict[str, Any]:
+    """A raw scene whose links have the kinds of their shapes, and `auto` models if an accuracy is required."""
     links = raw.get("links")
     if not isinstance(links, Mapping):
         return raw
@@ -179,14 +192,14 @@ def _of_a_kind(link: Any) -> Any:
 
 
 def _left_open(link: Any) -> Any:
-    """A raw link of a scene that asks for an accuracy: with a shape and no model stated it is `auto`."""
+    """A raw link of a scene with a required accuracy: its model is `auto` if it has a shape and states no model."""
     if not isinstance(link, Mapping) or "shape" not in link or link.keys() & {"model", "reduction"}:
         return link
     return {**link, "model": "auto"}
 
 
 def _prepared(raw: Mapping[str, Any], points: Mapping[str, XYZ]) -> dict[str, Any]:
-    """A raw scene with its points placed and the built-in materials that its links name."""
+    """A raw scene with constructed points, and the built-in materials that its links name."""
     ready = dict(raw)
     if isinstance(raw.get("points"), Mapping):
         ready["points"] = {name: point for name, point in points.items() if point is not UNPLACED}
@@ -198,7 +211,7 @@ def _prepared(raw: Mapping[str, Any], points: Mapping[str, XYZ]) -> dict[str, An
 
 
 def link_from(raw: Mapping[str, Any]) -> LinkScene:
-    """A solid link on its own, to be meshed; its faults are reported by its keys, e.g. ``mesh.size``."""
+    """A solid link on its own, for meshing; a SceneError has its faults by keys, e.g. ``mesh.size``."""
     raw = _of_a_kind(raw)
     try:
         link, faults = LinkScene.model_validate(raw), []
@@ -213,7 +226,7 @@ def link_from(raw: Mapping[str, Any]) -> LinkScene:
 
 
 def material_from(where: str, text: str) -> Material:
-    """A built-in material by its name, or one by its properties, ``{ density = 7850, … }``; faults are at `where`."""
+    """A material by its built-in name or its properties, ``{ density = 7850, … }``; a SceneError names `where`."""
     if not text.lstrip().startswith("{"):
         if text not in BUILT_IN:
             other = "another one by { density = …, youngs_modulus = …, poisson_ratio = … }"
@@ -223,7 +236,7 @@ def material_from(where: str, text: str) -> Material:
 
 
 def face_from(where: str, text: str) -> str | ChosenFace:
-    """A face by its name, or by what it is: ``{ cylinder = "8 mm", axis = "z" }``; faults are at `where`."""
+    """A face by its name or its geometry, ``{ cylinder = "8 mm", axis = "z" }``; a SceneError names `where`."""
     return _record(where, text, ChosenFace) if text.lstrip().startswith("{") else text
 
 

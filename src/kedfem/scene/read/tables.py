@@ -1,4 +1,4 @@
-"""Curves in CSV files beside a scene."""
+"""Curves from CSV files."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from kedfem.scene.read.files import file_text
 from kedfem.scene.records.curves import Curve
 from kedfem.scene.records.units import NUMBER, USUAL, si_number
 
-NO_UNIT = {"-", "–", "—", "−", "1", ""}  # how headings write that a column has no unit
+NO_UNIT = {"-", "–", "—", "−", "1", ""}  # in headings of columns without a unit
 NAMES = {"time", "speed", "angle", "travel", "length", "torque", "force", "factor"}  # of columns
 
 
 def two_columns(path: Path, names: tuple[str, str], si: tuple[str, str]) -> tuple[list[float], list[float]]:
-    """Two columns of a CSV file, by what they are, in SI units, under an optional heading with units."""
+    """Two columns of a CSV file in SI units, by names, after an optional heading with units; a SceneError for faults."""
     rows = [(i, row.split(",")) for i, row in enumerate(file_text(path).splitlines(), start=1) if row.strip()]
     factors = (1.0, 1.0)
     if rows and not any(map(_is_number, rows[0][1])):
@@ -56,7 +56,7 @@ def _heading_factors(path: Path, row: list[str], names: tuple[str, str], si: tup
 
 
 def _factor(cell: str, of: str) -> float:
-    """The SI unit per unit of a column; 1 where its heading gives none."""
+    """SI units per unit of a column; 1 if its heading has no unit."""
     if found := re.search(r"\[(.*)\]|\((.*)\)", cell):
         unit = (found[1] or found[2] or "").strip()
         if unit in NO_UNIT:
@@ -74,7 +74,7 @@ def _factor(cell: str, of: str) -> float:
 
 
 def _is_unit(word: str, of: str) -> bool:
-    """Whether a word is another unit than the SI unit of a column: a usual one, or any of its kind."""
+    """Whether a word is a unit other than the SI unit of a column: a usual one, or any of its kind."""
     if word in USUAL:
         return USUAL[word] != (of, 1.0)
     try:
@@ -84,7 +84,7 @@ def _is_unit(word: str, of: str) -> bool:
 
 
 def with_tables(raw: Mapping[str, Any], folder: Path, hint: Any) -> tuple[dict[str, Any], list[Fault]]:
-    """A raw scene of a type with its curves read from the files that they name; and faults."""
+    """A raw scene of a type with curves read from the files that they name, and faults."""
     faults: list[Fault] = []
 
     def of(where: Where, value: Any, kind: Any) -> Any:
@@ -103,9 +103,9 @@ def with_tables(raw: Mapping[str, Any], folder: Path, hint: Any) -> tuple[dict[s
 
 
 def with_curve(given: Mapping[str, Any], curve: type[Curve], folder: Path) -> Mapping[str, Any]:
-    """A raw curve with the columns of its file, if it is one that its record can read.
+    """A raw curve with the columns of its file, unless its other keys are faulty.
 
-    Of values that may be of either of two kinds the heading says the kind, and each value has its unit.
+    If values may be of two kinds, the heading determines the kind, and each value gets its unit.
     """
     over = given.get("over", "time")
     if over not in curve.units or given.keys() & {"time", "at", "value"}:
