@@ -250,7 +250,7 @@ class _Table:
 
 @dataclass
 class Clock:
-    """Seconds of each stage, reported to the watcher as it begins."""
+    """Seconds of each stage, whose name is passed to `watch` when it begins."""
 
     watch: Watch
     seconds: dict[str, float] = field(default_factory=dict)

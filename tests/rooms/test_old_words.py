@@ -111,6 +111,10 @@ RETIRED = {
     "let go": r"\blets? go of\b",
     "fidelity": r"(?i)\bfidelit",
     "averaged": r"`averaged`|\bAveraged\b",
+    "filled_mesh": r"\bfilled_mesh\b|\bmesh[./](filling|hollows)\b|\b(free|finer)_hollows\b",
+    "kept_whole": r"(?i)\bkept_?whole\b",
+    "laid_over": r"\b(laid_over|one_surface|not_too_bad|check_room)\b",
+    "watcher": r"(?i)\bwatcher\b|\bStepWatch\b|\b(asked_for|first_enough|last_of|let_go)\b",
     "truth": r"\b(from|against|beside) the truth\b",
 }
 """Words of docs/notation.md that package and docs do not use any more; its names and prose have the right column."""

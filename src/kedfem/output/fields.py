@@ -24,7 +24,7 @@ class LinkField:
     name : the link's name
     cell_type : meshio's name: ``hexahedron27``, ``hexahedron20``, ``hexahedron``, ``line``, ``line3``
     cells : (e, k) node numbers in VTK's order [-]
-    points : (n, 3) drawn positions of the nodes: rigid-body motion plus the scaled elastic displacement [m]
+    points : (n, 3) positions of the nodes in the picture: rigid-body motion plus the scaled elastic displacement [m]
     displacement : (n, 3) elastic displacement δ, world components, not scaled [m]
     stress : (n, 6) xx, yy, zz, xy, yz, zx in the world's axes [Pa]; nan for beams, which have only axial stress
     von_mises : (n,) [Pa]

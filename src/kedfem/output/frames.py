@@ -54,7 +54,7 @@ def link_fields(
     Parameters
     ----------
     recoveries : one for each link, then one for each prescribed link
-    deformation_scale : factor on the elastic displacement in the drawn positions, not on the displacement itself [-]
+    deformation_scale : factor on the elastic displacement of the points [-]; the displacement field itself is not scaled
     scene : the scene whose masses and springs are drawn too; None for links alone
     """
     motion, k = snapshot.motion, snapshot.k
