@@ -1,1 +1,1 @@
-"""The records of a scene: its tables and keys, each checked on its own."""
+"""Records of a scene: its tables with their keys, each checked independently of the others."""

@@ -1,4 +1,4 @@
-"""What is analysed, from which start, and what is written."""
+"""Records of the analysis, its initial state and its output."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ AngularVelocity = Annotated[tuple[Speed, Speed, Speed], BeforeValidator(as_vecto
 
 
 def joint_speed(value: object) -> float:
-    """A rotational speed or a speed; which of them suits the joint is checked with the joint."""
+    """A rotational speed or a speed. Whether it suits the joint is checked with the joint."""
     try:
         return EITHER_SPEED.number(value)
     except PydanticCustomError as reason:
@@ -56,7 +56,7 @@ JointSpeed = Annotated[float, PlainValidator(joint_speed)]
 
 
 class InitialMotion(Record):
-    """How a link moves at the start."""
+    """Initial motion of a link."""
 
     at_least_one = ("velocity", "angular_velocity"), " [m/s], or angular_velocity [rad/s]"
     at: Point
@@ -75,14 +75,14 @@ ACCURACY: TypeAdapter[float] = TypeAdapter(Annotated[float, Quantity("1", above=
 
 
 def accuracy_or_quick(value: object) -> float | str:
-    """A relative error, or the word for plain defaults."""
+    """A relative error, or the word that stands for plain defaults."""
     if isinstance(value, str) and value.strip() == "quick":
         return "quick"
     return ACCURACY.validate_python(value)
 
 
 class Analysis(Record):
-    """How long, in which steps, from which state."""
+    """Duration, time steps and initial state of the analysis."""
 
     kind: Literal["transient", "steady", "static", "quasi-static"] = "transient"
     """transient: the motion from the start on; steady: the motion that repeats itself with the drive and the loads, found
@@ -157,7 +157,7 @@ TOTAL = ("position", "travel", "total_velocity", "total_acceleration")
 
 
 class Probe(Record):
-    """A quantity at a point of a link, at every time step."""
+    """A quantity at a point of a link over time."""
 
     link: LinkName
     """the link; a rigid one for motions only"""
@@ -197,14 +197,14 @@ class Probe(Record):
 
 
 def animation_or_none(value: Any) -> Any:
-    """`animation = false`: none."""
+    """An animation, or None for `animation = false`."""
     if value is True or (isinstance(value, (int, float, str)) and value is not False):
         raise fault(f"must be a table of keys, or false, got {value!r}")
     return None if value is False else value
 
 
 class Output(Record):
-    """Which results are written, and where."""
+    """Selection of the results that are written, and their folder."""
 
     folder: FileName | None = None
     """the folder of the results; `<scene>-results` beside the scene file if not given"""

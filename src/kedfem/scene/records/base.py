@@ -1,4 +1,4 @@
-"""What all records of the scene share."""
+"""Base class of all records of the scene, and checks of names."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ NAME = re.compile(r"[^\W_](?:[\w \-]*\w)?")
 class Record(BaseModel):
     """A frozen record of the scene that refuses unknown keys.
 
-    exactly_one, at_least_one : keys of which so many must be given, and what the message asks for beside the first
-    only_with : pairs of a key and another without which it has no meaning
+    exactly_one, at_least_one : keys of which so many must be given, and the words of the message for the first
+    only_with : pairs of a key and another key that it needs
     """
 
     exactly_one: ClassVar[tuple[tuple[str, ...], str]] = ((), "")
@@ -49,7 +49,7 @@ class Record(BaseModel):
         return self
 
     def fill(self, **values: Any) -> Self:
-        """Put in defaults that depend on other keys; for the validators of a record under construction."""
+        """Fill in defaults that depend on other keys; for validators of a record under construction."""
         for key, value in values.items():
             object.__setattr__(self, key, value)
         return self
@@ -72,7 +72,7 @@ def printable(text: str, what: str = "a line") -> str:
 
 
 def checked_file(name: str) -> str:
-    """A path without control characters, none of its parts too long for a disk."""
+    """A path without control characters, whose parts are short enough for a file system."""
     printable(name, "a path")
     longest = max(len(part.encode()) for part in name.replace("\\", "/").split("/"))
     if longest > LONGEST_FILE:
@@ -87,7 +87,7 @@ Line = Annotated[str, AfterValidator(printable)]
 
 @dataclass(frozen=True, slots=True)
 class NameOf:
-    """What a text names: an entry of a table of the scene, or the ground."""
+    """Table of the scene to whose entries the names in a field refer, or the ground."""
 
     section: str
     what: str
@@ -101,7 +101,7 @@ MaterialName = Annotated[str, NameOf("materials", "a material")]
 
 
 def plain(value: Any) -> Any:
-    """A scene given as records, tuples or arrays, as the dicts and lists that a TOML file would give."""
+    """Convert records, tuples and arrays to the dicts and lists that a TOML file would give."""
     if isinstance(value, BaseModel):
         return plain(value.model_dump(by_alias=True, exclude_none=True))
     if isinstance(value, Mapping):
@@ -112,7 +112,7 @@ def plain(value: Any) -> Any:
 
 
 def refuse(faults: list[Fault]) -> None:
-    """Raise all faults of a record under validation at once, each at its place in it; none: no error."""
+    """Raise all faults of a record under validation at once, each at its place; without faults do nothing."""
     if faults:
         details = [InitErrorDetails(type=fault(x.message), loc=x.where, input=None) for x in faults]
         raise ValidationError.from_exception_data("scene", details)

@@ -21,9 +21,9 @@ Torque = Annotated[float, Quantity("N*m")]
 
 
 class Curve(Record):
-    """What all curves share: increasing places, a value at each; held outside, or repeated.
+    """Base class of curves: a value at each of increasing places, constant beyond the ends or repeated.
 
-    units : of what it may be over; what : of its values, words and their units; least : how many there must be
+    units : units of the possible arguments; what : names and units of the values; least : fewest values
     """
 
     units: ClassVar[dict[str, str]]
@@ -86,7 +86,7 @@ def _number(quantity: Quantity, where: tuple[str | int, ...], given: Any) -> flo
 
 
 def _faults(curve: Curve, at: Sequence[float], quantity: Quantity, key: str) -> list[Fault]:
-    """What is wrong with the values of a curve at places of a quantity, which a key holds."""
+    """Faults of the values of a curve over a quantity, whose places a key holds."""
     if len(at) < curve.least:
         wanted = "one value" if curve.least == 1 else f"{curve.least} values"
         return [Fault((key,), f"must hold at least {wanted}{quantity.bracket}, got {len(at) or 'none'}")]
@@ -103,7 +103,7 @@ def _faults(curve: Curve, at: Sequence[float], quantity: Quantity, key: str) -> 
 
 
 class Factor(Curve):
-    """What a load or a stiffness is multiplied by: over time, or over the angle or travel of the only drive."""
+    """A factor on a load or a stiffness over time, or over the angle or travel of the only drive."""
 
     units: ClassVar = {"time": "s", "angle": "rad", "travel": "m"}
     what: ClassVar = {"factor": "1"}
@@ -136,7 +136,7 @@ class ForceCurve(Curve):
 
 
 class PullCurve(Curve):
-    """A pull over time, or over the length, travel or speed of what pulls."""
+    """A pull over time, or over the length, travel or speed of the element that pulls."""
 
     units: ClassVar = {"time": "s", "speed": "m/s", "length": "m", "travel": "m"}
     what: ClassVar = {"force": "N"}

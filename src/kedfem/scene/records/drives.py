@@ -1,4 +1,4 @@
-"""Drives: which joints turn or slide, and how; gears between joints."""
+"""Records of drives, which prescribe motions of joints, and of gears between joints."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ TURNING, SLIDING = Quantity("rad/s"), Quantity("m/s")
 
 @dataclass(frozen=True, slots=True)
 class Either(Quantity):
-    """A quantity of an angle or of a travel; which of them suits the joint is checked with the joint."""
+    """A quantity of an angle or of a travel. Whether it suits the joint is checked with the joint."""
 
     slides: str = "m"
     """the unit of the travel's"""
@@ -55,7 +55,7 @@ Teeth = Annotated[StrictInt, Field(ge=1)]
 
 
 class ConstantSpeed(Record):
-    """Turns, or slides, at a constant speed: φ = ω t."""
+    """Rotation or sliding at a constant speed: φ = ω t."""
 
     kind: Literal["constant_speed"] = "constant_speed"
     speed: DriveSpeed
@@ -63,7 +63,7 @@ class ConstantSpeed(Record):
 
 
 class Ramp(Record):
-    """Speeds up from rest, then turns at a constant speed."""
+    """Acceleration from rest, then rotation at a constant speed."""
 
     kind: Literal["ramp"] = "ramp"
     speed: DriveSpeed
@@ -75,7 +75,7 @@ class Ramp(Record):
 
 
 class MotionCurve(Curve):
-    """An angle or a travel over time: a cubic spline, whose accelerations have no jumps."""
+    """An angle or a travel over time, by a cubic spline, whose acceleration is continuous."""
 
     units: ClassVar = {"time": "s"}
     what: ClassVar = {"angle": "rad", "travel": "m"}
@@ -104,7 +104,7 @@ class MotionCurve(Curve):
 
 
 class _Rise(Record):
-    """What laws share that move by an angle or a travel: how far."""
+    """Base class of laws that move by an angle or a travel."""
 
     exactly_one = ("angle", "travel"), " [rad], or travel [m] where the drive prescribes one"
     kind: str
@@ -120,7 +120,7 @@ class _Rise(Record):
 
 
 class _RiseAndDwell(_Rise):
-    """What laws share that rise, dwell and return."""
+    """Base class of laws that rise, dwell and return."""
 
     rise: PositiveTime
     """duration of the rise"""
@@ -147,7 +147,7 @@ class Polynomial(_RiseAndDwell):
 
 
 class Harmonic(_Rise):
-    """Swings, from the reference position on: φ = φ0 (sin(2π f t + α) − sin α)."""
+    """An oscillation from the reference position: φ = φ0 (sin(2π f t + α) − sin α)."""
 
     kind: Literal["harmonic"] = "harmonic"
     frequency: Frequency
@@ -160,9 +160,9 @@ MotionLaw = Annotated[ConstantSpeed | Ramp | MotionCurve | Cycloidal | Polynomia
 
 
 class Drive(Record):
-    """A joint that turns or slides in a given way, its first link that is not the ground against the other.
+    """A prescribed motion of a joint: of its first link that is not the ground, relative to the other.
 
-    Of a slot the pin slides along the line. Several may move one joint, each another coordinate.
+    In a slot the pin slides along the line. Several drives of one joint prescribe one coordinate each.
     """
 
     only_with = (("shaft_damping", "shaft_stiffness"),)
@@ -186,14 +186,15 @@ class Drive(Record):
 
 
 def prescribes_travel(kind: str, coordinate: object, along: object) -> bool:
-    """Whether a drive prescribes the travel of a joint of some kind, not its angle, by two of its keys."""
+    """Whether a drive with these two keys prescribes the travel of a joint of this kind, not its angle."""
     return kind in ("prismatic", "slot") or coordinate == "travel" or along is not None
 
 
 class Gear(Record):
-    """Gears, belts or a rack: two joints whose motions are in proportion.
+    """Gears, belts or a rack: a constant ratio of the motions of two joints.
 
-    A joint's motion is that of its first link that is not the ground against the other, about or along its axis.
+    The motion of a joint is that of its first link that is not the ground relative to the other, about or along its
+    axis.
     """
 
     exactly_one = ("ratio", "teeth", "radius"), ", or teeth, or radius [m] of a rack"
@@ -224,5 +225,5 @@ class Gear(Record):
 
     @property
     def turning(self) -> tuple[bool, bool]:
-        """Whether what it couples of each joint is the angle: of a rack's second joint it is the travel."""
+        """Whether it couples the angle of each joint; a rack couples the travel of its second joint."""
         return True, self.radius is None

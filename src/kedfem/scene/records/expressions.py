@@ -1,6 +1,6 @@
-"""Expressions such as ``"=2*r + 5 mm"``: numbers with units, parameters, a few functions; nothing else is worked out.
+"""Expressions such as ``"=2*r + 5 mm"`` of numbers with units, parameters and a few functions; nothing else is evaluated.
 
-The text becomes Python's syntax tree, of which only arithmetic is walked; pint multiplies and compares units.
+The text is parsed to Python's syntax tree, of which only arithmetic is evaluated; pint handles the units.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from kedfem.scene.records.units import crossed, fault, revolutions, unit_of, uni
 from kedfem.scene.records.wording import shown, unknown_name
 
 LONGEST_EXPRESSION = 1000  # letters
-MOST_POWER = 9.0  # exponents that are reckoned with, either sign
+MOST_POWER = 9.0  # largest exponent, of either sign
 NUMBER_HERE = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?", re.ASCII)
 WORD_HERE = re.compile(r"[^\W\d]\w*|[°%]")
 UNIT_WORD = r"(?:[A-Za-zµμΩ][A-Za-zµμΩ_0-9]{0,30}|°|%)(?:(?:\^|\*\*)-?[1-9](?![0-9.])|⁻?[¹²³⁴⁵⁶⁷⁸⁹])?"
@@ -40,17 +40,17 @@ RESERVED = frozenset({*FUNCTIONS, *CONSTANTS})
 
 
 def evaluated(text: str, known: Mapping[str, Any]) -> Any:
-    """What an expression comes to, a pint quantity.
+    """Value of an expression, a pint quantity.
 
     Parameters
     ----------
     text : the expression, without its equals sign
-    known : quantities of parameters by name; may raise ValueError when asked
+    known : quantities of parameters by name; looking one up may raise ValueError
 
     Raises
     ------
     ValueError
-        In words: not an expression, too long, an unknown name or unit, a division by zero, mixed units, no finite number.
+        The text is no expression or too long, has an unknown name or unit, divides by zero, mixes units or is not finite.
     """
     if len(text) > LONGEST_EXPRESSION:
         raise ValueError(f"it must have at most {LONGEST_EXPRESSION} letters, not {len(text)}")
@@ -68,7 +68,7 @@ def evaluated(text: str, known: Mapping[str, Any]) -> Any:
 
 
 def plain_number(quantity: Any) -> float | int | None:
-    """The number of a quantity without a unit, whole numbers as such; None if it has a unit."""
+    """Number of a quantity without a unit, an int if it is whole; None if the quantity has a unit."""
     if not quantity.dimensionless or revolutions(quantity._units):
         return None
     number = float(quantity.m_as(""))
@@ -77,7 +77,7 @@ def plain_number(quantity: Any) -> float | int | None:
 
 @dataclass
 class _Source:
-    """An expression, turned into Python's syntax: numbers with their units become names of literals."""
+    """Translator of an expression to Python's syntax, in which numbers with units become names of literals."""
 
     text: str
     known: Mapping[str, Any]
@@ -99,7 +99,7 @@ class _Source:
         return out.strip()
 
     def _literal(self, number: float, at: int) -> int:
-        """Take a number and the unit that follows it; where both end."""
+        """Store a number with the unit that follows it, and return the place where both end."""
         unit, end = "", at
         if (first := UNIT_HERE.match(self.text, at)) and not self.text[first.end() :].startswith("("):
             unit, end = first[1], first.end()
@@ -115,7 +115,7 @@ class _Source:
         return end
 
     def _goes_on(self, more: re.Match[str], unit: str) -> bool:
-        """Whether what follows a unit belongs to it, and is not a parameter."""
+        """Whether the text after a unit belongs to it and is not a parameter."""
         name = WORD_HERE.match(more[2])
         if name is None or name[0] in RESERVED or self.text[more.end() :].startswith("("):
             return False
@@ -131,13 +131,13 @@ class _Source:
 
 @dataclass
 class _Walk:
-    """A tree of arithmetic, worked out from its leaves."""
+    """Evaluator of a syntax tree of arithmetic, from its leaves."""
 
     literals: Mapping[str, Any]
     known: Mapping[str, Any]
 
     def of(self, node: ast.AST) -> Any:
-        later: list[ast.BinOp] = []  # of a long sum or product, whose parts stand one within the other
+        later: list[ast.BinOp] = []  # nested operations of a long sum or product
         while isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
             later.append(node)
             node = node.left
@@ -185,7 +185,7 @@ class _Walk:
 
 
 def finite(quantity: Any) -> Any:
-    """A quantity that is a finite real number."""
+    """Return a quantity if it is a finite real number, else raise ValueError."""
     number = quantity.magnitude
     if isinstance(number, complex) or not math.isfinite(number):
         raise ValueError("it comes to no finite number")
@@ -193,7 +193,7 @@ def finite(quantity: Any) -> Any:
 
 
 def alike(*each: Any) -> None:
-    """Refuse quantities of different kinds; turns and cycles are such, though both have the dimension 1/s."""
+    """Refuse quantities of different kinds, also turns and cycles, although both have the dimension 1/s."""
     first = each[0]
     for other in each[1:]:
         if first.dimensionality != other.dimensionality:
@@ -206,7 +206,7 @@ def alike(*each: Any) -> None:
 
 
 def named(quantity: Any) -> str:
-    """The unit of a quantity as it stands in messages."""
+    """Unit of a quantity as messages show it."""
     return f"'{quantity.units:~P}'" if quantity._units else "a number without a unit"
 
 
@@ -252,7 +252,7 @@ def called(name: str, given: list[Any]) -> Any:
 
 
 def checked_parameter_name(name: str) -> str:
-    """A name that expressions can hold."""
+    """A name that can stand in expressions."""
     if not re.fullmatch(r"[A-Za-z]\w{0,39}", name, re.ASCII) or name in RESERVED:
         wanted = "must be a name of at most 40 ASCII letters, digits and '_', beginning with a letter"
         raise fault(f"{wanted}, got {shown(name)}" + ", which expressions know already" * (name in RESERVED))

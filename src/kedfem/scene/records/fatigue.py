@@ -1,4 +1,4 @@
-"""Fatigue: the data of materials or links, and how damage is found from the stresses of a repeating motion."""
+"""Records of fatigue: data of materials and links, and the evaluation of damage by stresses of a periodic motion."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SLOPE: TypeAdapter[float] = TypeAdapter(Factor)
 
 
 def slope_or_endless(value: object) -> float | str:
-    """A slope, or the word for none."""
+    """A slope, or the word for a fatigue limit, below which nothing is damaged."""
     return "endless" if value == "endless" else SLOPE.validate_python(value)
 
 
@@ -42,7 +42,7 @@ class StrainLife(Record):
 
 
 class FatigueData(Record):
-    """What a material or a link withstands: a group of the FKM guideline, an S-N curve or strain-life data."""
+    """Fatigue strength of a material or a link: a group of the FKM guideline, an S-N curve or strain-life data."""
 
     group: Group | None = None
     """of the FKM guideline: strength, sensitivity to mean stress, influence of roughness and slope follow from
@@ -76,7 +76,7 @@ class FatigueData(Record):
         return self
 
     def _missing(self, kind: str) -> Iterator[Fault]:
-        """Keys that the kind of data requires, or does not know."""
+        """Faults of keys that the kind of data requires or does not have."""
         required = {
             "group": ("tensile_strength",),
             "endurance_stress": ("slope", "mean_stress_sensitivity"),
@@ -91,12 +91,12 @@ class FatigueData(Record):
             if getattr(self, key) is None:
                 yield Fault((key,), f"is required with {kind}, got nothing")
         for key in foreign[kind]:
-            # what has its default value may be written: a stored scene has every key
+            # keys with their default value are allowed, since a stored scene has every key
             if getattr(self, key) != type(self).model_fields[key].default:
                 yield Fault((key,), f"must be left out with {kind}, got one")
 
     def _impossible(self) -> Iterator[Fault]:
-        """Numbers that no material has together."""
+        """Faults of numbers that contradict each other."""
         Rm = self.tensile_strength
         if self.group is not None and Rm is not None:
             least, most = STRENGTHS["aluminium" if "aluminium" in self.group else "steel"]
@@ -118,7 +118,7 @@ class FatigueData(Record):
 
 
 class Fatigue(Record):
-    """Damage at the surfaces of elastic links by the stresses of the last period of a motion that repeats itself."""
+    """Damage at the surfaces of elastic links by the stresses of the last period of a periodic motion."""
 
     materials: dict[MaterialName, FatigueData] = Field(default_factory=dict)
     """data by name of the material of links"""

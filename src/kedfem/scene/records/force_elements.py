@@ -1,4 +1,4 @@
-"""Force elements: motors, springs with dampers, limits of joints."""
+"""Records of force elements: motors, springs with dampers, limits of joints."""
 
 from __future__ import annotations
 
@@ -34,9 +34,10 @@ from kedfem.scene.records.units import (
 
 
 class Motor(Record):
-    """A torque on a hinge or a force on a slider: on the joint's first link that is not the ground, against the other.
+    """A torque about a hinge or a force along a slide, between the links of a joint.
 
-    A curve over speed or angle is one over those of that link against the other.
+    It acts on the joint's first link that is not the ground, and in the opposite direction on the other. The speed or
+    angle of its curve is that of this link relative to the other.
     """
 
     exactly_one = ("torque", "force"), " [N*m], or force [N] of a slider"
@@ -69,7 +70,7 @@ FreeLength = Annotated[float, Quantity("m", least=0.0)]
 
 
 class SpringEnd(Record):
-    """Where a spring is fixed."""
+    """End of a spring: a point of a link or of the ground."""
 
     link: EndName
     """the link, or `"ground"`"""
@@ -78,7 +79,7 @@ class SpringEnd(Record):
 
 
 class _Elastic(Record):
-    """What all springs share."""
+    """Base class of springs."""
 
     effort: ClassVar[str]
     """the key of its curve"""
@@ -98,7 +99,7 @@ class _Elastic(Record):
 
     @property
     def curve(self) -> PullCurve | TorqueCurve | None:
-        """Its pull or restoring torque in addition to that of its constants."""
+        """The pull or restoring torque in addition to that of the constants."""
         curve: PullCurve | TorqueCurve | None = getattr(self, self.effort, None)
         return curve
 
@@ -122,10 +123,10 @@ class _Elastic(Record):
 
 
 class LineSpring(_Elastic):
-    """A spring and a damper between two points, or along a slide: it pulls with k (l − l0) + c l' + F.
+    """A spring and a damper between two points or along a slide, with the pull k (l − l0) + c l' + F.
 
-    Along a slide l is the travel of the joint's first link that is not the ground against the other, along a slot that of
-    its pin, from the reference position, and what it pulls back is that link.
+    Along a slide l is the travel of the joint's first link that is not the ground relative to the other, along a slot the
+    travel of the pin, both from the reference position. The spring pulls this link back.
     """
 
     effort = "force"
@@ -176,7 +177,7 @@ class LineSpring(_Elastic):
 
     @property
     def free(self) -> float:
-        """l0: the length or travel at which it does not pull [m]."""
+        """Free length l0: the length or travel without a pull [m]."""
         distance = 0.0 if self.between is None else math.dist(*(end.at for end in self.between))
         given = self.free_travel if self.between is None else self.free_length
         if self.preload is not None:
@@ -207,7 +208,7 @@ class TorsionSpring(_Elastic):
 
     @property
     def free(self) -> float:
-        """φ0 [rad]."""
+        """Free angle φ0 [rad]."""
         if self.preload is not None:
             return -self.preload / self.stiffness
         return self.free_angle or 0.0
@@ -217,7 +218,7 @@ Spring = Annotated[LineSpring | TorsionSpring, Field(discriminator="kind")]
 
 
 class _Range(Record):
-    """What both kinds share."""
+    """Base class of limits."""
 
     @model_validator(mode="after")
     def _holds_the_reference_position(self) -> Self:
@@ -239,16 +240,16 @@ class _Range(Record):
 
     @property
     def range(self) -> tuple[float, float]:
-        """Lower and upper end [rad or m]; −inf and inf where there is none."""
+        """Lower and upper limit [rad or m]; −inf and inf where there is none."""
         lower, upper = getattr(self, "lower", None), getattr(self, "upper", None)
         return (-math.inf if lower is None else lower, math.inf if upper is None else upper)
 
 
 class TravelLimit(_Range):
-    """Stops along a slide or slot: beyond a limit they push back with k s + c s', s the travel beyond it, and never pull.
+    """Stops along a slide or slot. At a travel s beyond a limit they push back with k s + c s', and never pull.
 
-    The travel is that of the joint's first link that is not the ground against the other, along a slot that of its pin,
-    from the reference position.
+    The travel is that of the joint's first link that is not the ground relative to the other, along a slot that of its
+    pin, from the reference position.
     """
 
     kind: Literal["travel"] = "travel"
@@ -267,10 +268,10 @@ class TravelLimit(_Range):
 
 
 class AngleLimit(_Range):
-    """Stops about a hinge: beyond a limit they push back with k s + c s', s the angle beyond it, and never pull.
+    """Stops about a hinge. At an angle s beyond a limit they push back with k s + c s', and never pull.
 
-    The angle is the rotation of the joint's first link that is not the ground against the other, about the joint's axis,
-    from the reference position.
+    The angle is the rotation of the joint's first link that is not the ground relative to the other, about the joint's
+    axis, from the reference position.
     """
 
     kind: Literal["angle"] = "angle"

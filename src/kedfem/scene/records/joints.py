@@ -1,4 +1,4 @@
-"""Joints between links, the bushings in them, and the faces that hold them, chosen by what they are."""
+"""Records of joints, of their bushings, and of the faces to which they are attached."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FORMS = ("plane", "cylinder", "sphere")
 
 
 class ChosenFace(Record):
-    """A face by what it is."""
+    """Choice of a face by its form and place."""
 
     only_with = (("axis", "cylinder"),)
     plane: Axis | None = None
@@ -64,7 +64,7 @@ FaceName = str | ChosenFace
 
 
 def face_choice(value: object) -> Any:
-    """A face's name, or a table that says what it is."""
+    """The name of a face, or a table that describes it."""
     if isinstance(value, Mapping):
         return ChosenFace.model_validate(value)
     if isinstance(value, ChosenFace) or (isinstance(value, str) and value):
@@ -73,13 +73,13 @@ def face_choice(value: object) -> Any:
 
 
 def no_face(value: object) -> Exception:
-    """The fault of what is no face."""
+    """The fault of a value that is no face."""
     wanted = "must be a face's name, a table that says what it is, or a list of these"
     return fault(f"{wanted}, got {shown(value)}")
 
 
 def several(value: object) -> object:
-    """One or several names or choices of faces, as a list that is not empty."""
+    """One or more names or choices of faces, as a list that is not empty."""
     listed = [value] if isinstance(value, (str, Mapping, ChosenFace)) else value
     if not isinstance(listed, (list, tuple)) or not listed:
         raise no_face(value)
@@ -90,9 +90,9 @@ Faces = Annotated[tuple[Annotated[FaceName, BeforeValidator(face_choice)], ...],
 
 
 JointKind = Literal["revolute", "spherical", "weld", "prismatic", "cylindrical", "screw", "universal", "planar", "slot"]
-DIRECTED = ("prismatic", "cylindrical", "screw", "planar", "slot")  # points may part along or across an axis
-ROTARY = ("revolute", "cylindrical", "screw")  # joints that turn about their axis
-SQUARE = 1e-6  # axes of a cross whose cosine is less are at right angles
+DIRECTED = ("prismatic", "cylindrical", "screw", "planar", "slot")  # points may separate along or across an axis
+ROTARY = ("revolute", "cylindrical", "screw")  # joints that rotate about their axis
+SQUARE = 1e-6  # largest cosine of axes of a cross that count as perpendicular
 COUPLINGS = ("distributing", "rigid")
 Coupling = Literal["distributing", "rigid"]
 
@@ -111,7 +111,7 @@ RotationalDampers = Annotated[tuple[RotationalDamper, RotationalDamper, Rotation
 
 
 class Bushing(Record):
-    """Springs and dampers in place of the constraints of a joint; motions that the joint releases stay free.
+    """Springs and dampers in place of the constraints of a joint; motions released by the joint stay free.
 
     One number for all directions, or three along the axes x, y, z of the joint. z is its `axis`; x is at right angles to
     z and to that world axis which is farthest from it in the reference position (of equals the first), y at right angles
@@ -132,14 +132,14 @@ class Bushing(Record):
 
 
 def of_links(value: object, what: Callable[[object], Any]) -> dict[str, Any]:
-    """Something for each of several links, by their names."""
+    """A table with an entry for each of several links."""
     if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
         raise fault(f"must be a table by names of links, got {shown(value)}")
     return {name: what(each) for name, each in value.items()}
 
 
 def couplings(value: object) -> object:
-    """The kind of coupling of a joint to its surfaces: one word, or one for each link."""
+    """Kind of coupling of a joint to its surfaces: one word, or one for each link."""
     if isinstance(value, Mapping):
         return of_links(value, couplings)
     if value not in COUPLINGS:
@@ -185,29 +185,29 @@ class Joint(Record):
     """springs and dampers in place of its constraints: `{ stiffness = 1e7 }`; rigid if not given"""
 
     def stiff(self, link: str) -> bool:
-        """Whether the coupling surface on a link keeps its shape."""
+        """Whether the coupling surface on a link is rigid."""
         return (self.coupling.get(link) if isinstance(self.coupling, dict) else self.coupling) == "rigid"
 
     def face_names(self, link: str) -> tuple[str, ...]:
-        """What the faces of a link that hold it are called: their names, or what was said of them."""
+        """Names, or descriptions in words, of the faces of a link to which the joint is attached."""
         return tuple(each if isinstance(each, str) else each.label for each in self.faces.get(link, ()))
 
     def chosen_faces(self, link: str) -> tuple[ChosenFace, ...]:
-        """The faces of a link that are chosen by what they are."""
+        """Faces of a link that are chosen by form and place."""
         return tuple(each for each in self.faces.get(link, ()) if not isinstance(each, str))
 
     @property
     def points(self) -> dict[str, XYZ]:
-        """Its points by link [m], where it has one for each."""
+        """Points by link [m], if the joint has one for each."""
         return self.at.points if isinstance(self.at, Apart) else {}
 
     @property
     def open(self) -> bool:
-        """Whether its links are given apart."""
+        """Whether the joint has a separate point on each link."""
         return len(set(self.points.values())) > 1
 
     def on(self, link: str) -> XYZ:
-        """Its point on a link [m]."""
+        """Point of the joint on a link [m]."""
         return self.points.get(link, self.at)
 
     @model_validator(mode="after")

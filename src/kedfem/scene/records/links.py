@@ -24,7 +24,7 @@ Frames = Literal["rigid-body", "co-rotational"]
 
 
 def counts(value: object) -> object:
-    """One number of elements, or two or three."""
+    """One, two or three numbers of elements."""
     if value is None:
         return None
     several = value if isinstance(value, (list, tuple)) else [value]
@@ -35,7 +35,7 @@ def counts(value: object) -> object:
 
 
 class Meshing(Record):
-    """How finely a link is divided into elements."""
+    """Mesh of a link: element sizes or numbers, and element type."""
 
     elements: Annotated[int | tuple[int, int] | tuple[int, int, int] | None, BeforeValidator(counts)] = None
     """bar: numbers along and across, of a solid also through the thickness; beam: number per segment
@@ -61,7 +61,7 @@ class Meshing(Record):
 
 
 def checked_reduction(value: object) -> object:
-    """Whether a link is reduced, and to how many modes."""
+    """Whether a link is reduced, or to how many modes."""
     if value in {"none", "modal"} or (isinstance(value, int) and not isinstance(value, bool) and value >= 1):
         return value
     raise fault(f"must be 'none', 'modal' or a number of modes, got {shown(value)}")
@@ -116,7 +116,7 @@ class LinkScene(Record):
         return self.fill(element=element, mesh=self.mesh.model_copy(update=self._mesh_defaults()))
 
     def _body_faults(self) -> list[Fault]:
-        """What is wrong with a link given by mass, centre and inertia, or by its mass alone."""
+        """Faults of a link given by mass, centre and inertia, or by its mass alone."""
         if self.model is None and not (self.shape or self.material) and (self.mass or self.centre or self.inertia):
             return [Fault(("model",), "must be 'rigid' for a link given by its mass, without a shape, got nothing")]
         if self.centre is None and self.inertia is None:
@@ -135,36 +135,36 @@ class LinkScene(Record):
         return [*lacking, *(inertia_faults(self.inertia) if self.inertia is not None else ())]
 
     def _usual_element(self) -> str | None:
-        """Of a part from CAD, which may be curved all over, the one whose geometry is as rich as can be."""
+        """Default element type of a part from CAD, which may be curved: the one whose geometry has the highest order."""
         if isinstance(self.shape, Cad) and self.family == "solid":
             return "hex27"
         return ELEMENTS[self.family] if self.shape is not None else None
 
     @property
     def family(self) -> Literal["solid", "plane", "beam"]:
-        """What the link is meshed as: of one that does not say, beams for a polyline, else hexahedra."""
+        """Family of elements of the link; by default beams for a polyline, else hexahedra."""
         if self.model in {"rigid", "auto", None}:
             return "beam" if isinstance(self.shape, Polyline) else "solid"
         return self.model  # type: ignore[return-value]
 
     @property
     def reduced(self) -> bool:
-        """Whether it moves in the span of a few modes only."""
+        """Whether the link is reduced to a few modes."""
         return self.reduction != "none"
 
     @property
     def modes(self) -> int | None:
-        """The number of these modes; None: as many as a tolerance asks for."""
+        """Number of these modes; None for as many as a tolerance requires."""
         return self.reduction if isinstance(self.reduction, int) else None
 
     @property
     def category(self) -> Literal["solid", "plane", "beam", "rigid"]:
-        """What the link is: rigid, or what it is meshed as."""
+        """Category of the link: rigid, or the family of its elements."""
         return "rigid" if self.model == "rigid" else self.family
 
     @property
     def rigid_line(self) -> bool:
-        """Whether it is a rigid polyline, which is made of beams."""
+        """Whether the link is a rigid polyline, which consists of beams."""
         return self.model == "rigid" and isinstance(self.shape, Polyline)
 
     def _mesh_defaults(self) -> dict[str, Any]:

@@ -20,7 +20,7 @@ Inertia = Annotated[float, Quantity("kg*m^2")]
 
 
 def six_moments(value: object) -> object:
-    """Ixx, Iyy, Izz, Ixy, Iyz, Izx of these, or of the first three alone, about principal axes."""
+    """Ixx, Iyy, Izz, Ixy, Iyz, Izx from all six or from the first three, if x, y, z are principal axes."""
     if not isinstance(value, (list, tuple)) or len(value) == 6:
         return value
     if len(value) != 3:
@@ -45,7 +45,7 @@ def moments_of_inertia(J: Float[np.ndarray, "3 3"]) -> tuple[float, float, float
 
 
 def inertia_faults(inertia: Sequence[float]) -> list[Fault]:
-    """What is wrong with moments that no body has, under the key `inertia`."""
+    """Faults, under the key `inertia`, of moments of inertia that no body can have."""
     a, b, c = np.linalg.eigvalsh(inertia_tensor(inertia))
     if a >= -1e-9 * abs(c) and c <= (a + b) * (1.0 + 1e-9):
         return []
@@ -67,7 +67,7 @@ SurfaceVector = Annotated[tuple[Pressure, Pressure, Pressure], BeforeValidator(a
 
 
 class _Load(Record):
-    """What all loads share."""
+    """Base class of loads."""
 
     kind: str
     link: LinkName
@@ -77,7 +77,7 @@ class _Load(Record):
 
 
 class _Directed(_Load):
-    """What loads share that have a direction."""
+    """Base class of loads with a direction."""
 
     frame: Literal["world", "link"] = "world"
     """world: keeps its direction; link: given in the reference position, rotates with the link from there"""
@@ -125,7 +125,7 @@ class SurfaceLoad(_Directed):
 
 
 class PressureLoad(_Load):
-    """A pressure on a face of a solid or plane link, or a flat side of a beam: normal to it, also as the link rotates."""
+    """A pressure on a face of a solid or plane link or a flat side of a beam; it stays normal to the rotating face."""
 
     kind: Literal["pressure"] = "pressure"
     at: Point
@@ -136,7 +136,7 @@ class PressureLoad(_Load):
 
 
 class TorqueLoad(_Directed):
-    """A torque on a bore, face or section of a link: on the mean rotation of it."""
+    """A torque on a bore, face or section of a link, which acts on its mean rotation."""
 
     exactly_one = ("at", "joint"), " [m], or a joint of the link"
     kind: Literal["torque"] = "torque"
@@ -153,7 +153,7 @@ Load = Annotated[ForceLoad | BodyLoad | LineLoad | SurfaceLoad | PressureLoad | 
 
 
 class Flywheel(Record):
-    """A disc on a bore, turning about the axis of the joint there."""
+    """A disc on a bore, which rotates about the axis of the joint there."""
 
     kind: Literal["flywheel"] = "flywheel"
     link: LinkName

@@ -1,4 +1,4 @@
-"""Materials, isotropic and linear elastic, of which a few are built in; damping of the elastic motion."""
+"""Records of materials, isotropic and linear elastic, a few of them built in, and of the damping of elastic motion."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from kedfem.errors import Fault
 from kedfem.scene.records.base import Record, refuse
 from kedfem.scene.records.units import PositivePressure, Quantity, fault
 
-LINE = "line of "  # how the name begins of what a rigid link without a shape is made of
+LINE = "line of "  # beginning of the name of the material of a rigid link without a shape
 Ratio = Annotated[float, Quantity("1", least=0.0, below=1.0)]
 Frequency = Annotated[float, Quantity("Hz", above=0.0)]
 
 
 def for_both(value: Any) -> Any:
-    """One ratio for both frequencies."""
+    """A single damping ratio, which holds at both frequencies."""
     if isinstance(value, (list, tuple)):
         return (*value, *value) if len(value) == 1 else tuple(value)
     return value if value is None else (value, value)
@@ -45,7 +45,7 @@ class Damping(Record):
 
 
 def damping_faults(damping: Damping) -> list[Fault]:
-    """What is contradictory in a damping: places and messages."""
+    """Contradictions in a damping: places and messages."""
     if damping.ratio is None:
         lacking = [Fault(("ratio",), "is required with frequencies, got nothing")]
         return [] if damping.frequencies is None else lacking
@@ -66,7 +66,7 @@ def damping_faults(damping: Damping) -> list[Fault]:
 def rayleigh(damping: Damping) -> tuple[float, float]:
     """α [1/s] and β [s] of C = α M + β K, [KED, eq. (20)].
 
-    From ratios ζ at two circular frequencies ω: α + β ω² = 2 ζ ω at both.
+    With ratios ζ given at two circular frequencies ω, α + β ω² = 2 ζ ω holds at both.
     """
     if damping.ratio is None or damping.frequencies is None:
         return damping.alpha, damping.beta
@@ -76,7 +76,7 @@ def rayleigh(damping: Damping) -> tuple[float, float]:
 
 
 class Material(Record):
-    """An isotropic, linear elastic material: of ``poisson_ratio`` and ``shear_modulus`` give one."""
+    """An isotropic, linear elastic material; either ``poisson_ratio`` or ``shear_modulus`` is given."""
 
     density: Annotated[float, Quantity("kg/m^3", above=0.0)]
     """mass per volume"""
@@ -114,8 +114,8 @@ class Material(Record):
         return E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), self.shear_modulus
 
 
-# Typical values at room temperature, as in engineering handbooks: for a design that counts on them, give
-# those of the supplier in [materials.NAME].
+# Typical values at room temperature, as in engineering handbooks. A design that depends on them should have those of
+# the supplier in [materials.NAME].
 BUILT_IN: dict[str, dict[str, float]] = {
     "steel": {"density": 7850.0, "youngs_modulus": 210e9, "poisson_ratio": 0.3},
     "stainless_steel": {"density": 7900.0, "youngs_modulus": 200e9, "poisson_ratio": 0.3},

@@ -1,4 +1,4 @@
-"""Outlines of plates: corners, arcs and round holes, and the checks that they bound an area."""
+"""Records of outlines of plates, with corners, arcs and round holes, and checks that they bound an area."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from kedfem.scene.records.base import Record, refuse
 from kedfem.scene.records.points import XYZ, Point, is_construction
 from kedfem.scene.records.units import PositiveLength, fault
 
-CHORDS = 64  # an arc as so many chords, for the checks only
+CHORDS = 64  # number of chords of an arc, for checks only
 NEAR = 1e-9  # relative to the size of the outline
 
 
@@ -39,13 +39,13 @@ CORNER: TypeAdapter[XYZ] = TypeAdapter(Point)
 
 
 def outline_item(value: object) -> XYZ | Arc:
-    """An arc if it is a table, else a corner."""
+    """An arc if the item is a table, else a corner."""
     arc = isinstance(value, Arc) or (isinstance(value, dict) and not is_construction(value))
     return Arc.model_validate(value) if arc else CORNER.validate_python(value)
 
 
 def stored_item(item: XYZ | Arc) -> object:
-    """What `outline_item` makes the same item of."""
+    """Raw value from which `outline_item` makes the same item."""
     return item.model_dump() if isinstance(item, Arc) else item
 
 
@@ -53,7 +53,7 @@ OutlineItem = Annotated[Point | Arc, PlainValidator(outline_item), PlainSerializ
 
 
 class Profile(Record):
-    """An area bounded by an outline, less its holes, with a thickness."""
+    """An area bounded by an outline, without its holes, and a thickness."""
 
     outline: tuple[OutlineItem, ...]
     """corners (points) and arcs `{ via = P, to = Q }` in order; closes by itself"""
@@ -79,10 +79,10 @@ class Profile(Record):
 
 
 def profile_faults(profile: Profile) -> list[Fault]:
-    """What keeps a profile from being an area with holes inside it: places and messages."""
+    """Faults of a profile that is not an area with holes inside it: places and messages."""
     ends = [(item.via, item.to) if isinstance(item, Arc) else (item,) for item in profile.outline]
     points = [point for group in ends for point in group] + [hole.at for hole in profile.holes]
-    if not np.isfinite(points).all():  # a point that could not be placed is a fault of its own
+    if not np.isfinite(points).all():  # a point that could not be constructed is another fault
         return []
     heights = [point[2] for group in ends for point in group]
     if max(heights) - min(heights) > NEAR * max(1.0, abs(heights[0])):
@@ -102,7 +102,7 @@ def profile_faults(profile: Profile) -> list[Fault]:
 def hole_faults(
     holes: tuple[Hole, ...], polygon: Float[np.ndarray, "n 2"], straight: Bool[np.ndarray, " n"]
 ) -> list[Fault]:
-    """Holes that leave the outline or meet another hole."""
+    """Faults of holes that cross the outline or meet another hole."""
     faults: list[Fault] = []
     for i, hole in enumerate(holes):
         centre, radius = np.array(hole.at[:2]), 0.5 * hole.diameter
@@ -119,7 +119,7 @@ def hole_faults(
 
 
 def outline_polygon(outline: tuple[Any, ...]) -> tuple[Float[np.ndarray, "n 2"], Bool[np.ndarray, " n"]]:
-    """An outline as a polygon: arcs as chords.
+    """Polygon of an outline, with chords in place of arcs.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def crossing_at(polygon: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "2"] | N
 
     near, area = NEAR * np.ptp(polygon), Polygon(polygon)
     sides = np.linalg.norm(np.roll(polygon, -1, axis=0) - polygon, axis=1)
-    if sides.min() <= near:  # a corner that is given twice, which shapely passes over
+    if sides.min() <= near:  # a corner that is given twice, which shapely accepts
         return np.asarray(polygon[sides.argmin()])
     if not area.is_valid:
         return np.array(is_valid_reason(area).partition("[")[2].rstrip("]").split(), dtype=float)
@@ -186,7 +186,7 @@ def crossing_at(polygon: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "2"] | N
 def edge_distance(
     point: Float[np.ndarray, "2"], polygon: Float[np.ndarray, "n 2"], straight: Bool[np.ndarray, " n"]
 ) -> float:
-    """Distance of a point from an outline: from its straight sides and the ends of the chords of its arcs."""
+    """Distance of a point from the straight sides of an outline and the ends of the chords of its arcs."""
     from shapely import MultiLineString, MultiPoint, Point
 
     sides = np.stack([polygon, np.roll(polygon, -1, axis=0)], axis=1)[straight]

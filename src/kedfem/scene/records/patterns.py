@@ -1,4 +1,4 @@
-"""`patterns` of a scene: tables that are repeated, rotated about an axis or shifted."""
+"""Records of patterns: tables of a scene that are repeated, rotated about an axis or shifted."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ Entries = dict[str, Any]
 
 
 class Pattern(Record):
-    """Tables that are repeated: NAME_1 as they are written, NAME_2 and so on rotated, shifted, or both, ever further.
+    """Repeated tables: NAME_1 as written; NAME_2 and so on are rotated, shifted or both, each further than the last.
 
-    Coordinates, axes and vectors in them move, and points of the pattern's own; those of the scene, by name, stay.
-    Names of the pattern's own links, joints and points mean those of the same copy.
+    Coordinates, axes and vectors in the tables move, as do points of the pattern; named points of the scene stay. Names
+    of links, joints and points of the pattern mean those of the same copy.
     """
 
     count: Count

@@ -1,4 +1,4 @@
-"""Points of the scene: coordinates, names and constructions; vectors and axes."""
+"""Records of points by coordinates, names and constructions, and of vectors and axes."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ AXES: dict[str, XYZ] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0
 MARKS = {"from", "between", "along", "distances"}
 """Keys that distinguish one construction of a point from others."""
 FARTHEST = 1e100  # m: squares of distances can still be formed
-UNIT = 1e-15  # a vector of a length so near one is a unit vector, and stays as it is when it is read again
+UNIT = 1e-15  # largest deviation from length 1 of a vector that is not normalized, so that it is read again unchanged
 NO_PLACE = "must be constructed from points that are known and near, got one at no place"
-UNPLACED: XYZ = (math.nan, math.nan, math.nan)  # a point that is named but could not be constructed
+UNPLACED: XYZ = (math.nan, math.nan, math.nan)  # a named point that could not be constructed
 
 _known_points: ContextVar[Mapping[str, XYZ] | None] = ContextVar("known_points", default=None)
 
 
 @contextmanager
 def known_points(points: Mapping[str, XYZ]) -> Iterator[None]:
-    """Within this context the names of these points may stand in point fields."""
+    """Allow names of these points in point fields within this context."""
     token = _known_points.set(points)
     try:
         yield
@@ -45,7 +45,7 @@ def padded(value: object, what: str = "a point: a name, two or three coordinates
 
 
 def placed(value: object, coordinates: ValidatorFunctionWrapHandler) -> Any:
-    """The coordinates of a point field: looked up if it holds a name, worked out if it holds a construction."""
+    """Coordinates of a point field, which holds them, a name or a construction."""
     if isinstance(value, Mapping):
         xyz = construction_of(value).model_validate(value).xyz()
         if not all(math.isfinite(x) and abs(x) < FARTHEST for x in xyz):
@@ -98,7 +98,7 @@ class AxisPoints(Record):
     """the point that it goes to"""
 
     def vector(self) -> XYZ:
-        """From one to the other [m]."""
+        """Vector from one point to the other [m]."""
         x, y, z = (q - p for p, q in zip(self.start, self.end, strict=True))
         return (x, y, z)
 
@@ -120,7 +120,7 @@ class PolarPoint(Record):
 
 
 class CirclesPoint(Record):
-    """The point at given distances from two others, in their common xy plane: where two circles meet."""
+    """The point at given distances from two others in their common xy plane, where two circles intersect."""
 
     centres: tuple[Point, Point] = Field(alias="from")
     """the two other points"""
@@ -171,7 +171,7 @@ class BetweenPoint(Record):
 
 
 class LinePoint(Record):
-    """A point of a line at a given distance from another point: where a circle meets the line."""
+    """The point of a line at a given distance from another point, where a circle intersects the line."""
 
     centre: Point = Field(alias="from")
     """the other point"""
@@ -201,7 +201,7 @@ class LinePoint(Record):
 
 
 def construction_of(value: Mapping[str, Any]) -> type[PolarPoint | CirclesPoint | BetweenPoint | LinePoint]:
-    """The construction that the keys of a point mean, or are likely to."""
+    """The construction that the keys of a point mean or most likely mean."""
     if not MARKS & value.keys():
         value = {nearest(str(key), MARKS) or key: item for key, item in value.items()}
     if "between" in value:
@@ -230,20 +230,20 @@ class Apart(tuple[float, float, float]):
 
 
 def apart(points: Mapping[str, XYZ]) -> Apart:
-    """Points by link, the first link's first."""
+    """Points by link, that of the first link first."""
     made = Apart(next(iter(points.values()), (0.0, 0.0, 0.0)))
     made.points = dict(points)
     return made
 
 
 def joint_point(value: object, coordinates: ValidatorFunctionWrapHandler) -> Any:
-    """A point, or points in a table by link."""
+    """A point, or a table of points by link."""
     by_link = isinstance(value, Mapping) and not is_construction(value)
     return apart(BY_LINK.validate_python(value)) if by_link else placed(value, coordinates)
 
 
 def stored_point(at: XYZ) -> object:
-    """What `joint_point` makes the same of."""
+    """Raw value from which `joint_point` makes the same point."""
     return dict(at.points) if isinstance(at, Apart) else at
 
 

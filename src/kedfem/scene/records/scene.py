@@ -1,4 +1,4 @@
-"""The record of a whole scene: its tables, each checked on its own."""
+"""Record of a whole scene, whose tables are checked independently of each other."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from kedfem.scene.records.points import AccelerationVector, Point
 
 
 class Scene(Record):
-    """A linkage, its drive and loads, and what to find out about it.
+    """A linkage with its drives and loads, and the analysis and output that are requested.
 
-    Point fields hold coordinates and numbers are in SI; `materials` holds those that are built in too. Scenes are made by
-    `scene_from` and `read_scene`, which check their tables against each other.
+    Point fields hold coordinates, and numbers are in SI units; `materials` includes the built-in ones. `scene_from` and
+    `read_scene` make scenes and check their tables against each other.
     """
 
     title: Line = ""
@@ -94,17 +94,17 @@ class Scene(Record):
 
     @property
     def folder(self) -> Path:
-        """The folder that file names in the scene are relative to."""
+        """Folder to which file names in the scene are relative."""
         return self._folder
 
     @property
     def as_given(self) -> Mapping[str, Any]:
-        """Keys and values as they were given, expressions and all, with the tables of included files."""
+        """Keys and values as given, expressions included, with the tables of included files."""
         return self._as_given
 
     @property
     def unit_warnings(self) -> tuple[str, ...]:
-        """Numbers without a unit that were probably meant in another one, in words."""
+        """Warnings about numbers without a unit that probably are in another one than SI."""
         return self._unit_warnings
 
     @property
@@ -114,25 +114,25 @@ class Scene(Record):
 
     @property
     def motion(self) -> MotionLaw | None:
-        """How the driven joint moves; None without a drive, and with several."""
+        """Law of the driven joint; None without a drive and with several."""
         drives = list(self.all_drives.values())
         return drives[0].motion if len(drives) == 1 else None
 
     @property
     def driven(self) -> str | None:
-        """Name of the driven joint, of several the first; None without a drive."""
+        """Name of the driven joint, the first if there are several; None without a drive."""
         return next(iter(self.driven_joints), None)
 
     @property
     def all_drives(self) -> dict[str, Drive]:
-        """Each drive by the name of its joint; as `JOINT.DRIVE`, with a name of its own, where several move one joint."""
+        """Drives by the name of their joint, or by `JOINT.DRIVE` if several drive one joint."""
         named = self.drives if self.drive is None else {"": self.drive, **self.drives}
         count = Counter(drive.joint for drive in named.values())
         return {x.joint if count[x.joint] == 1 else f"{x.joint}.{name}": x for name, x in named.items()}
 
     @property
     def driven_joints(self) -> dict[str, list[Drive]]:
-        """The joints whose motion is prescribed, and the drives of each."""
+        """Drives of each joint with a prescribed motion."""
         out: dict[str, list[Drive]] = {}
         for drive in self.all_drives.values():
             out.setdefault(drive.joint, []).append(drive)
@@ -140,5 +140,5 @@ class Scene(Record):
 
     @property
     def results_folder(self) -> Path:
-        """Where the results go."""
+        """Folder of the results."""
         return self._folder / (self.output.folder or f"{self._stem}-results")

@@ -1,4 +1,4 @@
-"""Cross-sections of beams."""
+"""Records of cross-sections of beams."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class BoxSection(Record):
 
 
 class ISection(Record):
-    """An I or H profile: two equal flanges and the web between them, sharp corners; twisted, it warps freely."""
+    """An I or H profile with two equal flanges, a web and sharp corners; under torsion it warps freely."""
 
     kind: Literal["i"] = "i"
     width: PositiveLength
@@ -87,7 +87,7 @@ class ISection(Record):
 
 
 class ConstantsSection(Record):
-    """Any section with two principal axes, by its constants; its shear stresses are not known."""
+    """Any section with two principal axes, by its constants; shear stresses are not known."""
 
     kind: Literal["constants"] = "constants"
     area: Area
@@ -109,7 +109,7 @@ class ConstantsSection(Record):
 
 
 def _too_thick(key: str, wall: float, name: str, limit: float) -> list[Fault]:
-    """A fault where a wall is not thinner than what has room for it, which has a name."""
+    """The fault of a wall that is not thinner than the named space for it."""
     message = f"must be less than {name} {limit:.6g} [m], got {wall:.6g}"
     return [Fault((key,), message)] if wall >= limit else []
 

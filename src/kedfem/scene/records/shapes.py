@@ -1,4 +1,4 @@
-"""Shapes of links in the reference position of the scene."""
+"""Records of shapes of links in the reference position of the scene."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from kedfem.scene.records.units import Length, PositiveLength, Quantity, fault
 
 
 def different(points: tuple[XYZ, ...]) -> tuple[XYZ, ...]:
-    """Points that all differ."""
+    """Check that all points differ."""
     for P, Q in combinations(points, 2):
         if math.dist(P, Q) == 0.0:
             raise fault(f"must be different points, got ({P[0]:.6g}, {P[1]:.6g}, {P[2]:.6g}) twice")
@@ -27,7 +27,7 @@ def different(points: tuple[XYZ, ...]) -> tuple[XYZ, ...]:
 
 
 def different_but_closed(points: tuple[XYZ, ...]) -> tuple[XYZ, ...]:
-    """Points that all differ, but that the last may be the first again where there are three others."""
+    """Check that all points differ; the last may equal the first after at least three different ones."""
     different(points[:-1] if is_closed(points) else points)
     return points
 
@@ -38,21 +38,21 @@ def is_closed(points: Sequence[XYZ]) -> bool:
 
 
 def level(points: tuple[XYZ, XYZ]) -> tuple[XYZ, XYZ]:
-    """Two points in one z plane."""
+    """Check that two points are in one z plane."""
     P, Q = points
     if abs(P[2] - Q[2]) > 1e-9 * math.dist(P, Q):
         raise fault(f"must be two points of the same z [m], got {P[2]:.6g} and {Q[2]:.6g}")
     return points
 
 
-UPRIGHT = 1 - 1e-6  # cosine between a line and `up` from which they count as one direction
-STEEP = 0.9  # cosine between a line and z from which x is up unless given
+UPRIGHT = 1 - 1e-6  # least cosine between a line and `up` that count as one direction
+STEEP = 0.9  # least cosine between a line and z with which the default of `up` is x
 
 TwoPoints = Annotated[tuple[Point, Point], AfterValidator(different)]
 
 
 def along_up(pairs: list[tuple[XYZ, XYZ]], up: XYZ | None) -> list[Fault]:
-    """Segments along `up`, to which no direction is nearest."""
+    """Faults of segments along `up`, which leave the direction of the section undefined."""
     for i, (P, Q) in enumerate(pairs if up is not None else ()):
         length = math.dist(P, Q)
         along = sum((q - p) * u for p, q, u in zip(P, Q, up or (), strict=True)) / length
@@ -67,7 +67,7 @@ MESH_ENDINGS = (
 
 
 class Bar(Record):
-    """A straight bar of rectangular section that ends exactly at two points; solid or beam."""
+    """A straight bar of rectangular section that ends at two points; solid or beam."""
 
     kind: Literal["bar"] = "bar"
     between: TwoPoints
@@ -87,7 +87,7 @@ class Bar(Record):
 
     @property
     def upward(self) -> XYZ:
-        """`up`, as given or as it is if not given."""
+        """The given `up`, or its default."""
         P, Q = self.between
         steep = abs(Q[2] - P[2]) >= STEEP * math.dist(P, Q)
         return self.up or ((1.0, 0.0, 0.0) if steep else (0.0, 0.0, 1.0))
@@ -129,7 +129,7 @@ class PlateLink(Record):
 
 
 class Extrusion(Profile):
-    """A plate of any outline with round holes; solid."""
+    """A plate of arbitrary outline with round holes; solid."""
 
     kind: Literal["extrusion"] = "extrusion"
     offset: Length = 0.0
@@ -147,7 +147,7 @@ class Part(Record):
 
 
 class Polyline(Record):
-    """A line through points, straight between them or smooth, of one section; beam."""
+    """A line through points, with straight segments or smooth, of one section; beam."""
 
     kind: Literal["polyline"] = "polyline"
     points: Annotated[tuple[Point, ...], AfterValidator(different_but_closed)] = Field(min_length=2)
@@ -184,14 +184,14 @@ class Polyline(Record):
 
     @property
     def of_section(self) -> SectionShape:
-        """Its section, a rectangle if given by width and thickness."""
+        """The section, which is a rectangle if width and thickness are given."""
         if self.section is not None:
             return self.section
         return RectangleSection(width=self.width or math.nan, thickness=self.thickness or math.nan)
 
 
 class _FromFile(Record):
-    """What shapes share that are drawn in a file of another program."""
+    """Base class of shapes from files of other programs."""
 
     kind: str
     file: FileName
@@ -228,7 +228,7 @@ class Cad(_FromFile):
 
 
 def with_kind(shape: Any) -> Any:
-    """A raw shape from a file with the kind that its ending says; any other raw input as it is."""
+    """Add to a raw shape from a file the kind that the file's ending tells; return any other input unchanged."""
     if not isinstance(shape, Mapping) or "kind" in shape or not isinstance(shape.get("file"), str):
         return shape
     ending = PurePath(shape["file"]).suffix.lower()
@@ -240,7 +240,7 @@ Shape = Annotated[Annotated[AnyShape, Field(discriminator="kind")], BeforeValida
 
 
 class PartGeometry(Profile):
-    """The geometry of a part, in a TOML file and coordinates of its own."""
+    """Geometry of a part in a separate TOML file, in coordinates of the part."""
 
     origin: Point
     """the point that goes to the first of the link's points"""

@@ -1,4 +1,4 @@
-"""Numbers with a unit: SI floats in the scene, strings such as ``"25.4 mm"`` or ``"600 rpm"`` at its rim."""
+"""Conversion of strings such as ``"25.4 mm"`` or ``"600 rpm"`` to the SI numbers of a scene."""
 
 from __future__ import annotations
 
@@ -47,20 +47,20 @@ USUAL = {
     "N*s/m": ("N*s/m", 1.0), "N*m/rad": ("N*m/rad", 1.0), "N*m*s/rad": ("N*m*s/rad", 1.0),
 }  # fmt: skip
 """Units as they are usually written, in SI: for hints, and read without pint, whose start takes half a second."""
-HUGE = 1e30  # a number beyond, or a positive one below 1 / HUGE, is no machine's: its powers would overflow
-OVERFLOW = 10**308  # whole numbers in TOML have no end
+HUGE = 1e30  # numbers beyond it, and positive ones below 1 / HUGE, are refused: their powers would overflow
+OVERFLOW = 10**308  # largest whole number; those in TOML are unlimited
 CYCLES = "hertz", "count", "counts_per_second", "baud", "becquerel", "curie", "rutherford"
 """How names of frequencies end, kilohertz too."""
 
 
 def fault(message: str) -> PydanticCustomError:
-    """A fault of one field of the scene, with kedfem's own wording: what was wanted, what was got."""
+    """A fault of one field of the scene in kedfem's wording, with the wanted and the given value."""
     return PydanticCustomError("kedfem", "{message}", {"message": message})
 
 
 @cache
 def unit_registry() -> pint.UnitRegistry[float]:
-    """Pint's registry of units, imported when the first string with a unit is met."""
+    """Pint's registry of units, imported with the first string with a unit."""
     import pint
 
     registry: pint.UnitRegistry[float] = pint.UnitRegistry()
@@ -69,7 +69,7 @@ def unit_registry() -> pint.UnitRegistry[float]:
 
 
 class Evaluated(str):
-    """The text of an expression whose value has a unit, and that value, a pint quantity."""
+    """Text of an expression whose value has a unit, and this value, a pint quantity."""
 
     quantity: Any
 
@@ -78,11 +78,11 @@ class Evaluated(str):
 
 
 def si_number(text: str, unit: str) -> float:
-    """The number that a string with a unit stands for.
+    """SI number of a string with a unit.
 
     Parameters
     ----------
-    text : a number and a unit, ``"914.4 mm"``, or an expression that was worked out.
+    text : a number and a unit, ``"914.4 mm"``, or an evaluated expression
     unit : the SI unit of the answer, a key of ``KINDS``.
 
     Returns
@@ -92,9 +92,9 @@ def si_number(text: str, unit: str) -> float:
     Raises
     ------
     ValueError
-        Not a number with a unit, an unknown unit or a unit of another dimension. Hertz are not accepted
-        for a rotational speed nor turns for a frequency: the factor 2π between them would be a guess. So it would be of
-        a length per revolution, for a lead or a radius: only expressions may leave an angle over, as v = ω r does.
+        The text is not a number with a unit, or its unit is unknown or of another dimension. Hertz are not accepted for
+        a rotational speed nor turns for a frequency, since the factor 2π between them would be a guess; nor is a length
+        per revolution for a lead or a radius. Only expressions may have an angle in addition, as v = ω r does.
     """
     if isinstance(text, Evaluated):
         quantity = text.quantity
@@ -121,17 +121,17 @@ def si_number(text: str, unit: str) -> float:
 
 
 def unit_of(given: str, wanted: str = "") -> Any:
-    """The unit that a text stands for.
+    """Unit of a text.
 
     Parameters
     ----------
-    given : names with powers of one digit, multiplied and divided
-    wanted : a unit of the kind that is wanted, for hints
+    given : names with powers of one digit, multiplied or divided
+    wanted : a unit of the wanted kind, for hints
 
     Raises
     ------
     ValueError
-        It is not a unit, or an unknown one.
+        The text is not a unit, or an unknown one.
     """
     import pint
 
@@ -152,14 +152,14 @@ def revolutions(unit: Mapping[str, float]) -> float:
 
 
 def crossed(given: Mapping[str, float], unit: str) -> bool:
-    """Whether a unit counts cycles where rad/s is wanted, or turns where Hz is: the factor 2π would be a guess."""
+    """Whether a unit counts cycles if rad/s is wanted, or turns if Hz is, so that the factor 2π would be a guess."""
     if unit == "Hz":
         return revolutions(given) != 0.0
     return unit == "rad/s" and any(name.endswith(CYCLES) for name in given) and revolutions(given) == 0.0
 
 
 def meant(given: str, unit: str) -> str:
-    """A hint at a unit of the kind that is wanted, if one is written like what was given but for capitals or a *."""
+    """A hint at a unit of the wanted kind that differs from the given text only by capitals or a *."""
     wanted = unit_registry().parse_units(unit).dimensionality
     for name in USUAL:
         same = name.casefold().replace("*", "") == given.casefold().replace("*", "") and name != given
@@ -170,7 +170,7 @@ def meant(given: str, unit: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """What a number in the scene is: its SI unit and bounds, as in ``Annotated[float, Quantity("m")]``."""
+    """Quantity of a number in the scene, with its SI unit and bounds, as in ``Annotated[float, Quantity("m")]``."""
 
     unit: str
     above: float = -math.inf
@@ -179,11 +179,11 @@ class Quantity:
     most: float = math.inf
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """The check of a field, for pydantic."""
+        """Schema of the check of a field, for pydantic."""
         return core_schema.no_info_plain_validator_function(self.number)
 
     def number(self, value: object) -> float:
-        """The SI number of a field that holds a number, or a string with a unit."""
+        """SI number of a field that holds a number or a string with a unit."""
         value = value.tolist() if hasattr(value, "tolist") else value
         if isinstance(value, str):
             try:
@@ -198,7 +198,7 @@ class Quantity:
         return number
 
     def check(self, number: float, value: object) -> None:
-        """Raise a fault if a number is not finite or out of bounds; ``value`` is how the user wrote it."""
+        """Raise a fault if a number is not finite or out of bounds; ``value`` is the user's text."""
         got = f"got {value!r}" if isinstance(value, str) else f"got {number:.12g}"
         if not math.isfinite(number):
             raise fault(f"must be finite{self.bracket}, {got}")
@@ -210,7 +210,7 @@ class Quantity:
 
     @property
     def bracket(self) -> str:
-        """The unit as it stands in messages: ' [m]', or nothing for a plain number."""
+        """The unit as messages show it: ' [m]', or nothing for a plain number."""
         return "" if self.unit == "1" else f" [{self.unit}]"
 
     @property

@@ -1,4 +1,4 @@
-"""Words and values in messages."""
+"""Wording of messages about names, keys and values."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import Any
 
-KEYS = {  # of scenes by their former names: messages about unknown words name the present ones
+KEYS = {  # present keys by their former names, for messages about unknown words
     "functions": "reduction", "modes": "reduction", "reduced": "reduction", "fidelity": "model",
     "step": "shape", "file": "shape", "reduction": "reduction_tolerance", "port": "coupling",
     "turning_stiffness": "rotational_stiffness", "turning_damping": "rotational_damping",
@@ -19,11 +19,11 @@ VALUES = {
     "nominal": "rigid-body", "following": "co-rotational", "literal": "monolithic",
     "averaged": "distributing", "stiff": "rigid", "table": "curve",
 }  # fmt: skip
-NOUNS = {"solid": "solid", "plane": "plane link", "beam": "beam"}  # links by what they are modelled as
+NOUNS = {"solid": "solid", "plane": "plane link", "beam": "beam"}  # links by their model
 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
-    """The known word that ``word`` was renamed to, or that looks most like it; None if there is none."""
+    """Known word to which ``word`` was renamed, or the most similar one; None if there is none."""
     lower = {name.lower(): name for name in known}
     for renamed in (KEYS, VALUES):
         if renamed.get(word) in lower:
@@ -33,7 +33,7 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
 
 
 def unknown_name(what: str, word: str, known: Iterable[str]) -> str:
-    """The message about a word that is not among the known ones."""
+    """Message about a word that is not among the known ones."""
     names = list(known)
     close = nearest(word, names)
     hint = f"did you mean {close!r}?" if close else f"known: {', '.join(names) or 'none'}"
@@ -41,7 +41,7 @@ def unknown_name(what: str, word: str, known: Iterable[str]) -> str:
 
 
 def shown(value: Any) -> str:
-    """A value as it stands in a message: shortened if it is long."""
+    """A value as messages show it, shortened if it is long."""
     if value is None:
         return "nothing"
     text = {True: "true", False: "false"}[value] if isinstance(value, bool) else repr(value)
@@ -49,18 +49,18 @@ def shown(value: Any) -> str:
 
 
 def either(words: list[Any]) -> str:
-    """'one of a, b, c'; a single word as it is."""
+    """'one of a, b, c', or a single word unchanged."""
     return ("one of " if len(words) > 1 else "") + ", ".join(str(word) for word in words)
 
 
 def one_of(words: list[Any], got: Any) -> str:
-    """The message about a word that is not one to choose from."""
+    """Message about a word that is not one of the choices."""
     close = nearest(got, [str(word) for word in words]) if isinstance(got, str) else None
     return f"must be {either(words)}, got {shown(got)}" + (f", did you mean {close!r}?" if close else "")
 
 
 def unknown_key(key: str, known: list[str], kinds: list[str]) -> str:
-    """The message about a key that a record does not have; `kinds` are those of its alternatives that have it.
+    """Message about a key that a record does not have; `kinds` are its alternatives that have it.
 
     >>> unknown_key("section", ["kind", "width"], ["polyline"])
     "unknown key, 'section' is one of kind polyline; known: kind, width"
