@@ -55,7 +55,7 @@ def missed(values: Float[np.ndarray, " n"]) -> float:
 
 
 def fewer_positions(scene: Scene, found: Histories) -> tuple[Scene, Histories]:
-    """The scene in as few positions as show the largest values of its channels nearly, and the channels there."""
+    """The scene in so few positions that they still nearly show the largest value of each channel, and its channels."""
     grid, sizes = time_grid(scene), counted(found)
     lengths = {name: np.linalg.norm(found.channels[name][1], axis=1) for name in sizes}
     apart = max(1, grid.steps // FEWEST)
