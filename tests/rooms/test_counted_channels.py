@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from kedfem.accuracy.estimates import budget, watcher
+from kedfem.accuracy.estimates import budget, error_monitor
 from kedfem.accuracy.histories import Histories, counted, scales
 from kedfem.accuracy.histories import histories as run
 from kedfem.accuracy.mesh_estimate import mesh_errors
@@ -97,7 +97,7 @@ def test_a_joint_that_carries_nothing_has_errors_of_those_that_do() -> None:
     sizes = counted(base)
     assert zeros == {"joints/A/force"}
     assert found["joints/A/force"] == pytest.approx(sizes["joints/A/force"] / sizes["joints/W/force"], rel=0.2)
-    limits = budget(ready, watcher(ready), None, base).limits
+    limits = budget(ready, error_monitor(ready), None, base).limits
     assert [x.partition(":")[0] for x in limits] == ["joints/A/force by itself"]
 
 
