@@ -134,13 +134,13 @@ def analyse(
 def _require_packages(scene: Scene) -> None:
     """OutputError unless the packages are there that the scene's files need."""
     if scene.output.parquet:
-        require_parquet("output.parquet")
+        require_parquet()
     if scene.output.report:
         from kedfem.report import require_report
 
         require_report("output.report")
     if scene.fatigue is not None:
-        require_fatigue("fatigue")
+        require_fatigue()
 
 
 @dataclass(frozen=True, slots=True)

@@ -67,17 +67,17 @@ def cell(x: float) -> str:
 
 def write_parquet(results: "Results", path: Path) -> None:
     """Write the table of `write_csv` as Parquet, all digits kept, time as index; how the run ended is in its `attrs`."""
-    require_parquet("output.parquet")
+    require_parquet()
     table = as_data_frame(results)
     table.attrs = {"status": results.status, "reason": results.reason, "kedfem_version": results.version}
     with replacing(Path(path)) as part:
         table.to_parquet(part, engine="pyarrow")
 
 
-def require_parquet(where: str) -> None:
-    """OutputError unless what Parquet needs is installed."""
+def require_parquet() -> None:
+    """OutputError unless the packages for Parquet are installed."""
     for package in ("pandas", "pyarrow"):
-        of_extra(package, where)
+        of_extra(package, "output.parquet")
 
 
 def as_data_tree(results: "Results") -> Any:

@@ -124,17 +124,12 @@ def space_mass(x: Float[np.ndarray, "m 3 3"], section: Section) -> Float[np.ndar
     return np.kron(m, np.diag([section.area, section.second_moment, section.second_moment_z]))
 
 
-def spatial_beam_link(
-    name: str, axis: Axis, section: Section, material: Material, node_stiffness: float = RIGID_NODE_STIFFNESS
-) -> Link:
+def spatial_beam_link(name: str, axis: Axis, section: Section, material: Material) -> Link:
     """The record of a beam in space.
 
-    Ends and corners are rigid cross-section nodes with four functions {1, x, y, z}: a full affine field, whose gradient
-    each segment reads along its own directions, p = G n1, q = G n2, and whose strain is stiff: a small rigid cube.
-
-    Parameters
-    ----------
-    node_stiffness : of E A L |sym G|²
+    Ends and corners are rigid cross-section nodes, small rigid cubes with four functions {1, x, y, z}. These form a full
+    affine field, whose strain is stiff by RIGID_NODE_STIFFNESS E A L |sym G|², and whose gradient G each segment reads
+    along its own directions, p = G n1, q = G n2.
     """
     X, one, triples = functions(axis)
     x, cells, n = axis.frame[:, [0, 2, 3]], axis.cells, len(X)
@@ -149,7 +144,7 @@ def spatial_beam_link(
     m = sp.csr_array(triples.T @ m @ triples + lumped)
     K0 = sp.csr_array(
         vectors.T @ K @ vectors
-        + rigid_node_stiffness(X, rigid_nodes, node_stiffness * rigidity[0] * length_of(axis.frame[:, 0], cells))
+        + rigid_node_stiffness(X, rigid_nodes, RIGID_NODE_STIFFNESS * rigidity[0] * length_of(axis.frame[:, 0], cells))
     )
     mass = (m, m, m)
     m1, mX = mass_constants(mass, one, X)

@@ -66,9 +66,9 @@ class Strength:
         return f"{source}: {1e-6 * self.endurance:.4g} MPa at {self.cycles:.3g} cycles, M = {self.M:.3g}"
 
 
-def require_fatigue(where: str) -> None:
+def require_fatigue() -> None:
     """OutputError unless the packages for fatigue are installed."""
-    of_extra("pylife", where, EXTRA)
+    of_extra("pylife", "fatigue", EXTRA)
 
 
 def strength_of(data: FatigueData, youngs_modulus: float) -> Strength:

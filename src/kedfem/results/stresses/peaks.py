@@ -11,7 +11,7 @@ from kedfem.results.records import Peak
 from kedfem.results.stresses.envelope import VON_MISES, LinkEnvelope
 
 APART = 0.02  # of the link's size: nearer points belong to the same place, as neighbours in a fine mesh do
-MOST = 10
+MOST = 10  # places of each link
 
 
 def peaks(found: Sequence[LinkEnvelope], near: Sequence[Sequence[str]]) -> dict[str, Peak]:
@@ -54,26 +54,23 @@ def peak_at(each: LinkEnvelope, node: int, words: Sequence[str]) -> Peak:
     )  # fmt: skip
 
 
-def hot_spots(found: Sequence[LinkEnvelope], near: Sequence[Sequence[str]], most: int = MOST) -> dict[str, list[Peak]]:
-    """The highest von Mises stresses of each link that has stress, falling, each at some distance from those before.
-
-    Link → its peaks; the first is the link's highest.
+def hot_spots(found: Sequence[LinkEnvelope], near: Sequence[Sequence[str]]) -> dict[str, list[Peak]]:
+    """The highest von Mises stresses of each link with stress, in falling order, at a distance from each other.
 
     Parameters
     ----------
-    found, near : as of :func:`peaks`
-    most : how many of each link
+    found, near : as in :func:`peaks`
     """
     names = dict.fromkeys(each.link for each in found if not np.isnan(each.stress).all())
-    return {name: _of([(e, w) for e, w in zip(found, near, strict=True) if e.link == name], most) for name in names}
+    return {name: _of([(e, w) for e, w in zip(found, near, strict=True) if e.link == name]) for name in names}
 
 
-def _of(parts: list[tuple[LinkEnvelope, Sequence[str]]], most: int) -> list[Peak]:
-    """Of one link, in segments or not."""
+def _of(parts: list[tuple[LinkEnvelope, Sequence[str]]]) -> list[Peak]:
+    """Highest stresses of one link, of all its segments together."""
     points = np.concatenate([drawn_points(each.recovery) for each, _ in parts])
     stress = np.concatenate([each.stress[VON_MISES] for each, _ in parts])
     sizes = [each.stress.shape[1] for each, _ in parts]
-    found = (within(sizes, k) for k in places_apart(points, stress, most))
+    found = (within(sizes, k) for k in places_apart(points, stress, MOST))
     return [peak_at(parts[part][0], node, parts[part][1]) for part, node in found]
 
 
