@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from kedfem.accuracy import estimates
 from kedfem.accuracy.error_budget import Budget, Share, budget_warning, by_kind, meaningless
 from kedfem.accuracy.estimates import budget, error_monitor, step_errors
-from kedfem.accuracy.histories import Histories, histories, relative_errors
+from kedfem.accuracy.histories import Histories, counted, histories, relative_errors
 from kedfem.accuracy.mesh_estimate import mesh_errors
 from kedfem.accuracy.positions import fewer_positions, missed
 from kedfem.accuracy.prepared import Prepared, meshed
@@ -310,3 +310,22 @@ def test_a_long_run_of_a_small_model_is_judged_as_a_whole(monkeypatch: pytest.Mo
     assert time_grid(estimates.beginning(ready.scene, ready.model)).steps == steps
     monkeypatch.setattr(estimates, "CHEAP", 7000.0 * ready.model.unknowns)
     assert time_grid(estimates.beginning(ready.scene, ready.model)).steps == 7000
+
+
+def test_a_force_that_is_rounding_beside_moments_is_not_judged() -> None:
+    """A cantilever under an end moment: what holds it exerts no force, and 1e-9 of M / L by rounding."""
+    shape = {"kind": "bar", "between": [[0, 0], [1, 0]], "width": 0.05, "thickness": 0.05}
+    found = histories(
+        meshed(
+            scene_from(
+                {
+                    "links": {"arm": {"model": "beam", "material": "steel", "mesh": {"elements": 4}, "shape": shape}},
+                    "joints": {"W": {"kind": "weld", "links": ["ground", "arm"], "at": [0, 0]}},
+                    "loads": {"M": {"kind": "torque", "link": "arm", "at": [1, 0], "vector": [0, 0, 1e5]}},
+                    "analysis": {"kind": "static", "accuracy": "quick"},
+                    "output": {"probes": {"tip": {"link": "arm", "at": [1, 0], "quantity": "travel"}}},
+                }
+            )
+        )
+    )
+    assert set(counted(found)) == {"probes/tip/travel"}

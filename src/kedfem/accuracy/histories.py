@@ -60,8 +60,8 @@ def histories(
     near : an estimate of the state at the beginning of a steady motion
     """
     every = recording(ready.scene, ready.model, linked=ready.linkage)
-    recorded = [x for x in every if is_judged(x.channel.name)]
-    times, taken, kept = [], [], []
+    recorded = [x for x in every if kept(x.channel.name)]
+    times, taken, states = [], [], []
     solvers = level_steps(ready.scene, ready.model)
     for solver in solvers:
         solver.search = Search(near, ROUGHLY)
@@ -71,12 +71,12 @@ def histories(
         watch()
         look(block)
         follow(block, taken[-1])
-        kept += [block.at(k) for k in range(len(block)) if block.step + k in keep]
+        states += [block.at(k) for k in range(len(block)) if block.step + k in keep]
     channels = {
         each.channel.name: (each.channel, np.concatenate([found[each.channel.name] for found in taken]))
         for each in recorded
     }
-    return Histories(np.concatenate(times), channels, tuple(kept), extent(ready.model), steady_state(solvers))
+    return Histories(np.concatenate(times), channels, tuple(states), extent(ready.model), steady_state(solvers))
 
 
 def steady_state(solvers: Sequence[Steps]) -> StateArrays | None:
@@ -94,6 +94,11 @@ def extent(model: Model) -> float:
 def is_judged(name: str) -> bool:
     """Whether a required accuracy applies to a channel: probes, joint forces, the drive's torque."""
     return kind_of_name(name) is not None
+
+
+def kept(name: str) -> bool:
+    """Whether a channel is judged, or shows beside which moments a judged force is none."""
+    return is_judged(name) or (name.startswith("joints/") and name.endswith("/moment"))
 
 
 def relative_errors(found: Histories, reference: Histories, zeros: set[str] | None = None) -> dict[str, float]:
@@ -132,7 +137,7 @@ def judged(reference: Histories) -> dict[str, tuple[str, float]]:
     }  # fmt: skip
     least = {unit: NOTHING * value for unit, value in units.items()}
     least["N m"] = max(least.get("N m", 0.0), FAINT * reference.size * units.get("N", 0.0))
-    if reference.size:  # for balanced rotors
+    if reference.size:  # for balanced rotors, and for what moments alone bend
         least["N"] = max(least.get("N", 0.0), NOTHING * units.get("N m", 0.0) / reference.size)
     return {name: (unit, size) for name, (unit, size) in sizes.items() if size > least[unit]}
 
@@ -191,5 +196,5 @@ def run_histories(results: Results, solvers: Sequence[Steps]) -> Histories:
     """The judged channels of a run; none if it did not record all time points."""
     if results.every > 1:
         return Histories(results.time[:0], {}, begun=steady_state(solvers))
-    names = tuple(name for name in results.channels if kind_of_name(name) is not None)
+    names = tuple(filter(kept, results.channels))
     return Histories(results.time, ChannelSelection(results.channels, names), begun=steady_state(solvers))
