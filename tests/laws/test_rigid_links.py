@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from kedfem.accuracy.estimates import step_errors
@@ -219,3 +221,34 @@ def test_a_plan_takes_steps_in_which_rigid_links_give_little_enough() -> None:
     reference = plan.scene.model_copy(update={"analysis": plan.scene.analysis.model_copy(update=finest)})
     errors = relative_errors(histories(meshed(plan.scene)), histories(meshed(reference)))
     assert max(errors.values()) < 0.01
+
+
+@pytest.mark.parametrize("axis", [(1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0), (0.48, 0.6, 0.64)])
+def test_a_rigid_bar_hinged_across_its_end_face_is_a_pendulum(axis: tuple[float, float, float]) -> None:
+    """A bar along the axis with a mass m at r beside it, let go with the mass level: I φ'' = m g r cos φ."""
+    d = np.array(axis)
+    e = np.roll(d, 1) - d * (d @ np.roll(d, 1))
+    e /= np.linalg.norm(e)
+    down = np.cross(d, e)
+    m, r, side, long, end = 5.0, 0.01, 0.02, 0.1, 0.01
+    shape = {
+        "kind": "bar",
+        "between": [[0, 0, 0], (long * d).tolist()],
+        "width": side,
+        "thickness": side,
+        "up": e.tolist(),
+    }
+    raw = {
+        "gravity": (9.81 * down).tolist(),
+        "links": {"bar": {"model": "rigid", "material": "steel", "shape": shape}},
+        "materials": {"steel": {"density": 7850.0, "youngs_modulus": 2.1e11, "poisson_ratio": 0.3}},
+        "bodies": {"m": {"kind": "point_mass", "link": "bar", "at": (long / 2 * d + r * e).tolist(), "mass": m}},
+        "joints": {"A": {"kind": "revolute", "links": ["ground", "bar"], "at": [0, 0, 0], "axis": list(axis)}},
+        "analysis": {"end_time": end, "step": end / 100, "initial": "rest", "rho_inf": 0.9},
+        "output": {"probes": {"p": {"link": "bar", "at": (long * d + r * e).tolist(), "quantity": "position"}}},
+    }  # fmt: skip
+    x = channels(*ran(raw))["probes/p/position"][-1][:3]
+    inertia = 7850.0 * side**2 * long * side**2 / 6 + m * r**2
+    exact = solve_ivp(lambda t, y: [y[1], m * 9.81 * r * np.cos(y[0]) / inertia], (0, end), [0, 0], rtol=1e-9, atol=1e-12)
+    assert_allclose(np.arctan2(x @ down, x @ e), exact.y[0, -1], rtol=1e-5)  # of order 2 in the step
+    assert_allclose(x @ d, long, atol=1e-12)

@@ -64,7 +64,8 @@ def test_hinge_across_a_flat_face() -> None:
     raw["joints"]["A"]["axis"] = "x"
     assert fault(raw) == (
         "joints.A: must sit on a bore of link 'arm', or on a flat face that contains its axis, "
-        "got a flat face across the axis: give the link a bore about the joint's axis"
+        "got a flat face across the axis, which determines no second point of it: give the link a bore there, or "
+        'weld the face to a link of model = "rigid" that has the joint'
     )
 
 

@@ -90,3 +90,37 @@ def test_a_free_drive_is_refused_where_there_is_none(tmp_path: Path) -> None:
         frequencies(scene, Wanted(free=True), tmp_path / "out")
     found = frequencies(scene, Wanted(2), tmp_path / "out")
     assert (len(found.time), found.still, found.crossings) == (1, 1, ())
+
+
+@pytest.mark.parametrize("axis", [[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0], [0.48, 0.6, 0.64]])
+def test_a_released_shaft_whose_hub_is_hinged_at_its_end_face_turns_freely(axis: list[float], tmp_path: Path) -> None:
+    """A cantilever on a rigid hub of next to no mass, along the axis: held by the drive, and free to rotate about itself,
+    where bending stays and torsion is that of a bar with a free end."""
+    d = np.array(axis)
+    section = {"kind": "rectangle", "width": 0.02, "thickness": 0.02}
+    up = np.roll(d, 1) - d * (d @ np.roll(d, 1))
+    shape = {"kind": "polyline", "points": [[0, 0, 0], (0.4 * d).tolist()], "section": section, "up": up.tolist()}
+    hub = {
+        "kind": "bar",
+        "between": [(-0.02 * d).tolist(), [0, 0, 0]],
+        "width": 0.02,
+        "thickness": 0.02,
+        "up": up.tolist(),
+    }
+    raw = {
+        "links": {
+            "hub": {"model": "rigid", "material": "steel", "shape": hub},
+            "shaft": {"model": "beam", "material": "steel", "shape": shape, "mesh": {"elements": 4}},
+        },
+        "joints": {
+            "A": {"kind": "revolute", "links": ["ground", "hub"], "at": (-0.02 * d).tolist(), "axis": axis},
+            "W": {"kind": "weld", "links": ["hub", "shaft"], "at": [0, 0, 0]},
+        },
+        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": "60 rpm"}},
+        "analysis": {"revolutions": 1, "steps_per_revolution": 180},
+    }  # fmt: skip
+    held, free = (
+        frequencies(scene_from(raw, tmp_path), Wanted(2, 2, free=each), tmp_path / f"{each}") for each in (False, True)
+    )
+    assert (held.still, free.still) == (0, 1)
+    assert_allclose(free.values[:, :2], held.values[:, :2], rtol=1e-5)  # bending, both ways

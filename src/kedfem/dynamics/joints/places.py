@@ -9,7 +9,12 @@ from kedfem.arrays import Float
 from kedfem.dynamics.joints.constraint_joints import bore_axis
 from kedfem.errors import KedfemError, MeshError, SceneError
 from kedfem.links.record import Link
-from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, joint_surface
+from kedfem.links.surfaces.coupling_surfaces import (
+    CouplingSurface,
+    determines_gradient,
+    joint_surface,
+    rigid_link_surface,
+)
 from kedfem.scene import Scene
 
 Key = TypeVar("Key")
@@ -17,10 +22,13 @@ T = TypeVar("T")
 
 
 def surface_of(scene: Scene, name: str, link: Link) -> CouplingSurface:
-    """The coupling surface of a joint on a link."""
+    """The coupling surface of a joint on a link; all of a rigid one for a hinge across a flat face of it."""
     joint = scene.joints[name]
-    axis = bore_axis(joint, link.name)
-    return joint_surface(link, f"joints.{name}", np.asarray(joint.at), axis, joint.face_names(link.name))
+    axis, at = bore_axis(joint, link.name), np.asarray(joint.at)
+    surface = joint_surface(link, f"joints.{name}", at, axis, joint.face_names(link.name))
+    across = joint.kind == "revolute" and axis is not None and not determines_gradient(surface, axis)
+    whole = across and link.rigid and link.d == 3 and link.full is not None and link.full.meshed
+    return rigid_link_surface(link, at) if whole else surface
 
 
 def on_part(

@@ -66,7 +66,8 @@ def _unheld(link: Link, kind: str) -> str:
         )
     return (
         f"must sit on a bore of link '{link.name}', or on a flat face that contains its axis, "
-        "got a flat face across the axis: give the link a bore about the joint's axis"
+        "got a flat face across the axis, which determines no second point of it: give the link a bore there, or "
+        'weld the face to a link of model = "rigid" that has the joint'
     )
 
 
