@@ -4,11 +4,16 @@ import re
 from io import StringIO
 
 import pytest
+from rich.console import Console
 from rich.table import Table
 
+from kedfem.accuracy.plan import Plan
 from kedfem.cli import screen
+from kedfem.scene import scene_from
 from kedfem.tables.layout import facts
+from kedfem.tables.run import chosen_table
 from kedfem.terminal import terminal
+from tests.scenes import arm, bar, constant_speed
 
 
 def test_tables_are_as_wide_as_they_are_in_a_pipe(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -73,3 +78,11 @@ def test_facts_are_read_in_a_hundred_columns(monkeypatch: pytest.MonkeyPatch) ->
         console.print(facts("Chosen for 1 %", rows))
         assert max(map(len, said.getvalue().splitlines())) <= 103  # at least 44 for the last column
         assert re.findall(r"word\d+", said.getvalue()) == note.split()
+
+
+@pytest.mark.parametrize(("model", "layers"), [("beam", False), ("plane", False), ("solid", True)])
+def test_layers_are_of_solids_alone(model: str, layers: bool) -> None:
+    scene = scene_from(arm(bar(model=model), constant_speed(1.0), analysis={"revolutions": 1}))
+    console = Console(width=120, file=StringIO())
+    console.print(chosen_table(Plan(scene, 0.01, 1.0, (), ())))
+    assert ("layers" in console.file.getvalue()) is layers  # type: ignore[attr-defined]

@@ -56,7 +56,8 @@ def _step(scene: Scene) -> str:
 
 def _chosen(link: LinkScene) -> str:
     """Model and mesh in words."""
-    sizes = ((key, value) for key, value in link.mesh if value is not None)
+    flat = link.category in {"beam", "plane"}  # without layers
+    sizes = ((key, value) for key, value in link.mesh if value is not None and not (flat and key == "layers"))
     if link.model == "rigid":
         return "rigid"
     mesh = ", ".join(f"{key} {_size(key, value)}" for key, value in sizes) if link.shape else ""
