@@ -417,15 +417,16 @@ def test_a_motor_whose_torque_repeats_itself_on_a_joint_that_goes_on_turning() -
     assert "rotates continuously" in refused(planar("beam", motors={"m": {"joint": "B", "torque": cogging}}))
 
 
-def test_what_nothing_moves_is_a_steady_motion_too() -> None:
+@pytest.mark.parametrize("far", [0.0, 50.0])
+def test_what_nothing_moves_is_a_steady_motion_too(far: float) -> None:
     """A table that rises and falls, a damped oscillator across on it: its mass m stands still, what would move it is
-    rounding, and it grows by exp(−c T/2m) in a period T."""
+    rounding, also of places far from the origin, and it grows by exp(−c T/2m) in a period T."""
     m, c, period = 10.0, 30.0, 0.5
     raw = {
         "links": {"table": {"model": "rigid"}, "mass": {"model": "rigid", "mass": m}},
         "joints": {
-            "lift": {"kind": "prismatic", "links": ["table", "ground"], "at": [0, 0], "axis": "y"},
-            "guide": {"kind": "prismatic", "links": ["mass", "table"], "at": [0, 0.3], "axis": "x"},
+            "lift": {"kind": "prismatic", "links": ["table", "ground"], "at": [far, 0], "axis": "y"},
+            "guide": {"kind": "prismatic", "links": ["mass", "table"], "at": [far, 0.3], "axis": "x"},
         },
         "springs": {"across": {"kind": "spring", "joint": "guide", "stiffness": 4000, "damping": c}},
         "drive": {"joint": "lift", "motion": {"kind": "harmonic", "frequency": 1 / period, "travel": 0.01}},

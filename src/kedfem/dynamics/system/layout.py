@@ -32,16 +32,16 @@ from kedfem.scene import Pieces
 
 KINDS = {"solid": 0, "spatial_beam": 0, "plane": 1, "beam": 2}
 TOLERANCE = 1e-9  # change of a pass, of what a step moves: far below what co-rotational frames are compared to, 1e-7
-SMALLEST = 1e-13  # of a system's size: what a step of one that is at rest may be out by
+SMALLEST = 1e-13  # of a system's size, or how far it is from the origin: what a step of one at rest may be out by
 
 
 def coefficients(
     scheme: Scheme, damping: Rayleigh, links: Sequence[Link], single: bool, tolerance: float = TOLERANCE
 ) -> Coefficients:
-    """Of generalised-α for bodies of a size."""
+    """Of generalised-α for bodies of a mass and a size; places far from the origin have its rounding."""
     c_M, c_K = effective_coefficients(scheme, damping)
     mass = sum(float(link.one @ link.m1[:, 0]) for link in links)
-    size = max(link.size for link in links)
+    size = max(max(link.size, float(np.linalg.norm((link.full or link).nodes, axis=1).max())) for link in links)
     return Coefficients(
         c_M, c_K, scheme.alpha_m, scheme.alpha_f, scheme.acceleration, scheme.rate, scheme.h,
         scheme.h * scheme.gamma, scheme.h * (1 - scheme.gamma), damping.alpha, damping.beta, tolerance,
