@@ -4,13 +4,14 @@ from dataclasses import replace
 from typing import Any
 from unittest.mock import patch
 
+import numpy as np
 import pytest
 from benchmarks.scenes import four_bar_of
 from numpy.testing import assert_allclose
 
 from kedfem.accuracy import reduction
 from kedfem.accuracy.estimates import step_errors
-from kedfem.accuracy.histories import histories
+from kedfem.accuracy.histories import histories, relative_errors
 from kedfem.accuracy.longer_steps import differs_alike, doubled
 from kedfem.accuracy.mesh_estimate import mesh_errors
 from kedfem.accuracy.prepared import Prepared, meshed
@@ -18,7 +19,7 @@ from kedfem.scene import scene_from
 
 #: 2 % at 20 and 200 Hz: a vibration of 20 steps, 180 Hz here, has 1.8 %
 DAMPED = {"ratio": 0.02, "frequencies": [20, 200]}
-FASTER = 0.2  # of an estimate: what steps twice as long may change; 12 % at most here, two thirds of it without damping
+FASTER = 0.2  # of an estimate: what steps twice as long may change of that of a mesh; 12 % at most here
 
 
 def bars(damping: dict[str, Any] | None = DAMPED, **analysis: Any) -> dict[str, Any]:
@@ -43,19 +44,33 @@ def ready(raw: dict[str, Any]) -> Prepared:
     return meshed(scene_from(raw))
 
 
-def estimated(full: Prepared, longer: bool) -> dict[str, float]:
-    """Of a reduction to a given number of modes, which no estimate changes."""
+def estimate_and_truth(full: Prepared, longer: bool) -> np.ndarray:
+    """(channels, 2): estimate of a reduction to a given number of modes, and its difference from the unreduced run."""
     names = [link.name for link in full.model.links]
     with patch.object(reduction, "differs_alike", differs_alike if longer else lambda ready: False):
-        return reduction.reduced(full, names, 0.01, dict.fromkeys(names, 14)).estimate
+        found = reduction.reduced(full, names, 0.01, dict.fromkeys(names, 14))
+    true = relative_errors(histories(found.ready), histories(full))
+    return np.array([(found.estimate[name], true[name]) for name in true])
 
 
-def test_a_damped_scene_shows_what_its_modes_leave_out_in_steps_twice_as_long() -> None:
-    full = ready(bars())
+@pytest.mark.parametrize("thickness", [0.0254, 0.02])
+def test_a_damped_scene_shows_what_its_modes_leave_out_in_steps_twice_as_long(thickness: float) -> None:
+    """Own steps show `CAUTION` times the true error, longer ones up to twice that.
+
+    A square section vibrates alike along both sides: which of its modes are taken depends on rounding.
+    """
+    raw = bars()
+    for link in raw["links"].values():
+        link["shape"]["thickness"] = thickness
+    full = ready(raw)
     assert differs_alike(full)
-    own = estimated(full, longer=False)
-    assert max(own.values()) > 1e-3
-    assert_allclose(list(estimated(full, longer=True).values()), list(own.values()), rtol=FASTER)
+    own, true = estimate_and_truth(full, longer=False).T
+    assert true.max() > 1e-3
+    assert (own > 1.2 * true).all()
+    assert (own < 1.8 * true).all()
+    estimate, true = estimate_and_truth(full, longer=True).T
+    assert (estimate > true).all()
+    assert (estimate < 3.5 * true).all()
 
 
 @pytest.mark.parametrize(
