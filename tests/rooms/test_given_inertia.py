@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from kedfem.accuracy.histories import histories
+from kedfem.accuracy.histories import histories, is_judged
 from kedfem.accuracy.prepared import meshed
 from kedfem.errors import SceneError
 from kedfem.kinematics import rigid_links
@@ -75,7 +75,8 @@ def rssr(coupler: Any) -> dict[str, Any]:
 
 
 def channels(raw: dict[str, Any]) -> dict[str, np.ndarray]:
-    return {name: x for name, (_, x) in histories(meshed(scene_from(raw))).channels.items()}
+    every = histories(meshed(scene_from(raw))).channels
+    return {name: x for name, (_, x) in every.items() if is_judged(name)}
 
 
 def shaped(a: list[float], b: list[float]) -> dict[str, Any]:
