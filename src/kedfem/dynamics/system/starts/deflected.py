@@ -7,22 +7,31 @@ their positions, and K δ = P − M a."""
 
 from collections.abc import Callable
 from copy import copy
+from dataclasses import replace
 
 import numpy as np
 
 from kedfem.dynamics.system.ready import Ready
 from kedfem.dynamics.system.starts.condensed import Rows, condensed
-from kedfem.dynamics.system.starts.differences import AHEAD, LATER, MovingDeflection, moved, scatter, with_links
+from kedfem.dynamics.system.starts.differences import (
+    AHEAD,
+    LATER,
+    MovingDeflection,
+    moved,
+    resistance,
+    rotating,
+    scatter,
+    strained,
+    with_links,
+)
 from kedfem.dynamics.system.starts.initial_states import as_coordinates, begun
 from kedfem.dynamics.system.starts.instant import Flat, Instant, Motion, instant_near, term_angles
-from kedfem.dynamics.system.starts.internal_forces import own, rotated_rate, rows
 from kedfem.dynamics.system.starts.laws import feels_rates
 from kedfem.dynamics.system.starts.modified_newton import ROUNDING, NoBalanceError, direct_balance, equilibrium
 from kedfem.dynamics.system.starts.relieved import relieved
 from kedfem.dynamics.system.starts.rotating_bodies import CONVERGED, Spins, spins_of
 from kedfem.dynamics.system.state import State
 from kedfem.errors import MotionError, SolveError
-from kedfem.motion.newton import cross_matrix
 
 DAMPED = 12  # times that rates of a deflection are found anew where dampers feel them
 WIDER = 6  # times that their instants are taken four times as far apart, while rates change by no more than
@@ -86,9 +95,7 @@ def _moving_state(
     small = condensed(now, motion_at(now.time + now.of.c.h / 4 * np.arange(5)), forces)
     first = small.at(now, motion_at, near)
     pull = 0.0 if forces is None else small.forces(forces)
-    found = _moving(first, motion_at, widenings, pull)
-    if damped and first.of.system.model.damping.present:
-        found = _damped(first, found, pull)
+    found = _moving(first, motion_at, widenings, pull, damped and first.of.system.model.damping.present)
     return begun(now, small.back(found.u), small.back(found.v), strained=small.back(found.strained))
 
 
@@ -180,18 +187,20 @@ def plucked(of: Ready, motion_at: Motion, forces: Rows, time: float = 0.0) -> St
     return _moving_state(now, motion_at, forces=forces)
 
 
-def _moving(first: Instant, motion_at: Motion, widenings: int = WIDER, pull: Flat | float = 0.0) -> MovingDeflection:
+def _moving(
+    first: Instant, motion_at: Motion, widenings: int = WIDER, pull: Flat | float = 0.0, damped: bool = False
+) -> MovingDeflection:
     """Deflection and rate with the rigid-body motion, from instants as close as their rounding allows, put farther apart
     so many times at most; under a pull beside loads, as it is at the first instant, that turns with its links."""
     h = first.of.c.h / 4
     pull = pull + np.zeros(int(first.of.bodies.at[-1]))
-    found, left = differenced_rates(first, motion_at, h, pull)
+    found, left = differenced_rates(first, motion_at, h, pull, damped)
     for _ in range(widenings):
         if left <= ENOUGH * np.linalg.norm(found.v):
             break
         h *= 4
         try:
-            wider, rest = differenced_rates(first, motion_at, h, pull)
+            wider, rest = differenced_rates(first, motion_at, h, pull, damped)
         except (SolveError, MotionError):
             break
         if np.linalg.norm(wider.v - found.v) > SAME * left:  # the motion bends within
@@ -203,35 +212,27 @@ def _moving(first: Instant, motion_at: Motion, widenings: int = WIDER, pull: Fla
     return found
 
 
-def _damped(now: Instant, found: MovingDeflection, pull: Flat | float) -> MovingDeflection:
-    """The same with the links' own damping in the balance, C g', without which they would vibrate by its deflection.
-
-    The rates stay, in which joints are closed: they would change by β g'', or by β ω × g'.
-    """
-    of, spins = now.of, cross_matrix(now.omega)
-
-    def turning(u: Flat) -> Flat:
-        every = enumerate(spins)
-        return as_coordinates(of, [rotated_rate(spin, rows(of, k, u[own(of, k)])) for k, spin in every])
-
-    both = zip(*(now.internal_states(found.u, v) for v in (found.strained, turning(found.u))), strict=True)
-    forces = pull - np.concatenate([moving.f - still.f for moving, still in both])
-    z1 = now.interface(found.v) if _feels_rates(of) else None
-    u = equilibrium(now, found.u, _constant(forces), spins_of(now), z1)
-    return MovingDeflection(u, found.v, found.strained + turning(u - found.u))
-
-
-def differenced_rates(first: Instant, motion_at: Motion, h: float, pull: Flat) -> tuple[MovingDeflection, float]:
+def differenced_rates(
+    first: Instant, motion_at: Motion, h: float, pull: Flat, damped: bool = False
+) -> tuple[MovingDeflection, float]:
     """Deflection and rate from five instants, h after each other, and by how much rates are open where rounding ends what
-    dampers feel of them."""
-    of = first.of
+    dampers feel of them.
+
+    Parameters
+    ----------
+    damped : whether the links' own damping is in the balance, C g', without which they would vibrate by its deflection;
+        it is small, so that the rates without it are good enough for it
+    """
+    of, feels = first.of, _feels_rates(first.of)
     instants = [first, *(Instant(of, motion_at, first.time + k * h, first) for k in range(1, 5))]
     pulls = [with_links(first, now, pull) for now in instants]
     u, change = np.zeros((5, len(pull))), np.inf
     v = felt = np.zeros((5, 0))
     left = 0.0
-    for again in range(DAMPED if _feels_rates(of) else 1):
+    for again in range(DAMPED if feels else 1 + damped):
         before, earlier, felt = u.copy(), felt, v
+        forces = [pulls[k] - resistance(now, u[k], strained(instants, u, h, k)) if again and damped else pulls[k]
+                  for k, now in enumerate(instants)]  # fmt: skip
         try:
             for k, now in enumerate(instants):
                 guess = u[k]
@@ -239,23 +240,28 @@ def differenced_rates(first: Instant, motion_at: Motion, h: float, pull: Flat) -
                     guess = AHEAD[k] @ u[:k]
                     now.near = term_angles(instants[k - 1], instants[k - 1].interface(u[k - 1]))
                 now.slow = now.slow or instants[k - 1].slow
-                z1 = now.interface(v[k]) if again else None
+                z1 = now.interface(v[k]) if again and feels else None
                 if again or k:
-                    u[k] = equilibrium(now, guess, _constant(pulls[k]), spins_of(now), z1)
+                    u[k] = equilibrium(now, guess, _constant(forces[k]), spins_of(now), z1)
                 else:
-                    u[k] = _balance(now, guess, pulls[k], spins_of(now))
+                    u[k] = _balance(now, guess, forces[k], spins_of(now))
         except SolveError:
             if again < 2:  # rounding has not grown yet
                 raise
             return moved(instants, before, earlier, h), np.inf
         v, last, change = LATER @ u / h, change, float(np.linalg.norm(u[0] - before[0]))
+        if not feels:
+            continue
         rest, left = left, float(np.linalg.norm(v[0] - felt[0])) if again else 0.0
         if again > 1 and change > last:  # rounding of rates; changes that only fall unevenly go on
             return moved(instants, before, earlier, h), max(left, rest)
         if again and change <= CONVERGED * float(np.linalg.norm(u[0])):
             return moved(instants, u, felt, h), 0.0
-    if again == 0:
-        return moved(instants, u, v, h), scatter(u) / h
+    if not feels:
+        found = moved(instants, u, v, h)
+        if damped:  # the rates whose resistance u balances
+            found = replace(found, strained=strained(instants, before, h) + rotating(first, u[0] - before[0]))
+        return found, scatter(u) / h
     return moved(instants, u, felt, h), left  # the rates that dampers have felt: u balances these
 
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from kedfem.arrays import Float
+from kedfem.dynamics.system.starts.initial_states import as_coordinates
 from kedfem.dynamics.system.starts.instant import Flat, Instant
-from kedfem.dynamics.system.starts.internal_forces import own
+from kedfem.dynamics.system.starts.internal_forces import own, rotated_rate, rows
 from kedfem.motion.newton import cross_matrix
 
 LATER = np.array([
@@ -41,14 +42,31 @@ def moved(
     instants: Sequence[Instant], u: Float[np.ndarray, "5 N"], v: Float[np.ndarray, "5 N"], h: float
 ) -> MovingDeflection:
     """At the first of five instants, h after each other."""
-    now, strained = instants[0], np.empty(u.shape[1])
+    return MovingDeflection(u[0], v[0], strained(instants, u, h))
+
+
+def strained(instants: Sequence[Instant], u: Float[np.ndarray, "5 N"], h: float, i: int = 0) -> Flat:
+    """Rates by differences in rigid-body frames at one of five instants, h after each other."""
+    now, out = instants[i], np.empty(u.shape[1])
     for k, link in enumerate(now.of.system.model.links):
         here, d = own(now.of, k), link.d
         x = u[:, here].reshape(len(u), d, -1)
         g = np.stack([each.R[k][:d, :d].T @ y for each, y in zip(instants, x, strict=True)])
-        rate = now.R[k][:d, :d] @ (np.tensordot(LATER[0], g, 1) / h)
-        strained[here] = (rate + cross_matrix(now.omega[k])[:d, :d] @ x[0]).ravel()
-    return MovingDeflection(u[0], v[0], strained)
+        rate = now.R[k][:d, :d] @ (np.tensordot(LATER[i], g, 1) / h)
+        out[here] = (rate + cross_matrix(now.omega[k])[:d, :d] @ x[i]).ravel()
+    return out
+
+
+def resistance(now: Instant, u: Flat, v: Flat) -> Flat:
+    """Forces by which links resist the rate of their deflection, C g'."""
+    both = zip(now.internal_states(u, v), now.internal_states(u, rotating(now, u)), strict=True)
+    return np.concatenate([moving.f - still.f for moving, still in both])
+
+
+def rotating(now: Instant, u: Flat) -> Flat:
+    """Rates of a deflection that only rotates with its links."""
+    every = enumerate(cross_matrix(now.omega))
+    return as_coordinates(now.of, [rotated_rate(spin, rows(now.of, k, u[own(now.of, k)])) for k, spin in every])
 
 
 def scatter(u: Float[np.ndarray, "5 N"]) -> float:
