@@ -104,7 +104,7 @@ def test_shown_lines_are_looked_for_in_the_output() -> None:
 
 @pytest.mark.long
 @pytest.mark.usefixtures("wide")
-@pytest.mark.parametrize(("page", "lines"), [("tutorial/first-linkage.md", 11), ("tutorial/own-part.md", 7)], ids=str)
+@pytest.mark.parametrize(("page", "lines"), [("tutorial/first-linkage.md", 11), ("tutorial/own-part.md", 8)], ids=str)
 def test_a_lesson_does_what_it_says(page: str, lines: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     shutil.copyfile(ROOT / "geometry" / "connecting_rod.step", "rod.step")
