@@ -40,15 +40,15 @@ def damped_errors(ready: Prepared, base: Histories, zeros: set[str] | None = Non
     if ready.scene.analysis.rho_inf > STRONG:
         return {}
     for rho_inf in LITTLE:
-        scene, turned = with_analysis(ready.scene, rho_inf=rho_inf), _Turned()
+        scene, rotation = with_analysis(ready.scene, rho_inf=rho_inf), _LargestRotation()
         if time_grid(scene).steps < fewest_steps(scene):
             continue
         grows = fewest_steps(with_analysis(scene, rho_inf=1.0)) == math.inf  # in links that rotate too far in a step
         try:
-            found = histories(replace(ready, scene=scene), look=turned.add if grows else _unwatched, near=base.begun)
+            found = histories(replace(ready, scene=scene), look=rotation.add if grows else _unwatched, near=base.begun)
         except KedfemError:  # the run needs the damping
             continue
-        if turned.most <= stable_rotation(rho_inf):
+        if rotation.most <= stable_rotation(rho_inf):
             return relative_errors(base, found, zeros)
     return {}
 
@@ -64,7 +64,7 @@ def damping_remedy(scene: Scene, step: Mapping[str, float], damped: Mapping[str,
 
 
 @dataclass
-class _Turned:
+class _LargestRotation:
     """The largest rotation of a link in a step so far [rad]."""
 
     most: float = 0.0
@@ -72,8 +72,8 @@ class _Turned:
     def add(self, block: Block) -> None:
         """Evaluate the steps of a block."""
         for R in (link.R for link in block.links if len(link.R) > 1):
-            turns = np.einsum("tji,tjk->tik", R[:-1], R[1:])
-            sine = np.linalg.norm(turns - turns.transpose(0, 2, 1), axis=(1, 2)) / math.sqrt(8)
+            rotations = np.einsum("tji,tjk->tik", R[:-1], R[1:])
+            sine = np.linalg.norm(rotations - rotations.transpose(0, 2, 1), axis=(1, 2)) / math.sqrt(8)
             self.most = max(self.most, float(np.arcsin(np.minimum(sine, 1.0)).max()))
 
 
