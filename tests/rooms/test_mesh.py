@@ -592,18 +592,18 @@ class TestSession:
         assert_array_equal(made[0].points, made[1].points)
 
     def test_meshes_on_after_an_error(self):
-        """A disk has not the corners of a mapped face; without that wish it can be meshed."""
+        """A cylinder has too few faces to be mapped; it can be meshed otherwise, in the same process."""
         with gmsh_model() as gmsh:
-            disk = gmsh.model.occ.addDisk(0, 0, 0, 1, 1)
+            cylinder = gmsh.model.occ.addCylinder(0, 0, 0, 1, 0, 0, 1)
             gmsh.model.occ.synchronize()
-            gmsh.model.mesh.setTransfiniteSurface(disk)
-            with pytest.raises(GmshError, match="is transfinite but has 1 corner"), gmsh_errors_at_end(gmsh):
-                gmsh.model.mesh.generate(2)
-            gmsh.model.mesh.removeConstraints([(2, disk)])
+            gmsh.model.mesh.setTransfiniteVolume(cylinder)
+            with pytest.raises(GmshError, match="bounded by 5 or 6 surfaces"), gmsh_errors_at_end(gmsh):
+                gmsh.model.mesh.generate(3)
+            gmsh.model.mesh.removeConstraints([(3, cylinder)])
             gmsh.model.mesh.clear()
             with gmsh_errors_at_end(gmsh):
-                gmsh.model.mesh.generate(2)
-            assert len(gmsh.model.mesh.getElements(2)[1][0]) > 10
+                gmsh.model.mesh.generate(3)
+            assert len(gmsh.model.mesh.getElements(3)[1][0]) > 10
 
     def test_what_gmsh_raises_is_an_error_of_gmsh_and_others_are_left(self):
         with gmsh_model() as gmsh:
