@@ -202,7 +202,8 @@ def _generated(gmsh: ModuleType, solid: Solid, failures: list[str]) -> SolidMesh
     except GmshError as error:
         failures += _in_words(gmsh, error, solid.faces)
         return None
-    sides = {face.tag: _sides(gmsh, face.tag) for face in solid.faces}
+    _, ranked = numbered_nodes(gmsh)
+    sides = {face.tag: _sides(gmsh, face.tag, ranked) for face in solid.faces}
     if not len(cells) or not sides:
         return None
     straightened = unfolded(points, cells, _BAD)
@@ -236,9 +237,8 @@ def _tetrahedra(gmsh: ModuleType, solid: Solid) -> tuple[Float[np.ndarray, "n 3"
     return points, np.searchsorted(ranked, nodes[0]).reshape(-1, 10)[:, order]
 
 
-def _sides(gmsh: ModuleType, face: int) -> Int[np.ndarray, "f 3"]:
-    """Corners of the triangles on a face."""
-    _, ranked = numbered_nodes(gmsh)
+def _sides(gmsh: ModuleType, face: int, ranked: Int[np.ndarray, " n"]) -> Int[np.ndarray, "f 3"]:
+    """Corners of the triangles on a face, among gmsh's numbers of nodes in rising order."""
     kinds, _, nodes = gmsh.model.mesh.getElements(2, face)
     if not len(kinds):
         return np.zeros((0, 3), dtype=np.int64)

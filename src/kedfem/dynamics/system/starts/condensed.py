@@ -4,7 +4,7 @@ A body whose frame does not turn with the rigid-body motion takes no other defle
 without vibration: the balance found is that of the unreduced body, without a solution of its factor.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -72,19 +72,22 @@ class Condensed:
         return np.concatenate(out)
 
 
-def condensed(now: Instant, turning: RigidMotion | None, forces: Rows | None = None) -> Condensed:
+def condensed(now: Instant, turning: Callable[[], RigidMotion] | None, forces: Rows | None = None) -> Condensed:
     """The system in which the balance at an instant is sought.
 
     Parameters
     ----------
-    turning : over the times of the search, if inertia of the deflection counts: a body has it that turns with this
+    turning : motion over the times of the search, if inertia of the deflection counts: a body has it that turns with
+        this; asked for where there are large bodies
     forces : per body (n, d), beside its loads
     """
     of, every = now.of, zip(now.of.parts, now.of.system.model.links, strict=True)
     large = [k for k, (part, link) in enumerate(every) if _is_large(part, link)]
     bodies = of.bodies.motion[large]
-    if turning is not None and (turning.omega[:, bodies].any() or turning.alpha[:, bodies].any()):
-        large = []
+    if large and turning is not None:
+        motion = turning()
+        if motion.omega[:, bodies].any() or motion.alpha[:, bodies].any():
+            large = []
     if not large or of.c.single or of.stressed is not None:
         return Condensed(of, of, now, [None] * len(of.parts))
     if forces is not None:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kedfem.arrays import Float
+from kedfem.dynamics.frames import rotations
 from kedfem.dynamics.system.forces.rotations import arc
 from kedfem.dynamics.system.record import (
     ANGLE,
@@ -212,8 +213,7 @@ def _directions(end: End, R: Series, u: Series) -> Series:
 
 def _rotation(A: Series) -> Series:
     """Q of A = Q U: the value by singular values and Newton, then order by order."""
-    left, _, right = np.linalg.svd(A[0].real)
-    Q = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    Q = rotations(A[0].real[None])[0]
     for _ in range(2):
         Q = Q @ rotation(_small_rotation(Q.T @ A[0].real))
     if np.iscomplexobj(A):  # one step more is exact to first order

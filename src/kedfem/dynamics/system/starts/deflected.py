@@ -94,7 +94,7 @@ def _moving_state(
     now: Instant, motion_at: Motion, widenings: int = WIDER, near: State | None = None, forces: Rows | None = None
 ) -> State:
     """The state at an instant with a deflection that moves on with the rigid-body motion, under forces beside loads."""
-    small = condensed(now, motion_at(now.time + now.of.c.h / 4 * np.arange(5)), forces)
+    small = condensed(now, lambda: motion_at(now.time + now.of.c.h / 4 * np.arange(5)), forces)
     first = small.at(now, motion_at, near)
     found = _moving(first, motion_at, widenings, 0.0 if forces is None else small.forces(forces))
     return begun(now, small.back(found.u), small.back(found.v), strained=small.back(found.strained))

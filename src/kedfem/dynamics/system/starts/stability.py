@@ -50,7 +50,7 @@ def stability(of: Ready, motion_at: Motion, state: State, at_rest: bool, like: I
     like : another instant, with what does not depend on time
     """
     whole = Instant(of, motion_at, float(state.time[0]), like, state.term_angles)
-    small = condensed(whole, None if at_rest else whole.motion)
+    small = condensed(whole, None if at_rest else lambda: whole.motion)
     now, u = small.at(whole, motion_at, state), small.onto(state.u)
     spins, z1 = (None, None) if at_rest else (spins_of(now), now.interface(small.onto(state.v)))
     problem = Equilibrium(now, lambda u, f: np.zeros_like(u), spins, z1)
