@@ -22,7 +22,7 @@ from kedfem.folders import sealed, unsealed
 from kedfem.memory import Packed, packed
 from kedfem.results import replacing
 from kedfem.results.layout import installed_version
-from kedfem.scene import Cad, MeshFile, Part, Scene
+from kedfem.scene import Scene, geometry_files
 from kedfem.store import contents, software
 
 STATE = "state.kept"
@@ -139,9 +139,7 @@ def has_state(folder: Path) -> bool:
 
 def origin(scene: Scene) -> dict[str, Any]:
     """What a run depends on: kedfem and its libraries, the scene key by key, the contents of its files."""
-    shapes = (link.shape for link in scene.links.values())
-    files = {x.file for x in shapes if isinstance(x, Cad | MeshFile | Part)}
-    named = {f"contents of {name}": contents([scene.folder / name]).hex() for name in sorted(map(str, files))}
+    named = {f"contents of {name}": contents(files).hex() for name, files in geometry_files(scene).items()}
     return {"kedfem": installed_version(), "software": software(), **flat(scene), **named}
 
 
@@ -161,8 +159,8 @@ def flat(scene: Scene) -> dict[str, Any]:
 
 
 def _refuse_other(before: Mapping[str, Any], now: Mapping[str, Any], remedy: str) -> None:
-    """Only what has not changed can be gone on with; the first key that differs is named."""
-    for key in before:
+    """Only what has not changed can be gone on with; the first key that differs, or is there in one alone, is named."""
+    for key in {**before, **now}:
         then, here = before.get(key, "nothing"), now.get(key, "nothing")
         if then != here:
             what = f"{key}: must be {_short(then)}, as in the run to be resumed, got {_short(here)}"

@@ -44,7 +44,7 @@ def scene_of(kind: str, folder: Path, analysis: dict[str, Any]) -> Scene:
     return scene_from(raw, folder)
 
 
-def turning(folder: Path, **analysis: Any) -> Scene:
+def turning(folder: Path, loads: dict[str, Any] | None = None, **analysis: Any) -> Scene:
     """A crank at constant speed for two revolutions: the second turn takes its motion from the first."""
     beam = {
         "material": "soft",
@@ -55,6 +55,7 @@ def turning(folder: Path, **analysis: Any) -> Scene:
     }
     raw = four_bar((0.1, 0.3, 0.25, 0.3), beam, constant_speed("60 rpm"))
     raw |= {"materials": {"soft": material(2700, 7e10)}, "output": {"plots": False, "picture": False}}
+    raw["loads"] = loads or {}
     raw["analysis"] = {
         "revolutions": 2,
         "steps_per_revolution": 48,
@@ -242,6 +243,17 @@ def test_another_scene_is_refused_with_the_key_that_differs(tmp_path: Path, chan
         analyse(turning(tmp_path, **changed), resumes=True)
     after = read_results(turning(tmp_path).results_folder / "results.h5")
     np.testing.assert_array_equal(after.time, before.time)
+
+
+def test_what_a_scene_has_more_is_refused_too(tmp_path: Path) -> None:
+    """Beside tables of the same kind; a second load began in the middle of the run."""
+    load = {"kind": "force", "link": "coupler", "at": "B", "vector": [0, -10]}
+    first, both = (turning(tmp_path, loads=dict.fromkeys(names, load)) for names in (["one"], ["one", "more"]))
+    ended_early(first, 0.5)
+    with pytest.raises(
+        SceneError, match=r"^loads\.more\.kind: must be nothing, as in .*, got force; it has to be changed"
+    ):
+        analyse(both, resumes=True)
 
 
 def test_another_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,6 +8,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
+from itertools import chain
 from typing import Any, TypeVar
 
 import numpy as np
@@ -24,14 +25,12 @@ from kedfem.motion.linkage import Linkage, linkage
 from kedfem.motion.path import Path, path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.scene import (
-    Cad,
     ConstantSpeed,
-    MeshFile,
-    Part,
     Ramp,
     Scene,
     corotational_links,
     drive_angle,
+    geometry_files,
     path_parameter,
     rayleigh,
     revolution_steps,
@@ -90,8 +89,7 @@ def key(scene: Scene) -> str:
     described = scene.model_dump(mode="json", exclude={*BESIDE})
     described["probes"] = scene.output.model_dump(mode="json")["probes"]
     digest = sha256(json.dumps(described).encode())
-    shapes = (link.shape for link in scene.links.values())
-    digest.update(contents(scene.folder / x.file for x in shapes if isinstance(x, Cad | MeshFile | Part)))
+    digest.update(contents(chain.from_iterable(geometry_files(scene).values())))
     return digest.hexdigest()
 
 

@@ -2,6 +2,7 @@
 
 from kedfem.scene.questions.curves import Pieces, pieces
 from kedfem.scene.questions.enforced import enforced_by_equations
+from kedfem.scene.questions.geometry_files import geometry_files
 from kedfem.scene.questions.laws import (
     curves,
     drive_angle,

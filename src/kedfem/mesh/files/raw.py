@@ -3,6 +3,7 @@
 import io
 import re
 import warnings
+from contextlib import chdir
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
@@ -13,6 +14,7 @@ import numpy as np
 from kedfem.arrays import Float, Int
 from kedfem.errors import MeshError
 from kedfem.mesh.session import gmsh_model, numbered_nodes
+from kedfem.scene.questions.geometry_files import INCLUDE
 from kedfem.scene.records.shapes import MESH_ENDINGS
 
 THROUGH_MESHIO = (".inp", ".vtu", ".vtk", ".xdmf", ".xmf", ".e", ".exo")
@@ -137,18 +139,24 @@ def _through_meshio(path: Path) -> RawMesh:
     _abaqus.abaqus_to_meshio_type.update(_PLANE)
     _mesh.topological_dimension.update(_QUADRATIC)
     abaqus = path.suffix.lower() == ".inp"
-    text = _with_sets(path.read_text(errors="replace")) if abaqus else ""
-    with warnings.catch_warnings():
+    text = _with_sets(_whole_text(path)) if abaqus else ""
+    with warnings.catch_warnings(), chdir(path.parent):  # relative to which XDMF names its data
         warnings.simplefilter("ignore")
-        raw = _abaqus.read_buffer(_named(text, path)) if abaqus else meshio.read(path)
+        raw = _abaqus.read_buffer(io.StringIO(text)) if abaqus else meshio.read(path.name)
     return from_meshio(raw, text)
 
 
-def _named(text: str, path: Path) -> io.StringIO:
-    """A text with the name of its file, relative to which it may include others."""
-    buffer = io.StringIO(text)
-    buffer.name = str(path)
-    return buffer
+def _whole_text(path: Path, within: tuple[Path, ...] = ()) -> str:
+    """An Abaqus text with those of the files that it includes, relative to its folder."""
+
+    def included(line: re.Match[str]) -> str:
+        file = path.parent / line[1]
+        if file in (*within, path) or not file.is_file():
+            got = "one that is being read" if file.is_file() else "nothing"
+            raise MeshError(f"*INCLUDE in {path.name} must name another file, got {got} at {file}")
+        return _whole_text(file, (*within, path)).rstrip()
+
+    return INCLUDE.sub(included, path.read_text(errors="replace"))
 
 
 def _with_sets(text: str) -> str:

@@ -16,6 +16,7 @@ from kedfem.mesh.elements.hexahedra import CELL_TYPES, Face, SolidMesh, without_
 from kedfem.mesh.elements.mixed import one_kind, triangles
 from kedfem.mesh.files.raw import CORNERS, RawMesh, read_mesh
 from kedfem.mesh.isolated import MESH_FILE, READING, in_own_process
+from kedfem.scene.questions.geometry_files import with_named
 from kedfem.scene.records.shapes import MESH_ENDINGS
 from kedfem.store import contents, itself, kept
 
@@ -68,7 +69,7 @@ def raw_of_file(where: str, path: Path) -> RawMesh:
         raise MeshError(f"{where}: {wanted}, got {'a folder' if path.is_dir() else 'nothing'} at {path}")
     if path.suffix.lower() not in MESH_ENDINGS:
         raise MeshError(f"{where}: {wanted}, got {path}")
-    key = sha256(path.suffix.lower().encode() + contents([path])).hexdigest()
+    key = sha256(path.suffix.lower().encode() + contents(with_named(path))).hexdigest()
 
     def read() -> RawMesh:
         try:

@@ -16,6 +16,7 @@ from kedfem.errors import Fault, SceneError, Where
 from kedfem.scene.checks.faults import record_faults
 from kedfem.scene.checks.hints import replaced, walk
 from kedfem.scene.checks.parts import Parts
+from kedfem.scene.questions.geometry_files import with_named
 from kedfem.scene.read.placing import Placement
 from kedfem.scene.records.points import known_points
 from kedfem.scene.records.shapes import Cad, MeshFile, Part, PartGeometry
@@ -50,7 +51,14 @@ def outside(raw: Any, folder: Path) -> list[Fault]:
     """Faults of all names of files and folders in a raw scene that are outside of its folder, with links resolved."""
     wanted = "must be within the scene's folder (--within)"
     named = ((where, x) for where, x, _ in walk(raw, None) if names_file(where, x))
-    return [Fault(where, f"{wanted}, got {x!r}") for where, x in named if not inside(folder, x)]
+    return [Fault(where, f"{wanted}, got {got}") for where, x in named if (got := _outside(folder, x))]
+
+
+def _outside(folder: Path, name: str) -> str:
+    """How a file, or one that it names, is called if it is outside of a folder; empty if none is."""
+    if not inside(folder, name):
+        return repr(name)
+    return next((f"{name!r}, which names {x}" for x in with_named(folder / name) if not inside(folder, x)), "")
 
 
 def renamed(raw: Mapping[str, Any], beside: Path) -> dict[str, Any]:
