@@ -66,11 +66,8 @@ def frozen(raw: dict[str, Any], count: int = 4, driven: bool = True) -> tuple[Sy
     return system, motion, Frozen(system, count, mobility).at(motion), mobility
 
 
-def monolithic_eigenvalues(system: System, motion: RigidMotion, s: float) -> np.ndarray:
-    """ω² [1/s²] of K and M on the null space of all constraints, assembled by the oracle.
-
-    s : of the size of the first, so that rounding of zero ones, 1e-16/s of θ = 1/(ω² + s), is small beside others
-    """
+def monolithic_matrices(system: System, motion: RigidMotion) -> tuple[np.ndarray, np.ndarray]:
+    """K and M on the null space of all constraints, assembled by the oracle."""
     oracle = Monolithic(system, generalised_alpha(1e-3, 1.0))
     every = zip(system.model.links, system.model.bodies, strict=True)
     K = [rotated_stiffness(sp.csr_array(link.K0), motion.R[0, n][: link.d, : link.d]).toarray() for link, n in every]
@@ -83,13 +80,29 @@ def monolithic_eigenvalues(system: System, motion: RigidMotion, s: float) -> np.
     G = np.block([[oracle.W.toarray(), -oracle.B.toarray()], [np.zeros((len(hard), oracle.N)), hard]])
     G /= np.maximum(np.linalg.norm(G, axis=1), 1e-300)[:, None]
     Z = scipy.linalg.null_space(G, rcond=1e-10)
-    A, M = Z.T @ A @ Z, Z.T @ M @ Z
+    return Z.T @ A @ Z, Z.T @ M @ Z
+
+
+def monolithic_eigenvalues(system: System, motion: RigidMotion, s: float, loose: System | None = None) -> np.ndarray:
+    """ω² [1/s²] of these matrices.
+
+    s : of the size of the first, so that rounding of zero ones, 1e-16/s of θ = 1/(ω² + s), is small beside others
+    loose : the system from whose one motion without strain vibrations are separated
+    """
+    A, M = monolithic_matrices(system, motion)
+    if loose is not None:
+        still = scipy.linalg.eigh(M, monolithic_matrices(loose, motion)[0] + s * M)[1][:, -1:]
+        beside = scipy.linalg.null_space(still.T @ M)
+        A, M = beside.T @ A @ beside, beside.T @ M @ beside
     theta = scipy.linalg.eigh(M, A + s * M, eigvals_only=True)[::-1]
     return 1 / theta[theta > 1e-13 * theta[0]] - s
 
 
-def difference(system: System, motion: RigidMotion, found: Modes) -> float:
-    wanted = monolithic_eigenvalues(system, motion, found.omega[found.still] ** 2)[found.still : len(found.omega)]
+def difference(system: System, motion: RigidMotion, found: Modes, loose: System | None = None) -> float:
+    first = found.still if loose is None else 0
+    wanted = monolithic_eigenvalues(system, motion, found.omega[found.still] ** 2, loose)[first:][
+        : len(found.frequencies)
+    ]
     return float(np.abs(found.omega[found.still :] ** 2 / wanted - 1).max())
 
 

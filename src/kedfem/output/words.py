@@ -103,7 +103,12 @@ def moment(scene: Scene, time: float, angle: float, frozen: bool = False) -> str
             return with_prefix(time, "s")
         case "drive travel":
             return with_prefix(angle, "m")
-    return f"{np.degrees(angle):.1f}°"
+    return f"{round(np.degrees(angle), 1) + 0.0:.1f}°"
+
+
+def unstrained(count: int) -> str:
+    """Rigid-body modes in words."""
+    return f"{count} motion{'s' * (count > 1)} without strain"
 
 
 def place_of(point: Iterable[float]) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from kedfem.accuracy.error_budget import OF_SOURCE, TOGETHER, UNKNOWN, percent
-from kedfem.output.words import number_in, place_of, with_prefix
+from kedfem.output.words import number_in, place_of, unstrained, with_prefix
 from kedfem.results import Fatigue, Peak, Results
 from kedfem.results.frequencies import Summary
 
@@ -155,7 +155,7 @@ def frequencies_table(found: Summary) -> Table:
     held = "release" if found.free else "hold"
     message = f"The mechanism frozen at {found.positions} positions, drives {held} their joints."
     if found.still:
-        message += f" {found.still} motions without strain are left out."
+        message += f" Left out: {unstrained(found.still)}."
     if found.speed:
         message += f" The scene's drive rotates at {found.speed:.4g} rpm."
     message += "".join(f" {note[0].upper()}{note[1:]}." for note in found.notes)

@@ -12,7 +12,7 @@ from kedfem.kinematics import KinematicsRun, first_largest
 from kedfem.load_cases import LoadCases
 from kedfem.loads import Loads
 from kedfem.motion.coordinates import driven_names
-from kedfem.output.words import NOTHING, clock, moment, number_in, with_prefix
+from kedfem.output.words import NOTHING, clock, moment, number_in, unstrained, with_prefix
 from kedfem.results.channels import largest_by_unit
 from kedfem.results.kinematic import transmission_key
 from kedfem.scene import Scene
@@ -130,7 +130,7 @@ def case_tables(found: LoadCases) -> list[Table]:
 
 def frequencies_tables(scene: Scene, found: Frequencies) -> list[Table]:
     """Frequencies at each position; of a drive that rotates continuously critical speeds of each harmonic."""
-    still = f"; {found.still} motions without strain, at 0 Hz" if found.still else ""
+    still = f"; {unstrained(found.still)}, at 0 Hz" if found.still else ""
     stiffened = ", stiffened by its motion" if scene.analysis.stiffening else ""
     title = Text(f"Natural frequencies of the frozen linkage{stiffened} [Hz]{still}")
     positions = zip(found.time.tolist(), found.angle.tolist(), strict=True)
@@ -177,7 +177,7 @@ def part_tables(found: PartFrequencies) -> list[Table]:
     """Frequencies of a single link; what it is and its support."""
     part, still = found.part, found.still
     held = f"held at {', '.join(part.held)}" if part.held else "free"
-    left_out = f"{still} motions without strain, at 0 Hz, are left out" if still else ""
+    left_out = f"{unstrained(still)}, at 0 Hz, left out" if still else ""
     rows = [("mass", with_prefix(found.mass, "kg")), ("unknowns", str(part.link.unknowns))]
     rows += [(f"mode {number}", f"{f:.5g} Hz") for number, f in enumerate(found.values, 1)]
     title = Text(f"Natural frequencies of {part.name}, {held}")

@@ -86,12 +86,14 @@ class Frozen:
     least : s at the least [1/s²], where links alone are not held by less
     preloaded : whether forces of springs and motors, which change their directions, count
 
+    excluded : (N, m) motions of unit mass that count as motions without strain; vibrations are orthogonal to them in M
     factorisations : of links, so far
     """
 
     def __init__(self, system: System, count: int, free: int = 0, least: float = 0.0, preloaded: bool = False) -> None:
         self.system, self.count, self.free, self.least = system, count, free, least
         self.preloaded = preloaded
+        self.excluded: Block | None = None
         elastic = [link for link in system.model.links if not link.rigid] or list(system.model.links)
         self.shift = max(FIRST * min(map(wave_frequency, elastic)) ** 2, least)
         self.factorisations = 0
@@ -174,16 +176,24 @@ class Frozen:
         return now, LinearEquations(self.of, self.held, now.R, with_preloads(now, found) if self.preloaded else found)
 
     def _lowest(self, motion: RigidMotion) -> tuple[Float[np.ndarray, " f"], Float[np.ndarray, "N f"]]:
-        """ω² in rising order, and shapes on the coordinates of all bodies."""
+        """ω² in rising order behind those of excluded motions, and shapes on the coordinates of all bodies."""
         _, balance = self.balance(motion)
 
-        def answer(r: Block) -> Block:
+        def solved(r: Block) -> Block:
             return np.stack([balance.solved(each).x for each in r.T], axis=1)
 
         size = int(self.of.bodies.at[-1])
+        x = np.zeros((size, 0)) if self.excluded is None else self.excluded
+        Mx = self.momentum(x) if x.size else x
+        held = solved(Mx) if x.size else x
+
+        def answer(r: Block) -> Block:
+            found = solved(r)
+            return np.asarray(found - held @ np.linalg.solve(Mx.T @ held, Mx.T @ found))
+
         block = max(RIGID_MOTIONS, self.free)
         theta, shapes = lanczos(answer, self.momentum, size, self.count + self.free, block)
-        return 1 / theta - self.shift, shapes
+        return np.append(np.zeros(x.shape[1]), 1 / theta - self.shift), np.hstack([x, shapes])
 
     def momentum(self, x: Block) -> Block:
         """M x."""

@@ -1,8 +1,9 @@
 """Natural frequencies of a linkage frozen at a position, with geometric stiffening and the inertia of rotation.
 
 For a link that rotates at Ω, δ = R y with M (y'' + 2 Ω̃ y' + Ω̃² y) + (K0 + k ⊗ P) y = 0 (`dynamics.stiffening`). The
-symmetric part K0 + k ⊗ P + M Ω̃², with the link's Ω, is kept; the gyroscopic term 2 M Ω̃ y' is left out. A bar that rotates
-freely about its hinge then has the frequency zero, as it should: the rotation of the tension and M Ω̃² cancel.
+symmetric part K0 + k ⊗ P + M Ω̃², with the link's Ω, is kept; the gyroscopic term 2 M Ω̃ y' is left out. Motions that
+released drives let go have no frequency: along the path of a linkage its inertia changes, and its loads do work, which a
+frozen position would take for a stiffness of either sign. Vibrations are those orthogonal to them.
 """
 
 from dataclasses import replace
@@ -31,7 +32,7 @@ from kedfem.scene import Scene, corotational_links
 
 Rigid = tuple[Float[np.ndarray, "k r"], Float[np.ndarray, "r r"]]
 """Rigid motions of a link, and its mass in them."""
-BUCKLES = "buckles under the stresses of its motion"
+BUCKLES = "buckles under the stresses of its motion, or tips over under its loads"
 AMPLE = 2.0  # times what holds a link that its stresses alone would let turn over
 
 
@@ -42,6 +43,7 @@ class Stiffened:
     ----------
     driven : the model of the same links that the drive moves, from which their stresses come
     elements : motors and springs on these links, if there are any
+    loose : the linkage without these stresses, whose motions without strain remain that; None if drives hold it
 
     Raises
     ------
@@ -50,9 +52,10 @@ class Stiffened:
     """
 
     def __init__(
-        self, system: System, driven: Model, count: int, free: int = 0, elements: RigidElements | None = None
-    ) -> None:
-        self.system, self.driven, self.count, self.free = system, driven, count, free
+        self, system: System, driven: Model, count: int, free: int = 0, elements: RigidElements | None = None,
+        loose: Frozen | None = None,
+    ) -> None:  # fmt: skip
+        self.system, self.driven, self.count, self.free, self.loose = system, driven, count, free, loose
         self.stresses = stiffening(driven, elements)
         self.rigid = [_rigid(link) for link in system.model.links]
         self.factorisations = 0
@@ -60,6 +63,9 @@ class Stiffened:
     def at(self, motion: RigidMotion) -> Modes:
         """As `Frozen.at`; stresses may make the linkage buckle there."""
         solver = self.frozen(motion)
+        if self.loose is not None:
+            _, still, shapes = self.loose.modes(motion)
+            solver.excluded = shapes[:, :still]
         try:
             found = solver.at(motion)
         except SolveError as fault:
@@ -144,7 +150,8 @@ def frozen_linkage(
         )
     driven = elastic_model(scene, linkage, along=along)
     _refuse_prescribed(driven, free)
-    return Stiffened(system, driven, count, released, rigid_elements(scene, linkage, along, driven))
+    loose = Frozen(system, 1, released) if free else None
+    return Stiffened(system, driven, count, released, rigid_elements(scene, linkage, along, driven), loose)
 
 
 def _refuse_prescribed(driven: Model, free: bool) -> None:
