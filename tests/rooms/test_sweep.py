@@ -204,8 +204,43 @@ def test_vectors_in_a_plane_have_a_magnitude_too(tmp_path: Path) -> None:
     unit, (most, _, rms, when) = extremes(found.results, -1.0)["probes/tip/displacement/magnitude"]
     size = np.linalg.norm(tip, axis=1)
     assert unit == "m"
-    assert_allclose([most, rms], [size.max(), np.sqrt(np.mean(size**2))], rtol=1e-12)
+    over = np.trapezoid(size**2, found.results.time) / found.results.time[-1]
+    assert_allclose([most, rms], [size.max(), np.sqrt(over)], rtol=1e-12)
     assert when == found.results.time[size.argmax()]
+
+
+@pytest.mark.parametrize("steps", [4, pytest.param(7, marks=pytest.mark.long)])
+def test_means_of_squares_are_over_time(steps: int, tmp_path: Path) -> None:
+    """Of a period, both of whose ends have rows, that of a sine is half its square: m g L/2 cos φ of a slow arm."""
+    done, _ = swept(tmp_path, "L=0.4,0.5", kind="static", revolutions=1, steps_per_revolution=steps)
+    for row, length in zip(done.rows, (0.4, 0.5), strict=True):
+        rms = row.extremes["drive/torque/torque"][1][2]
+        assert_allclose(rms, RHO * W**2 * length**2 * G / 2 / np.sqrt(2), rtol=1e-9)
+    late, _ = swept(tmp_path, "L=0.4,0.5")
+    _, (_, _, rms, _) = late.rows[1].extremes["joints/A/rigid_force/x"]
+    force = MASS * L / 2 * (2 * np.pi * 200 / 60) ** 2  # m ω² L/2 cos φ: to rounding of equal steps in a whole turn
+    assert_allclose(rms, force / np.sqrt(2), rtol=1e-9)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("over", ["analysis.accuracy=0.1,0.002", "links.arm.model=auto,beam"])
+def test_points_with_accuracies_or_models_of_their_own_have_plans_of_their_own(over: str, tmp_path: Path) -> None:
+    """All ran by the plan of the first: by its accuracy, and beams as the solids that it took for `auto`."""
+    raw = arm(accuracy=0.1)
+    del raw["analysis"]["steps_per_revolution"], raw["links"]["arm"]["mesh"]
+    base, axes = BaseScene(raw, tmp_path, "arm"), axes_of([over], raw)
+    done = sweep(base, axes, SweepOptions(), tmp_path / "out", executor=Inline())
+    alone = [finished(Job(base, done_at(axes, k), SharedChoices(), 1.0)) for k in range(2)]
+    peaks = [[row.extremes["stress/arm/peak"][1][0] for row in rows] for rows in (done.rows, alone)]
+    assert done.planned is None
+    assert peaks[0] == peaks[1]
+    assert peaks[0][0] != peaks[0][1]
+
+
+def test_kept_points_have_the_rows_of_all_steps(tmp_path: Path) -> None:
+    done, _ = swept(tmp_path, "output.every=1,2", asked=SweepOptions(quick=True, keep=True))
+    assert [row.status for row in done.rows] == ["complete", "failed"]
+    assert "output.every: must be 1 for files that stay (--keep)" in done.rows[1].message
 
 
 def test_what_counts_is_the_last_turns(tmp_path: Path) -> None:

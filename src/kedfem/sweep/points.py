@@ -19,9 +19,10 @@ from kedfem.accuracy.trials import Stage
 from kedfem.analysis import analyse
 from kedfem.arrays import Float
 from kedfem.dynamics.system.period.map import StateArrays
-from kedfem.errors import KedfemError, SceneError, Where, place
+from kedfem.errors import Fault, KedfemError, SceneError, Where, place
 from kedfem.motion.assembly import assembled
 from kedfem.results import Results
+from kedfem.results.forces.loads import rms
 from kedfem.resume import origin
 from kedfem.scene import Scene, revolution_steps, scene_from, time_grid
 from kedfem.sweep.axes import Value, with_values
@@ -133,8 +134,8 @@ class Row:
         if content["status"] not in STATUSES:
             raise ValueError(f"a status {content['status']!r}")
         found: dict[str, tuple[str, Extreme]] = {}
-        for name, (unit, (most, least, rms, when)) in content.pop("extremes").items():
-            found[name] = unit, (float(most), float(least), float(rms), float(when))
+        for name, (unit, (most, least, mean, when)) in content.pop("extremes").items():
+            found[name] = unit, (float(most), float(least), float(mean), float(when))
         return cls(**content, extremes=found)
 
 
@@ -165,8 +166,16 @@ def finished(job: Job) -> Row:
     return replace(row, seconds=perf_counter() - began)
 
 
+def refuse_thinned(scene: Scene, keep: bool) -> None:
+    """Refuse to keep files of thinned runs: a sweep finds extremes in the rows of all steps."""
+    if keep and scene.output.every > 1:
+        message = "must be 1 for files that stay (--keep): a sweep finds extremes in the rows of all steps"
+        raise SceneError([Fault(("output", "every"), f"{message}, got {scene.output.every}")])
+
+
 def _ran(job: Job) -> Row:
     scene = job.scene()
+    refuse_thinned(scene, job.folder is not None)
     since = _since(scene, job.last)
     with ExitStack() as stack:
         folder = job.folder or FilePath(stack.enter_context(TemporaryDirectory(prefix="kedfem-sweep-")))
@@ -222,14 +231,15 @@ def _since(scene: Scene, last: float) -> float:
 
 def extremes(results: Results, since: float) -> dict[str, tuple[str, Extreme]]:
     """Extremes of every column after a time [s], by name with unit; of vectors also of their magnitude."""
-    some = results.time > since
-    t = results.time[some]
-    return {name: (unit, _four(t, values)) for name, unit, values in columns(results, some)}
+    late = int(np.argmax(results.time > since))
+    begun = max(late - 1, 0)  # where the first interval of the mean begins
+    t, some = results.time[begun:], np.arange(begun, len(results.time))
+    return {name: (unit, _four(t, values, late - begun)) for name, unit, values in columns(results, some)}
 
 
-def _four(t: Float[np.ndarray, " n"], values: Float[np.ndarray, " n"]) -> Extreme:
-    rms = np.sqrt((values**2).mean())
-    return float(values.max()), float(values.min()), float(rms), float(t[np.abs(values).argmax()])
+def _four(t: Float[np.ndarray, " n"], values: Float[np.ndarray, " n"], begins: int) -> Extreme:
+    late = values[begins:]
+    return float(late.max()), float(late.min()), rms(t, values), float(t[begins + np.abs(late).argmax()])
 
 
 def columns(results: Results, some: np.ndarray) -> Iterator[tuple[str, str, Float[np.ndarray, " n"]]]:

@@ -8,10 +8,10 @@ from itertools import islice
 from pathlib import Path as FilePath
 from typing import Any
 
-from kedfem.errors import Fault, KedfemError, OutputError, SceneError
+from kedfem.errors import KedfemError, OutputError, SceneError
 from kedfem.processes import BLAS_THREADS, end_with_parent
 from kedfem.results import claimed
-from kedfem.scene import Scene, scene_from
+from kedfem.scene import scene_from
 from kedfem.scene.questions.timing import scene_speed
 from kedfem.stepping import Watch
 from kedfem.sweep.axes import Axis, with_values
@@ -19,7 +19,7 @@ from kedfem.sweep.edges import Edge, edges, refuse_without_growth, with_middles,
 from kedfem.sweep.files import ROWS, STATES, keep_row, kept_row, write_sweep, write_table
 from kedfem.sweep.neighbours import Continuation, Ends, refuse_without_order
 from kedfem.sweep.plot import write_plot
-from kedfem.sweep.points import BaseScene, Job, Row, SharedChoices, chosen_by_plan, finished
+from kedfem.sweep.points import BaseScene, Job, Row, SharedChoices, chosen_by_plan, finished, refuse_thinned
 
 AHEAD = 2  # points in the queue of each worker, so that none is idle
 ONE_THREAD = dict.fromkeys((*BLAS_THREADS, "NUMBA_NUM_THREADS"), "1")
@@ -91,16 +91,17 @@ def sweep(
         analysis = {**base.raw.get("analysis", {}), "accuracy": "quick"}
         base = replace(base, raw={**base.raw, "analysis": analysis})
     scene = scene_from(base.raw, base.folder, stem=base.stem)  # its own faults are not those of points
-    _refuse_thinned(scene, asked)
+    refuse_thinned(scene, asked.keep)
     if asked.edges is not None:
         refuse_without_growth(scene, axes[0], asked.edges)
     if asked.follow:
         refuse_without_order(scene, asked.edges is not None)
     with claimed(folder or sweep_folder(base), (ROWS, STATES)) as target:
         chosen, planned = _planned(base, axes, watch)
-        jobs = [Job(base, values, chosen, asked.last) for values in _points(axes)]
+        shared = chosen or SharedChoices()  # without a common plan no modes are shared
+        jobs = [Job(base, values, shared, asked.last) for values in _points(axes)] if chosen else []
         following = Continuation.along(axes) if asked.follow else Continuation()
-        point = _Points(base, chosen, asked, target, Ends.among(jobs), following)
+        point = _Points(base, shared, asked, target, Ends.among(jobs), following)
         rows: dict[int, Row] = {}
         axes, found, pool = list(axes), list[Edge](), executor
         try:
@@ -128,13 +129,6 @@ def sweep(
             if asked.edges is not None:
                 write_edges(target / "edges.csv", axes, found)
     return SweepResult(target, tuple(axes), tuple(every), point.before, planned, tuple(found))
-
-
-def _refuse_thinned(scene: Scene, asked: SweepOptions) -> None:
-    """Refuse to keep files of thinned runs: a sweep finds extremes in the rows of all steps."""
-    if asked.keep and scene.output.every > 1:
-        message = "must be 1 for files that stay (--keep): a sweep finds extremes in the rows of all steps"
-        raise SceneError([Fault(("output", "every"), f"{message}, got {scene.output.every}")])
 
 
 @dataclass
@@ -180,15 +174,21 @@ def _points(axes: Sequence[Axis]) -> Iterator[dict[Any, Any]]:
         yield {axis.where: value for axis, value in zip(axes, values, strict=True)}
 
 
-def _planned(base: BaseScene, axes: Sequence[Axis], watch: Watch) -> tuple[SharedChoices, int | None]:
-    """Choices for all points, by the plan of the point with the fastest drive, the first of several."""
-    points, speeds = list(_points(axes)), dict[int, float]()
+def _planned(base: BaseScene, axes: Sequence[Axis], watch: Watch) -> tuple[SharedChoices | None, int | None]:
+    """Choices for all points, by the plan of the point with the fastest drive, the first of several.
+
+    None where accuracies or models of links are swept: each point has a plan of its own.
+    """
+    points, speeds, wanted = list(_points(axes)), dict[int, float](), set[tuple[object, ...]]()
     for k, values in enumerate(points):
         try:
             scene = scene_from(with_values(base.raw, values), base.folder, stem=base.stem)
         except SceneError:
             continue
         speeds[k] = scene_speed(scene)
+        wanted.add((scene.analysis.accuracy, *(link.model for link in scene.links.values())))
+    if len(wanted) > 1:
+        return None, None
     for k in sorted(speeds, key=lambda k: -speeds[k]):
         scene = scene_from(with_values(base.raw, points[k]), base.folder, stem=base.stem)
         try:
