@@ -11,7 +11,7 @@ from kedfem.arrays import Float
 from kedfem.errors import OutputError
 from kedfem.output.plots.comparison import write_comparison
 from kedfem.results import Results, read_results, results_file
-from kedfem.results.differences import Difference, Over, common_abscissa, differences, differing_keys, in_common
+from kedfem.results.differences import Difference, Over, common_abscissa, common_channels, differences, differing_keys
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +93,7 @@ def _names(paths: Sequence[FilePath]) -> tuple[str, ...]:
 
 def _missing(names: Sequence[str], runs: Sequence[Results]) -> tuple[str, ...]:
     """Channels that some runs lack."""
-    common = set(in_common(runs))
+    common = set(common_channels(runs))
     out = []
     for name, run in zip(names, runs, strict=True):
         if own := [each for each in run.channels if each not in common]:

@@ -79,9 +79,8 @@ def loads(file: FilePath, last: float | None = None, folder: FilePath | None = N
 
 def loads_of(scene: Scene, results: Results) -> tuple[list[JointLoad], list[DriveLoad], tuple[str, ...]]:
     """Of all joints and drives whose forces the results show, over time; and what is not known of them, and why."""
-    linked, motion, why = _moved(scene, results)
-    joints = joint_loads(scene, results, linked, motion)
-    return joints, drive_loads(scene, results, linked, motion), why
+    moved, why = _moved(scene, results)
+    return joint_loads(scene, results, moved), drive_loads(scene, results, moved), why
 
 
 def summaries(
@@ -116,19 +115,19 @@ def thinned(results: Results) -> str:
     return f"{wanted}, got those of one step in {results.every} (output.every)"
 
 
-def _moved(scene: Scene, results: Results) -> tuple[Linkage | None, RigidMotion | None, tuple[str, ...]]:
-    """The rigid motion at the rows of the results; where it is not known why."""
+def _moved(scene: Scene, results: Results) -> tuple[tuple[Linkage, RigidMotion] | None, tuple[str, ...]]:
+    """The rigid motion at the rows of the results; None where it is not known, with the reason."""
     left = "loads are in the world's axes alone, without bearing loads and power"
     if scene.driven is None:
-        return None, None, (f"without a drive the links' orientation is not in the results: {left}",)
+        return None, (f"without a drive the links' orientation is not in the results: {left}",)
     try:
         linked, along = moving(scene)
         if linked.mobility:
-            return None, None, (f"beside the drive links move freely ({linked.mobility}): {left}",)
+            return None, (f"beside the drive links move freely ({linked.mobility}): {left}",)
         motion = rigid_motion(linked, along, results.time, path_parameter(scene, results.time))
     except KedfemError as error:
-        return None, None, (f"the rigid motion cannot be found again ({error}): {left}",)
-    return linked, motion, ()
+        return None, (f"the rigid motion cannot be found again ({error}): {left}",)
+    return (linked, motion), ()
 
 
 def _missing(scene: Scene, found: list[JointLoad]) -> tuple[str, ...]:

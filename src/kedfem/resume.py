@@ -21,6 +21,7 @@ from kedfem.errors import OutputError, SceneError
 from kedfem.folders import sealed, unsealed
 from kedfem.memory import Packed, packed
 from kedfem.results import replacing
+from kedfem.results.differences import flat
 from kedfem.results.layout import installed_version
 from kedfem.scene import Scene, geometry_files
 from kedfem.store import contents, software
@@ -80,7 +81,7 @@ class Keeper:
 
     def prepared(self, ready: Prepared) -> None:
         """What was planned and meshed belongs to the state to go on from."""
-        self.origin |= {f"planned {key}": value for key, value in flat(ready.scene).items()}
+        self.origin |= {f"planned {key}": value for key, value in flat(ready.scene.model_dump(mode="json")).items()}
         model = _fingerprint(ready)
         if self.stored:
             remedy = "planned and meshed again as before (it is, where KEDFEM_CACHE still has both)"
@@ -140,22 +141,7 @@ def has_state(folder: Path) -> bool:
 def origin(scene: Scene) -> dict[str, Any]:
     """What a run depends on: kedfem and its libraries, the scene key by key, the contents of its files."""
     named = {f"contents of {name}": contents(files).hex() for name, files in geometry_files(scene).items()}
-    return {"kedfem": installed_version(), "software": software(), **flat(scene), **named}
-
-
-def flat(scene: Scene) -> dict[str, Any]:
-    """A scene as its keys, dotted, with their values."""
-    out: dict[str, Any] = {}
-
-    def add(name: str, x: Any) -> None:
-        if isinstance(x, dict) and x:
-            for key, value in x.items():
-                add(f"{name}.{key}" if name else key, value)
-        else:
-            out[name] = x
-
-    add("", scene.model_dump(mode="json"))
-    return out
+    return {"kedfem": installed_version(), "software": software(), **flat(scene.model_dump(mode="json")), **named}
 
 
 def _refuse_other(before: Mapping[str, Any], now: Mapping[str, Any], remedy: str) -> None:

@@ -30,7 +30,7 @@ from kedfem.output.frames import joint_field, link_fields
 from kedfem.output.vtkhdf import AnimationFile
 from kedfem.results import Channel, ResultsWriter
 from kedfem.results.cross_checks import CrossChecks
-from kedfem.results.modelled import modelled
+from kedfem.results.modelled import link_facts
 from kedfem.results.recorded import Recorded, drive_channel
 from kedfem.results.recording import rows
 from kedfem.results.stresses.envelope import Envelope
@@ -148,7 +148,7 @@ def _notes(ready: Prepared, watched: Watched) -> dict[str, str | float | Mapping
     notes |= {f"segments of {name}": len(parts) for name, parts in corotational.items()}
     notes |= {f"mesh of {name}": method for name, method in mesh_methods(model).items()}
     notes |= {f"not reported: {name}": reason for name, reason in watched.indeterminate.items()}
-    return notes | modelled(ready.scene, ready.linkage, model)
+    return notes | link_facts(ready.scene, ready.linkage, model)
 
 
 @dataclass

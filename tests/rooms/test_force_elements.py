@@ -24,7 +24,7 @@ from kedfem.motion.constraints import perpendiculars
 from kedfem.motion.linkage import linkage
 from kedfem.motion.path import path
 from kedfem.motion.rigid import RigidMotion, resting
-from kedfem.results.forces.force_elements import acting, element_forces
+from kedfem.results.forces.force_elements import element_channels, element_forces
 from kedfem.results.recording import recording
 from kedfem.scene import Factor, Pieces, Scene, pieces, scene_from
 from tests.force_vectors import TURN, ForceElement, coordinate, placed, wrench
@@ -332,7 +332,7 @@ def test_channels_and_forces_are_those_of_laws_where_links_are(kind: str) -> Non
     ready, every = ran(raw)
     elements = by_vectors(ready.scene, ready.model)
     measured, before = element_forces(ready.scene, ready.model), np.zeros(len(elements))
-    channels = acting(ready.scene, measured)
+    channels = element_channels(ready.scene, measured)
     assert not any(each.channel.name.startswith("drive") for each in channels)
     for block in every:
         got = {each.channel.name: each.rows(block)[:, 0] for each in channels}

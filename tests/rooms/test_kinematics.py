@@ -17,7 +17,7 @@ from kedfem.dynamics.inertias import inertias_of_links
 from kedfem.kinematics import coarse, kinematics, rigid_links, worst_angle
 from kedfem.links.build import bare_links
 from kedfem.mesh.cad.sides import boundary_sides
-from kedfem.motion.coordinates import coordinates, counted_on
+from kedfem.motion.coordinates import coordinates, unwrapped
 from kedfem.motion.linkage import linkage
 from kedfem.motion.transmission import transmissions
 from kedfem.output.frames import drawn_bodies, rigid_fields
@@ -177,10 +177,10 @@ def test_joint_coordinates_are_counted_beyond_a_turn() -> None:
         return r * np.cos(q) + np.sqrt(rod**2 - (r * np.sin(q)) ** 2)
 
     inclination = -np.arcsin(r / rod * np.sin(q))
-    assert_allclose(counted_on(found["A", "angle"][:, None], None)[:, 0], t, atol=1e-9)
+    assert_allclose(unwrapped(found["A", "angle"][:, None], None)[:, 0], t, atol=1e-9)
     # of the first link, the crank, against the rod
     against = t - (inclination - inclination[0])
-    assert_allclose(counted_on(found["B", "angle"][:, None], None)[:, 0], against, atol=1e-7)
+    assert_allclose(unwrapped(found["B", "angle"][:, None], None)[:, 0], against, atol=1e-7)
     assert_allclose(found["guide", "travel"], travel(q) - travel(drawn), atol=1e-9)
     assert set(found) == {("A", "angle"), ("B", "angle"), ("C", "angle"), ("guide", "travel")}
 

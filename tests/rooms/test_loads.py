@@ -15,7 +15,7 @@ from kedfem.errors import OutputError
 from kedfem.kinematics import kinematics
 from kedfem.loads import loads
 from kedfem.results import Channel, Results, read_results
-from kedfem.results.forces.loads import BALL, ROLLER, DriveLoad, drive_summary, equivalent_load, facing, in_axes
+from kedfem.results.forces.loads import BALL, ROLLER, DriveLoad, drive_summary, equivalent_load, in_axes, polar_axes
 from kedfem.scene import scene_from
 from kedfem.tables import loads_tables
 from tests.reliability.fuzz import short
@@ -86,7 +86,7 @@ def test_a_standing_load_runs_backwards_round_a_turning_shaft() -> None:
     "axis", [[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0], [-1.0, 0, 0], [0.6, 0, 0.8], [2**-0.5, 2**-0.5, 0]]
 )
 def test_the_axes_of_a_polar_diagram_are_right_handed(axis: list[float]) -> None:
-    e1, e2 = facing(np.array(axis))
+    e1, e2 = polar_axes(np.array(axis))
     assert_allclose(np.cross(e1, e2), axis, atol=1e-14)
     assert_allclose([e1 @ e1, e2 @ e2, e1 @ e2], [1, 1, 0], atol=1e-14)
 

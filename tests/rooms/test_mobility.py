@@ -10,7 +10,7 @@ from kedfem.dynamics.stepping.transient import instant_in_words
 from kedfem.errors import MotionError
 from kedfem.motion.dead_point import DeadPoint
 from kedfem.motion.linkage import linkage, looser_rows, reference_linkage
-from kedfem.motion.messages import place
+from kedfem.motion.messages import position_in_words
 from kedfem.motion.mobility import Mobility, mobility
 from kedfem.motion.path import path
 from kedfem.motion.redundancy import redundancy, without_redundancy, wrenches
@@ -379,7 +379,7 @@ def carried(frames: str) -> Scene:
 
 def test_messages_of_a_slide_speak_of_its_travel() -> None:
     link = linkage(carried("co-rotational"))
-    assert place(link, -0.05) == "drive travel -50 mm"
+    assert position_in_words(link, -0.05) == "drive travel -50 mm"
     scene = carried("co-rotational")
     motion = rigid_motion(link, path(link, -0.05, 0.05), np.array([0.25]), path_parameter(scene, np.array([0.25])))
     assert instant_in_words(link, motion, 0) == "t = 0.25 s, drive travel -25 mm"

@@ -115,6 +115,7 @@ RETIRED = {
     "kept_whole": r"(?i)\bkept_?whole\b",
     "laid_over": r"\b(laid_over|one_surface|not_too_bad|check_room)\b",
     "watcher": r"(?i)\bwatcher\b|\bStepWatch\b|\b(asked_for|first_enough|last_of|let_go)\b",
+    "in_common": r"\b(in_common|drawn_points|places_apart|stated_link|counted_on)\b",
     "truth": r"\b(from|against|beside) the truth\b",
 }
 """Words of docs/notation.md that package and docs do not use any more; its names and prose have the right column."""

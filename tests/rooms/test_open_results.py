@@ -63,7 +63,8 @@ def test_channels_of_large_files_are_read_when_they_are_asked_for(
             assert not found.flags.writeable
     write_csv(results, tmp_path / "later.csv")
     assert (tmp_path / "later.csv").read_bytes() == (tmp_path / "whole.csv").read_bytes()
-    some = on_demand.ChannelSelection(results.channels, ("drive/torque",))
+    some = on_demand.selection(results.channels, ("drive/torque",))
+    assert isinstance(some, on_demand.OnDemand)
     assert list(some) == ["drive/torque"]
     assert "gears/g/ratio" not in some
     add_account(tmp_path / "results.h5", ["one more"], {"steps": 1.5})  # adds to the file, whose rows are the same

@@ -185,7 +185,7 @@ def test_the_page_tells_the_run(solid: Path) -> None:
 def test_mass_properties_are_those_of_a_box(axis: list[float], tmp_path: Path) -> None:
     """m = ρ a b c, its centre, and J = R diag(…) Rᵀ along x, y, z and oblique."""
     from kedfem.accuracy.prepared import meshed
-    from kedfem.results.modelled import modelled
+    from kedfem.results.modelled import link_facts
 
     e = np.array(axis) / np.linalg.norm(axis)
     link = {
@@ -196,7 +196,7 @@ def test_mass_properties_are_those_of_a_box(axis: list[float], tmp_path: Path) -
     raw = arm(link, cycloidal(1.0, 0.1), analysis=TIMES, output=output())
     raw["joints"] = {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0, 0], "axis": list(across)}}
     ready = meshed(scene_from(raw, tmp_path))
-    found = modelled(ready.scene, ready.linkage, ready.model)["arm"]
+    found = link_facts(ready.scene, ready.linkage, ready.model)["arm"]
     m, (a, b, c) = 7850 * 0.4 * 0.03 * 0.02, (0.4, 0.03, 0.02)
     assert found["mass [kg]"] == pytest.approx(m, rel=1e-9)
     assert_allclose(found["centre of mass [m]"], 0.2 * e, atol=1e-9)

@@ -16,7 +16,7 @@ from kedfem.dynamics.system.period.search import Periodic, Search
 from kedfem.dynamics.system.steps import Steps
 from kedfem.results import Channel, Results
 from kedfem.results.channels import largest_by_unit
-from kedfem.results.on_demand import ChannelSelection
+from kedfem.results.on_demand import selection
 from kedfem.results.recording import recording, rows
 
 FAINT = 3e-3  # of the largest force times the linkage's size, or of the largest value of the same unit: zero if below
@@ -196,5 +196,6 @@ def run_histories(results: Results, solvers: Sequence[Steps]) -> Histories:
     """The judged channels of a run; none if it did not record all time points."""
     if results.every > 1:
         return Histories(results.time[:0], {}, begun=steady_state(solvers))
-    names = tuple(filter(kept, results.channels))
-    return Histories(results.time, ChannelSelection(results.channels, names), begun=steady_state(solvers))
+    return Histories(
+        results.time, selection(results.channels, filter(kept, results.channels)), begun=steady_state(solvers)
+    )

@@ -18,6 +18,7 @@ from kedfem.dynamics.stepping.state import Nodal
 from kedfem.links.beams.metric import pulled_back, strains_of
 from kedfem.links.record import Frame, Link
 from kedfem.motion.newton import rotation as exponential
+from kedfem.vectors import nearest_rotations
 
 NUDGE = 1e-5  # of a link's size: what it moves by to show the rate of its deformation, rounding and error 1e-10 of it
 
@@ -53,25 +54,14 @@ def rotation(link: Link, fit: Float[np.ndarray, "n 3"], y: Nodal, angle: float) 
     return Q, float(turn + 2 * np.pi * np.round((angle - turn) / (2 * np.pi)))
 
 
-def rotations(A: Float[np.ndarray, "T 3 3"]) -> Float[np.ndarray, "T 3 3"]:
-    """Q of A = Q U, U symmetric; of rank two as well."""
-    left, _, right = np.linalg.svd(A)
-    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
-    return np.asarray(left @ right)
-
-
 def mean_rotations(
     link: Link, fit: Float[np.ndarray, "n 3"], y: Float[np.ndarray, "T n d"]
 ) -> Float[np.ndarray, "T d d"]:
     """Q of `rotation` at T times."""
     A = np.einsum("tna,nb->tab", y, fit[:, : y.shape[2]])
+    Q = nearest_rotations(A, link.planar)
     if link.planar:
-        turn = np.arctan2(A[:, 1, 0] - A[:, 0, 1], A[:, 0, 0] + A[:, 1, 1])
-        Q = np.tile(np.eye(link.d), (len(y), 1, 1))
-        cos, sin = np.cos(turn), np.sin(turn)
-        Q[:, 0, 0], Q[:, 0, 1], Q[:, 1, 0], Q[:, 1, 1] = cos, -sin, sin, cos
         return Q
-    Q = rotations(A)
     # once more by Newton: a slender segment shows its twist by small numbers
     U = Q.transpose(0, 2, 1) @ A
     axial = np.stack([U[:, 2, 1] - U[:, 1, 2], U[:, 0, 2] - U[:, 2, 0], U[:, 1, 0] - U[:, 0, 1]], axis=1)

@@ -76,7 +76,7 @@ def driven_names(scene: Scene, joint: str) -> list[str]:
     return [x if drive.about is None else f"{x}_about_{drive.about}" for x, (_, drive) in zip(names, drives, strict=True)]
 
 
-def counted_on(angle: Float[np.ndarray, "T c"], before: Float[np.ndarray, " c"] | None) -> Float[np.ndarray, "T c"]:
+def unwrapped(angle: Float[np.ndarray, "T c"], before: Float[np.ndarray, " c"] | None) -> Float[np.ndarray, "T c"]:
     """Angles beyond ±π, from the last ones of the time before on [rad]."""
     if before is None:
         return np.asarray(np.unwrap(angle, axis=0))

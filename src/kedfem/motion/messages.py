@@ -21,7 +21,7 @@ def stopped(link: Linkage, poses: Poses, tau: float, aim: Target) -> str:
     stress, driven = np.abs(left[:, len(s) - 1]), link.rows.drive >= 0
     own = np.array([name in link.drives.joints for name in link.joints])
     joint = link.joints[int(np.where(own, 0, stress).argmax())]
-    at = f"at {place(link, tau)}"
+    at = f"at {position_in_words(link, tau)}"
     if s[-1] > NEAR_SINGULAR * s[0]:
         apart = "its redundant joints no longer fit together {} (is an axis askew, or one joint too many?)"
         got = apart.format(at) if link.redundant else f"it cannot be assembled any further {at}"
@@ -35,7 +35,7 @@ def stopped(link: Linkage, poses: Poses, tau: float, aim: Target) -> str:
     return f"{whose}: the linkage must follow its {noun} {drives} over the whole range, got: {got}"
 
 
-def place(link: Linkage, tau: float, form: str = ".2f") -> str:
+def position_in_words(link: Linkage, tau: float, form: str = ".2f") -> str:
     """The position of a linkage on its path in words: the angle or travel of its drive; with several drives the time."""
     if len(link.drives) != 1:
         return f"t = {tau:.6g} s"

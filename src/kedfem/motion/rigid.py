@@ -9,7 +9,7 @@ from kedfem.arrays import Float, Int
 from kedfem.errors import MotionError
 from kedfem.motion.batch import Moving, moving
 from kedfem.motion.linkage import Linkage
-from kedfem.motion.messages import place
+from kedfem.motion.messages import position_in_words
 from kedfem.motion.newton import OPEN, cross_matrix
 from kedfem.motion.path import Path, aimed, predicted
 from kedfem.vectors import cross
@@ -109,7 +109,7 @@ def rigid_motion(link: Linkage, along: Path, t: Float[np.ndarray, " T"], drive: 
         k = int(got.gap.argmax())
         raise MotionError(
             f"joints: the linkage must close at all times, got an open joint ({got.gap[k] * link.size:.3g} m) "
-            f"at t = {t[k]:.6g} s, {place(link, float(tau[k, 0]), '.6g')}"
+            f"at t = {t[k]:.6g} s, {position_in_words(link, float(tau[k, 0]), '.6g')}"
         )
     return _about_origin(link, t, q, got)
 

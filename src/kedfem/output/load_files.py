@@ -11,7 +11,7 @@ from kedfem.motion.released_motions import components
 from kedfem.output.plots.drawing import figure_saved
 from kedfem.output.words import prefixed
 from kedfem.results import Results
-from kedfem.results.forces.loads import DriveLoad, JointLoad, facing
+from kedfem.results.forces.loads import DriveLoad, JointLoad, polar_axes
 from kedfem.results.table import drive_heading, text_file, write_numbers, write_rows
 
 XYZ = "xyz"
@@ -78,7 +78,7 @@ def _polar_unit(load: JointLoad, rows: Bool[np.ndarray, " T"]) -> tuple[float, s
 
 def draw_polar(figure: Any, load: JointLoad, rows: Bool[np.ndarray, " T"]) -> None:
     """Draw the diagram of a hinge: the load on each of its links."""
-    e1, e2 = facing(np.asarray(load.axis))
+    e1, e2 = polar_axes(np.asarray(load.axis))
     divisor, unit = _polar_unit(load, rows)
     sides = figure.subplots(1, 2, subplot_kw={"projection": "polar"})
     for ax, link, force in zip(sides, load.links, load.inside, strict=True):

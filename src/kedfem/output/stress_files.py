@@ -12,7 +12,7 @@ from kedfem.output.vtu import write_points
 from kedfem.results import Fatigue, Peak
 from kedfem.results.fatigue.surface import LinkFatigue
 from kedfem.results.stresses.envelope import LinkEnvelope
-from kedfem.results.stresses.peaks import drawn_points
+from kedfem.results.stresses.peaks import reference_points
 from kedfem.results.table import write_rows
 
 ENVELOPE, POINTS, TOP = "envelope.vtu", "envelope.csv", "peaks.csv"
@@ -117,7 +117,7 @@ def _write_spots(path: Path, found: Fatigue) -> None:
 
 def _write_field(path: Path, recoveries: Sequence[StressRecovery], columns: Columns) -> None:
     """Write values at all points of all links, undeformed, for ParaView."""
-    parts = [(x.link.name, drawn_points(x), (x.cell_type, x.cells)) for x in recoveries]
+    parts = [(x.link.name, reference_points(x), (x.cell_type, x.cells)) for x in recoveries]
     write_points(path, parts, columns)
 
 
@@ -126,7 +126,7 @@ def _write_table(
 ) -> None:
     """Write the same values as CSV, with texts for each point."""
     names = [(x.link.name, node) for x in recoveries for node in range(x.points)]
-    numbers = np.column_stack([np.concatenate([drawn_points(x) for x in recoveries]), *columns.values()])
+    numbers = np.column_stack([np.concatenate([reference_points(x) for x in recoveries]), *columns.values()])
     rows = zip(names, numbers.tolist(), *words.values(), strict=True)
     header = ["link", "node", *PLACE, *columns, *words]
     write_rows(path, header, ([*name, *row, *more] for name, row, *more in rows))

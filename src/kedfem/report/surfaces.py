@@ -12,6 +12,7 @@ from kedfem.output.fields import BODY, DISPLACEMENT, LINK, SPRING, VON_MISES
 from kedfem.output.rendering import QUADRILATERAL, SHARP
 from kedfem.output.stress_files import KINDS
 from kedfem.output.views import LIFT
+from kedfem.vectors import nearest_rotations
 
 NODES = 20_000  # most nodes on the surfaces of all links that a browser draws quickly
 HIGHEST = f"{KINDS[0]} stress [Pa]"
@@ -164,12 +165,8 @@ def placement(X: Places, x: Places, flat: bool = False) -> Placement:
     ----------
     flat : whether they stay in a plane z = constant, since points on a line do not determine the rotation about it
     """
-    if flat:
-        up = np.array([0.0, 0.0, float(np.ptp(X, axis=0).max()) or 1.0])
-        X, x = np.concatenate([X, X + up]), np.concatenate([x, x + up])
     centre, there = X.mean(axis=0), x.mean(axis=0)
-    U, _, Vt = np.linalg.svd((X - centre).T @ (x - there))
-    R = Vt.T @ np.diag([1.0, 1.0, np.linalg.det(Vt.T @ U.T)]) @ U.T
+    R = nearest_rotations((x - there).T @ (X - centre), flat)
     return Placement(there - R @ centre, R)
 
 

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from kedfem.errors import OutputError
-from kedfem.results.files import reason
+from kedfem.results.files import unwritable
 from kedfem.results.layout import FATIGUE, PEAKS, TIMING, WARNINGS, opened, read_facts, seal, write_facts
 from kedfem.results.records import Fatigue, FatigueSpot, Peak
 
@@ -25,7 +24,7 @@ OF_SPOT = {
     "utilisation": "utilisation", "amplitude": "amplitude [Pa]", "mean": "mean stress [Pa]",
     "disproportion": "disproportion", "support": "support factor", "cycles": "cycles in a period", "near": "near",
 }  # fmt: skip
-"""Fields of records by their names in the file."""
+"""Field of a record → its name in the file."""
 
 
 def mark_unreliable(path: Path, why: str) -> None:
@@ -124,4 +123,4 @@ def _changed(path: Path) -> Iterator[Any]:
             yield file
             seal(file)
     except (OSError, RuntimeError) as error:
-        raise OutputError(f"{path}: must be a file that can be written, got {reason(error)}") from error
+        raise unwritable(path, error) from error

@@ -30,7 +30,7 @@ from kedfem.dynamics.loads import applied
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.stepping.state import Rayleigh
-from kedfem.dynamics.stiffening import Stiffening, StressForce, StressModes
+from kedfem.dynamics.stiffening import Stiffening
 from kedfem.motion.rigid import RigidMotion
 from kedfem.results.balance import Balance, Flow, Stress, fields_of, flow, prescribed_fields, stress
 from kedfem.results.channels import Channel
@@ -67,7 +67,7 @@ class _Sums:
     def add(
         self, t: Float[np.ndarray, " T"], rates: Float[np.ndarray, "T r"], taken: Float[np.ndarray, "T s"]
     ) -> tuple[Float[np.ndarray, "T r"], Float[np.ndarray, "T s"]]:
-        """Both, at the time points of the next block."""
+        """Add the next block; both integrals at its time points."""
         before = np.concatenate([self.rates[None], rates[:-1]])
         h = np.diff(t, prepend=self.t)
         work = self.work + np.cumsum(0.5 * h[:, None] * (rates + before), axis=0)
@@ -118,7 +118,7 @@ class Account:
 
     @property
     def balance(self) -> Balance:
-        """Up to now."""
+        """The largest residuals so far."""
         exchanged, *left = self._largest.tolist()
         return Balance(*(x / exchanged if exchanged else 0.0 for x in left))
 
@@ -169,7 +169,7 @@ class Account:
         at = rates_of_bodies(block.motion)
         for group in self._groups:
             of, links = [self.of[i] for i in group], [block.links[i] for i in group]
-            made = [partial(_stress_force, stresses.modes[i], factors[i]) for i in group]
+            made = [(stresses.modes[i], factors[i]) for i in group]
             more = stress(of, links, made, at.of(_bodies(of), of[0].k))
             found = Stress(found.power + more.power, found.stored + more.stored)
         return found
@@ -227,11 +227,6 @@ def balance_warning(found: Balance) -> tuple[str, ...]:
         f"the residual of the balance is {100 * found.energy:.2g} % of energy: the steps are too long for the motion, or "
         "numerical damping takes vibrations that they do not resolve; take shorter ones",
     )
-
-
-def _stress_force(modes: StressModes, s: Float[np.ndarray, "T m"], t: int) -> StressForce:
-    """g → k g P of a link at a time point."""
-    return modes.force(s[t])
 
 
 def _grouped(of: Sequence[Constants], k: int) -> list[list[int]]:

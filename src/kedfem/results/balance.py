@@ -3,7 +3,7 @@
 The absolute motion is R' = R0 + δ, its rate R0' + δ' with R0' = 1 ⊗ p' + X R'ᵀ.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.dynamics.history import LinkHistory, Products
 from kedfem.dynamics.joints.ports import rotated_vectors
-from kedfem.dynamics.stiffening import StressForce
+from kedfem.dynamics.stiffening import StressModes
 from kedfem.results.forces.moments import Constants, Field, RigidRates, crossed, dot, rotated
 
 Scalars = Float[np.ndarray, " T"]
@@ -57,20 +57,20 @@ class Stress:
 def stress(
     of: Sequence[Constants],
     histories: Sequence[LinkHistory],
-    made: Sequence[Callable[[int], StressForce]],
+    made: Sequence[tuple[StressModes, Float[np.ndarray, "T m"]]],
     at: RigidRates,
 ) -> Stress:
     """Geometric stiffening of links that are all planar or all in space.
 
     Parameters
     ----------
-    made : g → k g P of each link at a time point
+    made : stress modes of each link, and their factors over time
     at : rigid-body motion of their bodies
     """
     S, T = len(of), len(histories[0].u)
     rows, power, stored = np.empty((of[0].fit.m, S, T)), np.zeros((S, T)), np.zeros(T)
-    for i, (x, history, force_at) in enumerate(zip(of, histories, made, strict=True)):
-        f = np.stack([force_at(t)(g) for t, g in enumerate(history.g)])
+    for i, (x, history, (modes, factors)) in enumerate(zip(of, histories, made, strict=True)):
+        f = np.stack([modes.force(s)(g) for s, g in zip(factors, history.g, strict=True)])
         stored += 0.5 * dot(history.g, f)
         f = f @ history.R.transpose(0, 2, 1)
         x.fit.of(f, rows[:, i])
@@ -81,13 +81,14 @@ def stress(
 
 @dataclass(frozen=True, slots=True)
 class Fields:
-    """Nodal fields of S links at T time points, as far as they matter, time last, in k dimensions.
+    """Moments of the nodal fields of S links at T time points, time last, in k dimensions.
 
     rows : (3, (1 + k) k + 1, S, T) moments and couple of M δ', P − M R0'' and port forces
     elastic : (c, S, T) Σ g × K0 g, link frame, in a plane the one component across it;
         None if K turns with no link's rigid-body motion
     powers : (3, S, T) δ' · M δ', δ' · (P − M R0'') and, where joints are enforced by constraint equations, δ' · port
-    forces"""
+        forces
+    """
 
     rows: Float[np.ndarray, "3 m S T"]
     elastic: Float[np.ndarray, "c S T"] | None

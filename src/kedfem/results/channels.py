@@ -27,7 +27,7 @@ class Channel:
 
     @property
     def vector(self) -> bool:
-        """Whether columns are components along axes: three, or two of what is planar or of what statics leave open."""
+        """Whether columns are components along axes: three; two in a plane, or where statics leave one indeterminate."""
         return len(self.columns) > 1 and set(self.columns) <= set(XYZ)
 
 

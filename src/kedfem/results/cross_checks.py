@@ -46,7 +46,6 @@ class _Pair:
         """Add more time points."""
         self.count += len(e)
         self.products += [np.vdot(e, e), np.vdot(e, r), np.vdot(r, r)]
-
         self.means = self.means + np.stack([e.sum(axis=0), r.sum(axis=0)])
 
     @property

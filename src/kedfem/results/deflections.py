@@ -13,6 +13,7 @@ from kedfem.motion.released_motions import components
 from kedfem.results.link_points import LinkPoint, Point, link_point, seen_from
 from kedfem.results.recorded import Rows
 from kedfem.scene import Probe, Scene
+from kedfem.vectors import nearest_rotations
 
 
 def deflection(
@@ -78,20 +79,6 @@ def _mean_motion(model: Model, name: str) -> Callable[[Block], tuple[Rows, Point
             x += np.tensordot(u, link.m1[:, 0], (1, 0))
             B += p[:, :, None] * (link.one @ fit) + R @ (link.X.T @ fit)
             B += np.einsum("tai,aj->tij", u, fit)
-        return x / mass, X, _rotation(B, here[0][1].planar)
+        return x / mass, X, nearest_rotations(B, here[0][1].planar)
 
     return moved
-
-
-def _rotation(B: Float[np.ndarray, "T 3 3"], planar: bool) -> Float[np.ndarray, "T 3 3"]:
-    """The rotations nearest to matrices, of planar links about z."""
-    if planar:
-        angle = np.arctan2(B[:, 1, 0] - B[:, 0, 1], B[:, 0, 0] + B[:, 1, 1])
-        out = np.tile(np.eye(3), (len(B), 1, 1))
-        out[:, 0, 0] = out[:, 1, 1] = np.cos(angle)
-        out[:, 1, 0] = np.sin(angle)
-        out[:, 0, 1] = -out[:, 1, 0]
-        return out
-    U, _, Vt = np.linalg.svd(B)
-    U[:, :, 2] *= np.linalg.det(U @ Vt)[:, None]
-    return np.asarray(U @ Vt)

@@ -1,18 +1,17 @@
 """Differences of runs from the first one in their common channels, over time or the drive's position."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.results.channels import Channel, largest_by_unit
+from kedfem.results.channels import NOTHING, Channel, largest_by_unit
 from kedfem.results.records import Results
 
 Over = Literal["time", "drive"]
-NOTHING = 1e-9  # of the largest value of the same unit in the first run: rounding, which is not compared
 SAME = 1e-9  # of a range: tolerance within which grids, and motions of drives, are equal
 CUBIC = 3
 
@@ -109,7 +108,7 @@ def differences(runs: Sequence[Results], over: Over, at: Float[np.ndarray, " T"]
     """Differences in all common channels, in the first run's order; channels that are rounding are left out."""
     out, highest = [], largest_by_unit(runs[0].channels.values())
     thinned = any(run.every > 1 for run in runs)
-    for name in in_common(runs):
+    for name in common_channels(runs):
         channel, _ = runs[0].channels[name]
         values = tuple(_smooth(_along(run, over), run.channels[name][1], at) for run in runs)
         sizes = [magnitude(channel, x) for x in values]
@@ -131,40 +130,42 @@ def _largest(run: Results, channel: Channel, over: Over, at: Float[np.ndarray, "
     return float(np.max(sizes, initial=0.0))
 
 
-def in_common(runs: Sequence[Results]) -> list[str]:
-    """The common channels of all runs: those with the same columns and unit."""
+def common_channels(runs: Sequence[Results]) -> list[str]:
+    """The common channels of all runs: those with the same columns, unit and frame."""
+
+    def described(run: Results, name: str) -> tuple[object, ...]:
+        channel, _ = run.channels[name]
+        return channel.columns, channel.unit, channel.frame
+
+    first, *others = runs
     return [
-        name for name, (channel, _) in runs[0].channels.items()
-        if all(name in run.channels and _same(channel, run.channels[name][0]) for run in runs[1:])
+        name for name in first.channels
+        if all(name in run.channels and described(run, name) == described(first, name) for run in others)
     ]  # fmt: skip
-
-
-def _same(a: Channel, b: Channel) -> bool:
-    return (a.columns, a.unit, a.frame) == (b.columns, b.unit, b.frame)
 
 
 def magnitude(channel: Channel, values: Float[np.ndarray, "T c"]) -> Float[np.ndarray, " T"]:
     """Length of a vector, von Mises stress of a tensor, else the largest of the columns."""
     if "von_mises" in channel.columns:
         return np.asarray(np.abs(values[:, channel.columns.index("von_mises")]))
-    if set(channel.columns) <= set("xyz"):
+    if channel.vector:
         return np.asarray(np.linalg.norm(values, axis=1))
     return np.asarray(np.abs(values).max(axis=1))
 
 
 def differing_keys(runs: Sequence[Results]) -> dict[str, tuple[Any, ...]]:
     """Dotted keys of the scenes that differ between runs, with their values; None if a key is missing."""
-    scenes = [_flat(json.loads(run.scene_json)) for run in runs]
+    scenes = [flat(json.loads(run.scene_json)) for run in runs]
     keys = dict.fromkeys(key for scene in scenes for key in scene)
     every = {key: tuple(scene.get(key) for scene in scenes) for key in keys}
     return {key: values for key, values in every.items() if any(x != values[0] for x in values[1:])}
 
 
-def _flat(x: Any, name: str = "") -> Mapping[str, Any]:
+def flat(x: Any, name: str = "") -> dict[str, Any]:
     """Nested tables as one table with dotted keys."""
     if not isinstance(x, dict) or not x:
         return {name: x}
     out: dict[str, Any] = {}
     for key, value in x.items():
-        out |= _flat(value, f"{name}.{key}" if name else key)
+        out |= flat(value, f"{name}.{key}" if name else key)
     return out

@@ -8,7 +8,7 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.inertias import Inertias
-from kedfem.motion.coordinates import Coordinate, coordinates, counted_on
+from kedfem.motion.coordinates import Coordinate, coordinates, unwrapped
 from kedfem.motion.joint_equations import GROUND
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
@@ -16,7 +16,7 @@ from kedfem.motion.released_motions import components
 from kedfem.motion.rigid import RigidMotion
 from kedfem.motion.transmission import Transmission, transmissions
 from kedfem.results.channels import XYZ, Channel
-from kedfem.results.forces.rigid import stated_link
+from kedfem.results.forces.rigid import reported_link
 from kedfem.results.recorded import Rows
 from kedfem.scene import Scene
 
@@ -42,7 +42,7 @@ class Kinematics:
         for channel, values in self.every:
             x = values(motion)
             if channel.name in self._turning:
-                x = counted_on(x, self._last.get(channel.name))
+                x = unwrapped(x, self._last.get(channel.name))
                 self._last[channel.name] = x[-1]
             out[channel.name] = x
         return out
@@ -62,7 +62,7 @@ def kinematics_of(scene: Scene, linkage: Linkage, along: Path, inertias: Inertia
         every += _orientation(name, body, normal)
     for name, joint in scene.joints.items():
         if GROUND not in joint.links:
-            link = stated_link(scene, joint)
+            link = reported_link(scene, joint)
             text = f"of joint {name} on link {link}"
             every += _point(f"joints/{name}", linkage.bodies.index(link), np.asarray(joint.at), text)
     for name, probe in scene.output.probes.items():
@@ -89,13 +89,6 @@ def plane_normal(along: Path) -> Float[np.ndarray, "3"] | None:
     n = n * np.sign(n[np.abs(n).argmax()])
     turns = np.abs(flat - np.outer(flat @ n, n)).max() <= FLAT * size.max()
     return n if turns and np.abs(v @ n).max() <= FLAT * max(np.abs(v).max(), 1e-300) else None
-
-
-def rotation_vector(R: Float[np.ndarray, "T 3 3"]) -> Float[np.ndarray, "T 3"]:
-    """Rotation vector θ of R = exp([θ]×), of magnitude 0 to π [rad]."""
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_matrix(R).as_rotvec())
 
 
 def _point(
@@ -127,7 +120,11 @@ def _orientation(
         text += f" about {components(normal)}"
 
     def turned(motion: RigidMotion) -> Rows:
-        return rotation_vector(motion.R[:, body]) if turn is None else turn.values(motion)[:, None]
+        from scipy.spatial.transform import Rotation
+
+        if turn is not None:
+            return turn.values(motion)[:, None]
+        return np.asarray(Rotation.from_matrix(motion.R[:, body]).as_rotvec())
 
     def rate(of: str, motion: RigidMotion) -> Rows:
         vector = getattr(motion, of)[:, body]

@@ -68,8 +68,8 @@ def link_point(model: Model, linked: Linkage, where: str, name: str, at: Point) 
 
 
 def _held(model: Model, name: str, at: Point) -> tuple[int, Float[np.ndarray, " n"]] | None:
-    """The number of the link or segment with the coupling surface of a joint about a point, and values of its
-    functions whose sum is the mean motion there; None where no joint does."""
+    """The link or segment with a joint's coupling surface about a point, and weights of its functions in the mean motion
+    there; None without such a joint."""
     for k, (link, joint) in enumerate(zip(model.links, model.joints, strict=True)):
         for each in dict.fromkeys(joint.joints) if link.name == name else ():
             ports = np.flatnonzero(np.array(joint.joints) == each)

@@ -20,7 +20,7 @@ ELEMENTS = {
 """What users call elements, by their name in meshio."""
 
 
-def modelled(scene: Scene, linkage: Linkage, model: Model) -> dict[str, Mapping[str, Any]]:
+def link_facts(scene: Scene, linkage: Linkage, model: Model) -> dict[str, Mapping[str, Any]]:
     """Link → facts about it, as `Results.links` has them."""
     inertias = inertias_of_model(scene, linkage, model)
     out = {name: element_facts(parts) for name, parts in segments(model).items()}
@@ -35,7 +35,7 @@ def element_facts(parts: Sequence[Link]) -> Mapping[str, Any]:
 
 
 def element_words(parts: Sequence[Link]) -> str:
-    """The elements of a link, or of its segments, and what was made of them."""
+    """The elements of a link, or of its segments, with frames and modes, in words."""
     first, functions = parts[0], [link.n for link in parts]
     kind = "rigid" if first.rigid else ELEMENTS[first.cell_type]
     if first.fit is not None and not first.rigid:

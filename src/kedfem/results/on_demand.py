@@ -1,7 +1,7 @@
 """Channels of a large results file, each read on demand, so that the end of a long run needs no more memory."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -75,20 +75,8 @@ class OnDemand(Mapping[str, Series]):
             raise OutputError(f"{wanted}, got one with a gap ({error})") from error
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ChannelSelection(Mapping[str, Series]):
-    """A selection of channels by name."""
-
-    every: Mapping[str, Series]
-    names: tuple[str, ...]
-
-    def __getitem__(self, name: str) -> Series:
-        if name not in self.names:
-            raise KeyError(name)
-        return self.every[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.names)
-
-    def __len__(self) -> int:
-        return len(self.names)
+def selection(channels: Mapping[str, Series], names: Iterable[str]) -> Mapping[str, Series]:
+    """A selection of channels by name; those that are read on demand still are."""
+    if isinstance(channels, OnDemand):
+        return replace(channels, known={name: channels.known[name] for name in names})
+    return {name: channels[name] for name in names}

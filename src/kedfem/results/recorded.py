@@ -24,8 +24,8 @@ class Recorded:
     rows: Callable[[Block], Rows]
 
 
-def once(of: Callable[[Block], T]) -> Callable[[Block], T]:
-    """A function of a block that is evaluated once, though several channels show parts of its result."""
+def once_per_block(of: Callable[[Block], T]) -> Callable[[Block], T]:
+    """A function of a block that is evaluated once for each block, though several channels show parts of its result."""
     last: tuple[Block, T] | None = None
 
     def made(block: Block) -> T:

@@ -12,7 +12,7 @@ from kedfem.motion.path import Path
 from kedfem.results.audit import Account, energy_channels
 from kedfem.results.forces.constraint_forces import ConstraintForces
 from kedfem.results.forces.drive_forces import drive_channels, gear_channel
-from kedfem.results.forces.force_elements import acting, element_forces
+from kedfem.results.forces.force_elements import element_channels, element_forces
 from kedfem.results.forces.joint_forces import joint_channels
 from kedfem.results.forces.port_forces import Forces
 from kedfem.results.forces.rigid import rigid_forces
@@ -53,7 +53,7 @@ def recording(
         energies = [each for each in energies if each.channel.name == STRAIN]
     return [
         *probes, *joints, *drive, *gears, *_rigid(scene, model, along, linked),
-        *acting(scene, forces.force_elements), *energies,
+        *element_channels(scene, forces.force_elements), *energies,
     ]  # fmt: skip
 
 

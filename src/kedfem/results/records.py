@@ -24,7 +24,7 @@ class Peak:
     node : number of the point in the link, in the order of ``envelope.vtu``
     step, time, angle : number of the step, of the finest of several levels in time, [s], and the drive's angle [rad] or
         travel [m]
-    near : what is near, in words, where stress is not what it seems: a sharp corner, a point force, a joint; else empty
+    near : the singular place near the point, in words: a sharp corner, a point force, a joint; else empty
     away : the highest stress away from such places, where `near` is not empty and there is one
     """
 

@@ -37,7 +37,7 @@ class Thinning:
         return -(-self.steps // self.every)
 
     def chosen(self, rows: Rows, when: tuple[str, str]) -> tuple[Rows, Rows | None]:
-        """The rows to be written now of more time points, and the last one if it has to wait.
+        """The rows of more time points that are written immediately, and the last time point if it is not among them.
 
         Parameters
         ----------

@@ -278,11 +278,9 @@ class ResultsWriter:
             write_facts(self._file[name], {LARGEST: rows.ravel()})
         write_facts(self._file, {"reason": why, "status": status})
         seal(self._file)
-        if self._published:
-            self._file.close()
-        else:
+        if not self._published:
             self._publish()
-            self._file.close()
+        self._file.close()
 
     def _discard(self) -> None:
         """Remove a file that has no rows yet."""

@@ -24,7 +24,7 @@ from kedfem.dynamics.system.steps import Steps
 from kedfem.errors import KedfemError
 from kedfem.links.recovery import StressRecovery, stress_recovery
 from kedfem.motion.initial import initial_twists
-from kedfem.motion.messages import place
+from kedfem.motion.messages import position_in_words
 from kedfem.motion.mobility import mobility
 from kedfem.motion.path import Path
 from kedfem.motion.released_motions import of_joints
@@ -175,7 +175,7 @@ def _over(ready: Prepared) -> str:
     """The range of the drives in words."""
     link, along = ready.linkage, ready.path
     if not along.periodic:
-        return " to ".join(place(link, float(tau), ".4g") for tau in along.phi[[0, -1]])
+        return " to ".join(position_in_words(link, float(tau), ".4g") for tau in along.phi[[0, -1]])
     revolutions = along.period / (2 * np.pi)
     if len(link.drives) > 1:
         return f"repeats every {with_prefix(along.period, 's')}"

@@ -17,7 +17,7 @@ from kedfem.mesh.places import in_mm
 from kedfem.motion.assembly import Assembly
 from kedfem.motion.dead_point import DeadPoint
 from kedfem.motion.linkage import Linkage
-from kedfem.motion.messages import place
+from kedfem.motion.messages import position_in_words
 from kedfem.motion.mobility import Mobility
 from kedfem.motion.released_motions import of_joints
 from kedfem.motion.released_motions import remedy as held_by
@@ -126,9 +126,9 @@ def _dead_point(link: Linkage, found: DeadPoint | None) -> Iterator[tuple[str, s
     if found.joint is not None and found.off < FAR:
         off = f"joint {found.joint} about {np.degrees(found.off):.2g}° from it"
     weakness = f"smallest singular value {found.weakness:.2g} of the largest"
-    yield "closest to a dead point", f"at {place(link, found.tau, '.4g')}, {off} (estimated; {weakness})"
+    yield "closest to a dead point", f"at {position_in_words(link, found.tau, '.4g')}, {off} (estimated; {weakness})"
     if found.outside is not None:
-        apart, near = _apart(link, abs(found.outside - found.tau)), place(link, found.outside, ".3g")
+        apart, near = _apart(link, abs(found.outside - found.tau)), position_in_words(link, found.outside, ".3g")
         yield "dead point outside the range", f"about {apart} from its end, near {near} (estimated)"
     if (found.joint is not None and found.off < CLOSE) or found.outside is not None:
         remedy = "drive another joint, limit the drive, or let a flywheel carry the linkage through"

@@ -15,7 +15,7 @@ from kedfem.results.fatigue.strength import Strength, strength_of, verdict
 from kedfem.results.fatigue.surface import CRITERIA, FINDLEY, LinkFatigue, Period, SurfaceHistory
 from kedfem.results.records import Fatigue, FatigueSpot
 from kedfem.results.stresses.envelope import Envelope
-from kedfem.results.stresses.peaks import drawn_points, places_apart, within
+from kedfem.results.stresses.peaks import part_and_number, reference_points, separated_points
 from kedfem.scene import Fatigue as FatigueSettings
 from kedfem.scene import Scene, revolution_steps, time_grid, without_vibration
 
@@ -39,7 +39,7 @@ def fatigue_of(
     Parameters
     ----------
     envelope : that kept the histories of two periods
-    near : per link or segment what each point is near to, in words
+    near : per link or segment the singular place near each point, in words
     length : of a period [s]
     """
     asked = scene.fatigue
@@ -102,10 +102,10 @@ def _spots(
     if not surfaces:
         return ()
     every = [fields[k] for k in surfaces]
-    points = np.concatenate([drawn_points(each.recovery) for each in every])
+    points = np.concatenate([reference_points(each.recovery) for each in every])
     damage = np.concatenate([each.damage for each in every])
     ranked = damage if np.nanmax(damage, initial=0.0) > 0 else np.concatenate([x.utilisation for x in every])
-    found = (within([len(each.damage) for each in every], k) for k in places_apart(points, ranked, MOST))
+    found = (part_and_number([len(each.damage) for each in every], k) for k in separated_points(points, ranked, MOST))
     return tuple(_spot(list(surfaces.values())[part], node, asked, period) for part, node in found)
 
 
@@ -117,7 +117,7 @@ def _spot(surface: SurfaceHistory, point: int, asked: FatigueSettings, period: P
     periods = np.inf if asked.required_life is None else asked.required_life / period.length
     strength = surface.strength.without_mean() if judged.criterion[0] == FINDLEY else surface.strength
     found = verdict(h, strength, gradient, asked.safety_factor, periods)
-    x, y, z = map(float, drawn_points(surface.recovery)[point])
+    x, y, z = map(float, reference_points(surface.recovery)[point])
     return FatigueSpot(
         surface.name, (x, y, z), point, CRITERIA[judged.criterion[0]], found.damage, found.utilisation,
         float(judged.found[0, 2]), float(judged.found[0, 3]), float(judged.disproportion[0]), found.support,

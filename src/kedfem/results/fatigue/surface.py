@@ -44,7 +44,7 @@ class LinkFatigue:
 
 @dataclass(frozen=True, slots=True)
 class DamageAtPoints:
-    """Some points of a surface.
+    """Damage at k points of a surface.
 
     found : (k, 4) damage, reversed amplitude, amplitude and mean of its cycle, of the worst plane
     disproportion, criterion : (k,)
@@ -71,9 +71,9 @@ class Period:
     before: bool
 
     def of(self, kept: StressHistory) -> tuple[Float[np.ndarray, "T r"], Float[np.ndarray, "_ r"]]:
-        """Coordinates of modes over the period, without its beginning, and how far those a period before are from them.
+        """Coordinates of modes over the period, without its beginning, and their differences from the period before.
 
-        Where there is no period before, those at its beginning and its end.
+        Without a period before, the difference between the end of the period and its beginning.
         """
         some = max(1e-9 * self.length, 1e-3 * float(kept.times[-1] - kept.times[-2]))
         last = kept.times > self.end - self.length + some
@@ -86,10 +86,10 @@ class Period:
 class SurfaceHistory:
     """The surface of one link or segment, and its stress history.
 
-    near : what each of its points is near to, in words
-    highest : stress over the period, of all that is examined [Pa]
-    repeats : by how much it differs from the period before, of the highest
-    left_out : points that are near to something
+    near : the singular place near each of its points, in words; else empty
+    highest : highest stress over the period of all points examined [Pa]
+    repeats : difference of stresses from the period before, relative to the highest
+    left_out : number of points left out near singular places
     """
 
     def __init__(
@@ -116,12 +116,12 @@ class SurfaceHistory:
         self.highest, self.repeats = highest, apart / highest if highest else 0.0
 
     def chunks(self, each: int = PLANES) -> Iterator[slice]:
-        """Some points at a time, of which each has so many histories."""
+        """Slices of points whose histories, `each` of every point, fit into the cache together."""
         size = max(1, CHUNK // (8 * each * max(len(self.C), len(self.gone))))
         return (slice(k, k + size) for k in range(0, len(self.surface.places), size))
 
     def judged(self, which: slice | list[int]) -> DamageAtPoints:
-        """Some of the points."""
+        """Damage at some of the points."""
         A, axes = self.parts[self.surface.places[which]], self.surface.axes[which]
         H = _histories(A, self.C)
         d = dominant(A @ self.moments @ A.transpose(0, 2, 1), A @ self.mean)
@@ -162,7 +162,7 @@ class SurfaceHistory:
         return found[rows, worst], h[rows, worst]
 
     def field(self) -> LinkFatigue:
-        """At all points; of the two fibres of a planar beam the worse."""
+        """Damage at all points; at those of a planar beam of the worse of its two fibres."""
         out = np.full((6, self.recovery.stressed), np.nan)
         endurance = self.strength.endurance * self.strength.endless / self.asked.safety_factor
 
@@ -175,11 +175,8 @@ class SurfaceHistory:
             for _ in pool.map(fill, self.chunks()):
                 pass  # an error of one is raised here
         sides = out.reshape(6, -1, self.recovery.points)
-        of_worse = np.take_along_axis(sides, self._side(sides)[None, None], 1)[:, 0]
-        return LinkFatigue(self.recovery, *of_worse)
-
-    def _side(self, sides: Float[np.ndarray, "6 s p"]) -> Int[np.ndarray, " p"]:
-        return worse(np.nan_to_num(sides[0].T), np.nan_to_num(sides[1].T))
+        side = worse(np.nan_to_num(sides[0].T), np.nan_to_num(sides[1].T))
+        return LinkFatigue(self.recovery, *np.take_along_axis(sides, side[None, None], 1)[:, 0])
 
     def place_of(self, point: int) -> int:
         """The position of a point in the list of the surface's places; of two fibres the worse."""

@@ -17,7 +17,7 @@ from kedfem.dynamics.system.forces.exerted import springs, wrench
 from kedfem.dynamics.system.forces.supports import supports
 from kedfem.motion.rigid import resting
 
-DEPENDENT = 1e-9  # singular values of rows of length one: below, one row says what others say
+DEPENDENT = 1e-9  # singular values of rows of length one: below, a row is a combination of others
 
 
 @dataclass

@@ -36,7 +36,10 @@ class DampingWork:
 
 @dataclass(frozen=True, slots=True)
 class PreviousPoint:
-    """The time point before a block: t, rigid-body motion, each link's g, K0 g, C0 g and `held`; T is one."""
+    """The time point before a block, T = 1: t, rigid-body motion, and of each link g, K0 g, C0 g and its deflection.
+
+    links : its deflection is that of `rigid_frame_deflection`
+    """
 
     t: Scalars
     at: RigidRates
@@ -56,7 +59,7 @@ def damping_work(
     """
     t, at = now
     h = np.diff(t, prepend=before.t)
-    seen = [held(x, history, at) for x, history in zip(of, histories, strict=True)]
+    seen = [rigid_frame_deflection(x, history, at) for x, history in zip(of, histories, strict=True)]
     which = np.flatnonzero([turn or u is not None for turn, u in zip(turns, seen, strict=True)])
     bodies = np.array([x.body for x in of])[which]
     taken = np.zeros(len(t))
@@ -90,7 +93,7 @@ def _drag(rows: Float[np.ndarray, "m S T"], arms: Float[np.ndarray, "c S T"], at
     return np.asarray(sum(np.einsum("ist,ist->t", x, y) for x, y in both))
 
 
-def held(of: Constants, history: LinkHistory, at: RigidRates) -> Field | None:
+def rigid_frame_deflection(of: Constants, history: LinkHistory, at: RigidRates) -> Field | None:
     """Of a link with co-rotational frames, the deflection in the rigid-body frame, where α acts; None without."""
     if of.link.fit is None or not of.damping.alpha:
         return None
@@ -109,7 +112,7 @@ def previous_of(
     kept = []
     for link, x, y in zip(of, histories, made, strict=True):
         Cg = None if y.Cg is None else y.Cg[one].copy()
-        kept.append((x.g[one].copy(), y.Kg[one].copy(), Cg, held(link, x.every(one), then)))
+        kept.append((x.g[one].copy(), y.Kg[one].copy(), Cg, rigid_frame_deflection(link, x.every(one), then)))
     return PreviousPoint(t[one], then, kept)
 
 
@@ -124,7 +127,7 @@ def products(of: Constants, history: LinkHistory, turns: bool) -> Products:
 def _changes(
     of: Constants, now: Field, made: Products, before: Field, Kg: Field, last: Field | None
 ) -> tuple[Field, Field]:
-    """g and C0 g in each step; of a link with co-rotational frames without α, which acts elsewhere, see `held`."""
+    """Changes of g and C0 g in each step; with co-rotational frames without α, see `rigid_frame_deflection`."""
     g = _change(now, before)
     if made.Cg is not None and last is not None:
         return g, _change(made.Cg, last)

@@ -10,7 +10,7 @@ from kedfem.motion.joint_equations import joint_axis, moving_pair
 from kedfem.results.channels import Channel
 from kedfem.results.forces.constraint_forces import of_joint
 from kedfem.results.forces.drive_joint_forces import drive_joint_wrench, partner
-from kedfem.results.forces.port_forces import Forces, holder, loose, negligible, port_wrench
+from kedfem.results.forces.port_forces import Forces, indeterminate_part, link_of_joint, negligible, port_wrench
 from kedfem.results.recorded import Recorded, Rows, effort_channel
 from kedfem.scene import Scene
 
@@ -26,7 +26,7 @@ def drive_channels(scene: Scene, model: Model, driven: str, forces: Forces) -> l
         return _prescribed_drive(scene, model, prescribed, forces)
     name = moving_pair(joint)[0]
     axis, at = joint_axis(joint), np.asarray(joint.at)
-    wrench = port_wrench(model, holder(model, name, driven), driven, at, forces)
+    wrench = port_wrench(model, link_of_joint(model, name, driven), driven, at, forces)
     return [Recorded(effort_channel(scene, driven), lambda block: wrench(block)[1] @ axis[:, None])]
 
 
@@ -35,7 +35,7 @@ def _prescribed_drive(scene: Scene, model: Model, prescribed: PrescribedBody, fo
     joint, first = scene.joints[prescribed.drive_joint], partner(scene, prescribed)
     axis, which = joint_axis(joint), 0 if joint.kind == "prismatic" else 1
     wrench, others = drive_joint_wrench(scene, model, prescribed, forces)
-    if not all(negligible(loose(model, *each)[which] @ axis) for each in others):
+    if not all(negligible(indeterminate_part(model, *each)[which] @ axis) for each in others):
         return []
     sign = 1.0 if moving_pair(joint)[0] == prescribed.link.name else -1.0
     bodies = {x.link.name: x.body for x in model.prescribed}

@@ -10,7 +10,7 @@ from kedfem.dynamics.system.forces.exerted import effort
 from kedfem.dynamics.system.forces.supports import supports
 from kedfem.links.record import in_space
 from kedfem.motion.joint_equations import ordered
-from kedfem.results.forces.port_forces import Forces, Wrench, holder, port_wrench, resultant
+from kedfem.results.forces.port_forces import Forces, Wrench, link_of_joint, port_wrench, resultant
 from kedfem.results.recorded import Rows
 from kedfem.scene import Scene
 from kedfem.vectors import cross
@@ -42,7 +42,7 @@ def drive_joint_wrench(
     for name, joint in scene.joints.items():
         elastic = [x.name for x in model.links if x.name in joint.links]
         if link.name in joint.links and elastic and name not in sliding:
-            held.append((holder(model, elastic[0], name), name, np.asarray(joint.at)))
+            held.append((link_of_joint(model, elastic[0], name), name, np.asarray(joint.at)))
     others = [(port_wrench(model, *each, forces), each[2]) for each in held]
     driven = [x for x in model.prescribed if partner(scene, x) == link.name]
     riders = [(x, *drive_joint_wrench(scene, model, x, forces)) for x in driven]

@@ -17,7 +17,7 @@ from kedfem.dynamics.system.forces.exerted import at_ends
 from kedfem.dynamics.system.forces.poses import value
 from kedfem.dynamics.system.forces.supports import supports
 from kedfem.dynamics.system.record import Term
-from kedfem.motion.coordinates import counted_on
+from kedfem.motion.coordinates import unwrapped
 from kedfem.motion.joint_equations import body_names, moving_pair
 from kedfem.results.channels import Channel
 from kedfem.results.recorded import Recorded, Rows
@@ -77,7 +77,7 @@ class ElementForces:
                 z = np.concatenate([one.unknowns(block), other.unknowns(block)], axis=1)
                 angle = value(term, (one.end, other.end), block.motion, z)
                 angles = np.column_stack([angles, angle])
-            self.block, self.angles = block, counted_on(angles, before)
+            self.block, self.angles = block, unwrapped(angles, before)
         return self.angles
 
 
@@ -96,7 +96,7 @@ def element_forces(scene: Scene, model: Model) -> ElementForces:
     return ElementForces(every, ends, hinges)
 
 
-def acting(scene: Scene, measured: ElementForces) -> list[Recorded]:
+def element_channels(scene: Scene, measured: ElementForces) -> list[Recorded]:
     """Coordinates and forces of motors, springs, limits and, without a drive, of hinges."""
     every = ((name, *each) for name, element in measured.every.items() for each in _channels(name, element))
     elements = [Recorded(channel, partial(_column, name, which, sign)) for name, channel, which, sign in every]

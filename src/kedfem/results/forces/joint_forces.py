@@ -10,8 +10,15 @@ from kedfem.dynamics.model import Model, PrescribedBody
 from kedfem.motion.joint_equations import moving_pair, ordered
 from kedfem.results.channels import XYZ, Channel
 from kedfem.results.forces.drive_joint_forces import constrained_joints, drive_joint_wrench, partner
-from kedfem.results.forces.port_forces import Forces, determinate, holder, loose, negligible, port_wrench
-from kedfem.results.recorded import Recorded, Rows, once
+from kedfem.results.forces.port_forces import (
+    Forces,
+    determinate,
+    indeterminate_part,
+    link_of_joint,
+    negligible,
+    port_wrench,
+)
+from kedfem.results.recorded import Recorded, Rows, once_per_block
 from kedfem.scene import Scene
 
 
@@ -25,7 +32,7 @@ def joint_channels(scene: Scene, model: Model, name: str, forces: Forces) -> lis
     held = [link for link in scene.joints[name].links if link in {x.name for x in model.links}]
     if not held:
         return []
-    k = holder(model, held[0], name)
+    k = link_of_joint(model, held[0], name)
     first, second = scene.joints[name].links
     opposite = first in {x.link.name for x in model.prescribed}  # it has no ports of its own
     on, other = (first, second) if held[0] == first or opposite else (second, first)
@@ -54,7 +61,7 @@ def _channels(
         Channel(f"joints/{joint}/moment", XYZ, "N m", "world", about),
     )
 
-    both = once(wrench)
+    both = once_per_block(wrench)
 
     def rows(which: int) -> Callable[[Block], Rows]:
         return lambda block: sign * both(block)[which]
@@ -65,7 +72,7 @@ def _channels(
 def _on_prescribed(scene: Scene, model: Model, prescribed: PrescribedBody, forces: Forces) -> list[Recorded]:
     """Force and moment that the driven joint exerts on a rigid link that moves with it."""
     wrench, others = drive_joint_wrench(scene, model, prescribed, forces)
-    determined = [all(negligible(loose(model, *x)[which]) for x in others) for which in (0, 1)]
+    determined = [all(negligible(indeterminate_part(model, *x)[which]) for x in others) for which in (0, 1)]
     rows = [forces.rows.determined(name) for name in constrained_joints(scene, model, prescribed)]
     determined = [determined[which] and all(x[which] and x[0] for x in rows) for which in (0, 1)]
     label = f"of joint {prescribed.drive_joint} on link {prescribed.link.name} from {partner(scene, prescribed)}"

@@ -6,7 +6,7 @@ of varying load lives as with P_m = (∫ P^p |ω| dt / ∫ |ω| dt)^(1/p), ω th
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -127,12 +127,12 @@ def in_axes(x: Vectors, R: Float[np.ndarray, "T 3 3"]) -> Vectors:
     return np.asarray((x[:, None] @ R)[:, 0])
 
 
-def joint_loads(scene: Scene, results: Results, linked: Linkage | None, motion: RigidMotion | None) -> list[JointLoad]:
+def joint_loads(scene: Scene, results: Results, moved: tuple[Linkage, RigidMotion] | None) -> list[JointLoad]:
     """Loads of all joints with complete forces in the results: elastic ones if present, else those of rigid links.
 
     Parameters
     ----------
-    linked, motion : the scene's rigid motion at the rows of the results; None where it is not known
+    moved : the scene's rigid motion at the rows of the results; None where it is not known
     """
     out = []
     for name, joint in scene.joints.items():
@@ -140,30 +140,29 @@ def joint_loads(scene: Scene, results: Results, linked: Linkage | None, motion: 
             channel, force = results.channels.get(f"joints/{name}/{key}", (None, None))
             if channel is None or force is None or len(channel.columns) != REPORTED:
                 continue
-            links = acted_links(name, joint, channel.description)
-            out.append(_load(name, joint, links, force, (linked, motion)))
+            load = JointLoad(name, joint.kind, acted_links(name, joint, channel.description), force)
+            out.append(load if moved is None else _in_link_axes(load, joint, *moved))
             break
     return out
 
 
-def _load(
-    name: str, joint: Joint, links: tuple[str, str], force: Vectors,
-    moved: tuple[Linkage | None, RigidMotion | None],
-) -> JointLoad:  # fmt: skip
-    linked, motion = moved
-    if linked is None or motion is None:
-        return JointLoad(name, joint.kind, links, force)
-    one, other = (linked.bodies.index(link) for link in links)
+def _in_link_axes(load: JointLoad, joint: Joint, linked: Linkage, motion: RigidMotion) -> JointLoad:
+    """A load with its components in the axes of both links, and the speed of one against the other."""
+    one, other = (linked.bodies.index(link) for link in load.links)
+    force = load.world
     inside = in_axes(force, motion.R[:, one]), in_axes(-force, motion.R[:, other])
     rate = np.linalg.norm(motion.omega[:, one] - motion.omega[:, other], axis=1)
     axis = joint_axis(joint) if joint.kind in HINGES else None
-    return JointLoad(name, joint.kind, links, force, inside, axis, rate)
+    return replace(load, inside=inside, axis=axis, rate=rate)
 
 
 def acted_links(name: str, joint: Joint, description: str) -> tuple[str, str]:
-    """The link that a joint's force acts on, and the link that exerts it, by the description of its channel.
+    """The link that a joint's force acts on, and the link that exerts it, from the description of its channel.
 
-    A ValueError says that it says neither.
+    Raises
+    ------
+    ValueError
+        The description names neither.
     """
     one, other = joint.links
     for on, by in ((one, other), (other, one)):
@@ -173,15 +172,14 @@ def acted_links(name: str, joint: Joint, description: str) -> tuple[str, str]:
     raise ValueError(f"joint {name}: must name the link on which the force acts, got {description!r}")
 
 
-def drive_loads(scene: Scene, results: Results, linked: Linkage | None, motion: RigidMotion | None) -> list[DriveLoad]:
+def drive_loads(scene: Scene, results: Results, moved: tuple[Linkage, RigidMotion] | None) -> list[DriveLoad]:
     """Loads of all drives with efforts in the results: elastic ones if present, else those of rigid links."""
     out = []
     for name in scene.all_drives:
         keys = [drive_effort(scene, name, rigid)[0] for rigid in ("", "rigid_")]
         found = next((results.channels[key] for key in keys if key in results.channels), None)
         if found is not None:
-            known = (linked, motion) if linked is not None and motion is not None else None
-            rate = drive_rate(scene, name, *known) if known else None
+            rate = drive_rate(scene, name, *moved) if moved else None
             out.append(DriveLoad(name, found[0].unit, found[1][:, 0], rate))
     return out
 
@@ -209,8 +207,8 @@ def last_revolutions(results: Results, turns: float | None) -> Bool[np.ndarray, 
     return np.asarray(later)
 
 
-def facing(axis: Float[np.ndarray, "3"]) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
-    """Unit vectors e1, e2 with e1 × e2 = axis, e1 as near to x as can be, about x itself to y."""
+def polar_axes(axis: Float[np.ndarray, "3"]) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+    """Unit vectors e1, e2 of a polar diagram about an axis, e1 × e2 = axis: e1 nearest to x, or to y about x itself."""
     start = np.eye(3)[1 if abs(axis[0]) > 1 - 1e-6 else 0]
     e1 = start - (start @ axis) * axis
     e1 /= np.linalg.norm(e1)

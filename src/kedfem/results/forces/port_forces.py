@@ -16,10 +16,10 @@ from kedfem.dynamics.system.forces.supports import supports
 from kedfem.links.record import Link, in_space
 from kedfem.results.forces.constraint_forces import ConstraintForces
 from kedfem.results.forces.force_elements import ElementForces
-from kedfem.results.recorded import Rows, once
+from kedfem.results.recorded import Rows, once_per_block
 from kedfem.vectors import cross
 
-INDETERMINATE = 1e-6  # [-, m] share of a loose port force of one that a joint would carry
+INDETERMINATE = 1e-6  # [-, m] share of an indeterminate port force of one that a joint would carry
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,14 +28,14 @@ class Forces:
 
     rows: ConstraintForces
     force_elements: ElementForces
-    on_ports: Callable[[Block], Rows] = field(default_factory=lambda: once(lambda x: on_ports(supports(x))))
+    on_ports: Callable[[Block], Rows] = field(default_factory=lambda: once_per_block(lambda x: on_ports(supports(x))))
 
 
 Wrench = Callable[[Block], tuple[Rows, Rows]]
 
 
 def port_wrench(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"], forces: Forces) -> Wrench:
-    """Force and moment about `at` of one joint on link k, world components, from the port forces that show it."""
+    """Force and moment about `at` of one joint on link k, world components, from the port forces that determine them."""
     attachment, link = model.joints[k], model.links[k]
     rows = rows_of_joint(attachment, joint)
     arms, placed = _arms(attachment, joint, at), _arms_over_time(model, k, joint, at)
@@ -55,7 +55,7 @@ def port_wrench(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"], fo
 
 
 def _sharing(model: Model, shares: sp.csr_array) -> Iterator[tuple[int, Float[np.ndarray, "m q"]]]:
-    """Links whose port forces show some of a link's, and what of each."""
+    """Links whose port forces determine some of a link's, and the share of each."""
     ends = np.cumsum([0, *(len(joint.keep) for joint in model.joints)])
     for j in np.unique(np.searchsorted(ends, np.unique(shares.indices), side="right") - 1):
         yield int(j), shares[:, ends[j] : ends[j + 1]].toarray()
@@ -64,10 +64,10 @@ def _sharing(model: Model, shares: sp.csr_array) -> Iterator[tuple[int, Float[np
 def _arms_over_time(
     model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]
 ) -> Callable[[Block], Float[np.ndarray, "T p 3"]]:
-    """From a joint's point on link k to its ports, world components.
+    """Vectors from a joint's point on link k to its ports, world components.
 
-    Of rigid-body frames as these turn. Co-rotational frames know where the ports are: displaced from the rigid-body
-    motion, the joint's point as it lies among them. So force and moment do the work that the ports' displacements say.
+    With rigid-body frames they rotate with the frame. With co-rotational frames ports are displaced from the rigid-body
+    motion, and the joint's point with them, so that force and moment do the work of the port forces.
     """
     attachment, link, body = model.joints[k], model.links[k], model.bodies[k]
     here = np.array([name == joint for name in attachment.joints], bool)
@@ -97,16 +97,16 @@ def _orientation(block: Block, k: int, link: Link) -> Float[np.ndarray, "T 3 3"]
 
 def determinate(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> tuple[bool, bool]:
     """Whether statics determine force and moment that a joint exerts on link k, where ports depend on each other."""
-    force, moment = loose(model, k, joint, at)
+    force, moment = indeterminate_part(model, k, joint, at)
     return negligible(force), negligible(force) and negligible(moment)
 
 
-def loose(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> tuple[Rows, Rows]:
+def indeterminate_part(model: Model, k: int, joint: str, at: Float[np.ndarray, "3"]) -> tuple[Rows, Rows]:
     """Forces and moments of a joint that statics do not determine, in the reference position."""
     attachment = model.joints[k]
     arms, link = _arms(attachment, joint, at), model.links[k]
-    loose = attachment.loose[rows_of_joint(attachment, joint)].toarray().T
-    return resultant(link, arms[None], loose.reshape(len(loose), len(arms), link.d))
+    f = attachment.loose[rows_of_joint(attachment, joint)].toarray().T
+    return resultant(link, arms[None], f.reshape(len(f), len(arms), link.d))
 
 
 def negligible(indeterminate: Float[np.ndarray, "..."]) -> bool:
@@ -133,7 +133,7 @@ def resultant(link: Link, arms: Float[np.ndarray, "_ p 3"], f: Float[np.ndarray,
     return force.sum(axis=1), cross(arms, force).sum(axis=1)
 
 
-def holder(model: Model, name: str, joint: str) -> int:
+def link_of_joint(model: Model, name: str, joint: str) -> int:
     """The link of a name, or its segment, that a joint acts on."""
     every = enumerate(zip(model.links, model.joints, strict=True))
     return next(k for k, (link, held) in every if link.name == name and joint in held.joints)

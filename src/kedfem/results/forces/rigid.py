@@ -33,7 +33,7 @@ class RigidChannel:
 
     which : 0 force, 1 moment, 2 + k effort of drive k
     body, at : the body that it acts on, and the point that moments are about, in the reference position [m]
-    project : (c, 3) from world components to columns of a force or moment; what statics leave open is not in them
+    project : (c, 3) from world components to columns of a force or moment, without statically indeterminate parts
     """
 
     channel: Channel
@@ -100,7 +100,7 @@ class RigidForces:
                 yield (multipliers @ effort(self.linkage, each.which - 2))[:, None]
 
     def _responses(self, motion: RigidMotion, step: int) -> Responses:
-        """All channels from forces and moments; those of the first revolution again and again."""
+        """All channels from forces and moments on bodies; those of the first revolution are used for all later ones."""
         known = sum(map(len, self._kept))
         if known < self.turn and step == known + 1:
             self._kept.append(self._made(motion))
@@ -124,9 +124,8 @@ class RigidForces:
 
 
 def rigid_forces(scene: Scene, linkage: Linkage, inertias: Inertias, along: Path | None = None) -> RigidForces:
-    """The determinate channels of a driven scene: drives, and with a path all joints; none if links move freely too.
-
-    A free motion is held in the rigid linkage, by what no link has there.
+    """The determinate channels of a driven scene: drives, and with a path all joints; none of a scene with free motions,
+    which the rigid linkage locks by constraints that the scene does not have.
     """
     every: list[RigidChannel] = []
     if not linkage.mobility:
@@ -137,11 +136,11 @@ def rigid_forces(scene: Scene, linkage: Linkage, inertias: Inertias, along: Path
     elements = None
     if scene.springs or scene.motors or scene.limits:
         elements = rigid_elements(scene, linkage, along or path(linkage, *drive_range(scene)))
-    turn = returning(scene, along) if linkage.blocks is None else 0  # responses of many bodies would fill the memory
+    turn = return_steps(scene, along) if linkage.blocks is None else 0  # responses of many bodies would fill the memory
     return RigidForces(scene, linkage, inertias, tuple(every), elements, turn)
 
 
-def returning(scene: Scene, along: Path | None) -> int:
+def return_steps(scene: Scene, along: Path | None) -> int:
     """Time steps of one or a few revolutions after which all poses return; 0 if they do not, or for too many."""
     if along is None or not along.periodic or not isinstance(scene.motion, ConstantSpeed):
         return 0
@@ -149,7 +148,7 @@ def returning(scene: Scene, along: Path | None) -> int:
     return round(turn) if abs(turn - round(turn)) < 1e-9 * turn and turn <= KEPT else 0
 
 
-def stated_link(scene: Scene, joint: Joint) -> str:
+def reported_link(scene: Scene, joint: Joint) -> str:
     """The link on which a joint's force is reported: the first that is not the ground."""
     return next(name for name in joint.links if name != GROUND)
 
@@ -164,7 +163,7 @@ def _drive(scene: Scene, linkage: Linkage, k: int) -> RigidChannel:
 
 def _joint(scene: Scene, linkage: Linkage, found: Reactions, name: str) -> list[RigidChannel]:
     joint = scene.joints[name]
-    link = stated_link(scene, joint)
+    link = reported_link(scene, joint)
     other = next(each for each in joint.links if each != link)
     body, at = linkage.bodies.index(link), np.asarray(joint.at)
     label = f"of joint {name} on link {link} from {other} with all links rigid"
@@ -185,7 +184,8 @@ def _joint(scene: Scene, linkage: Linkage, found: Reactions, name: str) -> list[
 def determined(
     open_part: Float[np.ndarray, "3 3"], whole: Float[np.ndarray, "3 3"]
 ) -> tuple[tuple[str, ...], Float[np.ndarray, "c 3"], str]:
-    """Columns of a joint's force that statics determine, from world components, and in words what they leave out.
+    """Statically determinate columns of a joint's force, the matrix from world components to them, and in words what is
+    left out.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def determined(
     if not lost.shape[1]:
         return XYZ, np.eye(3), ""
     kept = np.flatnonzero(np.linalg.norm(lost, axis=1) < ALONG)
-    if len(kept) == 3 - lost.shape[1]:  # what is open lies along axes of the world
+    if len(kept) == 3 - lost.shape[1]:  # the indeterminate directions are axes of the world
         return tuple(XYZ[k] for k in kept), np.eye(3)[kept], ""
     which = ", ".join(components(n, 6) for n in lost.T)
     return XYZ, P, f"; without the part along {which}, which is statically indeterminate"

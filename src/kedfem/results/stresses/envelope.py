@@ -19,12 +19,12 @@ from kedfem.links.reduced import rigid_modes
 
 EXACT = 1e-6  # of a link's highest stress: what may be missing of an envelope
 NOTHING = 1e-13  # of a link's displacement: rounding, which no mode is made for
-DECADES = 1e-4  # of the largest: singular values that one look at a Gram matrix shows
+DECADES = 1e-4  # of the largest: singular values that one Gram matrix resolves
 SOME = 64  # steps of which new modes are made at a time
 SAMPLE = 1000  # points at which the stress of a mode is judged
 WAITING = 192_000_000  # bytes of histories, at most, that are examined together
 STEPS = 2048  # and steps
-HEAD = 1e-3  # of the largest: coordinates below, by what they make of stress, are bounded before they are summed up
+HEAD = 1e-3  # of the largest: coordinates with less effect on stress are bounded before they are summed up
 VON_MISES, LARGEST, SMALLEST = range(3)
 
 
@@ -119,7 +119,7 @@ class Modes:
 
 @dataclass
 class Envelope:
-    """The highest and lowest stresses of blocks of steps as they come; it only reads them.
+    """The highest and lowest stresses of successive blocks of steps, which it only reads.
 
     model : whose steps they are
     recoveries : per link, then per prescribed rigid link
@@ -154,7 +154,7 @@ class Envelope:
             self._kept.append([])
 
     def add(self, block: Block) -> None:
-        """Look at a block, with others that wait or later."""
+        """Examine a block, together with earlier ones or later."""
         numbers = np.arange(block.step, block.step + len(block), dtype=float)
         self._when.append(np.stack([numbers, block.motion.t, block.motion.phi]))
         first = int(np.searchsorted(block.motion.t, self.since))
@@ -173,7 +173,7 @@ class Envelope:
         return bool(self._waiting)
 
     def flush(self) -> None:
-        """Look at all that waits."""
+        """Examine all blocks that wait."""
         if not self._waiting:
             return
         blocks, self._waiting = self._waiting, []
@@ -191,7 +191,7 @@ class Envelope:
         self._forget()
 
     def _forget(self) -> None:
-        """Instants that nothing refers to, unless histories are kept: a million are 24 MB."""
+        """Drop instants without an extreme, unless histories are kept: a million take 24 MB."""
         if self.kept_since == np.inf:
             wanted = np.unique(np.concatenate([np.zeros(1), *(x.ravel() for x in self._step)]))
             every = np.concatenate(self._when, axis=1)
@@ -257,16 +257,16 @@ class Envelope:
 
     @property
     def times(self) -> Float[np.ndarray, " T"]:
-        """Every step's, where histories are kept [s]."""
+        """Times of all steps, where histories are kept [s]."""
         return np.asarray(np.concatenate(self._when, axis=1)[1])
 
 
 def leading(
     C: Float[np.ndarray, "T r"], parts: Float[np.ndarray, "p 6 r"]
 ) -> tuple[Float[np.ndarray, "T r"], Float[np.ndarray, "p 6 r"], int]:
-    """Modes turned to their principal directions over some steps, by what they make of stress, the largest first.
+    """Modes rotated to their principal directions over some steps, sorted by their effect on stress, the largest first.
 
-    Coordinates and stresses of the same steps, and how many modes make all stress but `HEAD` of it.
+    Coordinates and stresses of the same steps, and the number of modes that make up all stress but `HEAD` of it.
     """
     seen = parts[:: 1 + len(parts) // SAMPLE]
     gain = np.sqrt((seen**2).sum(axis=(0, 1)))
@@ -279,7 +279,7 @@ def leading(
     head = int((size > HEAD * size[0]).sum())
     scale = np.zeros(len(gain))
     scale[: len(size)] = size
-    # the rest in units in which Cauchy and Schwarz says much
+    # the others scaled so that the bound of Cauchy and Schwarz is sharp
     unit = np.sqrt(np.maximum(scale, NOTHING * size[0]))
     turned = (parts.reshape(-1, len(gain)) @ (V.T / gain[:, None] * unit)).reshape(parts.shape)
     return np.ascontiguousarray((C * gain) @ V.T / unit), turned, head

@@ -3,9 +3,9 @@
 heads (p, m, 6) : of the m leading modes at each point five deviatoric components, whose norm is the von Mises stress, and
     the mean
 parts (p, 6, r) : of all modes the same
-C (T, r) : coordinates of the modes over time; rest (T,) the norm of those behind the head
-residuals (l, w, m + 1) : of every window of 2^(l+1) steps how far C leaves the line between its ends, at most; last for
-    the norm of those behind the head
+C (T, r) : coordinates of the modes over time; rest (T,) the norm of those of other than leading modes
+residuals (l, w, m + 1) : of every window of 2^(l+1) steps the largest distance of C from the chord between its ends; the
+    last is that of the norm of all others
 highest, at (3, p) : von Mises, largest principal, minus the smallest principal stress so far; numbers of their steps
 
 The three are convex in the stress. So within a window they are no larger than at its ends but for what the residual adds,
@@ -22,7 +22,7 @@ LEVELS = 5  # windows of at most 2^5 steps
 
 @compiled
 def residuals_of(C, m, out):  # type: ignore[no-untyped-def]
-    """Fill in how far C leaves its chords."""
+    """Fill in the largest distances of C from its chords."""
     T, r = C.shape
     for level in range(LEVELS):
         width = 2 << level
@@ -94,7 +94,7 @@ def principal(seen, k):  # type: ignore[no-untyped-def]
 
 @inner
 def below(seen, k, sign, limit):  # type: ignore[no-untyped-def]
-    """Whether no principal stress, times the sign, exceeds a limit: Sylvester on what is left up to there."""
+    """Whether no principal stress, times the sign, exceeds a limit: Sylvester's criterion, limit · 1 − sign · stress."""
     vm, rest = seen[k, 6], limit - sign * seen[k, 5]
     if 2 / 3 * vm <= rest:
         return True
@@ -151,7 +151,7 @@ def skipped(seen, a, b, more, spread, highest, i):  # type: ignore[no-untyped-de
 
 @inner
 def sizes_of(heads, parts, i, size):  # type: ignore[no-untyped-def]
-    """Of each leading mode, and of all others together, what one unit changes: von Mises, principal stresses."""
+    """Largest change of von Mises and principal stresses by a unit of each leading mode, and of all others together."""
     m, r = heads.shape[1], parts.shape[2]
     for j in range(m):
         vm = 0.0

@@ -15,12 +15,12 @@ MOST = 10  # places of each link
 
 
 def peaks(found: Sequence[LinkEnvelope], near: Sequence[Sequence[str]]) -> dict[str, Peak]:
-    """The highest von Mises stress of each link that has stress, and away from places where it means little.
+    """The highest von Mises stress of each link that has stress, and the highest away from singular places.
 
     Parameters
     ----------
     found : per link or segment
-    near : per link or segment what each point is near to, in words; empty where stress is what it seems
+    near : per link or segment the singular place near each point, in words; empty where there is none
     """
     out, away = dict[str, Peak](), dict[str, Peak]()
     for each, words in zip(found, near, strict=True):
@@ -46,7 +46,7 @@ def highest(every: Mapping[str, Peak]) -> Peak | None:
 def peak_at(each: LinkEnvelope, node: int, words: Sequence[str]) -> Peak:
     """The highest von Mises stress of one point of a link, and when it is."""
     step = int(each.step[VON_MISES, node])
-    place = drawn_points(each.recovery)[node]
+    place = reference_points(each.recovery)[node]
     time, angle = each.when[:, VON_MISES, node]
     return Peak(
         float(each.stress[VON_MISES, node]), each.link, (float(place[0]), float(place[1]), float(place[2])),
@@ -67,21 +67,21 @@ def hot_spots(found: Sequence[LinkEnvelope], near: Sequence[Sequence[str]]) -> d
 
 def _of(parts: list[tuple[LinkEnvelope, Sequence[str]]]) -> list[Peak]:
     """Highest stresses of one link, of all its segments together."""
-    points = np.concatenate([drawn_points(each.recovery) for each, _ in parts])
+    points = np.concatenate([reference_points(each.recovery) for each, _ in parts])
     stress = np.concatenate([each.stress[VON_MISES] for each, _ in parts])
     sizes = [each.stress.shape[1] for each, _ in parts]
-    found = (within(sizes, k) for k in places_apart(points, stress, MOST))
+    found = (part_and_number(sizes, k) for k in separated_points(points, stress, MOST))
     return [peak_at(parts[part][0], node, parts[part][1]) for part, node in found]
 
 
-def within(sizes: Sequence[int], k: int) -> tuple[int, int]:
+def part_and_number(sizes: Sequence[int], k: int) -> tuple[int, int]:
     """In which of several parts, one after the other, number k of all is, and its number there."""
     ends = np.cumsum(sizes)
     part = int(np.searchsorted(ends, k, side="right"))
     return part, k - int(ends[part]) + sizes[part]
 
 
-def places_apart(points: Float[np.ndarray, "p 3"], values: Float[np.ndarray, " p"], most: int) -> list[int]:
+def separated_points(points: Float[np.ndarray, "p 3"], values: Float[np.ndarray, " p"], most: int) -> list[int]:
     """Numbers of the points with the highest values, falling, at some distance from those before; nan do not count."""
     left, found = np.isfinite(values), list[int]()
     apart = APART * float(np.linalg.norm(np.ptp(points, axis=0)))
@@ -92,6 +92,6 @@ def places_apart(points: Float[np.ndarray, "p 3"], values: Float[np.ndarray, " p
     return found
 
 
-def drawn_points(recovery: StressRecovery) -> Float[np.ndarray, "p 3"]:
+def reference_points(recovery: StressRecovery) -> Float[np.ndarray, "p 3"]:
     """Where the points of a link are, in the reference position [m]."""
     return np.asarray(recovery.at_points((recovery.link.full or recovery.link).X))

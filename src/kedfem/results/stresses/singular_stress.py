@@ -63,7 +63,7 @@ def _place(where: str, at: Float[np.ndarray, "3"], link: Link) -> Float[np.ndarr
 
 
 def reason(near: str) -> str:
-    """Why stress near such a place is not what it seems."""
+    """Why stress near such a place is unreliable, in words."""
     if near == CUT:
         return AFFINE
     return CONTACT if near.startswith("the surface") else GROWS

@@ -12,11 +12,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.frames import rotations
 from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.matrices.dense import Coordinates, work_on
 from kedfem.dynamics.system.arrays import FollowerLoads, flat
 from kedfem.links.record import Link
+from kedfem.vectors import nearest_rotations
 
 Loads = Sequence[Sequence[Pattern]]
 Shown = tuple[Float[np.ndarray, "m 3"], Float[np.ndarray, "m n"]]
@@ -75,7 +75,7 @@ def rotated_forces(
         return np.asarray(factor[:, None, None] * out)
     y = e @ R.transpose(0, 2, 1)
     y[:, :, : link.d] += weights @ u
-    Q = rotations(y.transpose(0, 2, 1) @ e)
+    Q = nearest_rotations(y.transpose(0, 2, 1) @ e)
     if load.share is not None:
         about, world = load.share
         factor = factor * (Q @ about @ world)

@@ -3,13 +3,12 @@
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.frames import rotations
 from kedfem.dynamics.system import record
 from kedfem.dynamics.system.ends import line_weights
 from kedfem.dynamics.system.forces.rotations import rotation_moment, tilt_moment
 from kedfem.dynamics.system.record import End, Term
 from kedfem.motion.rigid import RigidMotion
-from kedfem.vectors import cross
+from kedfem.vectors import cross, nearest_rotations
 
 Vectors = Float[np.ndarray, "T 3"]
 
@@ -68,7 +67,7 @@ def poses(
         Q[:, 0, 0], Q[:, 0, 1], Q[:, 1, 0], Q[:, 1, 1], Q[:, 2, 2] = c, -s, s, c, 1.0
         return x, Q @ R
     A = _directions(end, R, u).transpose(0, 2, 1) @ end.directions
-    return x, A if strained else rotations(A)
+    return x, A if strained else nearest_rotations(A)
 
 
 def _directions(end: End, R: Float[np.ndarray, "T 3 3"], u: Float[np.ndarray, "T p d"]) -> Float[np.ndarray, "T 3 3"]:
@@ -124,7 +123,7 @@ def _on_points(
         return y
     D = _directions(end, R, u)
     A = D.transpose(0, 2, 1) @ end.directions
-    Q = rotations(A)
+    Q = nearest_rotations(A)
     U = Q.transpose(0, 2, 1) @ A
     G = np.trace(U, axis1=1, axis2=2)[:, None, None] * np.eye(3) - U
     turn = np.linalg.solve(G, (Q.transpose(0, 2, 1) @ moment[:, :, None]))[:, :, 0]

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.dynamics.frames import rotations
 from kedfem.dynamics.system.forces.rotations import arc
 from kedfem.dynamics.system.record import (
     ANGLE,
@@ -41,6 +40,7 @@ from kedfem.dynamics.system.starts.offsets import foot, offset
 from kedfem.dynamics.system.starts.series import Series, inverse, product, root
 from kedfem.motion.newton import cross_matrix, rotation
 from kedfem.motion.rigid import RigidMotion
+from kedfem.vectors import nearest_rotations
 
 STEP = 1e-150  # of complex steps: its square is nothing
 
@@ -213,7 +213,7 @@ def _directions(end: End, R: Series, u: Series) -> Series:
 
 def _rotation(A: Series) -> Series:
     """Q of A = Q U: the value by singular values and Newton, then order by order."""
-    Q = rotations(A[0].real[None])[0]
+    Q = nearest_rotations(A[0].real[None])[0]
     for _ in range(2):
         Q = Q @ rotation(_small_rotation(Q.T @ A[0].real))
     if np.iscomplexobj(A):  # one step more is exact to first order
