@@ -113,6 +113,46 @@ def test_stress_is_judged_by_von_mises_and_rounding_left_out() -> None:
     assert_allclose(each.largest[1], 0.01, rtol=1e-9)
 
 
+MOVES = (("position", "displacement"), ("total_velocity", "velocity"), ("total_acceleration", "acceleration"))
+
+
+def recorded(factor: float, channels: dict[str, tuple[str, float]]) -> Results:
+    """Rows of one revolution with channels of a unit and a size, multiplied by a factor."""
+    angle = np.linspace(0.0, 2 * np.pi, 50)
+    made = {
+        name: (Channel(name, ("x",), unit, "", ""), factor * size * np.cos(angle)[:, None])
+        for name, (unit, size) in channels.items()
+    }
+    return Results(angle, angle, made, "complete", "{}")
+
+
+def test_what_is_zero_by_symmetry_differs_by_what_is_little_beside_others() -> None:
+    """A force that is 1e-7 of another one in one run, and 3e-7 in the other one: 200 % of itself, nothing of it."""
+    names = {"joints/A/force": ("N", 1e3), "joints/S/force": ("N", 1e-4), "joints/S/moment": ("N m", 2e-5),
+             "joints/A/moment": ("N m", 5.0), "drive/torque": ("N m", 1e-3),
+             "energy/kinetic": ("J", 9.0), "energy/strain": ("J", 1e-3)}  # fmt: skip
+    by = {each.channel.name: each for each in found([recorded(1.0, names), recorded(3.0, names)])}
+    wanted = {"joints/A/force": 2.0, "joints/S/force": 2e-7, "joints/S/moment": 8e-6, "joints/A/moment": 2.0,
+              "drive/torque": 2.0, "energy/kinetic": 2.0, "energy/strain": 2.0}  # fmt: skip
+    assert {name: each.largest[1] for name, each in by.items()} == pytest.approx(wanted)
+    assert {name for name, each in by.items() if each.zero} == {"joints/S/force", "joints/S/moment"}
+
+
+@pytest.mark.parametrize(("whole", "elastic"), MOVES)
+def test_what_bends_is_compared_with_itself(whole: str, elastic: str) -> None:
+    names = {f"probes/p/{whole}": ("SI", 1.0), f"probes/p/{elastic}": ("SI", 1e-4)}
+    assert [each.largest[1] for each in found([recorded(1.0, names), recorded(1.1, names)])] == pytest.approx([0.1, 0.1])
+
+
+def test_what_only_the_second_run_has_is_compared_too() -> None:
+    """It was left out; and of a kind of which the first run has nothing, the difference is all of it."""
+    first, second = (
+        {"joints/A/force": ("N", 10.0), "joints/B/force": ("N", x), "energy/strain": ("J", x)} for x in (0.0, 2.0)
+    )
+    by = {each.channel.name: each.largest[1] for each in found([recorded(1.0, first), recorded(1.0, second)])}
+    assert by == pytest.approx({"joints/A/force": 0.0, "joints/B/force": 0.2, "energy/strain": 1.0})
+
+
 def test_keys_that_differ_are_listed_with_their_values() -> None:
     scenes = [{"drive": {"speed": 1.0, "joint": "A"}, "x": [1]}, {"drive": {"speed": 2.0, "joint": "A"}, "y": {}}]
     runs = [Results(np.zeros(1), np.zeros(1), {}, "complete", json.dumps(each)) for each in scenes]

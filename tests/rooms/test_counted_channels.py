@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from kedfem.accuracy.estimates import budget, error_monitor
-from kedfem.accuracy.histories import Histories, counted, scales
+from kedfem.accuracy.histories import Histories, counted, relative_errors
 from kedfem.accuracy.histories import histories as run
 from kedfem.accuracy.mesh_estimate import mesh_errors
 from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.step_estimate import single_errors
 from kedfem.results import Channel
+from kedfem.results.differences import scales
 from kedfem.scene import scene_from
 from tests.scenes import cycloidal
 
@@ -64,6 +65,23 @@ def test_what_is_zero_beside_others_has_errors_of_these(size: float, error: floa
     assert found == {"A": 0.01, "S": pytest.approx(relative)}
     assert zeros == ({"S"} if relative == error / 1000.0 and size < 1000.0 else set())
     assert scaled({"A": 10.0, "S": error}, {"A": 1000.0, "S": size}, "N m")[0]["S"] == pytest.approx(error / size)
+
+
+@pytest.mark.parametrize(("elastic", "whole"), [
+    ("displacement", "position"), ("deflection", "travel"), ("velocity", "total_velocity"),
+    ("acceleration", "total_acceleration"),
+])  # fmt: skip
+@pytest.mark.parametrize("size", [1e-3, 1e-7])
+def test_what_a_link_bends_is_not_zero_beside_how_far_it_moves(elastic: str, whole: str, size: float) -> None:
+    """A probe of the position made 12 % of the displacement 0.1 %: it is 1 mm beside 1 m."""
+    sizes = {f"probes/tip/{elastic}": size, f"probes/tip/{whole}": 1.0}
+
+    def recorded(factor: float) -> Histories:
+        every = {name: (Channel(name, ("x",), "SI", "", ""), np.full((3, 1), x * factor)) for name, x in sizes.items()}
+        return Histories(np.linspace(0.0, 1.0, 3), every)
+
+    found = relative_errors(recorded(1.1), recorded(1.0))
+    assert found == pytest.approx(dict.fromkeys(sizes, 0.1))
 
 
 def rotor(steps: int = 300) -> dict[str, Any]:

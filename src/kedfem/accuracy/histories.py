@@ -15,14 +15,12 @@ from kedfem.dynamics.system.period.map import StateArrays, state_arrays
 from kedfem.dynamics.system.period.search import Periodic, Search
 from kedfem.dynamics.system.steps import Steps
 from kedfem.results import Channel, Results
-from kedfem.results.channels import largest_by_unit
+from kedfem.results.differences import FAINT, MOMENT, comparable, scales
 from kedfem.results.on_demand import selection
 from kedfem.results.recording import recording, rows
 
-FAINT = 3e-3  # of the largest force times the linkage's size, or of the largest value of the same unit: zero if below
-SMALL = 0.1  # of the largest value of the same unit: a channel below it is zero if its error is larger than itself
 ROUGHLY = 1e-6  # relative residual of a period that a steady motion for comparison may have
-NOTHING = 1e-6  # of the largest value of the same unit: a channel below it is only rounding
+NOTHING = 1e-6  # of the largest value of the same kind: a channel below it is only rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,45 +127,20 @@ def counted(reference: Histories) -> dict[str, float]:
 
 
 def judged(reference: Histories) -> dict[str, tuple[str, float]]:
-    """Unit and largest value of each judged channel; negligible channels are left out."""
-    units = largest_by_unit(reference.channels.values())
-    sizes = {
-        name: (channel.unit, float(np.linalg.norm(values, axis=1).max()))
-        for name, (channel, values) in reference.channels.items() if is_judged(name)
-    }  # fmt: skip
-    least = {unit: NOTHING * value for unit, value in units.items()}
-    least["N m"] = max(least.get("N m", 0.0), FAINT * reference.size * units.get("N", 0.0))
+    """What each judged channel is comparable with, and its largest value; negligible channels are left out."""
+    most: dict[str, float] = {}
+    sizes = {}
+    for name, (channel, values) in reference.channels.items():
+        of, size = comparable(channel), float(np.linalg.norm(values, axis=1).max())
+        most[of] = max(most.get(of, 0.0), size)
+        if is_judged(name):
+            sizes[name] = of, size
+    least = {of: NOTHING * value for of, value in most.items()}
+    moment = max(most.get("N m", 0.0), most.get(MOMENT, 0.0))
+    least["N m"] = max(NOTHING * moment, FAINT * reference.size * most.get("N", 0.0))
     if reference.size:  # for balanced rotors, and for what moments alone bend
-        least["N"] = max(least.get("N", 0.0), NOTHING * units.get("N m", 0.0) / reference.size)
-    return {name: (unit, size) for name, (unit, size) in sizes.items() if size > least[unit]}
-
-
-def scales(
-    errors: Mapping[str, float], sizes: Mapping[str, tuple[str, float]], zeros: set[str] | None = None
-) -> dict[str, float]:
-    """Value to which each channel's error is relative: its largest, or the largest of its unit if the channel is zero.
-
-    A channel is zero if its largest value is below FAINT of the largest of its unit, or below SMALL of it and below its
-    own error. Torques keep their own scale: that of a wrist is small beside that of a shoulder, and matters.
-
-    Parameters
-    ----------
-    errors : in the channel's unit
-    sizes : unit and largest value of each channel
-    zeros : set to which the names of channels that are zero are added
-    """
-    largest: dict[str, float] = {}
-    for unit, size in sizes.values():
-        largest[unit] = max(largest.get(unit, 0.0), size)
-    out = {}
-    for name, error in errors.items():
-        unit, size = sizes[name]
-        most = largest[unit]
-        zero = unit != "N m" and (size <= FAINT * most or error > size <= SMALL * most)
-        out[name] = most if zero else size
-        if zero and zeros is not None:
-            zeros.add(name)
-    return out
+        least["N"] = max(least.get("N", 0.0), NOTHING * moment / reference.size)
+    return {name: (of, size) for name, (of, size) in sizes.items() if size > least[of]}
 
 
 def worst(errors: Mapping[str, float]) -> float:

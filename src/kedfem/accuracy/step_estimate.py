@@ -9,11 +9,12 @@ from typing import ClassVar
 import numpy as np
 
 from kedfem.accuracy.error_budget import kind_of_name
-from kedfem.accuracy.histories import Histories, counted, scales
+from kedfem.accuracy.histories import Histories, counted
 from kedfem.accuracy.prepared import Prepared
 from kedfem.accuracy.resolution import StepError
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Block
+from kedfem.results.differences import comparable, scales
 from kedfem.results.recorded import Recorded
 from kedfem.results.stresses.envelope import largest_row
 from kedfem.scene import time_grid
@@ -223,9 +224,9 @@ class StepErrorMonitor:
             errors = {each.channel.name: min(1.0, SINGLE * running) for each in self.recorded}
             return StepEstimate(h, 1, errors, {}, {}, running)
         sizes = {name: x for name, x in self.sizes.items() if x.peak}
-        units = {each.channel.name: each.channel.unit for each in self.recorded}
+        kinds = {each.channel.name: comparable(each.channel) for each in self.recorded}
         found = {name: _error(x) for name, x in sizes.items()}
-        scale = scales(found, {name: (units[name], x.peak) for name, x in sizes.items()})
+        scale = scales(found, {name: (kinds[name], x.peak) for name, x in sizes.items()})
         return StepEstimate(
             h, analysis.extrapolation_levels or 1, {name: error / scale[name] for name, error in found.items()},
             {name: tuple((x.differences / scale[name]).tolist()) for name, x in sizes.items()},
@@ -279,7 +280,7 @@ def single_errors(
         sizes = _Sizes()
         sizes.add((4 * own - other[: len(own)]) / 3, [other[: len(own)], own])
         if sizes.peak:
-            peaks[name] = channel.unit, largest_row(every[:, which])
+            peaks[name] = comparable(channel), largest_row(every[:, which])
             D, jolt = float(sizes.differences[0]), _jolt(every[:, which]) if stops else 0.0
             for found, factor in zip(errors, single_level(sizes.fast), strict=True):
                 found[name] = max(D * factor, jolt)

@@ -1,8 +1,8 @@
 """Differences of runs from the first one in their common channels, over time or the drive's position."""
 
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -14,6 +14,10 @@ from kedfem.results.records import Results
 Over = Literal["time", "drive"]
 SAME = 1e-9  # of a range: tolerance within which grids, and motions of drives, are equal
 CUBIC = 3
+FAINT = 3e-3  # of the largest force times the linkage's size, or of the largest value of the same kind: zero if below
+SMALL = 0.1  # of the largest value of the same kind: a channel below it is zero if its error is larger than itself
+MOMENT = "moments of joints"
+WHOLE = {"position", "travel", "total_velocity", "total_acceleration"}  # quantities of which deflections are little
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,8 +26,9 @@ class Difference:
 
     values : runs × (T, c) [unit of the channel]
     peaks : (runs,) largest magnitude; of stress channels of the von Mises stress
-    largest, rms : (runs,) of the difference from the first run [relative to the first run's peak]
+    largest, rms : (runs,) of the difference from the first run [relative to `scale`]
     at : (runs,) time or position of the largest difference [s], or [rad], [m] over the drive
+    scale : (runs,) the first run's peak, or of a channel that is zero beside others its highest one of the same kind
     """
 
     channel: Channel
@@ -32,6 +37,53 @@ class Difference:
     largest: Float[np.ndarray, " runs"]
     rms: Float[np.ndarray, " runs"]
     at: Float[np.ndarray, " runs"]
+    scale: Float[np.ndarray, " runs"]
+
+    @property
+    def zero(self) -> bool:
+        """Whether the channel is zero beside others in the first run."""
+        return bool((self.scale != self.peaks[0]).any())
+
+
+def comparable(channel: Channel) -> str:
+    """The kind of values beside which a channel may be zero: of one unit, elastic motion apart from that of the links,
+    moments of joints from torques, each energy by itself.
+
+    >>> comparable(Channel("probes/tip/position", ("x", "y", "z"), "m", "world", ""))
+    'm of links'
+    """
+    quantity = channel.name.rsplit("/", 1)[-1]
+    if channel.name.startswith("energy/"):
+        return channel.name
+    return MOMENT if quantity == "moment" else f"{channel.unit} of links" if quantity in WHOLE else channel.unit
+
+
+def scales(
+    errors: Mapping[str, float], sizes: Mapping[str, tuple[str, float]], zeros: set[str] | None = None
+) -> dict[str, float]:
+    """Value to which each channel's error is relative: its largest, or the largest of its kind if the channel is zero.
+
+    A channel is zero if its largest value is below FAINT of the largest of its kind, or below SMALL of it and below its
+    own error. Torques keep their own scale: that of a wrist is small beside that of a shoulder, and matters.
+
+    Parameters
+    ----------
+    errors : in the channel's unit
+    sizes : kind, as `comparable` has it, and largest value of each channel
+    zeros : set to which the names of channels that are zero are added
+    """
+    largest: dict[str, float] = {}
+    for kind, size in sizes.values():
+        largest[kind] = max(largest.get(kind, 0.0), size)
+    out = {}
+    for name, error in errors.items():
+        kind, size = sizes[name]
+        most = largest[kind]
+        zero = kind != "N m" and (size <= FAINT * most or error > size <= SMALL * most)
+        out[name] = most if zero else size
+        if zero and zeros is not None:
+            zeros.add(name)
+    return out
 
 
 def sparsest(runs: Sequence[Results]) -> int:
@@ -114,11 +166,27 @@ def differences(runs: Sequence[Results], over: Over, at: Float[np.ndarray, " T"]
         sizes = [magnitude(channel, x) for x in values]
         between = [_largest(run, channel, over, at) if thinned else 0.0 for run in runs]
         peaks = np.array([float(np.max(x, initial=most)) for x, most in zip(sizes, between, strict=True)])
-        if peaks.max() <= NOTHING * highest.get(channel.unit, 0.0) or not peaks[0]:
-            continue
-        off = [magnitude(channel, x - values[0]) / peaks[0] for x in values]
-        most, rms = np.array([x.max() for x in off]), np.array([np.sqrt(np.mean(x**2)) for x in off])
-        out.append(Difference(channel, values, peaks, most, rms, np.array([at[x.argmax()] for x in off])))
+        if peaks.max() > NOTHING * highest.get(channel.unit, 0.0):
+            off = [magnitude(channel, x - values[0]) for x in values]
+            most, rms = np.array([x.max() for x in off]), np.array([np.sqrt(np.mean(x**2)) for x in off])
+            where = np.array([at[x.argmax()] for x in off])
+            out.append(Difference(channel, values, peaks, most, rms, where, np.ones(len(runs))))
+    return _relative(out)
+
+
+def _relative(found: Sequence[Difference]) -> list[Difference]:
+    """Differences [unit of the channel] relative to the first run's values, as `scales` has it run by run.
+
+    Where the first run has nothing of a kind they are relative to the other run's peak.
+    """
+    sizes = {each.channel.name: (comparable(each.channel), float(each.peaks[0])) for each in found}
+    runs = range(len(found[0].peaks) if found else 0)
+    every = [scales({each.channel.name: float(each.largest[k]) for each in found}, sizes) for k in runs]
+    out = []
+    for each in found:
+        scale = np.array([by[each.channel.name] for by in every])
+        scale = np.where(scale > 0, scale, np.where(each.peaks > 0, each.peaks, 1.0))
+        out.append(replace(each, largest=each.largest / scale, rms=each.rms / scale, scale=scale))
     return out
 
 

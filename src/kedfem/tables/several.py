@@ -28,11 +28,12 @@ def _differences(found: Comparison, k: int) -> Table:
     title = f"{found.names[k]} compared with {found.names[0]}, over {found.over}, {low} to {high}"
     columns = [*left("channel"), *right("peak", f"of {found.names[0]}", "differs by", "at", "rms")]
     caption = "largest difference and its rms, of the first peak; of vectors the difference's length"
+    caption += "\n* zero beside others: of the highest of them" if any(each.zero for each in found.found) else ""
     table = listed(Text(title), columns, caption=caption)
     for each in found.found:
         peak, first = (with_prefix(float(each.peaks[m]), each.channel.unit) for m in (k, 0))
         at = with_prefix(float(each.at[k]), found.unit)
-        table.add_row(each.channel.name, peak, first, _off(each.largest[k]), at, _off(each.rms[k]))
+        table.add_row(each.channel.name + " *" * each.zero, peak, first, _off(each.largest[k]), at, _off(each.rms[k]))
     return table
 
 

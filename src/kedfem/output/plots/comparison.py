@@ -60,14 +60,14 @@ def _write_picture(
             look = {"color": f"C{k % 10}", "linestyle": LOOKS[k % len(LOOKS)], "linewidth": 1.3}
             above.plot(along[kept], shown[kept] / scale, label=name.replace("$", r"\$"), **look)
             if k:
-                off = 100 * magnitude(channel, values - each.values[0]) / each.peaks[0]
+                off = 100 * magnitude(channel, values - each.values[0]) / each.scale[k]
                 kept = envelope(off)
                 below.plot(along[kept], off[kept], **look)
         what = channel.name.rsplit("/", 1)[-1].replace("_", " ")
         if each.values[0].shape[1] > 1:
             what = f"{what}, {'von Mises' if 'von_mises' in channel.columns else 'magnitude'}"
         above.set_ylabel(f"{what} ({unit})" if unit else what)
-        below.set_ylabel("difference\n(% of peak)")
+        below.set_ylabel("difference\n(% of others)" if each.zero else "difference\n(% of peak)")
         below.set_xlabel(label)
         below.set_xlim(along[0], along[-1])
         draw_legend(above)
