@@ -16,7 +16,7 @@ from kedfem.dynamics.stepping.scheme import generalised_alpha
 from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_gradients, stress_of_gradient, von_mises
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, joint_surface
-from kedfem.links.surfaces.rigid_coupling import STIFF, radius, surface_gram, with_rigid_coupling
+from kedfem.links.surfaces.rigid_coupling import STIFF, surface_gram, surface_radius, with_rigid_coupling
 
 PLATE = next(part for part in PARTS if part.name == "plate with bores")
 LOADS = {"pull": (1.0, 0.0, 0.0), "bend": (0.0, 1.0, 0.0)}
@@ -82,7 +82,7 @@ def _peak_stress(link: Link, u: Float[np.ndarray, "n 3"]) -> float:
     """The highest equivalent stress of a node near the loaded bore."""
     surface = _bores(link)[1]
     H = np.stack([G @ u for G in nodal_gradients(link)], axis=2)
-    near = np.linalg.norm((link.X - surface.origin)[:, :2], axis=1) <= NEAR * radius(surface)
+    near = np.linalg.norm((link.X - surface.origin)[:, :2], axis=1) <= NEAR * surface_radius(surface)
     return float(von_mises(stress_of_gradient(H[near], link)).max())
 
 

@@ -13,7 +13,7 @@ from kedfem.analysis import Run, analyse
 from kedfem.dynamics.stepping.solvers import steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.links.recovery import extreme_stresses, nodal_state, nodal_stress, stress_recovery, von_mises
-from kedfem.links.singular_stress import re_entrant, reach
+from kedfem.links.singular_stress import influence_radius, re_entrant
 from kedfem.output.fields import VON_MISES
 from kedfem.results import read_results
 from kedfem.results.stresses.envelope import EXACT, Envelope, leading
@@ -154,7 +154,7 @@ def test_a_re_entrant_corner_is_found_and_a_round_one_is_not(model: str) -> None
         assert bool(len(nodes)) == bool(corners)
         assert_allclose(nodes[:, :2], np.tile([0.06, 0.02], (len(nodes), 1)), atol=1e-9)
         # volume over surface of a plate, less than half its thickness by the edges
-        assert 0.0025 < reach(link) < 0.005
+        assert 0.0025 < influence_radius(link) < 0.005
 
 
 def test_a_peak_at_a_corner_says_so_and_what_is_highest_away_from_it(tmp_path: Path) -> None:

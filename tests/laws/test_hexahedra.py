@@ -20,7 +20,7 @@ from kedfem.links.recovery import (
     stress_of_gradient,
     stress_recovery,
 )
-from kedfem.links.solid import elastic_stiffness, gradient_products, pattern, solid_basis
+from kedfem.links.solid import elastic_stiffness, gradient_products, solid_basis, sparsity_pattern
 from kedfem.links.surfaces.surface import surface_quadrature
 from kedfem.mesh import SolidMesh
 from kedfem.mesh.elements.shape_functions import NODES, shape_gradients
@@ -269,7 +269,7 @@ def test_20_functions_on_27_node_geometry_would_strain_in_a_rigid_turn() -> None
     """Why hex20 brings its own geometry: a node moved off the face's middle is no field of the 20 modes."""
     mesh = patch(27, np.random.default_rng(0))
     alien = skfem.Basis(solid_basis(mesh).mesh, skfem.ElementHexS2(), intorder=5)
-    K0 = elastic_stiffness(gradient_products(alien, pattern(alien)), MATERIAL.lame())
+    K0 = elastic_stiffness(gradient_products(alien, sparsity_pattern(alien)), MATERIAL.lame())
     forces = np.abs(K0 @ rigid_modes(alien.doflocs.T)).max(axis=0) / np.abs(K0).max()
     assert forces[:3].max() < ROUNDING
     assert forces[3:].min() > 1e-5
@@ -298,7 +298,7 @@ def test_stiffness_is_that_of_the_vector_form(mesh: SolidMesh, nu: float) -> Non
     """Six scalar matrices against scikit-fem's own linear elasticity on the vector-valued element."""
     basis = solid_basis(mesh)
     lame = (nu / ((1 + nu) * (1 - 2 * nu)), 1 / (2 * (1 + nu)))  # E = 1 Pa
-    K0 = elastic_stiffness(gradient_products(basis, pattern(basis)), lame).toarray()
+    K0 = elastic_stiffness(gradient_products(basis, sparsity_pattern(basis)), lame).toarray()
     vector = skfem.Basis(basis.mesh, skfem.ElementVector(basis.elem), quadrature=basis.quadrature)
     K = linear_elasticity(*lame).assemble(vector).toarray()
     here = np.empty(len(K), int)

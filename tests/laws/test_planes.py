@@ -14,7 +14,7 @@ from kedfem.links.plane import plane_basis, plane_link, plane_stress
 from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_stress, stress_recovery
-from kedfem.links.solid import elastic_stiffness, gradient_products, pattern, solid_link
+from kedfem.links.solid import elastic_stiffness, gradient_products, solid_link, sparsity_pattern
 from kedfem.links.surfaces.coupling_surfaces import face_surface, is_flat, joint_surface, port_weights, surface_weights
 from kedfem.mesh import QuadMesh
 from kedfem.mesh.elements.hexahedra import extruded, rectangle_quads
@@ -142,7 +142,7 @@ def test_stiffness_is_that_of_the_vector_form(mesh: QuadMesh, nu: float) -> None
     """Three scalar matrices against scikit-fem's own linear elasticity on the vector-valued element."""
     basis = plane_basis(mesh)
     lame = (nu / ((1 + nu) * (1 - 2 * nu)), 1 / (2 * (1 + nu)))  # E = 1 Pa
-    K0 = elastic_stiffness(gradient_products(basis, pattern(basis)), lame).toarray()
+    K0 = elastic_stiffness(gradient_products(basis, sparsity_pattern(basis)), lame).toarray()
     vector = skfem.Basis(basis.mesh, skfem.ElementVector(basis.elem), quadrature=basis.quadrature)
     K = linear_elasticity(*lame).assemble(vector).toarray()
     here = np.empty(len(K), int)

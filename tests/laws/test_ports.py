@@ -17,7 +17,7 @@ from kedfem.dynamics.joints.ports import port_values, port_vectors
 from kedfem.dynamics.model import Model
 from kedfem.links.plane import plane_link
 from kedfem.links.record import Link, mass_times
-from kedfem.links.reduced import reduced, rigid, rigid_functions, rigid_modes
+from kedfem.links.reduced import reduced, rigid, rigid_body_functions, rigid_modes
 from kedfem.links.solid import solid_link
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface, face_surface, joint_surface
 from kedfem.links.surfaces.rigid_coupling import STIFF, surface_gram, with_rigid_coupling
@@ -111,7 +111,7 @@ def test_a_stiff_bore_keeps_its_shape_and_makes_the_link_stiffer(mesh: SolidMesh
 def test_a_stiff_reduced_link_is_the_stiff_link_reduced(nodes: int) -> None:
     link = solid(ring(nodes))
     random = np.random.default_rng(0).standard_normal((link.n, 9))
-    Q = np.column_stack([rigid_functions(link), random])
+    Q = np.column_stack([rigid_body_functions(link), random])
     one = with_rigid_coupling(reduced(link, Q), bore(reduced(link, Q)))
     other = reduced(with_rigid_coupling(link, bore(link)), Q)
     for K in (one, other):  # functions may differ by a turn among them, the eigenvalues may not
@@ -278,7 +278,7 @@ def test_segments_and_reduced_links_take_stiff_ports(reduce: bool) -> None:
     assert changed == [True, False, True] * 3
     if reduce:
         part = models[1].links[0]
-        Q = np.column_stack([rigid_functions(part), np.sin(60 * part.X[:, :1])])
+        Q = np.column_stack([rigid_body_functions(part), np.sin(60 * part.X[:, :1])])
         assert reduced(part, Q).K0.shape == (2 * 4, 2 * 4)
 
 

@@ -10,7 +10,7 @@ from kedfem.links.beams.section import rectangle
 from kedfem.links.beams.spatial_beam import space_strains
 from kedfem.links.beams.spatial_stress import metric
 from kedfem.links.record import Link
-from kedfem.links.reduced import reduced, rigid, rigid_functions
+from kedfem.links.reduced import reduced, rigid, rigid_body_functions
 from kedfem.links.stress_stiffness import rotated_directions, stress_stiffness
 from kedfem.motion.newton import cross_matrix
 from kedfem.scene import Material
@@ -31,7 +31,7 @@ def links() -> dict[str, Link]:
     rng = np.random.default_rng(0)
     for name in ("hex20", "plane", "beam in space"):
         more = rng.standard_normal((out[name].n, 3))
-        out[f"{name}, reduced"] = reduced(out[name], np.hstack([rigid_functions(out[name]), more]))
+        out[f"{name}, reduced"] = reduced(out[name], np.hstack([rigid_body_functions(out[name]), more]))
         out[f"{name}, rigid"] = rigid(out[name])
     return out
 

@@ -15,11 +15,11 @@ from kedfem.dynamics.joints.places import part_surface, surface_of
 from kedfem.errors import MeshError
 from kedfem.links.build import bare_links
 from kedfem.links.record import Link
-from kedfem.links.reduced import reduced, rigid_functions
+from kedfem.links.reduced import reduced, rigid_body_functions
 from kedfem.links.segments import segmented
 from kedfem.links.solid import solid_link
 from kedfem.links.surfaces.candidates import surfaces
-from kedfem.links.surfaces.choosing import as_choice, chosen_surface, distance, fits
+from kedfem.links.surfaces.chosen_faces import choice_text, chosen_surface, distance, matches
 from kedfem.mesh import SolidMesh
 from kedfem.motion.closed import STILL, Shift, closed_scene
 from kedfem.motion.linkage import linkage
@@ -101,7 +101,7 @@ def test_segments_and_reduced_links_know_the_choice_that_was_made_on_the_whole(t
     assert_allclose(surface.origin, [0, 0, 0.015], atol=1e-7)
     X = links[key].X[links[key].basis.mesh.facets[:, surface.facets]]
     assert_allclose(np.hypot(X[..., 0], X[..., 1]), 0.004, rtol=1e-6)
-    small = reduced(whole, np.column_stack([rigid_functions(whole), np.sin(90 * whole.X[:, 0])]))
+    small = reduced(whole, np.column_stack([rigid_body_functions(whole), np.sin(90 * whole.X[:, 0])]))
     assert_allclose(surface_of(scene, "A", small).origin, surface.origin, atol=1e-7)
     (face,) = whole.faces
     assert face.face.chosen
@@ -115,7 +115,7 @@ def test_what_is_offered_chooses_itself_when_it_is_copied_back(mesh: SolidMesh) 
     offered = surfaces(link)
     assert len(offered) >= 2
     for each in offered:
-        text = as_choice(link, each)
+        text = choice_text(link, each)
         choice = ChosenFace.model_validate(tomllib.loads(f"x = {text}")["x"])
         assert choice.near is not None
         assert chosen_surface(link, "here", choice, np.array(choice.near), offered) is each
@@ -217,7 +217,7 @@ def test_a_choice_goes_with_its_link_when_joints_are_closed(tmp_path: Path) -> N
 def test_diameters_and_directions_have_their_tolerance() -> None:
     link = made(turned(SLEEVE))
     (bore,) = [x for x in surfaces(link) if x.form == "cylinder" and abs(x.radius - 0.004) < 1e-5]
-    assert fits(bore, ChosenFace(cylinder="8.03 mm"))
-    assert not fits(bore, ChosenFace(cylinder="8.05 mm"))
-    assert fits(bore, ChosenFace(cylinder="8 mm", axis=(0, 0.0015, -1)))
-    assert not fits(bore, ChosenFace(cylinder="8 mm", axis=(0, 0.003, -1)))
+    assert matches(bore, ChosenFace(cylinder="8.03 mm"))
+    assert not matches(bore, ChosenFace(cylinder="8.05 mm"))
+    assert matches(bore, ChosenFace(cylinder="8 mm", axis=(0, 0.0015, -1)))
+    assert not matches(bore, ChosenFace(cylinder="8 mm", axis=(0, 0.003, -1)))

@@ -14,7 +14,7 @@ from kedfem.dynamics.elastic_model import elastic_model
 from kedfem.errors import KedfemError, MeshError
 from kedfem.links.build import bare_link, bare_links
 from kedfem.links.record import Link
-from kedfem.links.reduced import reduced, rigid_functions
+from kedfem.links.reduced import reduced, rigid_body_functions
 from kedfem.links.segments import segmented
 from kedfem.links.solid import solid_link
 from kedfem.links.surfaces.candidates import candidates
@@ -235,7 +235,7 @@ def test_faces_that_are_named_make_the_coupling_surface_wherever_the_joint_is(no
     assert_allclose(narrow.origin, surface_at(link, 0.003).origin, atol=1e-12)
     assert both.facets is not None
     assert len(both.facets) == (64 if nodes == 10 else 32)
-    Q = np.column_stack([rigid_functions(link), np.sin(90 * link.X[:, 0])])
+    Q = np.column_stack([rigid_body_functions(link), np.sin(90 * link.X[:, 0])])
     small = reduced(link, Q)
     assert_allclose(surface_at(small, 0.5, ["narrow"]).fit, narrow.fit @ small.Q, atol=1e-9 * np.abs(narrow.fit).max())
 

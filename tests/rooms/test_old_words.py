@@ -116,6 +116,7 @@ RETIRED = {
     "laid_over": r"\b(laid_over|one_surface|not_too_bad|check_room)\b",
     "watcher": r"(?i)\bwatcher\b|\bStepWatch\b|\b(asked_for|first_enough|last_of|let_go)\b",
     "in_common": r"\b(in_common|drawn_points|places_apart|stated_link|counted_on)\b",
+    "parted": r"\b(parted|most_(segments|slices)|not_touching|in_its_plane|between_gauss|on_functions|rigid_functions)\b",
     "truth": r"\b(from|against|beside) the truth\b",
 }
 """Words of docs/notation.md that package and docs do not use any more; its names and prose have the right column."""

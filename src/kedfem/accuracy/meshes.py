@@ -16,8 +16,8 @@ from kedfem.accuracy.trials import Trials
 from kedfem.accuracy.variants import families, filleted, of_family, refinable, refined, shortened, with_links
 from kedfem.dynamics.model import Model, segments
 from kedfem.errors import KedfemError, SceneError
-from kedfem.links.build import most_segments
-from kedfem.links.segments import most_slices
+from kedfem.links.build import max_segments
+from kedfem.links.segments import max_slices
 from kedfem.scene import Cad, Extrusion, LinkScene, MeshFile, Part, Scene, link_frames, time_grid
 
 MESH_ORDER = 2.0  # of convergence of a mesh; lower at re-entrant edges
@@ -136,7 +136,7 @@ def open_segments(scene: Scene) -> list[str]:
 
 def with_segments(search: Trials, scene: Scene, allowed: float) -> tuple[Scene, float]:
     """The scene with the fewest sufficient segments, the same number in all links that are not stubby, and the error."""
-    most = {name: most_segments(scene, name) for name in open_segments(scene)}
+    most = {name: max_segments(scene, name) for name in open_segments(scene)}
     ladder = [(count, _segmented(scene, most, count)) for count in COUNTS]
     k, error = first_accurate(search, ladder, allowed, "more segments")
     return (scene, 0.0) if error == math.inf else (ladder[k][1], error)
@@ -186,7 +186,7 @@ def stubby_warning(model: Model) -> tuple[str, ...]:
         if len(parts) > 1 and parts[0].meshed:
             X = [(part.full or part).X for part in parts]
             e = X[-1].mean(axis=0) - X[0].mean(axis=0)
-            if len(parts) > (most := most_slices(np.concatenate(X), e / np.linalg.norm(e))):
+            if len(parts) > (most := max_slices(np.concatenate(X), e / np.linalg.norm(e))):
                 stubby.append(f"{name} ({len(parts)} segments: at most {most})")
     if not stubby:
         return ()

@@ -20,7 +20,7 @@ from kedfem.dynamics.shapeless import mass_alone, moving_ground
 from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.errors import Fault, MeshError, SceneError
 from kedfem.links.bodies import euler_tensor, flywheel_tensor, with_body, with_point_mass
-from kedfem.links.build import bare_links, parted
+from kedfem.links.build import bare_links, link_segments
 from kedfem.links.point_rows import point_rows, require_on_axis
 from kedfem.links.record import Link
 from kedfem.links.reduced import rigid
@@ -71,7 +71,7 @@ def elastic_model(
     SceneError
         If a load or body does not fit its link.
     """
-    cut = {name: parted(scene, name, link) for name, link in bare_links(scene, known).items()}
+    cut = {name: link_segments(scene, name, link) for name, link in bare_links(scene, known).items()}
     links = {key: part for name, link in cut.items() for key, part in zip(keys(name, link), link.parts, strict=True)}
     links = with_rigid_couplings(scene, links)
     ground, alone = moving_grounds(scene), {name: mass_alone(scene, name, links) for name in masses_alone(scene)}
@@ -111,7 +111,7 @@ def keys(name: str, link: Segments) -> list[str]:
 def _shared(name: str, link: Segments) -> list[SharedCut]:
     key = keys(name, link)
     return [
-        SharedCut((key[a], key[b]), cut.points, cut.weights, () if cut.even else cut.facets)
+        SharedCut((key[a], key[b]), cut.points, cut.weights, () if cut.prismatic else cut.facets)
         for cut in link.cuts
         for a, b in [cut.segments]
     ]

@@ -10,7 +10,7 @@ from kedfem.dynamics.joints.attachments import SharedCut
 from kedfem.dynamics.loads import Pattern
 from kedfem.dynamics.model import Model, link_keys
 from kedfem.links.record import Link
-from kedfem.links.reduced import can_be_stored, on_functions, reduced, restored, stored
+from kedfem.links.reduced import can_be_stored, mode_matrix, reduced, restored, stored
 
 
 def reduced_model(model: Model, functions: Sequence[Float[np.ndarray, "_ s"] | None]) -> Model:
@@ -21,7 +21,7 @@ def reduced_model(model: Model, functions: Sequence[Float[np.ndarray, "_ s"] | N
         if Q is not None:
             links[k] = link = reduced(model.links[k], Q)
             cuts = tuple(_cut_on(cut, names[k], link) for cut in cuts)
-            on, joint = on_functions(link), model.joints[k]
+            on, joint = mode_matrix(link), model.joints[k]
             joints[k] = replace(joint, nodes=np.arange(link.n), weights=joint.weights @ on[joint.nodes])
             loads[k] = tuple(_load_on(load, link) for load in model.loads[k])
     return replace(model, links=tuple(links), joints=tuple(joints), loads=tuple(loads), cuts=cuts)
@@ -45,12 +45,12 @@ def _with_links(model: Model, changed: Callable[[Link], Link]) -> Model:
 
 
 def _load_on(load: Pattern, link: Link) -> Pattern:
-    return replace(load, forces=on_functions(link).T @ load.forces)
+    return replace(load, forces=mode_matrix(link).T @ load.forces)
 
 
 def _cut_on(cut: SharedCut, key: str, link: Link) -> SharedCut:
     """A cut, its weights on the functions of a link that has become a reduced one."""
     if key not in cut.keys:
         return cut
-    one, other = (x @ on_functions(link) if key == name else x for name, x in zip(cut.keys, cut.weights, strict=True))
+    one, other = (x @ mode_matrix(link) if key == name else x for name, x in zip(cut.keys, cut.weights, strict=True))
     return replace(cut, weights=(one, other))

@@ -13,7 +13,7 @@ from kedfem.dynamics.stepping.step_limit import StepLimit
 from kedfem.errors import Fault, SceneError
 from kedfem.links.bodies import with_body, with_mass
 from kedfem.links.record import Link
-from kedfem.links.reduced import RIGID, reach, rigid, rigid_functions, wave_frequency
+from kedfem.links.reduced import RIGID, overall_length, rigid, rigid_body_functions, wave_frequency
 from kedfem.links.surfaces.coupling_surfaces import rigid_link_surface
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
@@ -107,7 +107,7 @@ def _beside(link: Link, elastic: Sequence[Link]) -> float:
     if not elastic:
         return np.inf
     stiffest = max(wave_frequency(each) ** 2 * float(each.one @ each.m1[:, 0]) for each in elastic)
-    lightest = min(float(link.one @ link.m1[:, 0]), float(_second_moments(link)[0]) / reach(link) ** 2)
+    lightest = min(float(link.one @ link.m1[:, 0]), float(_second_moments(link)[0]) / overall_length(link) ** 2)
     return float(RIGID * np.sqrt(stiffest / lightest))
 
 
@@ -130,15 +130,15 @@ def _spread(link: Link) -> Link:
     turning = float(link.one @ (link.mass[2] @ link.one))
     if _second_moments(link).sum() > LIGHT * turning:
         return link
-    Y = np.linalg.pinv(rigid_functions(link))[1:]  # nothing on what moves as a whole
-    share = min(turning / 2, float(link.one @ link.m1[:, 0]) * reach(link) ** 2 / 12)
+    Y = np.linalg.pinv(rigid_body_functions(link))[1:]  # nothing on what moves as a whole
+    share = min(turning / 2, float(link.one @ link.m1[:, 0]) * overall_length(link) ** 2 / 12)
     xy = sp.csr_array(link.mass[0] + share / len(Y) * (Y.T @ Y))
     return with_mass(link, (xy, xy, sp.csr_array(link.mass[2] * (1 - share / turning))))
 
 
 def _second_moments(link: Link) -> Float[np.ndarray, " e"]:
     """Of its mass about the centre, the least first [kg m²]."""
-    F = rigid_functions(link)
+    F = rigid_body_functions(link)
     A = F.T @ np.asarray(link.mass[0] @ F)
     return np.asarray(np.linalg.eigvalsh(A[1:, 1:] - np.outer(A[0, 1:], A[0, 1:]) / A[0, 0]))
 
@@ -156,7 +156,7 @@ def _with_extent(link: Link) -> None:
         length.
     """
     second = _second_moments(link)
-    if second[-1] < COMPACT * float(link.m1[:, 0] @ link.one) * reach(link) ** 2:
+    if second[-1] < COMPACT * float(link.m1[:, 0] @ link.one) * overall_length(link) ** 2:
         wanted = (
             "a rigid link must have mass in more than one place, got nearly all of it in one (a point mass on a link of "
             "next to no mass): give the link a denser material, or the body some inertia"
@@ -194,4 +194,4 @@ def _mounted(link: Link, along: float, about: float) -> float:
     """The highest frequency at which a link would swing alone on one of such mounts [rad/s]."""
     mass, second = float(link.one @ link.m1[:, 0]), _second_moments(link)
     least = float(second[:2].sum())  # about the axis with most mass near it
-    return float(np.sqrt(along / mass + (along * reach(link) ** 2 + about) / least))
+    return float(np.sqrt(along / mass + (along * overall_length(link) ** 2 + about) / least))

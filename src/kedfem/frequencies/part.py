@@ -19,7 +19,7 @@ from kedfem.links.record import Link
 from kedfem.links.recovery import stress_recovery
 from kedfem.links.solid import solid_link
 from kedfem.links.surfaces.candidates import surfaces
-from kedfem.links.surfaces.choosing import chosen_surface
+from kedfem.links.surfaces.chosen_faces import chosen_surface
 from kedfem.mesh import part_mesh
 from kedfem.motion.joint_equations import joint_axis
 from kedfem.output.fields import LinkField

@@ -23,8 +23,8 @@ def inertia_of(euler: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
 def flywheel_tensor(surface: CouplingSurface, axis: Float[np.ndarray, "3"], inertia: float) -> Float[np.ndarray, "3 3"]:
     """Euler tensor of a flywheel with moment of inertia J about an axis [kg m²].
 
-    On a bore a thin disc, ½ J (1 − a aᵀ). A flat face does not know how its displacement changes along its normal, so
-    there the same J stands across the axis within the face: J t tᵀ. In a plane both have xx + yy = J.
+    On a bore a thin disc, ½ J (1 − a aᵀ). The affine fit of a flat face has no gradient along its normal: there
+    J t tᵀ, t across the axis within the face. In a plane both have xx + yy = J.
     """
     if not is_flat(surface):
         return np.asarray(inertia / 2 * (np.eye(3) - np.outer(axis, axis)))
@@ -38,14 +38,13 @@ def with_body(
     """A link with a rigid body on one of its coupling surfaces: W4ᵀ Γ W4 is added to the scalar mass.
 
     Γ = [[mass, mass·cᵀ], [mass·c, G]], c the body's centre from the coupling surface's origin, G its Euler tensor about
-    that origin. On a planar beam the body adds its mass to the node's translation and its inertia about z to the node's
-    turn.
+    that origin. On a planar beam it adds its mass to the node's translation, and its inertia about z to its rotation.
 
     Parameters
     ----------
     mass : [kg]
-    centre : centre of mass in the reference position [m]; on a beam or a flat face the coupling surface must know the
-    direction to it
+    centre : centre of mass in the reference position [m]; the coupling surface of a beam or a flat face must have
+        a gradient along the direction to it
     euler : (3, 3) Euler tensor ∫ ρ x xᵀ dV about the centre [kg m²]
     """
     c = centre - surface.origin

@@ -16,9 +16,9 @@ from kedfem.links.beams.beam_segments import beam_segments, space_segments
 from kedfem.links.beams.of_scene import scene_axis, scene_beam
 from kedfem.links.plane import plane_link
 from kedfem.links.record import Link
-from kedfem.links.segments import Interval, Segments, along, corotational, most_slices, segmented
+from kedfem.links.segments import Interval, Segments, along, corotational, max_slices, segmented
 from kedfem.links.solid import solid_link
-from kedfem.links.surfaces.choosing import with_chosen_faces
+from kedfem.links.surfaces.chosen_faces import with_chosen_faces
 from kedfem.links.surfaces.coupling_surfaces import joint_surface
 from kedfem.mesh import SolidMesh, side_by_side
 from kedfem.scene import (
@@ -43,7 +43,7 @@ def bare_links(scene: Scene, known: Mapping[str, Link] | None = None) -> dict[st
 
     Parameters
     ----------
-    known : those that are made already, by name
+    known : records that exist already, by name
     """
     made = known or {}
     names = [name for name, link in scene.links.items() if link.shape is not None]
@@ -52,7 +52,7 @@ def bare_links(scene: Scene, known: Mapping[str, Link] | None = None) -> dict[st
 
 
 def part_meshes(scene: Scene, names: Iterable[str]) -> dict[str, SolidMesh]:
-    """Meshes of those solid links that are parts from CAD or mesh files, made side by side."""
+    """Meshes of the solid links that are parts from CAD or mesh files, made in parallel."""
     solids = (name for name in names if scene.links[name].family == "solid")
     parts = (name for name in solids if isinstance(scene.links[name].shape, Cad | MeshFile))
     return side_by_side({name: partial(solid_mesh, scene, name) for name in parts})
@@ -62,7 +62,7 @@ def solid_mesh(scene: Scene, name: str) -> SolidMesh:
     """The mesh of a solid link."""
     from kedfem.mesh import link_mesh
 
-    return link_mesh(name, scene.links[name], scene.folder, touched(scene, name))
+    return link_mesh(name, scene.links[name], scene.folder, attachment_places(scene, name))
 
 
 def link_axes(link: LinkScene) -> Float[np.ndarray, "3 3"]:
@@ -85,8 +85,8 @@ def bare_link(scene: Scene, name: str, spatial: frozenset[str] | None = None, me
 
     Parameters
     ----------
-    spatial : the beams of the scene that move in space, where that is known already
-    mesh : of a solid link, where it is made already
+    spatial : the beams of the scene that move in space, if known
+    mesh : of a solid link, if it exists already
     """
     link = scene.links[name]
     material = scene.materials[str(link.material)]
@@ -96,13 +96,13 @@ def bare_link(scene: Scene, name: str, spatial: frozenset[str] | None = None, me
     if link.family == "plane":
         from kedfem.mesh import plane_mesh
 
-        flat = plane_mesh(name, link, scene.folder, touched(scene, name))
+        flat = plane_mesh(name, link, scene.folder, attachment_places(scene, name))
         return plane_link(name, flat, material, link_axes(link))
     return scene_beam(scene, name, spatial_beams(scene) if spatial is None else spatial)
 
 
-def touched(scene: Scene, name: str) -> tuple[tuple[tuple[float, float, float], ...], tuple[str, ...]]:
-    """Where joints, bodies, loads, springs and probes sit on a link [m], and the faces of it that joints name."""
+def attachment_places(scene: Scene, name: str) -> tuple[tuple[tuple[float, float, float], ...], tuple[str, ...]]:
+    """Places of joints, bodies, loads, springs and probes on a link [m], and the names of its faces in joints."""
     joints = [joint for joint in scene.joints.values() if name in joint.links]
     ends = [end for spring in scene.springs.values() for end in getattr(spring, "between", None) or ()]
     singles = (*scene.loads.values(), *scene.bodies.values(), *scene.output.probes.values(), *ends)
@@ -114,7 +114,7 @@ def touched(scene: Scene, name: str) -> tuple[tuple[tuple[float, float, float], 
     return tuple(sorted(points)), tuple(sorted(named))  # type: ignore[arg-type]
 
 
-def parted(scene: Scene, name: str, link: Link) -> Segments:
+def link_segments(scene: Scene, name: str, link: Link) -> Segments:
     """A link for the dynamics: whole with a rigid-body frame, else divided into segments with co-rotational frames.
 
     Parameters
@@ -134,14 +134,14 @@ def parted(scene: Scene, name: str, link: Link) -> Segments:
             return space_segments(link, scene_axis(scene, name), material)
         case _:
             ends = _ends(scene, name, link)
-            whole = _whole(scene, name, link, along(link, ends))
+            whole = _undivided(scene, name, link, along(link, ends))
             if given.segments is not None:
                 return segmented(link, material, given.segments, ends, whole)
             return _usual_segments(link, material, ends, whole)
 
 
 def _ends(scene: Scene, name: str, link: Link) -> Float[np.ndarray, "p 3"]:
-    """Joints of a link, in the reference position [m]; of a line along which a pin slides its ends on the link."""
+    """Joints of a link in the reference position [m]; of a slot's line both ends on the link."""
     out = []
     for joint in scene.joints.values():
         at = np.asarray(joint.at)
@@ -154,21 +154,19 @@ def _ends(scene: Scene, name: str, link: Link) -> Float[np.ndarray, "p 3"]:
     return np.array(out).reshape(-1, 3)
 
 
-def most_segments(scene: Scene, name: str) -> int:
-    """The largest number of segments that do not soften a solid or plane link: none shorter than the link is wide."""
+def max_segments(scene: Scene, name: str) -> int:
+    """The largest number of segments of a solid or plane link: shorter than wide they would soften it."""
     link = bare_link(scene, name)
-    return most_slices(link.X, along(link, _ends(scene, name, link)))
+    return max_slices(link.X, along(link, _ends(scene, name, link)))
 
 
 def _usual_segments(link: Link, material: Material, ends: Float[np.ndarray, "p 3"], whole: list[Interval]) -> Segments:
     """SEGMENTS of a link, or as many as its mesh can be divided into, none shorter than the link is wide.
 
-    Cuts of stubby slices would soften the link, which bends little anyway.
-
     Their error falls with the square of their number: 6 leave 1 to 2 % of the peak stress of links that bend by 2 % of
-    their length (docs/theory/links.md).
+    their length (docs/theory/links.md). Cuts of shorter segments would soften the link.
     """
-    for count in range(min(SEGMENTS, most_slices(link.X, along(link, ends))), 1, -1):
+    for count in range(min(SEGMENTS, max_slices(link.X, along(link, ends))), 1, -1):
         try:
             return segmented(link, material, count, ends, whole)
         except MeshError:
@@ -176,8 +174,8 @@ def _usual_segments(link: Link, material: Material, ends: Float[np.ndarray, "p 3
     return segmented(link, material, 1, ends, whole)
 
 
-def _whole(scene: Scene, name: str, link: Link, e: Float[np.ndarray, "3"]) -> list[Interval]:
-    """What of a link the elements around its joints and bodies take up along a direction."""
+def _undivided(scene: Scene, name: str, link: Link, e: Float[np.ndarray, "3"]) -> list[Interval]:
+    """Ranges along a direction of the elements at a link's joints, which no cut may divide."""
     out = []
     places = [
         (joint.at, joint.axis if joint.kind != "prismatic" else None, joint.face_names(name))
@@ -189,7 +187,7 @@ def _whole(scene: Scene, name: str, link: Link, e: Float[np.ndarray, "3"]) -> li
         try:
             surface = joint_surface(link, f"links.{name}", np.asarray(at), about, faces)
         except MeshError:
-            continue  # is said where the joint is made
+            continue  # reported where the joint is made
         if surface.facets is not None:
             s = link.X[link.cells[link.basis.mesh.f2t[0, surface.facets]]] @ e
             out.append((float(s.min()), float(s.max())))

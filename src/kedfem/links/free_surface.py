@@ -15,7 +15,7 @@ ROUNDING = 1e-9  # of a function whose largest value is one
 
 @dataclass(frozen=True, slots=True)
 class FreeSurface:
-    """Places of stress at the surface.
+    """Stress places at the surface of a link.
 
     places : (k,) their numbers among those of `StressRecovery.stressed`
     axes : (k, 3, 3) two tangents and the outward normal as rows, in the axes of the stress
@@ -26,10 +26,10 @@ class FreeSurface:
 
 
 def free_surface(recovery: StressRecovery) -> FreeSurface:
-    """Places at a link's surface.
+    """Stress places at a link's surface.
 
-    Of solids the nodes of boundary facets, with the mean normal of these; of plane links all nodes, z being the normal;
-    of beams all places of their sections: the first tangent is the beam's, the second that of the shear by torsion.
+    Of solids the nodes of boundary facets, with the mean of their normals; of plane links all nodes, with the normal z;
+    of beams all places of their sections, with the beam's tangent and the direction of the shear stress of torsion.
     """
     link = recovery.link
     if link.kind == "solid":
@@ -53,7 +53,7 @@ def _of_solid(link: Link) -> FreeSurface:
 
 
 def surface_axes(normals: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3 3"]:
-    """Two tangents and the unit normal, as rows, along normals of any length."""
+    """Two tangents and the unit normal, as rows, from normals of any length."""
     n = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     least = np.eye(3)[np.abs(n).argmin(axis=1)]
     first = np.cross(least, n)
@@ -62,9 +62,9 @@ def surface_axes(normals: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3 3"
 
 
 def _of_sections(xy: sp.csr_array, zx: sp.csr_array) -> Float[np.ndarray, "k 3 3"]:
-    """The beam's tangent, the direction of the shear by torsion in the section, and the normal to both.
+    """The beam's tangent, the direction of the shear stress of torsion in the section, and the normal to both.
 
-    All of the shear at a place is in proportion to the twist, so that its direction stays.
+    Shear stress at a place is proportional to the twist, so that its direction is constant.
     """
     own = np.asarray(xy.multiply(xy).sum(axis=1)).ravel()
     both = np.asarray(xy.multiply(zx).sum(axis=1)).ravel()

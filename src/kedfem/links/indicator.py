@@ -1,7 +1,7 @@
 """The error of stresses in each element: the indicator of Zienkiewicz and Zhu (1987).
 
-The recovered stress, averaged at the nodes and interpolated by the shape functions, is nearer to the exact stress than
-that of the element. Their difference, relative to the whole in the energy norm, is the mesh's error in that norm:
+The recovered stress, averaged at the nodes and interpolated by the shape functions, is closer to the exact stress than
+that of the element. Their difference estimates the error of the mesh, relative to the whole in the energy norm:
 
     η² = ∫ (σ* − σ_h) : C⁻¹ : (σ* − σ_h) / (∫ σ_h : C⁻¹ : σ_h + the same)
 
@@ -19,7 +19,7 @@ from kedfem.links.record import Link
 from kedfem.links.recovery import nodal_gradients, nodal_state
 from kedfem.links.singular_stress import re_entrant
 
-NEAR_PEAK = 0.5  # of the highest density of the error: an edge there is worth a word
+NEAR_PEAK = 0.5  # of the highest density of the error: a re-entrant edge there is reported
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class Indicator:
 
     elements : (e,) share of each element in η², by volume: its density of the error over the mean energy's [-]
     error, energy : ∫ of the difference, and of the element's own stress: twice strain energies [J]
-    singular : whether the error is greatest at an edge that points inwards
+    singular : whether the error is greatest at a re-entrant edge
     """
 
     elements: Float[np.ndarray, " e"]

@@ -1,4 +1,4 @@
-"""Rows that give displacement and stress of a link at a point, such as that of a probe or a load."""
+"""Displacement and stress of a link at a point, such as a probe or a load, as rows on its state."""
 
 from dataclasses import dataclass
 
@@ -22,8 +22,8 @@ from kedfem.links.recovery import nodal_gradients, stress_of_gradient
 from kedfem.links.surfaces.coupling_surfaces import rigid_link_surface
 from kedfem.mesh.elements.shape_functions import barycentric
 
-POINT_TOLERANCE = 1e-3  # how far outside its link a probe may lie, of the link's size
-ON_AXIS = 1e-6  # of a planar beam's size: farther beside its axis its state shows no displacement
+POINT_TOLERANCE = 1e-3  # of the link's size: distance of a probe outside its link that is accepted
+ON_AXIS = 1e-6  # of a planar beam's size: its state determines no displacement farther off its axis
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +75,7 @@ def point_rows(
 def stress_rows(
     link: Link, where: str, point: Float[np.ndarray, "3"], kinks: Float[np.ndarray, "_ 3"] | None = None
 ) -> PointRows:
-    """`point_rows` of a point that must be in the material: not in the hollow of a section, or beside its web."""
+    """`point_rows` of a point that must be in the material: not in the bore of a section, or beside its web."""
     of, at = link.full or link, point_rows(link, where, point, kinks)
     if of.kind == "spatial_beam":
         _, e, r, yz = nearest_on_axis(of, point)
@@ -101,7 +101,7 @@ def require_on_axis(
     Parameters
     ----------
     at, nearest : the point in the reference position, and the nearest of the link [m]
-    noun, purpose : what a message calls the link, and says of what the point is for
+    noun, purpose : for the message: kind of the link, purpose of the point
     """
     beside = float(np.linalg.norm(nearest - at))
     if link.kind == "beam" and beside > ON_AXIS * link.size:
@@ -188,7 +188,7 @@ def _local_coordinates(link: Link, element: int, point: Float[np.ndarray, " d"])
 
 
 def _within(local: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
-    """The place in the reference tetrahedron whose barycentric coordinates are nearest."""
+    """The place in the reference tetrahedron with the nearest barycentric coordinates."""
     b = barycentric(local)
     falling = np.sort(b)[::-1]
     excess = (np.cumsum(falling) - 1) / np.arange(1, 5)
@@ -227,7 +227,7 @@ def _outside(
     link: Link, where: str, point: Float[np.ndarray, "3"], gap: float, nearest: Float[np.ndarray, "3"],
     what: str = "its axis",
 ) -> str:  # fmt: skip
-    """The message for a point beside a link, with a place of the link near to it: of a beam one of its axis."""
+    """The message for a point outside a link, with the nearest place of the link, of a beam of its axis."""
     shown, instead = (", ".join(f"{v + 0.0:.6g}" for v in np.round(x, 9)) for x in (point, nearest))
     near = f"{what} is nearest at ({instead})" if link.section is not None else f"({instead}) is the nearest"
     advice = f"take a point of its material, {near}"

@@ -1,4 +1,4 @@
-"""The record of a link, the same for all models; the solver uses nothing else of a link.
+"""The record of a link, the same for all models; the dynamics use nothing else of a link.
 
 A link is a scalar function space {N_a} with a vector at each function. Its state is an array (n, d), its mass scalar
 matrices, its stiffness K0 constant in the link frame: [KED, eqs. (9)(11)-(14)]. d is 3, for plane links 2.
@@ -23,9 +23,9 @@ class BeamPoint:
     """A Gauss point of a planar beam, whose frame follows the tangent there.
 
     tangent : (2,) in the reference position
-    strains : (3, 3n) rows of ε, γ, κ from what is seen in the frame
-    rigidity : (3,) EA, κGA, EI times the length that belongs to the point
-    share : (3n, 3) what ε, γ, κ here add to the deformation of the segment from which stresses come
+    strains : (3, 3n) rows of ε, γ, κ from the deformation in the frame
+    rigidity : (3,) EA, κGA, EI times the length of the point's Gauss weight
+    share : (3n, 3) contribution of ε, γ, κ here to the deformation of the segment, for stresses
     """
 
     tangent: Float[np.ndarray, "2"]
@@ -39,14 +39,14 @@ class BeamElement:
     """An element in space with E Gauss points, m nodes, K gradient functions and s strains: `links.beams.metric`.
 
     tangents : (E, n) x' at the Gauss points from the position; gradients : (K, n) the g_k of all nodes from it
-    node, drawn : (K,) whose they are, (K, 3) in the reference position; directors : (m, 2, 3) n1, n2 in the reference
-        position
+    node, drawn : (K,) their nodes, (K, 3) their values in the reference position
+    directors : (m, 2, 3) n1, n2 in the reference position
     N, D : (E, m) interpolation and its derivative by arc length; bend : (E, 4) n1'·t, n2'·t, n1'·n2, n2'·n1 in the
         reference position
-    pairs : (P, 2) which gradient functions the strains within sections pair
-    stiffness : (s,) of the strains, with the length that belongs to a Gauss point; s = 6 E + P
-    drawn_strains : (s,) what the formulas give in the reference position
-    rows, share : (s, 3n) strains for small displacements; (3n, s) a displacement that has given strains
+    pairs : (P, 2) pairs of gradient functions of the strains within sections
+    stiffness : (s,) of the strains, times the lengths of the Gauss weights; s = 6 E + P
+    drawn_strains : (s,) values of the formulas in the reference position
+    rows, share : (s, 3n) strains of small displacements; (3n, s) a displacement with given strains
     """
 
     tangents: Float[np.ndarray, "E n"]
@@ -80,10 +80,10 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class LinkFace:
-    """A face of a solid link that has a name.
+    """A named face of a solid link.
 
-    face : its geometry; the sides are of the mesh that the link was made from
-    facets : of the link's basis; of a segment those that it has
+    face : its geometry, with sides of the mesh that the link was made from
+    facets : facets of the link's basis on it; of a segment its own
     """
 
     face: Face
@@ -101,7 +101,7 @@ class Link:
     one : (n,) coefficients of the constant, Σ N_a one_a = 1 [-].
     cells, cell_type : elements in VTK order and their meshio name; of a spatial beam by stations (`triples`).
     axes : (3, 3) columns are the link axes (x along the link) in the reference position.
-    mass : one scalar (n, n) matrix per component [kg; ψ: kg m²]; but for beams all the same object.
+    mass : one scalar (n, n) matrix per component [kg; ψ: kg m²]; all the same object, except of planar beams.
     K0 : (dn, dn) stiffness in the link frame, dof d·node + component [N/m].
     m1 : (n, d) mass times one, component by component [kg].
     mX : (n, 3) mass times position [kg m].
@@ -114,13 +114,13 @@ class Link:
     full, Q : of a reduced link the link that it was made from and its functions there, (n_full, n); its matrices are
         dense. Else None.
     rigid : whether the link only moves rigidly; then it has no stress
-    anywhere : whether any point is one of its own, as of a mass alone, whose shape is drawn only
-    fit : (n, 3) of a segment whose frame follows it: weights of its rotation, that of Σ x_a ⊗ fit_a; else None
-    frames : of a segment that several frames follow: its strain energy in parts, K0 their sum
-    element : of a segment of a beam in space: its strains, exact for any turn, K0 their linearisation
-    faces : those with names, of a solid from CAD or from a mesh file with groups
-    method : how the mesh of a part from CAD was made, or what the report says of another's, in words
-    cuts : (c,) facets of the basis at which a segment ends and another one begins: no surface of the link
+    anywhere : whether any point in space is a point of the link, as of one without a shape
+    fit : (n, 3) of a segment with a co-rotational frame: weights of its rotation, that of Σ x_a ⊗ fit_a; else None
+    frames : of a segment with several co-rotational frames: its strain energy in parts, K0 their sum
+    element : of a segment of a beam in space: its strains, exact for any rotation, K0 their linearisation
+    faces : named faces, of a solid from CAD or from a mesh file with groups
+    method : how the mesh was made, in words
+    cuts : (c,) facets of the basis between two segments: no surface of the link
     """
 
     name: str
@@ -169,7 +169,7 @@ class Link:
 
     @property
     def nodes(self) -> Float[np.ndarray, "k 3"]:
-        """Nodes of the link: coefficients of position of the functions that are values, not slopes [m]."""
+        """Nodes of the link: coefficients of position of functions that are values, not slopes [m]."""
         return np.asarray(self.X[self.one != 0])
 
     @property
@@ -179,7 +179,7 @@ class Link:
 
     @property
     def centre(self) -> Float[np.ndarray, "3"]:
-        """Centre of mass in the reference position, attached bodies among it [m]."""
+        """Centre of mass in the reference position, with attached bodies [m]."""
         return np.asarray(self.one @ self.mX / (self.one @ self.m1[:, 0]))
 
     @property
@@ -194,14 +194,14 @@ class Link:
 
 
 def section_of(link: Link) -> Section:
-    """The section of a beam, which has one."""
+    """The section of a beam; TypeError of another link."""
     if link.section is None:
         raise TypeError(f"links.{link.name}: has no section")
     return link.section
 
 
 def as_rows(link: Link, vectors: Float[np.ndarray, "*k 3"]) -> Float[np.ndarray, "*k d"]:
-    """Forces or accelerations in space as rows of a link's state: a planar link takes what lies in its plane."""
+    """Forces or accelerations in space as rows of a link's state: of a planar link their components in the plane."""
     match link.kind:
         case "beam":
             return vectors * [1.0, 1.0, 0.0]  # the third row is a moment
@@ -210,7 +210,7 @@ def as_rows(link: Link, vectors: Float[np.ndarray, "*k 3"]) -> Float[np.ndarray,
 
 
 def in_space(link: Link, rows: Float[np.ndarray, "*k d"]) -> Float[np.ndarray, "*k 3"]:
-    """The translation that rows of a link's state mean, or the force."""
+    """Translations or forces in space from rows of a link's state."""
     match link.kind:
         case "beam":
             return rows * [1.0, 1.0, 0.0]
@@ -244,7 +244,7 @@ def mass_times_over(mass: Mass, u: Float[np.ndarray, "T n d"]) -> Float[np.ndarr
 def mass_constants(
     mass: Mass, one: Float[np.ndarray, " n"], X: Float[np.ndarray, "n 3"]
 ) -> tuple[Float[np.ndarray, "n d"], Float[np.ndarray, "n 3"]]:
-    """(m·1, m·X) [kg, kg m]: all that the inertia load −M R0'' needs of a link, [KED, eq. (17)]."""
+    """(m·1, m·X) [kg, kg m], by which a link's inertia load −M R0'' is determined, [KED, eq. (17)]."""
     m1 = mass_times(mass, np.repeat(one[:, None], len(mass), axis=1))
     mX = np.asarray(mass[0] @ X)
     return m1, mX

@@ -1,7 +1,7 @@
 """Displacements and stresses of a link from its state, at points and at nodes, in link axes.
 
-Stress = elasticity : sym(gradient). The operator of the gradient is scalar, too: d matrices (n, n) suffice.
-Gradients are taken at the superconvergent (reduced) Gauss points, extended linearly to the nodes and averaged there.
+Stress = elasticity : sym(gradient). The gradient operator is scalar: d matrices (n, n). Gradients are evaluated at the
+superconvergent (reduced) Gauss points, extrapolated linearly to the nodes and averaged there.
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ import skfem
 from kedfem.arrays import Float, Int
 from kedfem.links.beams.beam import line_pairs
 from kedfem.links.beams.beam_recovery import beam_fibre
-from kedfem.links.beams.spatial_recovery import drawn
+from kedfem.links.beams.spatial_recovery import section_solid
 from kedfem.links.record import Link
 from kedfem.mesh.elements.shape_functions import barycentric
 
@@ -31,7 +31,7 @@ def nodal_gradients(link: Link, elements: Int[np.ndarray, " e"] | None = None) -
 
     Parameters
     ----------
-    elements : restrict to these; right at the nodes whose elements are all among them
+    elements : restrict to these; exact at the nodes all of whose elements are among them
     """
     mesh_dofs = link.basis.element_dofs
     points, extension = _gauss_points(link)
@@ -59,7 +59,7 @@ def stress_of_gradient(H: Float[np.ndarray, "p d d"], link: Link) -> Float[np.nd
 
 
 def _stress_of_unit_gradients(link: Link) -> Float[np.ndarray, "dd 6"]:
-    """Of each H whose only component is 1, row by row."""
+    """Stresses of the gradients H with a single component 1, row by row."""
     (lam, mu), d = link.lame, link.d
     H = link.axes[:d, :d].T @ np.eye(d * d).reshape(-1, d, d) @ link.axes[:d, :d]
     stress = np.zeros((len(H), 3, 3))
@@ -94,11 +94,11 @@ class StressRecovery:
 
     @property
     def stressed(self) -> int:
-        """Number of places with a stress of their own: of planar beams four a node, two fibres in two elements."""
+        """Number of places with a stress of their own: of planar beams four per node, two fibres in two elements."""
         return len(self.matrices) * self.points if self.link.kind == "beam" else self.points
 
     def at_points(self, state: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "p d"]:
-        """What coefficients (of position, of displacement) mean at the points."""
+        """Values at the points of coefficients (of position, of displacement)."""
         return state if self.values is None else np.asarray(self.values @ state)
 
 
@@ -109,7 +109,7 @@ def stress_recovery(link: Link) -> StressRecovery:
     if link.meshed:
         return StressRecovery(link, nodal_gradients(link), link.cells, link.cell_type)
     if link.kind == "spatial_beam":
-        values, stresses, cells = drawn(link)
+        values, stresses, cells = section_solid(link)
         return StressRecovery(link, stresses, cells, "hexahedron", values)
     half = link.section.height / 2 if link.section else 0.0
     fibres = (*beam_fibre(link, half), *beam_fibre(link, -half))
@@ -180,7 +180,7 @@ def stress_modes(recovery: StressRecovery, link: Link, modes: Float[np.ndarray, 
 
 
 def _meshed_modes(recovery: StressRecovery, states: Float[np.ndarray, "n d r"]) -> Float[np.ndarray, "n 6 r"]:
-    """`stress_modes` of a meshed link: λ tr(ε) 1 + 2 μ ε, in reference axes: what is asked for depends on none."""
+    """`stress_modes` of a meshed link: λ tr(ε) 1 + 2 μ ε, in reference axes, as invariants are the same in all axes."""
     of, (n, d, r) = recovery.link, states.shape
     lam, mu = of.lame
     H = [(G @ states.reshape(n, -1)).reshape(n, d, r) for G in recovery.matrices]
@@ -210,7 +210,7 @@ def von_mises(stress: Float[np.ndarray, "p 6"]) -> Float[np.ndarray, " p"]:
 
 
 def rotated_stress(stress: Float[np.ndarray, "p 6"], T: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "p 6"]:
-    """Stresses xx, yy, zz, xy, yz, zx in the axes that T takes components to: T S Tᵀ [same unit]."""
+    """Stresses xx, yy, zz, xy, yz, zx after the transformation of components T S Tᵀ [same unit]."""
     units = np.zeros((6, 3, 3))
     for k, (i, j) in enumerate(COMPONENTS):
         units[k, i, j] = units[k, j, i] = 1.0
@@ -220,7 +220,7 @@ def rotated_stress(stress: Float[np.ndarray, "p 6"], T: Float[np.ndarray, "3 3"]
 def principal_stresses(stress: Float[np.ndarray, "p 6"]) -> Float[np.ndarray, "p 2"]:
     """Smallest and largest principal stress by the angle of Lode, from xx, yy, zz, xy, yz, zx [same unit]; nan of nan."""
     mean, vm = stress[:, :3].mean(axis=1), von_mises(stress)
-    size = np.where(vm > 1e-150, vm, 1.0)  # squares of less are not numbers of full precision
+    size = np.where(vm > 1e-150, vm, 1.0)  # squares of smaller numbers are subnormal
     xx, yy, zz = (stress[:, :3].T - mean) / size
     xy, yz, zx = stress[:, 3:].T / size
     third = xx * (yy * zz - yz**2) - xy * (xy * zz - yz * zx) + zx * (xy * yz - yy * zx)
@@ -230,7 +230,7 @@ def principal_stresses(stress: Float[np.ndarray, "p 6"]) -> Float[np.ndarray, "p
 
 
 def _gauss_points(link: Link) -> tuple[Float[np.ndarray, "d q"], Float[np.ndarray, "m q"]]:
-    """Reduced Gauss points of the reference element and the matrix that extends values there to the element's nodes."""
+    """Reduced Gauss points of the reference element, and the matrix that extrapolates values there to the nodes."""
     d, at_nodes = link.d, np.asarray(link.basis.elem.doflocs)  # (m, d)
     if link.cell_type == "tetra10":
         b = np.full((4, 4), (5 - np.sqrt(5)) / 20) + np.eye(4) / np.sqrt(5)  # barycentric, of degree 2

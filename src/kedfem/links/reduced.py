@@ -16,15 +16,13 @@ from kedfem.arrays import Float
 from kedfem.links.record import Link, read_only
 
 RIGID = 1e3
-LIGHT = 1e-10  # of a rigid link's mass: what its matrix gets where it could be singular
-STRAIGHT = 1e-9  # of a link's length: what it leaves its line by is rounding
-INDEPENDENT = 1e-14  # of the largest eigenvalue: below, a function repeats others
+LIGHT = 1e-10  # of a rigid link's mass: added to a mass matrix that could be singular
+STRAIGHT = 1e-9  # of a link's length: smaller deviations from a line are rounding
+INDEPENDENT = 1e-14  # of the largest eigenvalue: below, a function depends on others
 
 
 def reduced(link: Link, Q: Float[np.ndarray, "n s"]) -> Link:
-    """The changed copy of a link that moves in the span of modes Q only.
-
-    With dense matrices; `full` and `Q` lead back to the link that it came from.
+    """The link reduced to the span of modes Q, with dense matrices; `full` and `Q` refer to the original.
 
     Parameters
     ----------
@@ -35,7 +33,7 @@ def reduced(link: Link, Q: Float[np.ndarray, "n s"]) -> Link:
     mQ = np.asarray(link.mass[0] @ Q)
     one, X = mQ.T @ link.one, mQ.T @ link.X
     if link.planar:
-        X[:, 2] = 0.0  # the height of its plane, which is not in the span and matters to nothing
+        X[:, 2] = 0.0  # the height of its plane, which is not in the span and has no effect
     K0 = projected_stiffness(link, Q)
     m1, mX = Q.T @ link.m1, Q.T @ link.mX
     volume = Q.T @ link.volume
@@ -47,7 +45,7 @@ def reduced(link: Link, Q: Float[np.ndarray, "n s"]) -> Link:
     return replace(made, K0=_unstrained(K0, rigid_modes(made)))
 
 
-def on_functions(link: Link) -> Float[np.ndarray, "n s"]:
+def mode_matrix(link: Link) -> Float[np.ndarray, "n s"]:
     """Q of a reduced link: weights of the unreduced link @ Q are weights of its modes."""
     if link.Q is None:
         raise ValueError(f"link {link.name} is not reduced")
@@ -78,7 +76,7 @@ def projected_stiffness(link: Link, Q: Float[np.ndarray, "n s"]) -> Float[np.nda
 
 
 def _unstrained(K0: Float[np.ndarray, "k k"], modes: Float[np.ndarray, "k r"]) -> Float[np.ndarray, "k k"]:
-    """K0 without what rounding left of it on rigid motions: with stiff modes in it that is not little."""
+    """K0 without rounding errors on rigid motions, which are large with stiff modes."""
     B = np.linalg.qr(modes)[0]
     K0 = K0 - B @ (B.T @ K0)
     K0 = K0 - (K0 @ B) @ B.T
@@ -101,8 +99,8 @@ def _gram(m: sp.csr_array, Q: Float[np.ndarray, "n s"]) -> Float[np.ndarray, "s 
     return np.asarray((G + G.T) / 2)
 
 
-def rigid_functions(link: Link) -> Float[np.ndarray, "n r"]:
-    """1 and the coordinates about the middle, of planar links x and y only; of a straight beam the one along it."""
+def rigid_body_functions(link: Link) -> Float[np.ndarray, "n r"]:
+    """1 and the coordinates from the mean of the nodes: of planar links x and y, of a straight beam the one along it."""
     X = link.X[:, :2] if link.planar else link.X
     X = X - np.outer(link.one, X[link.one != 0].mean(axis=0))
     sizes, axes = np.linalg.svd(X, full_matrices=False)[1:]
@@ -110,13 +108,13 @@ def rigid_functions(link: Link) -> Float[np.ndarray, "n r"]:
 
 
 def rigid(link: Link, frequency: float | None = None) -> Link:
-    """The changed copy of a link that only moves rigidly: {1, x, y, z} made stiff.
+    """The link reduced to {1, x, y, z} and made stiff, so that it only moves rigidly.
 
     Parameters
     ----------
-    frequency : what its own vibrations are put at [rad/s]; RIGID times its `wave_frequency` if not given
+    frequency : of its own vibrations [rad/s]; RIGID times its `wave_frequency` if not given
     """
-    made = reduced(link, rigid_functions(link))
+    made = reduced(link, rigid_body_functions(link))
     if link.kind == "beam":
         made = replace(made, mass=(*made.mass[:2], _definite(made.mass[2], made.one)))
     stiffness = (RIGID * wave_frequency(link) if frequency is None else frequency) ** 2
@@ -126,29 +124,29 @@ def rigid(link: Link, frequency: float | None = None) -> Link:
 
 
 def _definite(m: Float[np.ndarray, "n n"], one: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n n"]:
-    """The mass of a planar beam's ψ, definite though all of it may be at one point, as a flywheel's on a light beam.
+    """The mass of a planar beam's ψ made definite, as it may be at one point alone: a flywheel on a light beam.
 
-    What it gets does not move as the link turns as a whole.
+    The added part does not move in rigid rotations of the link.
     """
     e = one / np.linalg.norm(one)
     return np.asarray(m + LIGHT * np.trace(m) * (np.eye(len(m)) - np.outer(e, e)))
 
 
 def wave_frequency(link: Link) -> float:
-    """Of the order of a link's first axial vibration: √(E/ρ)/L, how often a wave passes along it [1/s]."""
+    """√(E/ρ)/L, of the order of the frequency of a link's first axial vibration [1/s]."""
     density = float(link.one @ link.m1[:, 0]) / float(link.one @ link.volume)
-    return float(np.sqrt(link.E / density) / reach(link))
+    return float(np.sqrt(link.E / density) / overall_length(link))
 
 
-def reach(link: Link) -> float:
-    """How far a link reaches from the node farthest from its middle [m]; the same in a scene that is turned."""
+def overall_length(link: Link) -> float:
+    """Distance of the two ends of a link: from the node farthest from its middle to the node farthest from that [m]."""
     nodes = (link.full or link).nodes
     end = nodes[np.argmax(np.linalg.norm(nodes - nodes.mean(axis=0), axis=1))]
     return float(np.linalg.norm(nodes - end, axis=1).max())
 
 
 def rigid_modes(link: Link) -> Float[np.ndarray, "k r"]:
-    """States (dn,) of small rigid motion: translations and turns, column by column."""
+    """States (dn,) of small rigid motions: translations and rotations, column by column."""
     modes = rigid_motions(link.X, link.one, 2 if link.planar else 3)
     if link.kind != "beam":
         return modes
@@ -158,7 +156,7 @@ def rigid_modes(link: Link) -> Float[np.ndarray, "k r"]:
 
 
 def rigid_motions(X: Float[np.ndarray, "n 3"], one: Float[np.ndarray, " n"], d: int) -> Float[np.ndarray, "k r"]:
-    """Translations and turns about the origin, (n functions, d components) by motions."""
+    """Translations and rotations about the origin, (n functions, d components) by motions."""
     motions = [np.outer(one, e) for e in np.eye(d)]
     for i, j in ((0, 1), (1, 2), (2, 0))[: 1 if d == 2 else 3]:
         turn = np.zeros((len(X), d))
@@ -168,7 +166,7 @@ def rigid_motions(X: Float[np.ndarray, "n 3"], one: Float[np.ndarray, " n"], d: 
 
 
 def _weighted(link: Link, A: Float[np.ndarray, "k c"]) -> Float[np.ndarray, "k c"]:
-    """M^½ A of a reduced link: only a beam's turning has another mass than 1."""
+    """M^½ A of a reduced link; only the mass of a beam's ψ is not 1."""
     out = A.reshape(link.n, link.d, -1).copy()
     for c, m in enumerate(link.mass):
         values, vectors = np.linalg.eigh(m)
@@ -177,12 +175,12 @@ def _weighted(link: Link, A: Float[np.ndarray, "k c"]) -> Float[np.ndarray, "k c
 
 
 def can_be_stored(link: Link) -> bool:
-    """Whether a link is small once its origin's matrices are left out."""
+    """Whether `stored` makes a link small: it is reduced, or has no mesh."""
     return link.full is not None or link.basis is None
 
 
 def stored(link: Link) -> Link:
-    """A changed copy that can be pickled: of the unreduced link only geometry and function space are left."""
+    """A copy that can be pickled: of the unreduced link only geometry and function space are left."""
     if link.full is None:
         return link
     full, none = link.full, sp.csr_array((0, 0))
@@ -193,7 +191,7 @@ def stored(link: Link) -> Link:
 
 
 def restored(link: Link) -> Link:
-    """The link that `stored` was given, but for the matrices."""
+    """The link that `stored` was given, without the unreduced link's matrices."""
     if link.full is None or link.full.basis is None:
         return link
     mesh, element, X, W = link.full.basis

@@ -1,8 +1,8 @@
 """Links divided into segments with co-rotational frames, for large deflections; each segment is a link, too.
 
 The segments of a beam are its elements, those of a solid or plane link slices of its mesh. Neighbours share the ports of
-the cut between them: for beams its node, for meshed links the affine field that fits the cut best, so that both sides of
-a cut may warp differently.
+the cut between them: of a beam its node, of a meshed link the affine field that best fits the cut, so that both sides may
+warp differently.
 """
 
 from collections.abc import Sequence
@@ -22,11 +22,11 @@ from kedfem.mesh import QuadMesh, SolidMesh
 from kedfem.mesh.elements.hexahedra import Face
 from kedfem.scene import Material
 
-SMOOTHINGS = 5  # times that tetrahedra go where more of their neighbours are; a few flip for ever
+SMOOTHINGS = 5  # passes in which tetrahedra join the slice of most neighbours; a few would alternate for ever
 SAME = 1e-9  # of a link's size: nodes and facets at the same place
-LEANS = np.radians(10)  # of a surface against the link: facets of a cylinder along it lean by less
-TRIED = 64  # places for cuts, in the length of a link
-NEAR = 0.4  # of a segment's length: so far a cut goes to where the link is a prism
+LEANS = np.radians(10)  # between a surface and the direction of the link: facets of a cylinder along it lean by less
+TRIED = 64  # places for cuts along a link
+NEAR = 0.4  # of a segment's length: largest displacement of a cut to where the link is prismatic
 Interval = tuple[float, float]
 
 
@@ -36,25 +36,25 @@ class Cut:
 
     segments : their numbers
     points : (k, 3) in the reference position [m]
-    weights : (k, n) of each
-    facets : of each, of a mesh
-    even : whether the link is a prism around the cut, where an affine field is all that it must carry: stresses near it
-        are those of the whole link
+    weights : (k, n) of each segment
+    facets : of each segment of a meshed link
+    prismatic : whether the link is prismatic around the cut: it transmits an affine field, and stresses near it are those
+        of the undivided link
     """
 
     segments: tuple[int, int]
     points: Float[np.ndarray, "k 3"]
     weights: tuple[Float[np.ndarray, "k _"], Float[np.ndarray, "k _"]]
     facets: tuple[Int[np.ndarray, " f"], ...] = ()
-    even: bool = True
+    prismatic: bool = True
 
 
 @dataclass(frozen=True, slots=True)
 class Segments:
-    """A link cut up.
+    """A link divided into segments.
 
-    parts, cuts : segments in order along the link, and where they meet
-    functions : of a meshed link, which functions of the whole are those of each segment
+    parts, cuts : segments in order along the link, and the cuts between them
+    functions : of a meshed link, numbers of each segment's functions in the undivided link
     """
 
     parts: tuple[Link, ...]
@@ -63,9 +63,9 @@ class Segments:
 
 
 def corotational(link: Link) -> Link:
-    """The changed copy of a link whose frame is its own mean rotation: the one that fits its shape best, by mass.
+    """The link with a co-rotational frame: its mean rotation, which best fits its shape, weighted by mass.
 
-    Meant for links without attached bodies: a heavy one would pull the frame to it.
+    The link is without attached bodies: a heavy one would determine the frame.
     """
     return replace(link, fit=link.mX - np.outer(link.m1[:, 0], link.centre))
 
@@ -73,29 +73,29 @@ def corotational(link: Link) -> Link:
 def segmented(
     link: Link, material: Material, count: int, ends: Float[np.ndarray, "p 3"], whole: Sequence[Interval]
 ) -> Segments:
-    """A solid or plane link in slices across the line between the two of its joints that are furthest apart.
+    """A solid or plane link divided into slices across the line between the two of its joints that are farthest apart.
 
     Parameters
     ----------
     link : without attached bodies
     count : number of slices
     ends : joints of the link, in the reference position [m]
-    whole : ranges along `along(ends)` that no cut may divide, those of bores and other coupling surfaces [m]
+    whole : ranges along that line which no cut may divide: bores and other coupling surfaces [m]
 
     Raises
     ------
     MeshError
-        If the mesh has not so many layers of elements.
+        If the mesh has fewer layers of elements.
     """
     if count == 1:
         return Segments((corotational(link),), functions=(np.arange(link.n),))
     e = along(link, ends)
     s = link.X[link.cells] @ e  # (e, m)
-    places, even = _places(count, ends @ e if len(ends) > 1 else s, whole, _Shape(link, e))
+    places, prismatic = _places(count, ends @ e if len(ends) > 1 else s, whole, _Shape(link, e))
     slice_of = _smoothed(link, np.searchsorted(places, s.mean(axis=1)), count)
     found = [np.flatnonzero(slice_of == k) for k in range(count)]
     parts = [_slice(link, material, elements) for elements in found if len(elements)]
-    cuts = [_cut(a, b, e, k, even[k]) for k, ((a, _), (b, _)) in enumerate(pairwise(parts))]
+    cuts = [_cut(a, b, e, k, prismatic[k]) for k, ((a, _), (b, _)) in enumerate(pairwise(parts))]
     if len(parts) < count or None in cuts:
         fewer = sum(cut is not None for cut in cuts) + 1
         raise MeshError(
@@ -108,14 +108,13 @@ def segmented(
 
 
 def _facets_on(cuts: Sequence[Cut], number: int) -> Int[np.ndarray, " c"]:
-    """Facets of a segment that are sides of cuts."""
+    """Facets of a segment at its cuts."""
     sides = [cut.facets[cut.segments.index(number)] for cut in cuts if number in cut.segments]
     return np.unique(np.concatenate(sides, dtype=np.int64))
 
 
 def along(link: Link, ends: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, "3"]:
-    """Unit vector across which a link is cut: between the two joints furthest apart, else, from its joint on, its longest
-    axis of inertia."""
+    """Unit normal of a link's cuts: between the two joints farthest apart, else along its axis of least inertia."""
     if len(ends) > 1:
         distance = np.linalg.norm(ends[:, None] - ends, axis=2)
         a, b = np.unravel_index(distance.argmax(), distance.shape)
@@ -127,13 +126,13 @@ def along(link: Link, ends: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, "3"]:
 
 
 def longest_axis(link: Link) -> Float[np.ndarray, "3"]:
-    """Unit vector, either way, along which the mass of a meshed link is furthest from its centre."""
+    """Axis of least inertia of a meshed link, a unit vector of either sign."""
     X = link.X - np.outer(link.one, link.centre)
     return np.asarray(np.linalg.eigh(X.T @ (link.mass[0] @ X))[1][:, -1])
 
 
 class _Shape:
-    """Where a link is a prism along a direction: no surface around leans by more than LEANS, ends apart."""
+    """Where a link is prismatic along a direction: no surface but its ends leans by more than LEANS."""
 
     def __init__(self, link: Link, e: Float[np.ndarray, "3"]) -> None:
         _, corners, normals = boundary(link)
@@ -145,21 +144,16 @@ class _Shape:
         leaning = (np.abs(normals @ e) > np.sin(LEANS)) & ~end
         self.low, self.high = along[leaning].min(axis=1), along[leaning].max(axis=1)
 
-    def even(self, place: float) -> bool:
-        """Whether it is one around a place, as far as half of its width there: what is not affine dies away so fast."""
+    def prismatic(self, place: float) -> bool:
+        """Whether it is around a place, within half of its width: fields that are not affine decay over that length."""
         reach = np.ptp(self.s) / TRIED
         here = self.across[np.abs(self.s - place) < reach]
         half = np.linalg.norm(here - here.mean(axis=0), axis=1).max() if len(here) else 0.0
         return not ((self.low < place + half) & (self.high > place - half)).any()
 
 
-def most_slices(X: Float[np.ndarray, "n 3"], e: Float[np.ndarray, "3"]) -> int:
-    """How many slices across a direction are none of them shorter than the link is wide: stubbier ones soften it.
-
-    Parameters
-    ----------
-    X : (n, 3) its nodes [m]
-    """
+def max_slices(X: Float[np.ndarray, "n 3"], e: Float[np.ndarray, "3"]) -> int:
+    """The largest number of slices across a direction, none shorter than a link with nodes X [m] is wide."""
     s = X @ e
     across = X - np.outer(s, e)
     widest = np.linalg.svd(across - across.mean(axis=0), full_matrices=False)[2][0]
@@ -169,30 +163,27 @@ def most_slices(X: Float[np.ndarray, "n 3"], e: Float[np.ndarray, "3"]) -> int:
 def _places(
     count: int, s: Float[np.ndarray, "..."], whole: Sequence[Interval], shape: _Shape
 ) -> tuple[Float[np.ndarray, " c"], list[bool]]:
-    """Where to cut: evenly, but where the link is a prism if there is such a place near, never in ranges that stay whole.
+    """Places of cuts, and whether the link is prismatic at each.
 
-    Returns also whether it is one around each place.
+    They are equally spaced, but moved to where the link is prismatic if that is near, and out of undivided ranges.
     """
     places = np.linspace(s.min(), s.max(), count + 1)[1:-1]
     tried = np.linspace(s.min(), s.max(), TRIED + 1)[1:-1]
-    free = [x for x in tried if shape.even(x) and not any(low < x < high for low, high in whole)]
-    even = [shape.even(x) for x in places]
+    free = [x for x in tried if shape.prismatic(x) and not any(low < x < high for low, high in whole)]
+    prismatic = [shape.prismatic(x) for x in places]
     for k, place in enumerate(places):
         held = any(low < place < high for low, high in whole)
         near = min(free, key=lambda x: abs(x - place), default=np.inf)
-        if (held or not even[k]) and abs(near - place) < NEAR * np.ptp(s) / count:
-            places[k], even[k] = near, True
+        if (held or not prismatic[k]) and abs(near - place) < NEAR * np.ptp(s) / count:
+            places[k], prismatic[k] = near, True
     for low, high in whole:
         inside = (places > low) & (places < high)
         places[inside] = np.where(places[inside] - low < high - places[inside], low, high)
-    return places, even
+    return places, prismatic
 
 
 def _smoothed(link: Link, slice_of: Int[np.ndarray, " e"], count: int) -> Int[np.ndarray, " e"]:
-    """The slice of each tetrahedron, those that stick out of one taken into that of more of their neighbours.
-
-    Hexahedra are in layers, and stay where they are.
-    """
+    """Slices of elements, tetrahedra moved to the slice of most of their neighbours; hexahedra are in layers already."""
     if link.cell_type != "tetra10":
         return slice_of
     left, right = link.basis.mesh.f2t[:, link.basis.mesh.f2t[1] >= 0]
@@ -209,7 +200,7 @@ def _smoothed(link: Link, slice_of: Int[np.ndarray, " e"], count: int) -> Int[np
 
 
 def _slice(link: Link, material: Material, elements: Int[np.ndarray, " e"]) -> tuple[Link, Int[np.ndarray, " n"]]:
-    """A link of some elements of another, and which of its functions they are."""
+    """A link of some elements of another, and numbers of its functions in that."""
     from scipy.spatial import cKDTree
 
     used, cells = np.unique(link.cells[elements], return_inverse=True)
@@ -219,7 +210,7 @@ def _slice(link: Link, material: Material, elements: Int[np.ndarray, " e"]) -> t
     else:
         faces = _slice_faces(link, elements, used)
         part = solid_link(link.name, SolidMesh(link.X[used], cells, faces, link.method), material, link.axes)
-    # the function space numbers its functions in its own way
+    # the function space has numbers of its own
     distance, same = cKDTree(link.X).query(part.X)
     if distance.max() > SAME * link.size:
         got = "got some that it does not have"
@@ -228,7 +219,7 @@ def _slice(link: Link, material: Material, elements: Int[np.ndarray, " e"]) -> t
 
 
 def _slice_faces(link: Link, elements: Int[np.ndarray, " e"], used: Int[np.ndarray, " n"]) -> tuple[Face, ...]:
-    """Faces of a link that have names, with the sides that are of some of its elements, if any."""
+    """Named faces of a link, with their sides on some of its elements, if any."""
     mesh, faces = link.basis.mesh, []
     for each in link.faces:
         here = each.facets[np.isin(mesh.f2t[0, each.facets], elements)]
@@ -236,8 +227,8 @@ def _slice_faces(link: Link, elements: Int[np.ndarray, " e"], used: Int[np.ndarr
     return tuple(faces)
 
 
-def _cut(a: Link, b: Link, e: Float[np.ndarray, "3"], number: int, even: bool) -> Cut | None:
-    """The ports of the facets that two slices share, None if they share none: its middle, and points off it within it."""
+def _cut(a: Link, b: Link, e: Float[np.ndarray, "3"], number: int, prismatic: bool) -> Cut | None:
+    """The cut between two slices, with ports at its centre and beside it; None if they share no facets."""
     from scipy.spatial import cKDTree
 
     middles = [_facet_middles(part) for part in (a, b)]
@@ -251,7 +242,7 @@ def _cut(a: Link, b: Link, e: Float[np.ndarray, "3"], number: int, even: bool) -
     off = first.spread[: a.d - 1, None] * first.directions[: a.d - 1]
     points = first.origin + np.concatenate([np.zeros((1, 3)), off])
     weights = (port_weights(surfaces[0], points), port_weights(surfaces[1], points))
-    return Cut((number, number + 1), weights[0] @ a.X, weights, (one, other), even)
+    return Cut((number, number + 1), weights[0] @ a.X, weights, (one, other), prismatic)
 
 
 def _facet_middles(part: Link) -> Float[np.ndarray, "f d"]:

@@ -6,11 +6,11 @@ from kedfem.arrays import Bool, Float
 from kedfem.links.record import Link
 from kedfem.links.surfaces.surface import boundary, neighbours, surface_quadrature
 
-SHARP = np.cos(np.radians(20))  # between facets at their edge; those of rounds differ by a few degrees there
+SHARP = np.cos(np.radians(20))  # between facets at their edge; those of fillets differ by a few degrees there
 
 
 def re_entrant(link: Link) -> Bool[np.ndarray, " n"]:
-    """Nodes of a meshed link that lie on edges where its surface bends inwards without a round."""
+    """Nodes of a meshed link on re-entrant edges without a fillet."""
     full = link.full or link
     out = np.zeros(full.n, bool)
     if not full.meshed:
@@ -43,8 +43,8 @@ def _nearest_normal(
     return np.asarray(normals[np.arange(len(x)), nearest])
 
 
-def around(link: Link, at: Float[np.ndarray, "k 3"]) -> Bool[np.ndarray, " n"]:
-    """Nodes of a meshed link in whose stress such places have a part: within `reach`, or in an element with one of them.
+def affected_nodes(link: Link, at: Float[np.ndarray, "k 3"]) -> Bool[np.ndarray, " n"]:
+    """Nodes of a meshed link whose stress singular places affect: within `influence_radius`, or in the same element.
 
     Parameters
     ----------
@@ -59,11 +59,11 @@ def around(link: Link, at: Float[np.ndarray, "k 3"]) -> Bool[np.ndarray, " n"]:
     near = cKDTree(at).query(full.X)[0]
     touching = (near[full.cells] < 1e-6 * full.size).any(axis=1)
     out[full.cells[touching].ravel()] = True
-    return np.asarray(out | (near <= reach(full)))
+    return np.asarray(out | (near <= influence_radius(full)))
 
 
-def reach(link: Link) -> float:
-    """Volume over surface: half the thickness of a plate, a quarter of a square bar's width [m]. No mesh changes it."""
+def influence_radius(link: Link) -> float:
+    """Volume over surface, whatever the mesh: half the thickness of a plate, a quarter of a square bar's width [m]."""
     facets, _, _ = boundary(link)
     area = float(surface_quadrature(link, facets).dA.sum())
     if link.d == 2:  # edges times the thickness, and both sides

@@ -19,12 +19,12 @@ from kedfem.mesh import SolidMesh
 from kedfem.mesh.elements.hexahedra import CELL_TYPES
 from kedfem.scene import Material
 
-#: 2³, 3³ and 14 Gauss points: the volume of a distorted element is exact, as is ∫ ∂_i N_a of a curved tetrahedron.
+#: 2³, 3³ and 14 Gauss points: exact volume of distorted elements, and ∫ ∂_i N_a of curved tetrahedra.
 QUADRATURE_ORDER = {8: 3, 10: 5, 20: 5, 27: 5}
 
 
 class HexS2(skfem.ElementHexS2):  # type: ignore[misc]
-    """Evaluated once at the same points: scikit-fem asks for every function at them again and again."""
+    """The 20-node element with cached values: scikit-fem evaluates its functions at the same points many times."""
 
     def lbasis(self, X: Float[np.ndarray, "3 q"], i: int) -> tuple[np.ndarray, np.ndarray]:
         """The i-th function and its gradient in the reference element."""
@@ -38,8 +38,8 @@ def _serendipity(points: bytes, shape: tuple[int, ...], i: int) -> tuple[np.ndar
     return found
 
 
-class MappingOnce(skfem.MappingIsoparametric):  # type: ignore[misc]
-    """Inverts its gradient once at the same points: scikit-fem asks for it for every function."""
+class CachedMapping(skfem.MappingIsoparametric):  # type: ignore[misc]
+    """An isoparametric mapping with its inverse gradient cached: scikit-fem asks for it for every function."""
 
     _last: tuple[Any, Any, np.ndarray] = (None, None, np.zeros(0))
 
@@ -52,14 +52,14 @@ class MappingOnce(skfem.MappingIsoparametric):  # type: ignore[misc]
 
 @dataclass(repr=False)
 class MeshHexS2(skfem.MeshHex1):  # type: ignore[misc]
-    """20-node hexahedra whose geometry is serendipity too, which scikit-fem has not: on its 27-node geometry the
-    20 functions would not hold x, y, z themselves, and a rigid turn would cause strain."""
+    """20-node hexahedra with serendipity geometry, which scikit-fem lacks: on its 27-node geometry the 20 functions
+    do not contain x, y, z, so that a rigid rotation would cause strain."""
 
     elem: type[skfem.Element] = HexS2
 
     def _mapping(self) -> skfem.MappingIsoparametric:
         if not hasattr(self, "_cached_mapping"):
-            self._cached_mapping = MappingOnce(self, self.elem(), self.bndelem)
+            self._cached_mapping = CachedMapping(self, self.elem(), self.bndelem)
         return self._cached_mapping
 
 
@@ -67,7 +67,7 @@ MESHES = {8: skfem.MeshHex1, 10: skfem.MeshTet2, 20: MeshHexS2, 27: skfem.MeshHe
 
 
 def vtk_order(nodes: int) -> list[int]:
-    """Of each node of an element in scikit-fem's order its place in VTK's; those of tetrahedra are the same."""
+    """Position in VTK's order of each node of an element in scikit-fem's; the same for tetrahedra."""
     from skfem.io.meshio import HEX_MAPPING  # which loads meshio, a fifth of a second
 
     return list(range(10)) if nodes == 10 else list(HEX_MAPPING[:nodes])
@@ -88,11 +88,11 @@ def vtk_cells(basis: skfem.Basis) -> Int[np.ndarray, "e m"]:
 
 
 @dataclass(frozen=True, slots=True)
-class Pattern:
-    """The one sparsity pattern of all scalar matrices of a basis: where each entry of each element goes.
+class SparsityPattern:
+    """The common sparsity pattern of all scalar matrices of a basis.
 
     indices, indptr : CSR structure
-    slot : of each local entry, column by column, rows one after the other, of all elements
+    slot : position of each local entry: columns, then rows, then elements
     """
 
     indices: Int[np.ndarray, " nnz"]
@@ -100,30 +100,31 @@ class Pattern:
     slot: Int[np.ndarray, " k"]
 
     def assembled(self, local: Float[np.ndarray, "e m m"]) -> sp.csr_array:
-        """The matrices of all elements as one sparse array, entries that happen to vanish kept."""
+        """The matrices of all elements as one sparse array, with its zero entries."""
         data = np.bincount(self.slot, weights=local.transpose(2, 1, 0).ravel(), minlength=len(self.indices))
         n = len(self.indptr) - 1
         return sp.csr_array((data, self.indices, self.indptr), shape=(n, n))
 
 
-def pattern(basis: skfem.Basis) -> Pattern:
+def sparsity_pattern(basis: skfem.Basis) -> SparsityPattern:
     """Sparsity pattern of a basis."""
     dofs, n = basis.element_dofs.astype(np.int64), basis.N
     keys = (dofs[None, :, :] * n + dofs[:, None, :]).ravel()  # entry (j, i, e): row i, column j
     found, slot = np.unique(keys, return_inverse=True)
     indptr = np.searchsorted(found, n * np.arange(n + 1)).astype(np.int32)
-    return Pattern((found % n).astype(np.int32), indptr, slot)
+    return SparsityPattern((found % n).astype(np.int32), indptr, slot)
 
 
-def scalar_mass(basis: skfem.Basis, on: Pattern, density: float) -> sp.csr_array:
+def scalar_mass(basis: skfem.Basis, on: SparsityPattern, density: float) -> sp.csr_array:
     """Scalar Gram matrix m_ab = ∫ ρ N_a N_b det(J), [KED, eqs. (9)(11)] [kg]."""
     N = np.stack([np.asarray(shape[0]) for shape in basis.basis], axis=1) * np.sqrt(density * basis.dx)[:, None]
     return on.assembled(N @ N.transpose(0, 2, 1))
 
 
-def gradient_products(basis: skfem.Basis, on: Pattern) -> dict[tuple[int, int], sp.csr_array]:
+def gradient_products(basis: skfem.Basis, on: SparsityPattern) -> dict[tuple[int, int], sp.csr_array]:
     """The scalar matrices D_ij = ∫ ∂_i N_a ∂_j N_b, i ≤ j, all on one sparsity pattern [m; in a plane: -]."""
-    axes, root = (range(basis.mesh.dim()), np.sqrt(basis.dx)[:, None])  # on both: D_ii is symmetric to the bit
+    # the root of the weights is on both factors, so that D_ii is exactly symmetric
+    axes, root = range(basis.mesh.dim()), np.sqrt(basis.dx)[:, None]
     dN = [np.stack([np.asarray(shape[0].grad)[k] for shape in basis.basis], axis=1) * root for k in axes]
     return {(i, j): on.assembled(dN[i] @ dN[j].transpose(0, 2, 1)) for i, j in combinations_with_replacement(axes, 2)}
 
@@ -155,7 +156,7 @@ def elastic_stiffness(D: dict[tuple[int, int], sp.csr_array], lame: tuple[float,
 
 
 def transposition(like: sp.csr_array) -> Int[np.ndarray, " nnz"]:
-    """Where the transposed entry of each entry of a structurally symmetric matrix stands."""
+    """Position of the transposed entry of each entry of a structurally symmetric matrix."""
     number = sp.csr_array((np.arange(like.nnz), like.indices, like.indptr), shape=like.shape)
     turned = sp.csr_array(number.T.tocsr())
     turned.sort_indices()
@@ -163,7 +164,7 @@ def transposition(like: sp.csr_array) -> Int[np.ndarray, " nnz"]:
 
 
 def link_faces(basis: skfem.Basis, mesh: SolidMesh) -> tuple[LinkFace, ...]:
-    """Faces of a mesh that have names, as facets of its function space, whose first functions are those of corners."""
+    """Named faces of a mesh as facets of its function space, whose first functions are those of corners."""
     if not mesh.faces:
         return ()
     corners = np.unique(mesh.cells[:, : basis.elem.refdom.nnodes])
@@ -191,8 +192,8 @@ def meshed_link(
     name: str, basis: skfem.Basis, X: Float[np.ndarray, "n 3"], material: Material, lame: tuple[float, float],
     thickness: float = 1.0, **given: Any,
 ) -> Link:  # fmt: skip
-    """The record of a solid or plane link from its function space: mass and stiffness, and what else is given."""
-    on, X, one = pattern(basis), np.ascontiguousarray(X), np.ones(len(X))
+    """The record of a solid or plane link from its function space, with mass and stiffness and all that is given."""
+    on, X, one = sparsity_pattern(basis), np.ascontiguousarray(X), np.ones(len(X))
     m = scalar_mass(basis, on, material.density * thickness)
     mass: Mass = (m,) * basis.mesh.dim()
     m1, mX = mass_constants(mass, one, X * [1, 1, len(mass) - 2])

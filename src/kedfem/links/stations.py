@@ -1,9 +1,8 @@
 """Stations along a line of a link on which a joint slides, with cubic splines of the displacements between them.
 
-Slopes of the shape functions jump between elements, which would accelerate a slider like an impact. A spline through
-stations is twice continuously differentiable. In a solid the displacement under a point force grows without bounds as the
-mesh is refined; the displacement of a station is therefore the affine mean over the material in a ball about it, with
-the distance between stations as its width.
+Slopes of the shape functions jump between elements, which would accelerate a slider like an impact; a spline is twice
+continuously differentiable. In a solid the displacement under a point force diverges as the mesh is refined; the
+displacement of a station is therefore an affine mean over a ball whose radius is the distance between stations.
 """
 
 from collections.abc import Mapping
@@ -16,16 +15,16 @@ from kedfem.errors import MeshError
 from kedfem.links.beams.of_scene import FEWEST
 from kedfem.links.record import Link
 
-BESIDE = 1e-6  # of the link's size: nodes so far off a line are on it
+BESIDE = 1e-6  # of the link's size: nodes closer to a line are on it
 SPARE = 2  # stations beyond the travel of the slider, where the link has them
 MOST = 48
-FAR = 10  # of a rigid link without a shape: its stations reach so many of its lengths beyond where it is held
-# relative: what rounding must not decide, as of elements as long as stations are apart, or at a cut
+FAR = 10  # lengths of a rigid link without a shape, by which its stations extend beyond its joints
+# relative: differences by rounding, as between the lengths of elements and the distance of stations, or at a cut
 SAME = 1e-6
-KNOWN = 1e-3  # of the ball: a spread below cannot determine a gradient
+KNOWN = 1e-3  # of the ball: a smaller spread determines no gradient
 Directed = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]
 """Origin and axis of a line."""
-APART = 1e-3  # of the largest singular value of stations that move apart: 0.1 of two elements, 2e-6 of one, 1 of beams
+INDEPENDENT = 1e-3  # of the largest singular value of stations: 0.1 with two elements, 2e-6 with one, 1 of beams
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +33,8 @@ class Stations:
 
     s : (k,) places along the line from its origin, increasing [m]
     points : (k, 3) the same in the reference position [m]
-    weights : of each the scalar weights (n,) of its displacement, u = weights @ state of its segment
-    keys : of each the segment of the link that it is on
+    weights : (n,) for each station, of its displacement: u = weights @ state of its segment
+    keys : segment of each station
     """
 
     s: Float[np.ndarray, " k"]
@@ -43,18 +42,18 @@ class Stations:
     weights: tuple[Float[np.ndarray, " _"], ...]
     keys: tuple[str, ...]
 
-    def reach(self, s: float) -> bool:
-        """Whether a place is between the first and the last."""
+    def covers(self, s: float) -> bool:
+        """Whether a place is between the first and the last station."""
         slack = BESIDE * float(np.ptp(self.s))
         return bool(self.s[0] - slack <= s <= self.s[-1] + slack)
 
     def at(self, s: Float[np.ndarray, " T"], rate: int = 0) -> Float[np.ndarray, "T k"]:
-        """Weights of the stations in the displacement at other places: cardinal functions of the cubic spline, and beyond
-        its ends of its tangents there.
+        """Weights of the stations in the displacement at other places: cardinal functions of the cubic spline,
+        extrapolated linearly beyond its ends.
 
         Parameters
         ----------
-        rate : their derivative by s of that order
+        rate : order of the derivative by s
         """
         from scipy.interpolate import CubicSpline
 
@@ -74,20 +73,20 @@ def stations(
     whole: bool = False,
     endless: bool = False,
 ) -> Stations:
-    """Stations for a slider on a line of a link; each of one that bends can move without the others.
+    """Stations for a slider on a line of a link; on an elastic link their displacements are independent.
 
     Parameters
     ----------
-    parts : the link's segments by their keys, or it alone
+    parts : the link's segments by their keys, or the link alone
     line : origin and axis of the line, in the reference position; axis a unit vector
     travel : least and greatest place of the slider along the line [m]
-    whole : whether they reach along all of the link, as its bending and the slider's own motion may carry this anywhere
-    endless : whether a rigid link has no ends, as it is given by numbers
+    whole : whether stations extend along all of the link, as the slider may move anywhere
+    endless : whether a rigid link has no ends, as it has no shape
 
     Raises
     ------
     MeshError
-        If the link does not reach along the line as far as the slider goes, or cannot bend there.
+        If the link does not extend along the slider's travel, or has too few deflections there.
     """
     full = {key: link if link.full is None or link.Q is None else link.full for key, link in parts.items()}
     meshed = next(iter(full.values())).meshed
@@ -99,21 +98,21 @@ def stations(
     for key, link in parts.items():
         here = [k for k, each in enumerate(found.keys) if each == key]
         if meshed and not link.rigid:
-            _check_apart(full[key], where, [weights[k] for k in here])
+            _check_independent(full[key], where, [weights[k] for k in here])
         if full[key] is not link:
             for k in here:
                 weights[k] = weights[k] @ link.Q
             if not link.rigid:
-                _check_apart(link, where, [weights[k] for k in here])
+                _check_independent(link, where, [weights[k] for k in here])
     return replace(found, weights=tuple(weights))
 
 
-def _check_apart(link: Link, where: str, weights: list[Float[np.ndarray, " n"]]) -> None:
-    """Whether each station can move without the others: what dependent ones bear is rounding."""
+def _check_independent(link: Link, where: str, weights: list[Float[np.ndarray, " n"]]) -> None:
+    """Refuse stations whose displacements depend on each other, between which forces are indeterminate."""
     if not weights:
         return
     size = np.linalg.svd(np.array(weights), compute_uv=False)
-    determined = int((size > APART * size[0]).sum())
+    determined = int((size > INDEPENDENT * size[0]).sum())
     if determined == len(weights):
         return
     more = "more basis functions" if link.Q is not None else "two elements along the line at least"
@@ -126,7 +125,7 @@ def _check_apart(link: Link, where: str, weights: list[Float[np.ndarray, " n"]])
 def _at_nodes(
     parts: Mapping[str, Link], where: str, line: Directed, travel: tuple[float, float], whole: bool
 ) -> Stations:
-    """Of a beam: its nodes on the line, of one that is cut up those of all segments."""
+    """Stations at the nodes of a beam on the line, of all its segments."""
     found, name, size = _nodes(parts, line), next(iter(parts.values())).name, _size(parts)
     if len(found) < FEWEST:
         raise MeshError(
@@ -146,7 +145,7 @@ def _at_nodes(
 def _between_nodes(
     parts: Mapping[str, Link], where: str, line: Directed, travel: tuple[float, float], endless: bool
 ) -> Stations:
-    """Of a rigid line: any places, as displacements of two of its nodes give those between them and beyond."""
+    """Stations of a rigid line anywhere: two of its nodes determine all displacements."""
     found, name, size = _nodes(parts, line), next(iter(parts.values())).name, _size(parts)
     if len(found) < 2:
         wanted = f"the line of a slot must run along the axis of the rigid line '{name}'"
@@ -165,7 +164,7 @@ def _between_nodes(
 
 
 def _nodes(parts: Mapping[str, Link], line: Directed) -> list[tuple[float, str, int]]:
-    """Nodes of a beam on a line: places along it [m], increasing, and those of which segment they are."""
+    """Nodes of a beam on a line, increasing: place along it [m], key of the segment, number there."""
     found: list[tuple[float, str, int]] = []
     for key, link in parts.items():
         along, off = _along(link.X, *line)
@@ -176,17 +175,15 @@ def _nodes(parts: Mapping[str, Link], line: Directed) -> list[tuple[float, str, 
 
 
 def _size(parts: Mapping[str, Link]) -> float:
-    """Of the largest segment [m]."""
+    """Size of the largest segment [m]."""
     return max(link.size for link in parts.values())
 
 
 def _in_balls(
     parts: Mapping[str, Link], where: str, line: Directed, travel: tuple[float, float], whole: bool
 ) -> Stations:
-    """Of a meshed link: means over balls that reach to the next station, as far as the link is wide, or an element long.
-
-    Closer ones would be as good as dependent on each other. Of a link that is cut up each is a mean over the segment that
-    has the most of its ball.
+    """Stations of a meshed link: means over balls that extend to the next station, and at least over the link's width or
+    an element's length, as closer ones are nearly dependent. Each is a mean over the segment with most of its ball.
     """
     origin, axis = line
     on = {key: _material(link) for key, link in parts.items()}
@@ -239,7 +236,7 @@ def _material(link: Link) -> _Material:
 
 
 def _mean_at(on: _Material, link: Link, point: np.ndarray, radius: float) -> Float[np.ndarray, " n"]:
-    """Weights of the value at a point of the affine field that fits the material in a ball about it best."""
+    """Weights of the value at a point of the affine field that best fits the displacement in a ball about it."""
     share = _share(on, point, radius)
     cells = np.flatnonzero(share.any(axis=1))
     if not len(cells):
@@ -253,13 +250,13 @@ def _mean_at(on: _Material, link: Link, point: np.ndarray, radius: float) -> Flo
 
 
 def _share(on: _Material, point: np.ndarray, radius: float) -> Float[np.ndarray, "e q"]:
-    """Volume of Gauss points, those near a point weighted most."""
+    """Volumes of Gauss points, with weights that decrease from a point to zero at a radius."""
     away = np.linalg.norm(on.x - point, axis=2) / radius
     return np.asarray(on.dV * np.clip(1 - away**2, 0, None) ** 2)
 
 
 def _width(nodes: Float[np.ndarray, "n 3"], axis: np.ndarray) -> float:
-    """A link's width across a line: that of a bar whose nodes spread as much."""
+    """A link's width across a line: that of a bar with the same spread of nodes."""
     X = nodes - nodes.mean(axis=0)
     across = X - np.outer(X @ axis, axis)
     return float(np.sqrt(12) * np.linalg.svd(across / np.sqrt(len(X)), compute_uv=False)[0])
@@ -274,7 +271,7 @@ def _along(
 
 
 def _near(s: Float[np.ndarray, " k"], travel: tuple[float, float]) -> slice:
-    """The stations that a slider meets, and a few beyond."""
+    """The stations within a slider's travel, and a few beyond."""
     first = max(int(np.searchsorted(s, travel[0], "right")) - 1 - SPARE, 0)
     end = min(int(np.searchsorted(s, travel[1], "left")) + 1 + SPARE, len(s))
     first = max(min(first, end - FEWEST), 0)

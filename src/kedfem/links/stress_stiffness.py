@@ -16,17 +16,17 @@ from kedfem.links.beams.beam import assembled, strain_rows
 from kedfem.links.beams.spatial_stress import spatial_stress_stiffness
 from kedfem.links.record import Link, Matrix, section_of
 from kedfem.links.reduced import STRAIGHT
-from kedfem.links.solid import Pattern, pattern
+from kedfem.links.solid import SparsityPattern, sparsity_pattern
 
 StressStiffness = Callable[[Float[np.ndarray, "n d"]], Matrix]
 ELEMENTS = 256  # taken together
 
 
 def rotated_directions(link: Link) -> Float[np.ndarray, "d d"]:
-    """P, link frame, with which k acts on the rows of a state, k g P: the unit matrix, but for planar beams.
+    """P of k g P, link frame, the components on which k acts: the unit matrix, but for planar beams.
 
-    Of these ψ does not take part, and of straight ones only what is across them: the strain of a beam's axis is that of
-    its length, √((1 + u')² + v'²) − 1 = u' + v'²/2 + …
+    Of planar beams it is without ψ, and of straight ones only the component across the axis, as the axial strain is
+    √((1 + u')² + v'²) − 1 = u' + v'²/2 + …
     """
     if link.kind != "beam":
         return np.eye(link.d)
@@ -41,7 +41,7 @@ def rotated_directions(link: Link) -> Float[np.ndarray, "d d"]:
 def stress_stiffness(link: Link) -> StressStiffness:
     """The map from a state g (n, d), link frame, to the stress stiffness k (n, n) of its stresses [N/m].
 
-    Of a reduced link Qᵀ k Q with k of the link that it was made from; of a rigid one what its forces ask for.
+    Of a reduced link Qᵀ k Q with k of the link that it was made from; of a rigid one that of its forces.
     """
     if link.rigid:
         return lambda g: _rigid(link, g)
@@ -54,11 +54,11 @@ def stress_stiffness(link: Link) -> StressStiffness:
         case "spatial_beam":
             return lambda g: spatial_stress_stiffness(link, g)
         case _:
-            on = pattern(link.basis)
+            on = sparsity_pattern(link.basis)
             return lambda g: _meshed(link, on, g)
 
 
-def _meshed(link: Link, on: Pattern, g: Float[np.ndarray, "n d"]) -> sp.csr_array:
+def _meshed(link: Link, on: SparsityPattern, g: Float[np.ndarray, "n d"]) -> sp.csr_array:
     """Stress stiffness of a solid or plane link, at the Gauss points of K0."""
     (lam, mu), basis = link.lame, link.basis
     shapes: list[skfem.DiscreteField] = [shape[0] for shape in basis.basis]
@@ -94,7 +94,7 @@ def _beam(link: Link, g: Float[np.ndarray, "n d"]) -> sp.csr_array:
 
 
 def _rigid(link: Link, g: Float[np.ndarray, "n d"]) -> Float[np.ndarray, "n n"]:
-    """Of the functions {1, x, y, z}, whose gradients are constant: they only need ∫ σ dV = Σ f_a X_aᵀ of the forces f."""
+    """k of the functions {1, x, y, z}, by their constant gradients and ∫ σ dV = Σ f_a X_aᵀ of the forces f."""
     space = 2 if link.kind == "beam" else link.d
     f = (link.K0 @ g.ravel()).reshape(g.shape)[:, :space]
     X = link.X[:, :space]

@@ -10,7 +10,7 @@ import numpy as np
 from kedfem.arrays import Float, Int
 from kedfem.dynamics.history import LinkMoment, Snapshot
 from kedfem.dynamics.model import Model
-from kedfem.links.beams.spatial_recovery import drawn
+from kedfem.links.beams.spatial_recovery import section_solid
 from kedfem.links.record import Link, in_space
 from kedfem.links.recovery import StressRecovery, extreme_stresses, nodal_state, nodal_stress, rotated_stress
 from kedfem.mesh.cad.sides import boundary_sides, side_corners
@@ -71,8 +71,8 @@ def link_fields(
     out = _joined(fields)
     if scene is None or not (scene.bodies or scene.springs):
         return out
-    drawn = zip(every_link(model), recoveries, strict=True)
-    places = [recovery.at_points((link.full or link).X) for link, recovery in drawn]
+    both = zip(every_link(model), recoveries, strict=True)
+    places = [recovery.at_points((link.full or link).X) for link, recovery in both]
     carriers = Carriers(model, snapshot, fields, places, deformation_scale)
     return out + balls(carriers, scene.bodies) + springs(carriers, scene)
 
@@ -160,7 +160,7 @@ def rigid_fields(every: Sequence[DrawnBody], motion: RigidMotion, k: int) -> lis
 
 def _seen(link: Link) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e k"], str]:
     if link.kind == "spatial_beam":
-        values, _, cells = drawn(link)
+        values, _, cells = section_solid(link)
         return np.asarray(values @ link.X), boundary_sides(cells), "quad"
     if link.kind == "beam":
         return link.X, link.cells, link.cell_type

@@ -22,8 +22,8 @@ from kedfem.dynamics.stepping.state import NodalOf
 from kedfem.links.record import Link, mass_times_over
 from kedfem.links.reduced import (
     mass_orthonormal,
-    on_functions,
-    rigid_functions,
+    mode_matrix,
+    rigid_body_functions,
     scalar_block,
     stiffness_blocks,
     wave_frequency,
@@ -160,7 +160,7 @@ def energy_sorted(link: Link, ports: Float[np.ndarray, "n p"], deflections: Sequ
     """Scalar components of deflections, orthonormal in an energy-like product and sorted by their weight in it."""
     H = energy_product(link)
     S = np.concatenate(deflections, axis=1)
-    rigid = mass_orthonormal(link, rigid_functions(link))
+    rigid = mass_orthonormal(link, rigid_body_functions(link))
     S, E = (x - rigid @ (rigid.T @ np.asarray(link.mass[0] @ x)) for x in (S, ports))
     E = orthonormal(E, H, 1e-10)[0]
     S = S - E @ (E.T @ np.asarray(H @ S))
@@ -177,7 +177,7 @@ def enriched(link: Link, deflections: Sequence[Float[np.ndarray, "n d"]], most: 
     deflections : of the link that it was made from
     most : modes to add
     """
-    full, Q = link.full or link, on_functions(link)
+    full, Q = link.full or link, mode_matrix(link)
     H = energy_product(full)
     S = np.concatenate(deflections, axis=1)
     own = orthonormal(Q, H, INDEPENDENT)[0]

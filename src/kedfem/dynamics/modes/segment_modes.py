@@ -25,7 +25,7 @@ from kedfem.dynamics.joints.ports import port_columns
 from kedfem.dynamics.matrices.substructure import Substructure
 from kedfem.dynamics.modes.reduction import Basis, energy_product, orthonormal
 from kedfem.links.record import Link, mass_times
-from kedfem.links.reduced import mass_orthonormal, projected_stiffness, rigid_functions, rigid_modes
+from kedfem.links.reduced import mass_orthonormal, projected_stiffness, rigid_body_functions, rigid_modes
 
 CANDIDATES = 32  # modes to choose from
 SHAPES = 24  # deflections that count
@@ -51,7 +51,7 @@ def segment_basis(
     """
     g = _relative(link, np.stack([x.ravel() for x in deflections], axis=1))
     S = _shapes(link, np.concatenate([_answers(link, joint, part, g), _rotated_ports(link, joint, part, g), g], axis=1))
-    rigid = mass_orthonormal(link, rigid_functions(link))
+    rigid = mass_orthonormal(link, rigid_body_functions(link))
     H = energy_product(link)
     S = S - rigid @ (rigid.T @ np.asarray(link.mass[0] @ S))
     functions = orthonormal(S, H, 1e-13)[0][:, :CANDIDATES]

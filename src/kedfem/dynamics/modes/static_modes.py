@@ -16,7 +16,7 @@ from kedfem.dynamics.joints.ports import port_columns
 from kedfem.dynamics.matrices.substructure import anchored
 from kedfem.dynamics.modes.reduction import energy_product
 from kedfem.links.record import Link, mass_times
-from kedfem.links.reduced import mass_orthonormal, rigid_functions, rigid_modes
+from kedfem.links.reduced import mass_orthonormal, rigid_body_functions, rigid_modes
 
 BALANCED = 1e-9  # of unit forces: resultants of fewer directions are rounding
 REPEATED = 1e-11  # of the largest: modes below repeat others
@@ -35,7 +35,7 @@ def static_modes(link: Link, joint: Attachment, loads: Sequence[Float[np.ndarray
         If K0 is not that of an elastic body.
     """
     g = _deflections(link, _forces(link, joint, loads))
-    rigid = mass_orthonormal(link, rigid_functions(link))
+    rigid = mass_orthonormal(link, rigid_body_functions(link))
     S = g.reshape(link.n, -1)
     S = S - rigid @ (rigid.T @ np.asarray(link.mass[0] @ S))
     weight = np.sqrt(energy_product(link).diagonal())[:, None]

@@ -14,15 +14,15 @@ CELL_TYPES = {2: "line", 3: "line3"}
 
 
 def cell_type(nodes: int) -> str:
-    """meshio's name of a line element, or one like it where meshio has none."""
+    """Name of a line element in meshio, or one of the same form where meshio has none."""
     return CELL_TYPES.get(nodes, f"line{nodes}")
 
 
 @cache
 def parent_nodes(nodes: int) -> Float[np.ndarray, " m"]:
-    """Where the nodes of a line element are on [-1, 1]: ends first, those within in order; Lobatto's points.
+    """Nodes of a line element on [-1, 1], the Lobatto points: ends first, inner nodes in order.
 
-    There the interpolation of any number of nodes is well conditioned; up to 3 they are equally spaced.
+    Interpolation through them is well conditioned for any number of nodes; up to three they are equally spaced.
     """
     within = np.asarray(np.polynomial.legendre.Legendre.basis(nodes - 1).deriv().roots(), float)
     out = np.array([-1.0, 1.0, *(within - within[::-1]) / 2])  # symmetric to the last digit
@@ -52,15 +52,15 @@ def shape_functions(r: float, nodes: int) -> tuple[Float[np.ndarray, " m"], Floa
 
 
 def lagrange(at: float, points: Float[np.ndarray, " q"]) -> Float[np.ndarray, " q"]:
-    """Weights of the values at some points of the polynomial through them at another place."""
+    """Values at a place of the Lagrange polynomials of some points."""
     return np.array([np.prod([(at - q) / (p - q) for q in points if q != p]) for p in points])
 
 
-def between_gauss(r: float, nodes: int) -> Float[np.ndarray, " q"]:
-    """What dM/ds at the Gauss points says of M beyond the polynomial through its values there, at r, divided by det J.
+def moment_correction(r: float, nodes: int) -> Float[np.ndarray, " q"]:
+    """Weights of dM/ds at the q Gauss points in the correction of M at r, divided by det J.
 
-    That is c P_q(r), zero at all q Gauss points, whose derivative has the highest term of dM/ds, the shear force. So M is
-    exact where the force per length is constant, though an element may have two such points alone.
+    The correction c P_q(r) vanishes at the Gauss points; its derivative has the highest term of dM/ds, the shear force.
+    With it M is exact under a constant force per length, even in elements with two Gauss points.
     """
     q = nodes - 1
     points, weights = np.polynomial.legendre.leggauss(q)
@@ -78,8 +78,8 @@ def nearest_parameter(x: Float[np.ndarray, "m d"], point: Float[np.ndarray, " d"
     return r
 
 
-def spaced(elements: int, nodes: int) -> Float[np.ndarray, " n"]:
-    """Places of the nodes of elements in a row, each of length one."""
+def node_places(elements: int, nodes: int) -> Float[np.ndarray, " n"]:
+    """Places of the nodes of successive elements of length one."""
     within = (1 + np.sort(parent_nodes(nodes))[:-1]) / 2
     return np.append((np.arange(elements)[:, None] + within).ravel(), elements)
 
@@ -90,7 +90,7 @@ def line_cells(first: Int[np.ndarray, " e"], nodes: int) -> Int[np.ndarray, "e m
 
 
 def line_pairs(cells: Int[np.ndarray, "e m"]) -> Int[np.ndarray, "p 2"]:
-    """Neighbouring nodes of line elements: how elements of many nodes are drawn."""
+    """Pairs of neighbouring nodes of line elements, by which elements of many nodes are drawn."""
     in_order = cells[:, [0, *range(2, cells.shape[1]), 1]]
     return np.stack([in_order[:, :-1].ravel(), in_order[:, 1:].ravel()], axis=1)
 
@@ -113,7 +113,7 @@ def strain_rows(x: Float[np.ndarray, "m 2"], r: float) -> tuple[Float[np.ndarray
 
 
 def tangent_fit(x: Float[np.ndarray, "m 2"], r: float) -> Float[np.ndarray, "m 3"]:
-    """Weights with which an element's nodes show the rotation of its axis at r: Σ x_a ⊗ fit_a = x' ⊗ t, undeformed t."""
+    """Weights of nodes in the rotation of an element's axis at r: Σ x_a ⊗ fit_a = x' ⊗ t, t the undeformed tangent."""
     _, dN = shape_functions(r, len(x))
     tangent = dN @ x
     return np.asarray(np.outer(dN, [*tangent, 0.0]) / (tangent @ tangent))
@@ -133,12 +133,12 @@ def element_stiffness(x: Float[np.ndarray, "m 2"], rigidity: Float[np.ndarray, "
     return K
 
 
-def element_mass(x: Float[np.ndarray, "m 2"]) -> Float[np.ndarray, "m m"]:
-    """∫ N_a N_b det J of one element [m], to be multiplied by (ρA, ρA, ρI), [KED, eq. (22)]."""
+def element_mass(x: Float[np.ndarray, "m d"]) -> Float[np.ndarray, "m m"]:
+    """∫ N_a N_b det J of one element [m]; of a planar one to be multiplied by (ρA, ρA, ρI), [KED, eq. (22)]."""
     m = np.zeros((len(x), len(x)))
     for r, w in zip(*np.polynomial.legendre.leggauss(len(x) + 1), strict=True):
         N, dN = shape_functions(r, len(x))
-        m += w * np.hypot(*(dN @ x)) * np.outer(N, N)
+        m += w * np.hypot.reduce(dN @ x) * np.outer(N, N)
     return m
 
 
@@ -151,17 +151,17 @@ def planar_rigidities(section: Section, material: Material) -> Float[np.ndarray,
 def beam_mesh(
     points: Float[np.ndarray, "p 3"], elements: int, nodes: int
 ) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, "e m"]]:
-    """Nodes and elements along a polyline, ends first; as many elements, of so many nodes, on each of its segments.
+    """Nodes and elements along a polyline: the same number of elements on each of its segments.
 
-    One that ends where it begins has a single node there.
+    A closed polyline has a single node where it ends and begins.
     """
-    s = spaced((len(points) - 1) * elements, nodes) / elements
+    s = node_places((len(points) - 1) * elements, nodes) / elements
     X = np.stack([np.interp(s, np.arange(len(points)), points[:, k]) for k in range(3)], axis=1)
     cells = line_cells(np.arange(0, len(X) - 1, nodes - 1), nodes)
-    return (X[:-1], cells % (len(X) - 1)) if closes(points) else (X, cells)
+    return (X[:-1], cells % (len(X) - 1)) if is_closed(points) else (X, cells)
 
 
-def closes(points: Float[np.ndarray, "p 3"]) -> bool:
+def is_closed(points: Float[np.ndarray, "p 3"]) -> bool:
     """Whether a line ends where it begins."""
     return bool((points[0] == points[-1]).all())
 
@@ -194,30 +194,30 @@ def beam_link(name: str, points: Float[np.ndarray, "p 3"], section: Section, mat
 
 
 def polyline_axes(points: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, "3 3"]:
-    """Link axes of a line through points, x from its start to its end; of a closed one along its first segment."""
-    return line_axes(points[0], points[1 if closes(points) else -1])
+    """Link axes of a polyline, x from its start to its end; of a closed one along its first segment."""
+    return line_axes(points[0], points[1 if is_closed(points) else -1])
 
 
 def line_axes(start: Float[np.ndarray, "3"], end: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
-    """Link axes as columns: x from start to end, z as near to the world's z as can be (its x, if the link is along z)."""
+    """Link axes as columns: x from start to end, z as close as possible to the world's z, or x if the link is along z."""
     x = (end - start) / np.linalg.norm(end - start)
     return section_axes(x, np.eye(3)[2 if abs(x[2]) < 0.9 else 0]).T
 
 
 def section_axes(x: Float[np.ndarray, "3"], up: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
-    """Unit vectors as rows: along a line, across it (the section's y) and as near to `up` as can be (its z)."""
+    """Unit vectors as rows: along a line, the section's y, and the section's z, as close as possible to `up`."""
     y = np.cross(up, x)
     y /= np.linalg.norm(y)
     return np.stack([x, y, np.cross(x, y)])
 
 
 def dofs(numbers: Int[np.ndarray, "e m"]) -> Int[np.ndarray, "e k"]:
-    """The three of each function of an element, one after the other."""
+    """Degrees of freedom of elements: three for each function, one function after the other."""
     return (3 * numbers[:, :, None] + np.arange(3)).reshape(len(numbers), 3 * numbers.shape[1])
 
 
 def assembled(blocks: list[np.ndarray], at: Int[np.ndarray, "e k"], size: int) -> sp.csr_array:
-    """The sum of element matrices, each at its dofs."""
+    """The global matrix: element matrices added at their degrees of freedom."""
     if not blocks:
         return sp.csr_array((size, size))
     rows = np.repeat(at, at.shape[1], axis=1).ravel()

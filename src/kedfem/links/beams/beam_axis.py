@@ -6,20 +6,20 @@ from itertools import pairwise
 import numpy as np
 
 from kedfem.arrays import Bool, Float, Int
-from kedfem.links.beams.beam import closes, line_axes, line_cells, polyline_axes, section_axes, spaced
+from kedfem.links.beams.beam import is_closed, line_axes, line_cells, node_places, polyline_axes, section_axes
 
-LEVEL = 1e-6  # least sine between a chord and what its z is to be near to
+LEVEL = 1e-6  # least sine between a chord and `up`
 
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """Stations of an axis: the nodes, those at corners once for each segment that meets there.
+    """Stations of an axis: its nodes; a node at a corner has one station for each segment that meets there.
 
     frame : (s, 4, 3) position [m], tangent, directions of the section's y and z
-    node : (s,) number of the station's node, ascending, but for the last of a closed line, which is the first again
+    node : (s,) number of each station's node, ascending; the last of a closed line is the first again
     cells : (e, m) stations of each element, ends first
-    rigid_node : (k,) which nodes carry a full affine field: where segments meet and at the ends
-    up : what the section's z is near to; None where `line_axes` chooses
+    rigid_node : (k,) whether a node has a full affine field, as at ends and corners
+    up : direction to which the section's z is as close as possible; None: as `line_axes` chooses
     """
 
     frame: Float[np.ndarray, "s 4 3"]
@@ -36,10 +36,10 @@ def straight_axis(points: Float[np.ndarray, "p 3"], elements: int, nodes: int, u
     ----------
     elements : per segment
     nodes : per element
-    up : the section's z is as near to it as can be; as `line_axes` chooses if None
+    up : direction to which the section's z is as close as possible; None: as `line_axes` chooses
     """
     steps = elements * (nodes - 1)
-    along = spaced(elements, nodes)[:, None] / elements
+    along = node_places(elements, nodes)[:, None] / elements
     segments = []
     for P, Q in pairwise(points):
         frame = np.empty((steps + 1, 4, 3))
@@ -49,7 +49,7 @@ def straight_axis(points: Float[np.ndarray, "p 3"], elements: int, nodes: int, u
     count = len(segments)
     node = (steps * np.arange(count)[:, None] + np.arange(steps + 1)).ravel()
     first = ((steps + 1) * np.arange(count)[:, None] + (nodes - 1) * np.arange(elements)).ravel()
-    many = count * steps + (not closes(points))
+    many = count * steps + (not is_closed(points))
     rigid_node = np.arange(many) % steps == 0
     return Axis(np.concatenate(segments), node % many, line_cells(first, nodes), rigid_node, up)
 
@@ -61,7 +61,7 @@ def smooth_axis(points: Float[np.ndarray, "p 3"], elements: int, nodes: int, up:
     ----------
     elements : between neighbouring points
     nodes : per element
-    up : the section's z at the first point is as near to it as can be
+    up : direction to which the section's z at the first point is as close as possible; None: as `line_axes` chooses
     """
     chord = np.concatenate([[0.0], np.linalg.norm(np.diff(points, axis=0), axis=1).cumsum()])
     from scipy.interpolate import CubicSpline
@@ -69,7 +69,7 @@ def smooth_axis(points: Float[np.ndarray, "p 3"], elements: int, nodes: int, up:
     curve = CubicSpline(chord, points)
     steps = elements * (nodes - 1)
     number = np.arange((len(points) - 1) * steps + 1)
-    s = np.interp(spaced((len(points) - 1) * elements, nodes) / elements, np.arange(len(points)), chord)
+    s = np.interp(node_places((len(points) - 1) * elements, nodes) / elements, np.arange(len(points)), chord)
     frame = np.empty((len(s), 4, 3))
     frame[:, 0] = curve(s)
     tangent = curve(s, 1)
@@ -82,12 +82,12 @@ def smooth_axis(points: Float[np.ndarray, "p 3"], elements: int, nodes: int, up:
 
 
 def directions(along: Float[np.ndarray, "3"], up: Float[np.ndarray, "3"] | None) -> Float[np.ndarray, "3 3"]:
-    """`section_axes` of a line, with z as near to the world's as can be where no `up` is given."""
+    """`section_axes` of a line; as `line_axes` chooses if `up` is None."""
     return line_axes(np.zeros(3), along).T if up is None else section_axes(along / np.linalg.norm(along), up)
 
 
 def chord_axes(points: Float[np.ndarray, "p 3"], up: Float[np.ndarray, "3"] | None) -> Float[np.ndarray, "3 3"]:
-    """Link axes of a line through points as columns, x as of `polyline_axes`, z as near to `up` as can be, if given."""
+    """Link axes of a polyline as columns: x as of `polyline_axes`, z as close as possible to `up`, if given."""
     axes = polyline_axes(points)
     level = up is not None and np.linalg.norm(np.cross(up, axes[:, 0])) > LEVEL * np.linalg.norm(up)
     return directions(axes[:, 0], up).T if level else axes
@@ -96,7 +96,7 @@ def chord_axes(points: Float[np.ndarray, "p 3"], up: Float[np.ndarray, "3"] | No
 def transported(
     v: Float[np.ndarray, "3"], before: Float[np.ndarray, "3"], after: Float[np.ndarray, "3"]
 ) -> Float[np.ndarray, "3"]:
-    """A direction turned by the smallest rotation that takes one tangent into the next."""
+    """A direction after parallel transport: the smallest rotation that takes one tangent into the next."""
     turned = v - (v @ after) / (1 + before @ after) * (before + after)
     turned -= (turned @ after) * after
     return np.asarray(turned / np.linalg.norm(turned))

@@ -1,19 +1,26 @@
-"""Stress of a planar beam from the strains at its reduced Gauss points, which are its most accurate ones.
+"""Stress of a planar beam from the strains at its reduced Gauss points, where they are most accurate.
 
-Within an element the bending moment is the polynomial through them, and one degree more, given by the shear force, which
-is the derivative of the moment: exact under a force per length that is constant.
+Within an element the bending moment is the polynomial through its values there, with one more degree from the shear
+force, the derivative of the moment: it is exact under a constant force per length.
 
-A probe interpolates the nearest four of them by a cubic. Its error falls with the third power of the elements' length, at
-nodes and half way between them with the fourth, if the moment is smooth along a straight run of elements, as under
-distributed loads. Joints, bodies, forces at a point and ends of forces per length (kinks) end a run. In elements of more
-than five nodes the interpolation takes as many points as an element has.
+A probe interpolates the moment at the nearest four Gauss points by a cubic. Its error falls with the third power of the
+elements' length, and with the fourth at nodes and half way between them, if the moment is smooth along a straight run of
+elements, as under distributed loads. Joints, bodies, forces at a point and ends of forces per length (kinks) end a run.
+In elements of more than five nodes the interpolation takes as many points as an element has.
 """
 
 import numpy as np
 import scipy.sparse as sp
 
 from kedfem.arrays import Float, Int
-from kedfem.links.beams.beam import between_gauss, lagrange, nearest_parameter, parent_nodes, shape_functions, strain_rows
+from kedfem.links.beams.beam import (
+    lagrange,
+    moment_correction,
+    nearest_parameter,
+    parent_nodes,
+    shape_functions,
+    strain_rows,
+)
 from kedfem.links.record import Link, section_of
 
 THROUGH = 4  # Gauss points of a probe at least
@@ -23,9 +30,9 @@ Points = Float[np.ndarray, "_ 3"]
 
 
 def nearest_on_beam(link: Link, point: Float[np.ndarray, "3"]) -> tuple[float, int, float, float]:
-    """How far a point is outside a beam, and the element, parent coordinate and offset to the left of the axis there.
+    """Distance of a point from a beam [m], and the nearest element, parent coordinate and offset to the left of the axis.
 
-    At a node between two elements the first of them is taken.
+    At a node between two elements it is the first of them.
     """
     half = link.section.height / 2 if link.section else 0.0
     found = []
@@ -50,7 +57,7 @@ def fibre_row(link: Link, element: int, r: float, offset: float, kinks: Points |
 
     Parameters
     ----------
-    element, r : where; the run of elements is the one that the element is in
+    element, r : place on the axis; interpolation is within the straight run that has this element
     offset : to the left of the axis [m]
     kinks : places of joints, bodies and forces [m]; the element's own Gauss points alone if not given
     """
@@ -73,20 +80,20 @@ def fibre_row(link: Link, element: int, r: float, offset: float, kinks: Points |
 
 
 def _within(link: Link, element: int, r: float, offset: float) -> Float[np.ndarray, " k"]:
-    """`fibre_row` by one element alone: M at its Gauss points, and what its shear force says between, dM/ds = −κGA γ."""
+    """`fibre_row` of one element alone: M at its Gauss points, corrected between them by dM/ds = −κGA γ."""
     cell, section = link.cells[element], section_of(link)
     x, gauss = link.X[cell][:, :2], _gauss(link)
     points = [strain_rows(x, float(q)) for q in gauss]
     of_shear = section.shear_coefficient * link.lame[1] * section.area / (link.E * section.second_moment)
     out = np.zeros((link.n, 3))
-    for (rows, det_J), w, more in zip(points, lagrange(r, gauss), between_gauss(r, len(cell)), strict=True):
+    for (rows, det_J), w, more in zip(points, lagrange(r, gauss), moment_correction(r, len(cell)), strict=True):
         curvature = w * rows[2] - more * det_J * of_shear * rows[1]
         out[cell] += link.E * (w * rows[0] - offset * curvature).reshape(-1, 3)
     return out.ravel()
 
 
 def straight_run(link: Link, element: int, kinks: Points) -> Int[np.ndarray, " e"]:
-    """The elements on one line with an element and no kink between, in order along the axis."""
+    """The elements of the straight run without kinks that has an element, in order along the axis."""
     within = [_between_ends(link, e, kinks) for e in range(len(link.cells))]
     run = [element]
     for step in (-1, 1):
@@ -100,9 +107,9 @@ def straight_run(link: Link, element: int, kinks: Points) -> Int[np.ndarray, " e
 
 
 def beam_fibre(link: Link, offset: float) -> tuple[sp.csr_array, sp.csr_array]:
-    """(n, 3n): σ_xx of a fibre at every node, by the first and by the last of the elements that meet there.
+    """(n, 3n): σ_xx of a fibre at every node, in the first and in the last of the elements that meet there.
 
-    These differ where a torque, a weld or a body acts on the axis, which one side may bear alone.
+    They differ where a torque, a weld or a body acts on the axis.
     """
     first, last = np.zeros((link.n, 3 * link.n)), np.zeros((link.n, 3 * link.n))
     met = np.zeros(link.n, bool)
@@ -129,7 +136,7 @@ def _on_axis(link: Link, element: int, r: float) -> Float[np.ndarray, "2"]:
 
 
 def _bent(link: Link, element: int, kinks: Points) -> bool:
-    """Whether the axis turns, ends or has a kink at the node between an element and the next."""
+    """Whether the axis changes its direction, ends or has a kink between an element and the next."""
     if link.cells[element][1] != link.cells[element + 1][0]:
         return True
     a, b = _side(link, element), _side(link, element + 1)

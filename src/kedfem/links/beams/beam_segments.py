@@ -19,9 +19,9 @@ from kedfem.scene import Material
 
 
 def beam_segments(link: Link, material: Material) -> Segments:
-    """A planar beam element by element; a frame follows the tangent at each Gauss point, [KED, eqs. (21)(22)].
+    """A planar beam divided into its elements, with a frame along the tangent at each Gauss point, [KED, eqs. (21)(22)].
 
-    There the strains are exact, however much the element bends: ε = |x'| − 1, γ, ψ' along the turned axis.
+    The strains there are exact at any deflection: ε = |x'| − 1, γ, ψ' along the rotated axis.
     """
     nodes = link.cells.shape[1]
     parts = []
@@ -36,13 +36,13 @@ def beam_segments(link: Link, material: Material) -> Segments:
 
 
 def _neighbours(count: int, closed: bool) -> list[tuple[int, int]]:
-    """Which elements meet, in order along the beam."""
+    """Pairs of elements that meet, in order along the beam."""
     pairs = list(pairwise(range(count)))
     return [*pairs, (count - 1, 0)] if closed else pairs
 
 
 def _unit(part: Link, node: int) -> Float[np.ndarray, "1 n"]:
-    """Weights of one end of an element: nodes are in order along it."""
+    """Weights of one end of an element, whose nodes are in order along it."""
     return np.eye(part.n)[[node]]
 
 
@@ -64,7 +64,7 @@ def _gauss_frames(part: Link, material: Material) -> tuple[Frame, ...]:
 
 
 def space_segments(link: Link, axis: Axis, material: Material) -> Segments:
-    """A beam in space element by element; a cut shares the whole field of its node.
+    """A beam in space divided into its elements; neighbours share the whole field of the node between them.
 
     Parameters
     ----------

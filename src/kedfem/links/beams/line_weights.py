@@ -1,4 +1,4 @@
-"""Forces along the axis of a beam as nodal forces: ∫ N_a q ds, on a beam as a whole or on its elements one by one."""
+"""Nodal forces of distributed forces along the axis of a beam, ∫ N_a q ds, for the beam as a whole or its segments."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ Place = tuple[int, float]
 class AxisElement:
     """An element of a beam's axis.
 
-    key : of the beam, or of its segment; link : that, unreduced; number : of the element there
+    key, link, number : the beam or segment that has it, unreduced, and its number there
     x : (m, 3) its nodes [m]
     """
 
@@ -59,12 +59,12 @@ def axis_elements(parts: Mapping[str, Link]) -> list[AxisElement]:
 def axis_weights(
     parts: Mapping[str, Link], where: str, between: Sequence[Sequence[float]] | None = None
 ) -> dict[str, Float[np.ndarray, "n 2"]]:
-    """∫ N_a (1 − f) ds and ∫ N_a f ds [m] on a beam's functions, f from 0 to 1 along the part of its axis that is loaded.
+    """∫ N_a (1 − f) ds and ∫ N_a f ds [m] for a beam's functions, f from 0 to 1 along the loaded part of its axis.
 
     Parameters
     ----------
     where : how messages name the part, e.g. ``loads.wind.between``
-    between : where the part begins and ends, all if not given; of a closed line in its direction
+    between : beginning and end of the part, the whole axis if not given; on a closed line in its direction
 
     Raises
     ------
@@ -92,7 +92,7 @@ def axis_weights(
 
 
 def side_forces(parts: Mapping[str, Link], where: str, at: Float[np.ndarray, "3"]) -> dict[str, Float[np.ndarray, "n 3"]]:
-    """Forces of a unit pressure on a flat side of a beam: on the straight run of its axis that a point of the side is at.
+    """Nodal forces of a unit pressure on a flat side of a beam, along the straight run of its axis there.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def side_forces(parts: Mapping[str, Link], where: str, at: Float[np.ndarray, "3"
 
 
 def _pieces(stretches: Sequence[tuple[Place, Place]]) -> Iterator[tuple[int, tuple[float, float]]]:
-    """Elements of stretches in order, and the range of parent coordinates of each that is in it."""
+    """Elements of stretches of the axis in order, and the range of parent coordinates of each."""
     for (first, start), (last, end) in stretches:
         for k in range(first, last + 1):
             low, high = start if k == first else -1.0, end if k == last else 1.0
@@ -139,14 +139,14 @@ def _integrals(of: AxisElement, r: tuple[float, float], done: float) -> tuple[Fl
 
 
 def _add(found: dict[str, Float[np.ndarray, "s 2"]], of: AxisElement, weights: Float[np.ndarray, "m 2"]) -> None:
-    """Weights of an element's nodes or stations to those of its beam or segment."""
+    """Add weights of an element's nodes or stations to those of its beam or segment."""
     stations = of.link.n if of.link.triples is None else of.link.triples.shape[0] // 3
     here = found.setdefault(of.key, np.zeros((stations, 2)))
     np.add.at(here, of.link.cells[of.number], weights)
 
 
 def _on_functions(part: Link, weights: Float[np.ndarray, "s 2"]) -> Float[np.ndarray, "n 2"]:
-    """Weights of nodes or stations on the functions of a beam, reduced or not."""
+    """Weights of a beam's functions, reduced or not, from those of its nodes or stations."""
     full = part.full or part
     if full.triples is not None:
         weights = full.triples[::3].T @ weights
@@ -154,7 +154,7 @@ def _on_functions(part: Link, weights: Float[np.ndarray, "s 2"]) -> Float[np.nda
 
 
 def _nearest(along: Sequence[AxisElement], at: Float[np.ndarray, "3"]) -> Place:
-    """The place of an axis that is nearest to a point; of two elements that meet there the first."""
+    """The place of an axis nearest to a point; between two elements it is in the first."""
     places = [(k, nearest_parameter(each.x, at)) for k, each in enumerate(along)]
     gaps = [_gap(along, place, at) for place in places]
     return places[int(np.argmin(np.array(gaps) > min(gaps) + SAME * _size(along)))]
@@ -185,7 +185,7 @@ def _place(along: Sequence[AxisElement], where: str, at: Float[np.ndarray, "3"])
 
 
 def _side(of: AxisElement, where: str, at: Float[np.ndarray, "3"], r: float) -> tuple[Float[np.ndarray, "3"], float]:
-    """Where a pressure on the side at a point pushes, and the width of the side [m]."""
+    """Direction of a pressure on the side at a point, and the width of the side [m]."""
     section, frame = section_of(of.link), of.frame
     d = at - shape_functions(r, len(of.x))[0] @ of.x
     near = NEAR * max(section.height, section.thickness) + 1e-9 * float(np.linalg.norm(at))
@@ -203,7 +203,7 @@ def _side(of: AxisElement, where: str, at: Float[np.ndarray, "3"], r: float) -> 
 
 
 def _run(along: Sequence[AxisElement], k: int) -> list[int]:
-    """The elements in line with one, whose sections are turned alike."""
+    """The elements in line with one and with the same directions of the section."""
     count, frame, closed = len(along), along[k].frame, _closed(along)
     out = [k]
     for step in (-1, 1):

@@ -1,4 +1,4 @@
-"""Elements of beams in space whose strains are changes of the metric of axis and directors: exact for any rotation.
+"""Elements of beams in space with strains as changes of the metric of axis and directors, exact for any rotation.
 
 Node a has the gradient functions g_k, in the reference position X_k; its rotation Q_a is the nearest to them, Σ g_k ⊗
 X_k = Q_a U, and its directors are d_i = Q_a n_i. With x' and d_i interpolated, and b = n1'·t, n2'·t, n1'·n2, n2'·n1 in
@@ -8,7 +8,7 @@ the reference position,
     κ1 = x'·d1' − b1 (ε + a11) − b3 γ2 − b2 a12,   κ2 = x'·d2' − b2 (ε + a22) − b4 γ1 − b1 a12
     τ = ½ (d2·d1' − d1·d2') − b3 (a11 + a22)
 
-less their values in the reference position. They vanish for rigid motions of any size, so that no frame is needed.
+less their values in the reference position. They vanish for finite rigid motions: these elements need no frame.
 For small displacements they are `spatial_beam.space_strains` of p, q = θ × n1, θ × n2. Strains within the section,
 ½ (g_k·g_l − X_k·X_l), do not rotate nodes: they are independent of the beam's forces and have a stiffness of their own.
 """
@@ -22,9 +22,9 @@ from kedfem.links.beams.beam import parent_weights, shape_functions
 from kedfem.links.record import BeamElement, read_only
 from kedfem.vectors import cross, nearest_rotations
 
-# of κ G A l: as stiff as sections are against leaning, so that A fits them turned by any angle
+# of κ G A l: the stiffness of sections against shear, so that A fits at any rotation of them
 SECTION_STIFF = 1.0
-# of E I / l, besides, at ends and corners, which joints strain
+# of E I / l, in addition, at ends and corners, which joints strain
 RIGID_NODE_STIFF = 1000.0
 Vectors = Float[np.ndarray, "*b _ 3"]
 Column = Float[np.ndarray, "*b _"]
@@ -94,7 +94,7 @@ def strains_of(element: BeamElement, y: Vectors) -> Column:
 def pulled_back(
     element: BeamElement, y: Float[np.ndarray, "*#b n 3"], stress: Float[np.ndarray, "*#b s"]
 ) -> Float[np.ndarray, "*#b n 3"]:
-    """Nodal forces (…, n, 3) of stress resultants (…, s), also of many at one position: (∂ strains / ∂ y)ᵀ stress."""
+    """Nodal forces (…, n, 3) of stress resultants (…, s), or of many at one position: (∂ strains / ∂ y)ᵀ stress."""
     g, x = element.gradients @ y, element.tangents @ y
     Q = node_rotations(element, g)
     d = _directors(element, Q)
@@ -119,7 +119,7 @@ def _torque_forces(
     element: BeamElement, g: Float[np.ndarray, "*#b k 3"], Q: Float[np.ndarray, "*#b m 3 3"],
     torque: Float[np.ndarray, "*#b m 3"],
 ) -> Float[np.ndarray, "*#b k 3"]:  # fmt: skip
-    """Forces on gradient functions that do what torques (…, m, 3) do on the nodes' rotations."""
+    """Forces on gradient functions with the same virtual work as torques (…, m, 3) on the nodes' rotations."""
     out = np.zeros((*np.broadcast_shapes(g.shape[:-2], torque.shape[:-2]), *g.shape[-2:]))
     for a in range(Q.shape[-3]):
         mine, q = np.flatnonzero(element.node == a), Q[..., a, :, :]
@@ -148,7 +148,7 @@ def _interpolated(element: BeamElement, d: Float[np.ndarray, "*b m 2 3"]) -> lis
 
 
 def _pair_factors(element: BeamElement) -> Column:
-    """Of strains within a section: |sym|² counts those off the diagonal twice."""
+    """Factors of strains within a section: |sym|² has off-diagonal components twice."""
     i, j = element.pairs.T
     return np.where(i == j, 0.5, np.sqrt(0.5))
 

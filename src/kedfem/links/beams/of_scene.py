@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.links.beams.beam import beam_link, spaced
+from kedfem.links.beams.beam import beam_link, node_places
 from kedfem.links.beams.beam_axis import Axis, smooth_axis, straight_axis
 from kedfem.links.beams.section import scene_section
 from kedfem.links.beams.spatial_beam import spatial_beam_link
@@ -14,15 +14,13 @@ from kedfem.links.record import Link
 from kedfem.scene import Bar, LinkScene, PointMass, Polyline, RectangleSection, Scene, SectionShape
 
 FEWEST = 4  # nodes along a slot
-SAME = 1e-6  # of a segment's length: what is so near is at one place
+SAME = 1e-6  # of a segment's length: points closer together coincide
 
 
 def scene_beam(scene: Scene, name: str, spatial: frozenset[str]) -> Link:
     """A beam of a scene; `spatial`: names of those in space."""
     link = scene.links[name]
-    shape, material = link.shape, scene.materials[str(link.material)]
-    if not isinstance(shape, Bar | Polyline):
-        raise TypeError(f"links.{name}: a beam is a bar or a polyline")  # refused by the scene already
+    shape, material = _line(link), scene.materials[str(link.material)]
     if isinstance(shape, Polyline):
         of_section: SectionShape = shape.of_section
     else:
@@ -37,9 +35,7 @@ def scene_beam(scene: Scene, name: str, spatial: frozenset[str]) -> Link:
 def scene_axis(scene: Scene, name: str) -> Axis:
     """The axis of a beam in space."""
     link = scene.links[name]
-    shape = link.shape
-    if not isinstance(shape, Bar | Polyline):
-        raise TypeError("a beam is a bar or a polyline")  # refused by the scene already
+    shape = _line(link)
     smooth, up = (shape.smooth, shape.up) if isinstance(shape, Polyline) else (False, shape.upward)
     elements = segment_elements(scene, name)
     make = smooth_axis if smooth else straight_axis
@@ -48,21 +44,21 @@ def scene_axis(scene: Scene, name: str) -> Axis:
 
 
 def beam_points(scene: Scene, name: str, spatial: bool) -> Float[np.ndarray, "p 3"]:
-    """The corners of a beam, and where joints and bodies sit between them: segments begin and end there.
+    """The corners of a beam, and joints and bodies between them, where segments begin and end.
 
-    Those that have a node already need no corner, but for bodies with inertia on a beam in space.
+    Joints and bodies at a node need no corner, except bodies with inertia on a beam in space.
     """
     link = scene.links[name]
-    shape = link.shape
-    points = np.array(shape.between if isinstance(shape, Bar) else getattr(shape, "points", ()))
-    if getattr(shape, "smooth", False):
+    shape = _line(link)
+    points = np.array(shape.between if isinstance(shape, Bar) else shape.points)
+    if isinstance(shape, Polyline) and shape.smooth:
         return points
     joints = (x for x in scene.joints.values() if name in x.links)
     held = [x.on(name) for x in joints if x.kind != "slot" or name != x.links[1]]  # a pin is anywhere along its slot
     light = [x.at for x in scene.bodies.values() if x.link == name and isinstance(x, PointMass)]
     heavy = [x.at for x in scene.bodies.values() if x.link == name and not isinstance(x, PointMass)]
     elements = segment_elements(scene, name)
-    nodes = spaced(elements, beam_nodes(link)) / elements
+    nodes = node_places(elements, beam_nodes(link)) / elements
     out = [points[:1]]
     for P, Q in pairwise(points):
         length = float(np.linalg.norm(Q - P))
@@ -80,7 +76,7 @@ def beam_points(scene: Scene, name: str, spatial: bool) -> Float[np.ndarray, "p 
 
 
 def segment_elements(scene: Scene, name: str) -> int:
-    """Elements of each segment of a beam, 1 if not given; of a bar along a slot enough for its stations."""
+    """Number of elements of each segment of a beam, 1 if not given; for a bar with a slot enough for its stations."""
     link = scene.links[name]
     given = link.mesh.elements if isinstance(link.mesh.elements, int) else 1
     slotted = any(x.kind == "slot" and x.links[1] == name for x in scene.joints.values())
@@ -92,3 +88,9 @@ def segment_elements(scene: Scene, name: str) -> int:
 def beam_nodes(link: LinkScene) -> int:
     """Nodes of each element of a beam: the number in its name."""
     return int(str(link.element).removeprefix("beam"))
+
+
+def _line(link: LinkScene) -> Bar | Polyline:
+    if not isinstance(link.shape, Bar | Polyline):
+        raise TypeError("a beam must be a bar or a polyline")  # refused by the scene already
+    return link.shape

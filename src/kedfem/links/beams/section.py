@@ -9,16 +9,16 @@ from kedfem.arrays import Float, Int
 from kedfem.scene import BoxSection, ISection, RectangleSection, RoundSection, SectionShape, TubeSection
 
 EDGE = 1e-9  # of a wall: points on its edge are in it
-CORNER = 4 * (1 - 0.5587)  # walls by which a flow round four corners is shorter than its middle line
-ROUND = 0.41  # walls squared by which it encloses less, measured (tests/laws/test_sections.py)
-TERMS = 200  # of the series of a rectangle in torsion: stress to 1e-5 on its edges, far better inside
+CORNER = 4 * (1 - 0.5587)  # wall thicknesses by which the shear flow round four corners is shorter than the middle line
+ROUND = 0.41  # squares of the wall thickness by which it encloses less area, measured (tests/laws/test_sections.py)
+TERMS = 200  # of the series of a rectangle in torsion: relative error of stress 1e-5 on its edges, less inside
 
 
 @dataclass(frozen=True, slots=True)
 class Section:
     """Cross-section of a beam in principal axes: y along its width, z along its thickness; a planar beam bends in xy.
 
-    kind : whether the shear stresses of torsion are known, and how it is drawn.
+    kind : its shape, by which it is drawn; with `constants` alone the shear stresses of torsion are unknown.
     height, thickness : extents along y and z [m]: the outer fibres are at half of them.
     area : A [m²].
     second_moment, second_moment_z : I_y = ∫ y² dA and I_z = ∫ z² dA [m⁴].
@@ -64,9 +64,9 @@ def tube(diameter: float, bore: float, shear_coefficient: float) -> Section:
 
 
 def box(height: float, thickness: float, wall: float, shear_coefficients: tuple[float, float]) -> Section:
-    """A rectangular tube with sharp corners, height along y [m]; torsion by Bredt, with the walls' own.
+    """A rectangular tube with sharp corners, height along y [m]; torsion by Bredt, and of the walls by themselves.
 
-    EN 10210-2 has the same without `CORNER` and `ROUND`, which is 2 to 5 % too soft at walls of a tenth of the sides.
+    EN 10210-2 has the same without `CORNER` and `ROUND`: 2 to 5 % too soft with walls of a tenth of the sides.
     """
     h, t, w = height, thickness, wall
     inner_h, inner_t = h - 2 * w, t - 2 * w
@@ -84,8 +84,8 @@ def i_profile(
 ) -> Section:
     """Two flanges and a web between them, height along y over both [m]; torsion by El Darwish and Johnston, free to warp.
 
-    M. El Darwish, B. Johnston, Torsion of structural shapes, J. Struct. Div. ASCE 91 (1965): each wall b t³/3, less what
-    the flanges' ends lack, and more where web and flange meet.
+    M. El Darwish, B. Johnston, Torsion of structural shapes, J. Struct. Div. ASCE 91 (1965): b t³/3 of each wall, with
+    corrections at the flanges' ends and where web and flange meet.
     """
     h, b, s, f = height, thickness, web, flange
     inner = h - 2 * f
@@ -99,7 +99,7 @@ def i_profile(
 
 
 def _flow(h: float, t: float, wall: float) -> tuple[float, float]:
-    """Area that the flow of shear round a box encloses [m²], and the length of its way [m]."""
+    """Area that the shear flow round a box encloses [m²], and its length [m]."""
     return (h - wall) * (t - wall) - ROUND * wall**2, 2 * (h + t - 2 * wall) - CORNER * wall
 
 
@@ -152,7 +152,7 @@ def cowper_i(poisson_ratio: float, height: float, thickness: float, web: float, 
 
 
 def _thin_walled(nu: float, m: float, across: float) -> float:
-    """What Cowper's coefficients of a box and an I share; `across` is what their flanges' width adds."""
+    """The common part of Cowper's coefficients of a box and an I; `across`: the share of their flanges' width."""
     walls = 12 + 72 * m + 150 * m**2 + 90 * m**3 + nu * (11 + 66 * m + 135 * m**2 + 90 * m**3)
     return 10 * (1 + nu) * (1 + 3 * m) ** 2 / (walls + across)
 
@@ -186,7 +186,7 @@ def torsion_stress(section: Section, y: float, z: float) -> tuple[float, float]:
 
 
 def _wall_stress(section: Section, y: float, z: float) -> tuple[float, float]:
-    """Of a box 2 A / s of the flow round area A over length s, of all walls twice the way from their middle."""
+    """Shear stresses in a wall: 2 A / s by the shear flow of a box, and twice the distance from its middle line."""
     along_y, along_z = section.walls
     from_flange = abs(y) - (section.height - along_z) / 2  # of the middle of a wall along z
     in_flange = from_flange >= -along_z / 2 * (1 + EDGE)
@@ -229,7 +229,7 @@ def nearest_in_section(section: Section, y: float, z: float) -> tuple[float, flo
 
 
 def _walls(section: Section, h: float, t: float) -> list[tuple[tuple[float, float], tuple[float, float]]]:
-    """Rectangles, from and to along y and along z, that make up a section with corners."""
+    """Rectangles of which a section with corners consists, as ranges of y and of z."""
     along_y, along_z = section.walls
     if section.kind not in {"box", "i"}:
         return [((-h, h), (-t, t))]
@@ -272,7 +272,7 @@ def _box_outline(h: float, t: float, wall: float) -> tuple[Float[np.ndarray, "c 
 
 
 def _i_outline(h: float, t: float, web: float, flange: float) -> tuple[Float[np.ndarray, "c 2"], Int[np.ndarray, "q 4"]]:
-    """Both edges of the flanges at their ends and at the web, and the middle of the web; h and t are half the extents."""
+    """Both edges of the flanges at their ends and at the web, and the web's middle; h and t are half the extents."""
     columns, rows = (-t, -web / 2, web / 2, t), (-h, flange - h, h - flange, h)
     points = [[y, z] for y in rows for z in columns] + [[0.0, -web / 2], [0.0, web / 2]]
     flanges = [[k, k + 4, k + 5, k + 1] for first in (0, 8) for k in range(first, first + 3)]

@@ -1,22 +1,30 @@
 """Beams in space: a line element times a linear section, functions N_a(s) {1, y, z} with a vector in R³ at each.
 
-x = Σ N_a (x_a + y n1_a + z n2_a) and u = Σ N_a (u_a + y p_a + z q_a): isoparametric, so that a rigid motion is in the
-space, and a state is rows of vectors as in a solid: mass m ⊗ I3, [KED, eqs. (4)(9)(11)]. Strains are the linearised
-changes of the metric of curve and directions, which vanish for rigid motions.
+x = Σ N_a (x_a + y n1_a + z n2_a) and u = Σ N_a (u_a + y p_a + z q_a): isoparametric, so that the space contains rigid
+motions. A state has rows of vectors as in a solid, with mass m ⊗ I3, [KED, eqs. (4)(9)(11)]. Strains are linearised
+changes of the metric of axis and directors, which vanish for rigid motions.
 """
 
 import numpy as np
 import scipy.sparse as sp
 
 from kedfem.arrays import Float, Int
-from kedfem.links.beams.beam import assembled, cell_type, dofs, parent_nodes, parent_weights, shape_functions
+from kedfem.links.beams.beam import (
+    assembled,
+    cell_type,
+    dofs,
+    element_mass,
+    parent_nodes,
+    parent_weights,
+    shape_functions,
+)
 from kedfem.links.beams.beam_axis import Axis, chord_axes
 from kedfem.links.beams.section import Section
 from kedfem.links.record import Link, mass_constants, read_only
 from kedfem.scene import Material
 
-RIGID_NODE_STIFFNESS = 100.0  # of E A L: a corner gives EI/(100 E A L²) of what the beam does
-RIGID_NODE_INERTIA = 1e-3  # of a cube's, along the axis: a rigid node needs some there, where the section has none
+RIGID_NODE_STIFFNESS = 100.0  # of E A L: compliance of a corner EI/(100 E A L²) of the beam's
+RIGID_NODE_INERTIA = 1e-3  # of a cube's, along the axis, in which the section itself has no inertia
 STRAIGHT = 1e-9  # of tangents: rounding
 T, N1, N2, N1_S, N2_S = range(5)  # the fields x', n1, n2, n1', n2'
 
@@ -94,8 +102,8 @@ def rigidities(section: Section, E: float, G: float) -> Float[np.ndarray, "6"]:
 def space_stiffness(x: Float[np.ndarray, "m 3 3"], rigidity: Float[np.ndarray, "6"]) -> Float[np.ndarray, "k k"]:
     """Stiffness of one element, [KED, eq. (13)].
 
-    The strains of the beam by reduced integration (m − 1 Gauss points); those within the section at the nodes, as
-    stiff as the beam is along its axis and without ν: the section stays as it is, and does not lock.
+    Beam strains by reduced integration (m − 1 Gauss points); strains within the section at the nodes, with the axial
+    stiffness and without ν: the section keeps its shape, and does not lock.
 
     Parameters
     ----------
@@ -117,19 +125,14 @@ def space_stiffness(x: Float[np.ndarray, "m 3 3"], rigidity: Float[np.ndarray, "
 
 def space_mass(x: Float[np.ndarray, "m 3 3"], section: Section) -> Float[np.ndarray, "k k"]:
     """∫ N_a N_b det J ⊗ diag(A, I_y, I_z) of one element, (3m, 3m), to be multiplied by ρ, [KED, eq. (9)]."""
-    m = np.zeros((len(x), len(x)))
-    for r, w in zip(*np.polynomial.legendre.leggauss(len(x) + 1), strict=True):
-        N, dN = shape_functions(r, len(x))
-        m += w * np.linalg.norm(dN @ x[:, 0]) * np.outer(N, N)
-    return np.kron(m, np.diag([section.area, section.second_moment, section.second_moment_z]))
+    return np.kron(element_mass(x[:, 0]), np.diag([section.area, section.second_moment, section.second_moment_z]))
 
 
 def spatial_beam_link(name: str, axis: Axis, section: Section, material: Material) -> Link:
     """The record of a beam in space.
 
-    Ends and corners are rigid cross-section nodes, small rigid cubes with four functions {1, x, y, z}. These form a full
-    affine field, whose strain is stiff by RIGID_NODE_STIFFNESS E A L |sym G|², and whose gradient G each segment reads
-    along its own directions, p = G n1, q = G n2.
+    Ends and corners are rigid cross-section nodes with four functions {1, x, y, z}: an affine field with the energy
+    ½ RIGID_NODE_STIFFNESS E A L |sym G|², whose gradient G gives each segment p = G n1, q = G n2 in its own directions.
     """
     X, one, triples = functions(axis)
     x, cells, n = axis.frame[:, [0, 2, 3]], axis.cells, len(X)
@@ -157,14 +160,14 @@ def spatial_beam_link(name: str, axis: Axis, section: Section, material: Materia
 
 
 def _link_axes(axis: Axis) -> Float[np.ndarray, "3 3"]:
-    """Of a straight beam those of its section, else x between its ends; of a closed one along its first element."""
+    """Axes of a straight beam's section, else x between its ends; of a closed beam along its first element."""
     chord = chord_axes(axis.frame[[0, axis.cells[0][1], -1], 0], axis.up)
     straight = np.abs(axis.frame[:, 1] - chord[:, 0]).max() < STRAIGHT
     return np.asarray(axis.frame[0, 1:].T) if straight else chord
 
 
 def functions(axis: Axis) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, " n"], sp.csr_array]:
-    """Functions of all nodes in turn, (1, y, z) or at a rigid one (1, x, y, z) in the directions of its first station.
+    """Functions of all nodes in order, (1, y, z), or (1, x, y, z) of a rigid one in the directions of its first station.
 
     Returns
     -------
@@ -196,7 +199,7 @@ def rigid_node_functions(one: Float[np.ndarray, " n"]) -> Int[np.ndarray, "h 3"]
 
 
 def rigid_node_stiffness(X: Float[np.ndarray, "n 3"], rigid_nodes: Int[np.ndarray, "h 3"], k: float) -> sp.csr_array:
-    """k |sym G|² of every rigid cross-section node's gradient G, (3n, 3n) [N m]; no turn strains it."""
+    """k |sym G|² of every rigid cross-section node's gradient G, (3n, 3n) [N m]; zero for rotations."""
     blocks = []
     for node in rigid_nodes:
         pairs = [(i, j) for i in range(3) for j in range(i, 3)]

@@ -4,7 +4,14 @@ import numpy as np
 import scipy.sparse as sp
 
 from kedfem.arrays import Float, Int
-from kedfem.links.beams.beam import between_gauss, lagrange, line_pairs, nearest_parameter, parent_nodes, shape_functions
+from kedfem.links.beams.beam import (
+    lagrange,
+    line_pairs,
+    moment_correction,
+    nearest_parameter,
+    parent_nodes,
+    shape_functions,
+)
 from kedfem.links.beams.section import Section, outline, torsion_stress
 from kedfem.links.beams.spatial_beam import STRAIGHT, rigidities, space_strains
 from kedfem.links.record import Link, section_of
@@ -24,7 +31,7 @@ def section_value(link: Link, element: int, r: float, y: float, z: float) -> Flo
 def beam_strains(link: Link, element: int, r: float) -> Float[np.ndarray, "6 k"]:
     """Rows (6, 3n) of (ε, γ1, γ2, κ1, κ2, τ): those of the reduced Gauss points, extended to r.
 
-    In a straight element bending moments between these are what its shear forces say too, dM1/ds = κ1 GA γ1.
+    In a straight element bending moments between these are corrected by the shear forces, dM1/ds = κ1 GA γ1.
     """
     x = element_frame(link, element)
     gauss = np.polynomial.legendre.leggauss(len(x) - 1)[0]
@@ -32,7 +39,7 @@ def beam_strains(link: Link, element: int, r: float) -> Float[np.ndarray, "6 k"]
     rows = sum(w * of for w, (of, _) in zip(lagrange(r, gauss), points, strict=True))
     if np.ptp(x[:, 1:], axis=0).max() < STRAIGHT:
         rigidity = rigidities(section_of(link), link.E, link.lame[1])
-        for more, (of, det_J) in zip(between_gauss(r, len(x)), points, strict=True):
+        for more, (of, det_J) in zip(moment_correction(r, len(x)), points, strict=True):
             rows[3:5] += more * det_J * (rigidity[1:3] / rigidity[3:5])[:, None, None, None] * of[1:3]
     triples = _triples(link, link.cells[element])
     out = np.einsum("smfc,mfn->snc", rows, triples.reshape(len(x), 3, link.n))
@@ -47,7 +54,7 @@ def section_stress(link: Link, strains: Float[np.ndarray, "6 k"], y: float, z: f
 
 
 def nearest_on_axis(link: Link, point: Float[np.ndarray, "3"]) -> tuple[float, int, float, tuple[float, float]]:
-    """How far a point is outside the beam, and the element, parent coordinate and (y, z) of its section there."""
+    """Distance of a point from the beam [m], and the nearest element, parent coordinate and (y, z) of its section."""
     found = []
     for e in range(len(link.cells)):
         x = element_frame(link, e)
@@ -61,8 +68,8 @@ def nearest_on_axis(link: Link, point: Float[np.ndarray, "3"]) -> tuple[float, i
     return beyond, e, r, yz
 
 
-def drawn(link: Link) -> tuple[sp.csr_array, tuple[sp.csr_array, ...], Int[np.ndarray, "c 8"]]:
-    """The beam as a body: values of its section's points at all stations, stresses σ_xx, σ_xy, σ_zx, hexahedra."""
+def section_solid(link: Link) -> tuple[sp.csr_array, tuple[sp.csr_array, ...], Int[np.ndarray, "c 8"]]:
+    """The beam as a solid: values of its section's points at all stations, stresses σ_xx, σ_xy, σ_zx, hexahedra."""
     points, quads = outline(section_of(link))
     stations = link.cells.max() + 1
     count = np.bincount(link.cells.ravel(), minlength=stations)

@@ -28,8 +28,8 @@ from kedfem.links.record import Link, section_of
 def spatial_stress_stiffness(link: Link, g: Float[np.ndarray, "n 3"]) -> sp.csr_array:
     """k (n, n) of the stresses in a state g of a full beam in space.
 
-    Section forces at the Gauss points of K0, with what an axial force does to a section that turns along the beam, E I ε;
-    the sections' own stresses at the nodes; the stresses of rigid cross-section nodes.
+    Section forces at the Gauss points of K0, with the effect E I ε of an axial force on a section that rotates along the
+    beam; the sections' own stresses at the nodes; the stresses of rigid cross-section nodes.
     """
     if link.triples is None:
         raise TypeError(f"links.{link.name}: is not a beam in space")

@@ -1,6 +1,6 @@
-"""Candidate surfaces for joints on a link: bores, journals, balls, plane faces, by name or by geometry.
+"""Candidate surfaces for joints on a link: bores, journals, balls and plane faces, by name or by geometry.
 
-Messages list them, and a bore whose axis is not given is found among them.
+They are listed in messages, and searched for bores whose axis is not given.
 """
 
 from collections.abc import Iterator
@@ -15,12 +15,12 @@ from kedfem.links.record import Link, LinkFace
 from kedfem.links.surfaces.round_surfaces import CLOSED
 from kedfem.links.surfaces.surface import PLANE_TOLERANCE, SMOOTH, boundary, components, neighbours, surface_quadrature
 
-FITS = 0.01  # of the radius: how far corners may be off the cylinder or ball that they are taken for
-FEWEST = 3  # facets that a cylinder or a ball is found from
+FITS = 0.01  # of the radius: largest distance of corners from their cylinder or ball
+FEWEST = 3  # facets of a cylinder or a ball
 # least mean square of normals along any direction, of a ball; less along the axis of a cylinder
 ROUNDED = 0.02
 TRIMMED = 5  # times that the worse half of facets is left out
-SEVERAL = 20  # cylinders and balls that hang together
+SEVERAL = 20  # cylinders and balls in a connected region
 SOME = 0.15  # of a ball's facets: less is a rounded corner
 
 Kind = Literal["bore", "journal", "ball seat", "ball", "plane face", "face"]
@@ -28,9 +28,9 @@ Kind = Literal["bore", "journal", "ball seat", "ball", "plane face", "face"]
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A surface that a joint could sit on.
+    """A surface for a joint.
 
-    name : of a face that has one, else empty
+    name : of a named face, else empty
     centre, direction, radius : as of `mesh.elements.hexahedra.Face`; nan where they have no meaning
     length : along the axis of a cylinder, else 0 [m]
     facets : boundary facets of the link on it
@@ -52,41 +52,41 @@ class Candidate:
 
     @property
     def cylindrical(self) -> bool:
-        """Whether it has an axis to turn about."""
+        """Whether it is a cylinder, with an axis."""
         return self.kind in {"bore", "journal"}
 
     def distance(self, point: Float[np.ndarray, "3"]) -> float:
-        """From a point to its axis, as far as that goes, or to its centre [m]."""
+        """Distance of a point from its axis, between its ends, or from its centre [m]."""
         r = point - self.centre
         if self.cylindrical:
             along = np.clip(r @ self.direction, -self.length / 2, self.length / 2)
             r = r - along * self.direction
         return float(np.linalg.norm(r))
 
-    def beside(self, point: Float[np.ndarray, "3"]) -> float:
-        """From a point to its axis, however long [m]."""
+    def axis_distance(self, point: Float[np.ndarray, "3"]) -> float:
+        """Distance of a point from its axis, extended beyond its ends [m]."""
         r = point - self.centre
         return float(np.linalg.norm(r - (r @ self.direction) * self.direction))
 
 
 def candidates(link: Link) -> list[Candidate]:
-    """All of a solid link: those with names if there are any, else round ones and plane faces."""
+    """Candidates of a solid link: named faces if there are any, else round surfaces and plane faces."""
     link = link.full or link
     planes = link.kind == "solid" and not _with_names(link)
     return [*round_candidates(link), *(_planes(link) if planes else ())]
 
 
 def distance(link: Link, each: Candidate, point: Float[np.ndarray, "3"]) -> float:
-    """From a point to the facets of a surface, taken as flat between their corners [m]."""
+    """Distance of a point from the facets of a surface, taken as flat between their corners [m]."""
     if not len(each.facets):
         return float("inf")
     corners = link.X[link.basis.mesh.facets[:, each.facets]].transpose(1, 0, 2)
     triangles = [corners[:, list(three)] for three in combinations(range(corners.shape[1]), 3)]
-    return float(_to_triangles(point, np.concatenate(triangles)).min())
+    return float(_triangle_distances(point, np.concatenate(triangles)).min())
 
 
-def _to_triangles(point: Float[np.ndarray, "3"], corners: Float[np.ndarray, "t 3 3"]) -> Float[np.ndarray, " t"]:
-    """Distances from a point to triangles: to their planes if it is above them, else to the nearest edge [m]."""
+def _triangle_distances(point: Float[np.ndarray, "3"], corners: Float[np.ndarray, "t 3 3"]) -> Float[np.ndarray, " t"]:
+    """Distances of a point from triangles: from their planes if it is above them, else from the nearest edge [m]."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     edges = np.roll(corners, -1, axis=1) - corners
@@ -99,7 +99,7 @@ def _to_triangles(point: Float[np.ndarray, "3"], corners: Float[np.ndarray, "t 3
 
 
 def surfaces(link: Link) -> list[Candidate]:
-    """All surfaces of a solid link: its faces if they cover it, else closed cylinders, balls and planes as they fit."""
+    """All surfaces of a solid link: its named faces if they cover it, else fitted closed cylinders, balls and planes."""
     if link.kind != "solid":
         return []
     named = _with_names(link)
@@ -109,14 +109,14 @@ def surfaces(link: Link) -> list[Candidate]:
 
 
 def round_candidates(link: Link) -> list[Candidate]:
-    """Those of a solid link with names; if there are none, closed cylinders and balls as they fit."""
+    """Named faces of a solid link; if there are none, fitted closed cylinders and balls."""
     if link.kind != "solid":
         return []
     return [_named(link, each) for each in _with_names(link)] or list(_fitted(link))
 
 
 def _with_names(link: Link) -> list[LinkFace]:
-    """Its faces whose names are their own, not what a joint said of them."""
+    """Its faces with names of their own, not those that joints chose by properties."""
     return [each for each in link.faces if not each.face.chosen]
 
 
@@ -136,7 +136,7 @@ def _named(link: Link, each: LinkFace) -> Candidate:
 
 
 def _fitted(link: Link) -> Iterator[Candidate]:
-    """Closed cylinders and balls among the curved facets that hang together over smooth edges."""
+    """Closed cylinders and balls fitted to curved facets that are connected over smooth edges."""
     facets, corners, normals = boundary(link)
     first, second = neighbours(link, facets)
     bent = _bent(link, facets, corners, normals, first, second)
@@ -161,7 +161,7 @@ def _bent(
     first: Int[np.ndarray, " k"],
     second: Int[np.ndarray, " k"],
 ) -> Bool[np.ndarray, " f"]:
-    """Facets that are curved; of 8-node hexahedra, which have none, those with a smooth edge to one turned from them."""
+    """Curved facets; of 8-node hexahedra, whose facets are flat, those with a smooth edge to an inclined neighbour."""
     level = PLANE_TOLERANCE * link.size
     x = surface_quadrature(link, facets).x
     height = np.abs(np.einsum("fqk,fk->fq", x - corners[:, :1], normals)).max(axis=1)
@@ -176,10 +176,10 @@ def _bent(
 def _best(
     corners: Float[np.ndarray, "f c 3"], normals: Float[np.ndarray, "f 3"]
 ) -> tuple[Bool[np.ndarray, " f"], Candidate | None]:
-    """Which facets lie on one cylinder or ball, and it; of length -1 if it is but a part that no joint sits on.
+    """Facets on one cylinder or ball, and that surface; its length is -1 if it is a part to which no joint fits.
 
-    A whole ball comes first, since its belt is nearly a cylinder; then cylinders with other facets beside them, as
-    rounded edges are; then balls with such.
+    First a whole ball is tried, since its belt is nearly a cylinder; then cylinders, and then balls, among other facets
+    such as rounded edges.
     """
     for ball, rounds in ((True, 1), (False, TRIMMED), (True, TRIMMED)):
         kept = np.ones(len(corners), bool)
@@ -192,7 +192,7 @@ def _best(
             centre, axis, radius = _fit(corners[kept].reshape(-1, 3), None if ball else vectors[:, 0])
             off = np.abs(_distances(corners, centre, axis) - radius).max(axis=1) / radius
             if (off[kept] <= FITS).all():
-                on = off <= FITS  # with those that an earlier fit had left out
+                on = off <= FITS  # also those that an earlier fit left out
                 return on, _candidate(corners[on], normals[on], centre, axis, radius)
             kept = kept & (off <= max(FITS, float(np.median(off[kept]))))
     return np.zeros(len(corners), bool), None
@@ -201,7 +201,7 @@ def _best(
 def _fit(
     x: Float[np.ndarray, "p 3"], axis: Float[np.ndarray, "3"] | None
 ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"] | None, float]:
-    """Centre, axis and radius of the cylinder through points whose axis is nearly known; of the ball if none is."""
+    """Centre, axis and radius of the cylinder through points with an approximate axis; of the ball if that is None."""
     middle = x.mean(axis=0)
     y = x - middle
     size = float(np.abs(y).max())
@@ -249,7 +249,7 @@ def _candidate(
     r = corners.mean(axis=1) - centre
     inward = bool(np.einsum("fk,fk->f", r, normals).mean() < 0)
     if axis is None:
-        # the mean of the corners of a whole ball is its centre, that of a corner's rounding lies on it
+        # the mean of the corners of a whole ball is its centre, that of a rounded corner is on the surface
         part = np.linalg.norm(r.mean(axis=0)) / radius
         length = 0.0 if part < 1 - 2 * SOME else -1.0
         return Candidate("ball seat" if inward else "ball", "", centre, np.full(3, np.nan), radius, length)
@@ -261,7 +261,7 @@ def _candidate(
 
 
 def _planes(link: Link) -> Iterator[Candidate]:
-    """Flat facets that hang together in one plane."""
+    """Connected flat facets in one plane."""
     facets, corners, normals = boundary(link)
     first, second = neighbours(link, facets)
     bent = _bent(link, facets, corners, normals, first, second)

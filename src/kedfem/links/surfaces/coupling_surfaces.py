@@ -1,4 +1,4 @@
-"""Coupling surfaces of joints: the affine field that best fits a bore or face, with scalar weights that do not rotate."""
+"""Coupling surfaces of joints: the affine field that best fits a bore or face, with weights invariant in rotations."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,7 +10,7 @@ from kedfem.arrays import Float, Int
 from kedfem.errors import MeshError
 from kedfem.links.record import Link
 from kedfem.links.surfaces.facet_selection import named_facets, selected_facets
-from kedfem.links.surfaces.missing import in_its_plane, not_touching
+from kedfem.links.surfaces.missing import in_link_plane, missing_surface
 from kedfem.links.surfaces.surface import PLANE_TOLERANCE, boundary, flat_face, smooth_face, surface_quadrature
 
 
@@ -26,7 +26,7 @@ class CouplingSurface:
     directions : (3, 3) rows, principal directions, widest spread first
     spread : (3,) standard deviations along them [m]; along z of a plane link 0, directions[2] being z
     facets : boundary facets of a solid or plane link (for surface loads)
-    dimensions : of the link that it is on: 2 for a plane link
+    dimensions : of its link: 2 for a plane link
     """
 
     fit: Float[np.ndarray, "4 n"]
@@ -67,20 +67,19 @@ def face_normal(surface: CouplingSurface) -> Float[np.ndarray, "3"]:
 def joint_surface(
     link: Link, where: str, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"] | None, faces: Sequence[str] = ()
 ) -> CouplingSurface:
-    """The coupling surface that a link offers to a joint: a beam's node; else a bore or journal about the axis, else the
-    face there.
+    """A joint's coupling surface on a link: a beam's node; else a bore or journal about the axis, else the face there.
 
     Parameters
     ----------
     where : how messages name the joint, e.g. ``joints.B``
     point : reference position of the joint [m]
     axis : unit vector of a bore to look for, or None
-    faces : names of the faces that make the coupling surface, if they are given
+    faces : names of the faces that make up the coupling surface, if given
 
     Raises
     ------
     MeshError
-        If the link has no node, bore or face there, or several that nothing distinguishes.
+        If the link has no node, bore or face there, or several that cannot be distinguished.
     """
     if link.full is not None and link.Q is not None:
         surface = joint_surface(link.full, where, point, axis, faces)
@@ -96,8 +95,7 @@ def joint_surface(
 
 
 def rigid_link_surface(link: Link, at: Float[np.ndarray, "3"]) -> CouplingSurface:
-    """The coupling surface that a rigid solid or plane link offers at any point: its affine field, determined by four, or
-    three, of its nodes.
+    """The coupling surface of a rigid solid or plane link at any point: its affine field by four, or three, of its nodes.
 
     Parameters
     ----------
@@ -116,12 +114,12 @@ def face_surface(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Coupl
     if link.full is not None and link.Q is not None:
         surface = face_surface(link.full, where, point)
         return replace(surface, fit=surface.fit @ link.Q)
-    seen = in_its_plane(link, point)
+    seen = in_link_plane(link, point)
     facets = flat_face(link, seen)
     if not len(facets):
         facets = smooth_face(link, seen)
     if not len(facets):
-        raise MeshError(not_touching(link, where, point))
+        raise MeshError(missing_surface(link, where, point))
     return facet_surface(link, facets)
 
 
@@ -168,11 +166,10 @@ def face_normals(link: Link, surface: CouplingSurface) -> Float[np.ndarray, "n d
 
 
 def surface_couples(link: Link, surface: CouplingSurface, where: str) -> Float[np.ndarray, "3 n d"]:
-    """Forces of unit couples about x, y, z that work on the turn of a coupling surface's affine fit; they have no
-    resultant force.
+    """Nodal forces of unit couples about x, y, z on a coupling surface, conjugate to the rotation of its affine fit.
 
-    The turn in the plane of two principal directions i, j is ½ (∂_i u_j − ∂_j u_i), or where the fit does not know ∂_j
-    (j across a flat coupling surface) ∂_i u_j.
+    The rotation in the plane of two principal directions i, j is ½ (∂_i u_j − ∂_j u_i), or ∂_i u_j where the fit does not
+    determine ∂_j (j across a flat coupling surface). There is no resultant force.
     """
     D, known = surface.directions, surface.spread > 0
     if link.d == 2:
@@ -194,7 +191,7 @@ def _node_at(link: Link, where: str, point: Float[np.ndarray, "3"]) -> int:
     distance = np.where(link.one != 0, np.linalg.norm(link.X - point, axis=1), np.inf)
     node = int(distance.argmin())
     if distance[node] > PLANE_TOLERANCE * link.size:
-        raise MeshError(not_touching(link, where, point))
+        raise MeshError(missing_surface(link, where, point))
     return node
 
 
@@ -206,10 +203,9 @@ def _node_surface(link: Link, where: str, point: Float[np.ndarray, "3"]) -> Coup
 
 
 def _section_surface(link: Link, where: str, point: Float[np.ndarray, "3"]) -> CouplingSurface:
-    """The section at a node of a spatial beam; between rigid nodes it does not show how a field changes along the axis.
+    """The section at a node of a spatial beam; between rigid nodes it does not determine the gradient along the axis.
 
-    Its spread is of the link's size, not the section's: ports are part of it apart, and the nearer they were, the less
-    could be determined of the section's turn from their difference.
+    Its spread is of the link's size, not the section's: from ports farther apart the section's rotation is more accurate.
     """
     node = _node_at(link, where, point)
     following = np.flatnonzero(link.one[node + 1 :])
@@ -230,8 +226,8 @@ def facet_surface(
 
     Parameters
     ----------
-    across : unit vector; facets count with their area across it, and the field is affine over a plane across it. So what
-        it bears is spread as the tension and bending of a prism would be over facets that are no plane
+    across : unit normal of a plane on which facets that are not plane are projected, so that forces are distributed as
+        those of tension and bending in a prism
     """
     on = surface_quadrature(link, facets)
     x, dA = on.x.transpose(2, 0, 1), on.dA  # (3, f, q), (f, q)

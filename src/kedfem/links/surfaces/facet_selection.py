@@ -11,7 +11,7 @@ from kedfem.arrays import Float, Int
 from kedfem.errors import MeshError
 from kedfem.links.record import Link, read_only
 from kedfem.links.surfaces.candidates import round_candidates
-from kedfem.links.surfaces.missing import ambiguous, in_its_plane, not_touching
+from kedfem.links.surfaces.missing import in_link_plane, missing_surface, several_surfaces
 from kedfem.links.surfaces.round_surfaces import RoundSurface, ball, nearest_round_surfaces, round_surfaces
 from kedfem.links.surfaces.surface import CYLINDER_TOLERANCE, flat_face
 
@@ -26,7 +26,7 @@ def named_facets(link: Link, where: str, faces: Sequence[str]) -> Facets:
     Raises
     ------
     MeshError
-        If the link has no face of such a name, or has none of it as the segment of another.
+        If the link has no face of such a name, or as a segment no part of it.
     """
     known = {each.face.name: each.facets for each in link.faces}
     for name in faces:
@@ -43,9 +43,9 @@ def named_facets(link: Link, where: str, faces: Sequence[str]) -> Facets:
 
 
 def selected_facets(link: Link, where: str, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"] | None) -> Facets:
-    """As `_selected_facets`; of a mesh that has been asked for the same before what was found then.
+    """Facets of a joint about its point and axis, as of `_selected_facets`, cached for each mesh.
 
-    A joint is looked for on the same mesh some dozen times in a run: by every model that choices and estimates make.
+    They are needed some dozen times in a run, for every model of choices and estimates.
     """
     about = link.axes if axis is None else axis
     given = (point, about, link.X)
@@ -62,9 +62,9 @@ def _selected_facets(
 ) -> Facets:
     """A ball if no axis is given; else a bore about the axis (or one of the link's), a journal, a flat face.
 
-    A MeshError says that there is none, or that it cannot be determined which.
+    MeshError if there is none, or several that cannot be distinguished.
     """
-    seen = in_its_plane(link, point)
+    seen = in_link_plane(link, point)
     if axis is None and link.d == 3 and len(found := ball(link, point)):
         return found
     axes = np.eye(3)[2:] if link.kind == "plane" else link.axes.T if axis is None else (axis,)
@@ -80,24 +80,24 @@ def _selected_facets(
         return face
     if journals:
         return _one_pin(link, where, seen, journals)
-    raise MeshError(not_touching(link, where, point, axis))
+    raise MeshError(missing_surface(link, where, point, axis))
 
 
 def _first(several: Iterable[list[RoundSurface]]) -> list[RoundSurface]:
-    """The first that are any."""
+    """The first list that is not empty."""
     return next((found for found in several if found), [])
 
 
 def _one_pin(link: Link, where: str, point: Float[np.ndarray, "3"], found: list[RoundSurface]) -> Facets:
-    """The facets of the one that a joint sits on, or of several that one pin fits; MeshError if they differ in radius."""
+    """Facets of the surface of a joint, or of several of one radius, which one pin fits; MeshError if radii differ."""
     chosen = nearest_round_surfaces(found, link.d == 2)
     size = [each.radius for each in chosen]
     if max(size) - min(size) > CYLINDER_TOLERANCE * max(size):
-        raise MeshError(ambiguous(link, where, point, chosen))
+        raise MeshError(several_surfaces(link, where, point, chosen))
     return np.concatenate([each.facets for each in chosen])
 
 
 def _own_axes(link: Link, point: Float[np.ndarray, "3"]) -> list[Float[np.ndarray, "3"]]:
     """Directions of the link's own bores and journals whose axes pass through a point."""
     found = (each for each in round_candidates(link) if each.cylindrical)
-    return [x.direction for x in found if x.beside(point) <= CYLINDER_TOLERANCE * x.radius]
+    return [x.direction for x in found if x.axis_distance(point) <= CYLINDER_TOLERANCE * x.radius]

@@ -1,4 +1,4 @@
-"""Messages for joints that find no surface on a link, or several, with the nearest candidates and likely wrong units."""
+"""Messages for joints with no surface on a link, or several: the nearest candidates, likely wrong units."""
 
 from collections.abc import Sequence
 from operator import itemgetter
@@ -12,22 +12,22 @@ from kedfem.links.surfaces.round_surfaces import RoundSurface
 
 MOST = 3  # bores, journals and balls in a message; of faces the nearest alone
 SMALL = 0.1  # [m]: shorter lengths are reported in millimetres
-STRAIGHT = 0.05  # [deg]: axes within are one direction
-ASKEW = 45.0  # [deg]: axes further off are others
+STRAIGHT = 0.05  # [deg]: axes with a smaller angle between them are parallel
+ASKEW = 45.0  # [deg]: axes with a larger angle are unrelated
 SCALES = (1000.0, 0.001)
 
 Vector = Float[np.ndarray, "3"]
-NEAR = 0.05  # of a link's size: a joint so near a beam's node was meant to be on it
+NEAR = 0.05  # of a link's size: a joint closer to a beam's node was meant to be at it
 
 
-def not_touching(link: Link, where: str, point: Vector, axis: Vector | None = None) -> str:
-    """The message that a link has nothing at a joint's point, with what it has nearest to it, and what to do.
+def missing_surface(link: Link, where: str, point: Vector, axis: Vector | None = None) -> str:
+    """The message that a link has no surface at a joint's point, with the nearest ones, and what to do.
 
     Parameters
     ----------
-    axis : of the bore that was looked for
+    axis : of the required bore
     """
-    point = in_its_plane(link, point)
+    point = in_link_plane(link, point)
     nearest = link.nodes[np.linalg.norm(link.nodes - point, axis=1).argmin()]
     gap = float(np.linalg.norm(nearest - point))
     what = "a node of" if not link.meshed else "a bore or a flat face of"
@@ -35,7 +35,7 @@ def not_touching(link: Link, where: str, point: Vector, axis: Vector | None = No
         f"{where}: must sit on {what} link '{link.name}' at {shown(point)}, "
         f"got none there (nearest node {shown(nearest)}, {length(gap)} away)"
     )
-    level = 1e-6 * link.size  # what is as near: the narrowest first
+    level = 1e-6 * link.size  # of those at the same distance the narrowest first
     offered = sorted(candidates(link), key=lambda each: (round(each.distance(point) / level), each.radius))
     near = not link.meshed and gap < NEAR * link.size
     apart = f"the parts do not meet: they are given {1e3 * gap:.3g} mm apart" if near else ""
@@ -44,8 +44,8 @@ def not_touching(link: Link, where: str, point: Vector, axis: Vector | None = No
     return "; ".join([text, *(hint for hint in hints if hint)])
 
 
-def ambiguous(link: Link, where: str, point: Vector, found: Sequence[RoundSurface]) -> str:
-    """The message that a joint could sit on several bores or journals."""
+def several_surfaces(link: Link, where: str, point: Vector, found: Sequence[RoundSurface]) -> str:
+    """The message that a joint fits several bores or journals."""
     each = ", ".join(
         f"{'bore' if x.inward else 'journal'} of radius {length(x.radius)}, {length(x.low)} to {length(x.high)} along it"
         for x in found
@@ -57,12 +57,12 @@ def ambiguous(link: Link, where: str, point: Vector, found: Sequence[RoundSurfac
 
 
 def _units(link: Link, point: Vector, axis: Vector | None, gap: float, offered: Sequence[Candidate]) -> str | None:
-    """Whether the part would have the joint's point if it were 1000 times larger or smaller."""
+    """The hint that the part has the joint's point if it is 1000 times larger or smaller."""
     low, high = link.nodes.min(axis=0), link.nodes.max(axis=0)
     room = 0.01 * link.size
     for scale in SCALES:
         if np.linalg.norm(point) < 0.1 * scale * link.size:
-            continue  # much of what is large is near the origin
+            continue  # near the origin a large part has many surfaces
         boxed = bool(((scale * (low - room) <= point) & (point <= scale * (high + room))).all())
         nearest_rounds = any(each.cylindrical and _fits(each, point / scale, axis) for each in offered)
         if nearest_rounds or (boxed and gap > link.size):
@@ -73,11 +73,11 @@ def _units(link: Link, point: Vector, axis: Vector | None, gap: float, offered: 
 
 def _fits(each: Candidate, point: Vector, axis: Vector | None) -> bool:
     straight = axis is None or abs(each.direction @ axis) > np.cos(np.radians(STRAIGHT))
-    return bool(straight and each.beside(point) <= 0.01 * each.radius) and each.distance(point) <= 2 * each.length
+    return bool(straight and each.axis_distance(point) <= 0.01 * each.radius) and each.distance(point) <= 2 * each.length
 
 
 def _beside(point: Vector, axis: Vector | None, offered: Sequence[Candidate]) -> str | None:
-    """A bore or journal that passes the point, but in another direction or a little off."""
+    """The hint at a bore or journal through the point with another direction, or a little beside it."""
     if axis is None:
         return None
     here = [each for each in offered if each.cylindrical and each.distance(point) <= each.radius]
@@ -87,7 +87,7 @@ def _beside(point: Vector, axis: Vector | None, offered: Sequence[Candidate]) ->
         if STRAIGHT < off <= ASKEW:
             return f"{name} passes here, but its axis is {off:.2g} deg off: it is {shown(each.direction)}"
         if off <= STRAIGHT:
-            return f"{name} is here, but its axis is {length(each.beside(point))} beside the point"
+            return f"{name} is here, but its axis is {length(each.axis_distance(point))} beside the point"
     return None
 
 
@@ -136,6 +136,6 @@ def shown(x: Vector) -> str:
     return "(" + ", ".join(f"{v:.6g}" for v in np.round(x, 12) + 0.0) + ")"
 
 
-def in_its_plane(link: Link, point: Vector) -> Vector:
-    """The point as a plane link sees it, which knows no z."""
+def in_link_plane(link: Link, point: Vector) -> Vector:
+    """The projection of a point on the plane of a plane link; of other links the point itself."""
     return np.array([*point[:2], link.X[0, 2]]) if link.kind == "plane" else point

@@ -16,18 +16,18 @@ from kedfem.mesh import SolidMesh
 from kedfem.mesh.elements.hexahedra import CELL_TYPES, Face
 
 KINDS = ("bore", "journal", "ball seat", "ball", "part of a bore", "part of a journal", "plane")
-BLENDS = ("fillet", "rounded")  # words of faces that no joint sits on
+BLENDS = ("fillet", "rounded")  # words of faces that are not for joints
 MOST = 40  # of a part with hundreds of plane faces the largest
-MOSTLY = 0.5  # of a face's sides: so many found are the face
+MOSTLY = 0.5  # of a face's sides: a larger share selected is that face
 
 
 @dataclass(frozen=True, slots=True)
 class PartCandidate:
-    """A face that a joint can sit on, by its number in the table and the picture.
+    """A face for a joint, by its number in the table and the picture.
 
     kind : one of KINDS
-    at : (3,) on its axis half way, its centre, of a plane a point on it next to its centroid [m]
-    found : numbers of all faces that a joint at `at` finds by itself, about the axis of a round one
+    at : (3,) middle of its axis, its centre, or of a plane the point on it nearest to its centroid [m]
+    found : numbers of all faces that a joint at `at`, about the axis of a round face, selects
     area : [m²]
     """
 
@@ -40,7 +40,7 @@ class PartCandidate:
 
     @property
     def finds(self) -> str:
-        """What a joint there finds, in words: it, it and others, others instead, or nothing."""
+        """Faces that a joint there selects, in words: this one, it with others, others instead, or none."""
         others = ", ".join(str(each) for each in self.found if each != self.number)
         if self.number in self.found:
             return f"it with {others}" if others else "it"
@@ -48,7 +48,7 @@ class PartCandidate:
 
 
 def part_candidates(mesh: SolidMesh) -> list[PartCandidate]:
-    """The faces of a meshed part that a joint can sit on, round ones first, those of a kind by area."""
+    """The faces of a meshed part for joints, round ones first, those of a kind by area."""
     link = _surface_of(mesh)
     rows = []
     for each in link.faces:
@@ -64,7 +64,7 @@ def part_candidates(mesh: SolidMesh) -> list[PartCandidate]:
 
 
 def face_kind(mesh: SolidMesh, face: Face) -> str:
-    """What a joint can take a face for: cylinders only where they are closed; of blends what they are called."""
+    """The kind of a face for a joint: bores and journals are closed cylinders; of blends their description."""
     if face.words.startswith(BLENDS) or face.kind == "other":
         return face.words or "other"
     if face.kind != "cylinder":
@@ -76,7 +76,7 @@ def face_kind(mesh: SolidMesh, face: Face) -> str:
 
 
 def _surface_of(mesh: SolidMesh) -> Link:
-    """A link of a mesh without mass and stiffness: what faces are looked for on."""
+    """A link of a mesh without mass and stiffness, to select faces."""
     basis = solid_basis(mesh)
     X = np.ascontiguousarray(basis.doflocs.T)
     nothing = np.zeros(len(X))
@@ -94,7 +94,7 @@ def _point(link: Link, each: LinkFace) -> Float[np.ndarray, "3"]:
 
 
 def _found(link: Link, kind: str, each: LinkFace, listed: Sequence[LinkFace]) -> tuple[int, ...]:
-    """Numbers of the faces that a joint on a face finds."""
+    """Numbers of the faces that a joint on a face selects."""
     point = _point(link, each)
     axis = each.face.direction if each.face.kind == "cylinder" else None
     facets: Int[np.ndarray, " f"]

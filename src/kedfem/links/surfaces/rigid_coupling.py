@@ -15,16 +15,16 @@ from kedfem.links.reduced import reduced, rigid_motions
 from kedfem.links.surfaces.coupling_surfaces import CouplingSurface
 from kedfem.links.surfaces.surface import surface_quadrature
 
-#: κ in E per radius of the surface. The shape's error falls with 1/STIFF, rounding grows with it: here a bore deforms by
-#: 5e-4 of what a distributing one does, deflections are within 2e-4 of those about rigid pins (docs/ports.md).
+#: κ in E per radius of the surface. The error of the shape is proportional to 1/STIFF, rounding to STIFF: here a bore
+#: deforms by 5e-4 of a distributing one, with deflections within 2e-4 of those about rigid pins (docs/ports.md).
 STIFF = 1e3
-FLAT = 1e-5  # of the radius: what a coupling surface's nodes leave a plane by
-EQUAL = 1e-6  # of the largest distance: rounding does not choose between nodes
+FLAT = 1e-5  # of the radius: largest distance of the nodes of a flat coupling surface from their plane
+EQUAL = 1e-6  # of the largest distance: smaller differences between nodes are rounding
 NOTHING = 1e-12  # of the largest value: functions that vanish on the coupling surface
 
 
 def with_rigid_coupling(link: Link, surface: CouplingSurface, times: float = STIFF) -> Link:
-    """A link whose coupling surface keeps its shape; beams and rigid links are returned as they are, since theirs do.
+    """A link whose coupling surface keeps its shape; beams and rigid links, whose sections are rigid, are unchanged.
 
     K0 ← K0 + κ [((1 − L P)ᵀ G (1 − L P)) ⊗ I + Pᵀ (D − D B (Bᵀ D B)⁻¹ Bᵀ D) P], κ = times · E / radius [N/m³], with
     G_ab = ∫ N_a N_b dΓ over the coupling surface, P a few nodes of it far apart, L the affine field through these at all
@@ -32,15 +32,15 @@ def with_rigid_coupling(link: Link, surface: CouplingSurface, times: float = STI
 
     Parameters
     ----------
-    link : also a reduced one, whose functions stay
-    times : how stiff, where another than STIFF is to be tried [-]
+    link : reduced or not; a reduced one keeps its functions
+    times : stiffness relative to E / radius [-]
     """
     if link.full is not None and link.Q is not None:
         return reduced(with_rigid_coupling(link.full, surface, times), link.Q)
     if surface.facets is None or link.rigid:
         return link
     nodes, G = surface_gram(link, surface.facets)
-    x, unit = (link.X[nodes] - surface.origin) / radius(surface), sp.eye_array(link.d)
+    x, unit = (link.X[nodes] - surface.origin) / surface_radius(surface), sp.eye_array(link.d)
     few = _far_apart(x)
     L, P = _affine(x, few), _choice(few, len(x))
     off = sp.csr_array(sp.eye_array(len(x)) - sp.csr_array(L) @ P)
@@ -49,7 +49,7 @@ def with_rigid_coupling(link: Link, surface: CouplingSurface, times: float = STI
     on_few = sp.csr_array(sp.kron(P, unit))
     within = sp.kron(off.T @ G @ off, unit) + on_few.T @ sp.csr_array(bent) @ on_few
     at = sp.csr_array(sp.kron(_choice(nodes, link.n), unit))
-    added = times * link.E / radius(surface) * sp.csr_array(at.T @ within @ at)
+    added = times * link.E / surface_radius(surface) * sp.csr_array(at.T @ within @ at)
     return replace(link, K0=sp.csr_array(link.K0 + (added + added.T) / 2))
 
 
@@ -59,13 +59,13 @@ def _choice(which: Int[np.ndarray, " k"], n: int) -> sp.csr_array:
 
 
 def _affine(x: Float[np.ndarray, "b 3"], few: Int[np.ndarray, " k"]) -> Float[np.ndarray, "b k"]:
-    """L: at all places the affine field through its values at a few."""
+    """L: values at all places of the affine field through values at a few."""
     parts = (x - x[few[0]]) @ np.linalg.pinv(x[few[1:]] - x[few[0]])
     return np.column_stack([1 - parts.sum(axis=1), parts])
 
 
 def _far_apart(x: Float[np.ndarray, "b 3"]) -> Int[np.ndarray, " k"]:
-    """Nodes that show an affine field: four, three of a plane face, two of a straight edge; the first of equals."""
+    """Nodes that determine an affine field: four, three of a plane face, two of a straight edge; the first of equals."""
     chosen: list[int] = []
     left = x - x.mean(axis=0)
     for _ in range(4):
@@ -81,9 +81,8 @@ def _far_apart(x: Float[np.ndarray, "b 3"]) -> Int[np.ndarray, " k"]:
     return np.array(chosen)
 
 
-def radius(surface: CouplingSurface) -> float:
-    """How large a coupling surface is across: the radius of a bore; of other surfaces what that would be from their
-    spread [m]."""
+def surface_radius(surface: CouplingSurface) -> float:
+    """The radius of a bore; of other coupling surfaces the radius of a bore with the same spread [m]."""
     return float(np.sqrt(2) * surface.spread[surface.spread > 0][:2][-1])
 
 

@@ -1,5 +1,4 @@
-"""Round coupling surfaces by their geometry: bores, journals and balls about a joint's point, in any mesh of
-hexahedra."""
+"""Round coupling surfaces by their geometry: bores, journals and balls about a joint's point, in any mesh."""
 
 from dataclasses import dataclass
 
@@ -16,23 +15,23 @@ from kedfem.links.surfaces.surface import (
     surface_quadrature,
 )
 
-FAR = 5.0  # lengths and radii of a bore: a joint further off along its axis does not sit in it
-AROUND = 0.1  # of a bore's radius: how near the middle of one of its facets may be to the axis
-# of the radius: how far from the axis the mean of a cylinder's corners is that goes all round it
+FAR = 5.0  # lengths and radii of a bore: largest distance of a joint along its axis
+AROUND = 0.1  # of a bore's radius: least distance of the middle of a facet from the axis
+# of the radius: largest distance from the axis of the mean of a closed cylinder's corners
 CLOSED = 0.3
-LEVEL = 1e-3  # of a cylinder's length and radius: places along the axis that are the same
-MANY = 12  # facets at one distance from a point are not so by chance
-SUNK = 0.1  # of a cylinder's radius: how far within it its facets may sink; those of a prism of six sides sink by 0.13
+LEVEL = 1e-3  # of a cylinder's length and radius: smaller distances along the axis are rounding
+MANY = 12  # facets at one distance from a point, which are no coincidence
+SUNK = 0.1  # of a cylinder's radius: largest depth of its facets; those of a prism of six sides have 0.13
 ALL_WAYS = 0.01  # least variance of the normals of a ball in any direction; a zone of it of 30° has 0.02
-# of a ball's radius: how far below it curved facets may sink; those of a cube about it sink by 0.4
+# of a ball's radius: largest depth of curved facets; those of a cube about it have 0.4
 DOMED = 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class RoundSurface:
-    """Facets on a closed cylinder about an axis: of all bores of one radius, which one pin goes through, or of a journal.
+    """Facets on a closed cylinder about an axis: of all bores of one radius, which one pin fits, or of a journal.
 
-    low, high : where it begins and ends along the axis, from the joint's point [m]
+    low, high : its ends along the axis, from the joint's point [m]
     """
 
     facets: Int[np.ndarray, " f"]
@@ -43,19 +42,19 @@ class RoundSurface:
 
     @property
     def gap(self) -> float:
-        """How far the joint's point is off along the axis; negative by how far it is inside [m]."""
+        """Distance of the joint's point from the nearer end along the axis, negative inside [m]."""
         return max(self.low, -self.high)
 
     @property
     def level(self) -> float:
-        """What is no distance along the axis [m]."""
+        """Tolerance of distances along the axis [m]."""
         return LEVEL * (self.high - self.low + self.radius)
 
 
 def round_surfaces(link: Link, point: Float[np.ndarray, "3"], axis: Float[np.ndarray, "3"]) -> list[RoundSurface]:
-    """All closed cylinders about an axis through a point, as far as they are near it along the axis.
+    """All closed cylinders about an axis through a point, near to it along the axis.
 
-    Facets may be flat, seven or more of them around; a prism of fewer sides is none.
+    Facets may be flat, with at least seven of them around.
     """
     facets, corners, normals = boundary(link)
     along = (corners - point) @ axis
@@ -63,7 +62,7 @@ def round_surfaces(link: Link, point: Float[np.ndarray, "3"], axis: Float[np.nda
     radii = np.linalg.norm(r, axis=2)
     mean, middle = radii.mean(axis=1), r.mean(axis=1)
     out = np.linalg.norm(middle, axis=1)
-    # a facet around the axis, whose corners are as far from it too, is no part of a bore
+    # the corners of a facet that the axis passes through may be equidistant from it, too
     round_ = (np.ptp(radii, axis=1) <= CYLINDER_TOLERANCE * mean) & (out > AROUND * mean)
     round_ &= mean > PLANE_TOLERANCE * np.ptp(link.X, axis=0).max()
     some = np.flatnonzero(round_)
@@ -89,20 +88,20 @@ def _of_one_radius(which: Int[np.ndarray, " k"], radius: Float[np.ndarray, " f"]
 
 
 def _pieces(link: Link, facets: Int[np.ndarray, " f"], which: Int[np.ndarray, " k"]) -> list[Int[np.ndarray, " _"]]:
-    """Facets divided into those that hang together."""
+    """Facets divided into connected groups."""
     first, second = neighbours(link, facets[which])
     label = components(first, second, np.ones(len(first), bool), len(which))
     return [which[label == k] for k in range(label.max() + 1)]
 
 
 def nearest_round_surfaces(found: list[RoundSurface], flat: bool) -> list[RoundSurface]:
-    """Those of some bores, or of some journals, that a joint sits on: several only where it cannot be determined.
+    """The bores, or journals, of a joint: several only where they cannot be distinguished.
 
     One whose extent contains the joint's point, of bores the narrowest; else the nearest along the axis.
 
     Parameters
     ----------
-    flat : in a plane, where cylinders have no extent
+    flat : whether they are in a plane, where cylinders have no extent
     """
     inside = [each for each in found if flat or each.gap < -each.level]
     if inside:
@@ -113,7 +112,7 @@ def nearest_round_surfaces(found: list[RoundSurface], flat: bool) -> list[RoundS
 
 
 def ball(link: Link, point: Float[np.ndarray, "3"]) -> Int[np.ndarray, " f"]:
-    """Facets of the smallest ball or ball seat about the point, or of what there is of it: a ball may have a neck."""
+    """Facets of the smallest ball or ball seat about the point, whole or in part: a ball may have a neck."""
     facets, corners, normals = boundary(link)
     radius = np.linalg.norm(corners - point, axis=2)
     mean = radius.mean(axis=1)
@@ -127,6 +126,6 @@ def ball(link: Link, point: Float[np.ndarray, "3"]) -> Int[np.ndarray, " f"]:
 
 
 def _domed(link: Link, facets: Int[np.ndarray, " f"], point: Float[np.ndarray, "3"]) -> Bool[np.ndarray, " f"]:
-    """Whether facets are as far from a point within as at their corners."""
+    """Whether the interior of facets is as far from a point as their corners."""
     distance = np.linalg.norm(surface_quadrature(link, facets).x - point, axis=2)
     return np.asarray(np.ptp(distance, axis=1) <= DOMED * distance.max(axis=1))

@@ -42,7 +42,7 @@ def surface_quadrature(link: Link, facets: Int[np.ndarray, " f"]) -> Surface:
     kind: Any = type(elem)
     elements = mesh.f2t[0, facets]
     corners = mesh.t[: elem.refdom.nnodes, elements]
-    on = (corners[:, None] == mesh.facets[:, facets][None]).any(axis=1)  # (c, f) which corners a facet has
+    on = (corners[:, None] == mesh.facets[:, facets][None]).any(axis=1)  # (c, f) corners of each facet
     face = (1 << np.arange(len(corners))) @ on
     dofs = link.basis.element_dofs[:, elements].T
     gauss = len(_facet_rule(elem)[1])
@@ -71,7 +71,7 @@ def middle_facet(link: Link, facets: Int[np.ndarray, " f"], centre: Float[np.nda
 
 @cache
 def _face_functions(of: Any, on: tuple[bool, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """N (q, m), its derivatives along the face (q, m, d − 1) and weights (q,) on the facet with some corners."""
+    """N (q, m), its derivatives along the face (q, m, d − 1) and weights (q,) on the facet with given corners."""
     elem = of()
     corners = np.asarray(elem.doflocs)[: len(on)][np.array(on)]
     places, weights = _facet_rule(elem)
@@ -143,7 +143,7 @@ def flat_face(link: Link, point: Float[np.ndarray, "3"]) -> Int[np.ndarray, " f"
 
 
 def smooth_face(link: Link, point: Float[np.ndarray, "3"]) -> Int[np.ndarray, " f"]:
-    """Facets of the curved face at a point: from the facet there over all edges that are not sharp."""
+    """Facets of the curved face at a point: those connected with the facet there over smooth edges."""
     facets, corners, normals = boundary(link)
     centre = corners.mean(axis=1)
     reach = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
@@ -169,7 +169,7 @@ def neighbours(link: Link, facets: Int[np.ndarray, " f"]) -> tuple[Int[np.ndarra
 def connected(
     seed: int, first: Int[np.ndarray, " k"], second: Int[np.ndarray, " k"], joined: Bool[np.ndarray, " k"], size: int
 ) -> Bool[np.ndarray, " f"]:
-    """Which facets can be reached from one of them over the pairs that are joined."""
+    """Whether each facet is connected with one of them over joined pairs."""
     label = components(first, second, joined, size)
     return np.asarray(label == label[seed])
 
@@ -177,7 +177,7 @@ def connected(
 def components(
     first: Int[np.ndarray, " k"], second: Int[np.ndarray, " k"], joined: Bool[np.ndarray, " k"], size: int
 ) -> Int[np.ndarray, " f"]:
-    """Of each facet the number of the piece that it belongs to, of those that hang together over the pairs joined."""
+    """Number of the connected component of each facet over joined pairs."""
     ones = np.ones(np.count_nonzero(joined))
     graph = sp.csr_array((ones, (first[joined], second[joined])), shape=(size, size))
     return np.asarray(connected_components(graph, directed=False)[1])

@@ -12,7 +12,7 @@ from kedfem.errors import KedfemError
 from kedfem.links.point_rows import point_rows
 from kedfem.links.record import Link
 from kedfem.links.recovery import StressRecovery
-from kedfem.links.singular_stress import around, re_entrant
+from kedfem.links.singular_stress import affected_nodes, re_entrant
 from kedfem.scene import ForceLoad, Scene
 
 CORNER = "a sharp re-entrant corner"
@@ -40,21 +40,21 @@ def singular_places(scene: Scene, model: Model, recoveries: Sequence[StressRecov
                 on = np.abs(surface.fit[0]) > 0
                 link = full[key]
                 what = f"the {'rigid coupling' if stiff else 'surface'} of joint {name}"
-                words[int(key)][around(link, link.X[on]) if stiff else on] = what
+                words[int(key)][affected_nodes(link, link.X[on]) if stiff else on] = what
     for name, load in scene.loads.items():
         if isinstance(load, ForceLoad) and load.link in meshed:
             at = np.asarray(load.at)
             where = f"loads.{name}.at"
             key, place = on_part(full, load.link, at, partial(_place, where, at))
-            words[int(key)][around(full[key], place[None])] = f"the point force loads.{name}"
+            words[int(key)][affected_nodes(full[key], place[None])] = f"the point force loads.{name}"
     for k, link in full.items():
         if link.meshed and not link.rigid:
-            words[int(k)][around(link, link.X[re_entrant(link)])] = CORNER
+            words[int(k)][affected_nodes(link, link.X[re_entrant(link)])] = CORNER
     names = link_keys(model)
     for cut in model.cuts:
         for key, facets in zip(cut.keys, cut.uneven, strict=False):
             link = full[str(number := names.index(key))]
-            words[number][around(link, link.X[link.basis.mesh.facets[:, facets].ravel()])] = CUT
+            words[number][affected_nodes(link, link.X[link.basis.mesh.facets[:, facets].ravel()])] = CUT
     return [list(each) for each in words]
 
 

@@ -15,7 +15,7 @@ from kedfem.dynamics.system.period.krylov import Derivative, gmres
 from kedfem.dynamics.system.period.map import PeriodMap
 from kedfem.dynamics.system.starts.instant import Flat
 from kedfem.dynamics.system.starts.internal_forces import own, rows
-from kedfem.links.reduced import on_functions
+from kedfem.links.reduced import mode_matrix
 
 START, LATER = 1e-6, 1e-2  # what is left of the first of its equations, and of those that precondition
 MOST = 60  # its marches for one of them
@@ -37,7 +37,7 @@ class Coarse:
         self._at = x, small(x)
         small.weighed(self._at[1])
         links = zip(fine.of.system.model.links, small.of.system.model.links, strict=True)
-        self._modes = [on_functions(less) if less is not each else None for each, less in links]
+        self._modes = [mode_matrix(less) if less is not each else None for each, less in links]
         self.usable = True
 
     def __call__(self, r: Flat) -> Flat:

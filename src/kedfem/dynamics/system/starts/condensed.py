@@ -23,7 +23,7 @@ from kedfem.dynamics.system.starts.instant import Flat, Instant, instant_near
 from kedfem.dynamics.system.starts.internal_forces import own, rows
 from kedfem.dynamics.system.state import State
 from kedfem.links.record import Link, mass_times
-from kedfem.links.reduced import on_functions
+from kedfem.links.reduced import mode_matrix
 from kedfem.motion.rigid import RigidMotion
 
 Rows = Sequence[Float[np.ndarray, "_ _"]]
@@ -110,7 +110,7 @@ def _made(now: Instant, large: Sequence[int], forces: Rows) -> Condensed:
         modes[k] = static_modes(model.links[k], model.joints[k], loads)
     small = reduced_model(model, modes)
     for k in large:
-        modes[k] = on_functions(small.links[k])
+        modes[k] = mode_matrix(small.links[k])
         parts[k] = dense_part(small.links[k], small.joints[k], of.c.c_M, of.c.c_K)
     system = replace(of.system, model=small)
     made = replace(of, system=system, parts=parts, **_arrays(system, parts), halves=[], condensed=[])

@@ -155,7 +155,7 @@ class Instant:
         """
         system = self.of.system
         for end, s in pins(system, self.at, z).items():
-            if not line_of(system.ends[end]).stations.reach(s):
+            if not line_of(system.ends[end]).stations.covers(s):
                 raise SolveError(left_line(system, end, self.time))
 
     def measured(self, z: Flat, z1: Flat | None = None) -> tuple[sp.csr_array, Float[np.ndarray, "2 r"]]:

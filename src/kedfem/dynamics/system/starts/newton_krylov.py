@@ -34,7 +34,7 @@ from kedfem.dynamics.system.starts.open_joints import gaps
 from kedfem.dynamics.system.starts.rotating_bodies import CONVERGED, RotatingBodies, Spins
 from kedfem.dynamics.system.starts.tangents import Tangents, held_by_tangents, tangents
 from kedfem.errors import SolveError
-from kedfem.links.reduced import reach
+from kedfem.links.reduced import overall_length
 
 ITERATIONS, WHOLE = 120, 30  # of shortened steps, and of whole ones
 SHORTEST, IN_A_ROW = 1 / 64, 4  # of a step; so many of them end a search
@@ -92,7 +92,7 @@ class Equilibrium:
         self.right = [np.linalg.pinv(part.W) for part in now.of.parts]
         links = now.of.system.model.links
         mass = sum(float(link.one @ link.m1[:, 0]) for link in links)
-        self.size = DIFFERENCE * np.sqrt(mass) * max(reach(link) for link in links)
+        self.size = DIFFERENCE * np.sqrt(mass) * max(overall_length(link) for link in links)
 
     def forces(self, u: Flat) -> tuple[Flat, Flat, Frames]:
         """Internal ones, all on bodies, and their mean frames."""

@@ -4,7 +4,7 @@ import numpy as np
 
 from kedfem.dynamics.system.starts.instant import Flat, Instant
 from kedfem.dynamics.system.starts.internal_forces import moved, own
-from kedfem.links.reduced import reach
+from kedfem.links.reduced import overall_length
 
 OPEN = 1e-4  # of the largest link: what joints may be open in a balance; found ones are at 1e-9
 CLOSED = 1e-9  # of displacements at interface points: open by less is closed but for rounding
@@ -36,7 +36,7 @@ def stands_off(now: Instant, u: Flat, z1: Flat | None) -> str:
     system, z = now.of.system, now.interface(u)
     links = system.model.links
     off = [np.abs(x).max(initial=0.0) for x in gaps(now, u, z)]
-    largest, far = max(map(reach, links)), moved(now.of, u)
+    largest, far = max(map(overall_length, links)), moved(now.of, u)
     if max(far) > FAR * largest and max(off) <= OPEN * max(far):
         return f"link '{links[int(np.argmax(far))].name}' would move by {max(far):.3g} m"
     size = OPEN * largest

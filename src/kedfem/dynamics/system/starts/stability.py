@@ -23,7 +23,7 @@ from kedfem.dynamics.system.starts.newton_krylov import Equilibrium, Point
 from kedfem.dynamics.system.starts.rotating_bodies import spins_of
 from kedfem.dynamics.system.state import State
 from kedfem.errors import SolveError
-from kedfem.links.reduced import reach
+from kedfem.links.reduced import overall_length
 
 DIFFERENCE = 5e-4  # of the largest link: displacements to both sides, and twice as far, where forces are differenced
 CENTRAL = {1: 2 / 3, -1: -2 / 3, 2: -1 / 12, -2: 1 / 12}  # of fourth order: what turns linearly is strained by its square
@@ -77,7 +77,7 @@ class _Tangent:
 
     def __init__(self, problem: Equilibrium, at: Point, push: Flat, balance: LinearEquations) -> None:
         self.problem, self.at, self.push, self.balance = problem, at, push, balance
-        self.far = DIFFERENCE * max(map(reach, problem.now.of.system.model.links))
+        self.far = DIFFERENCE * max(map(overall_length, problem.now.of.system.model.links))
         self.falling = np.where(at.hard, 0.0, np.minimum(at.slopes, 0.0))  # tangents of laws that A does not have
 
     def __call__(self, x: Flat) -> Flat:

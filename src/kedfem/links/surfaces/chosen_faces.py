@@ -1,4 +1,4 @@
-"""Faces of a link that a joint chooses by their properties, found before the link is reduced or divided."""
+"""Faces of a link that joints choose by their properties, found before the link is reduced or divided."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,25 +16,25 @@ from kedfem.scene import ChosenFace, Scene
 
 MOST = 8  # surfaces in a message
 
-# of the diameter: nodes of mesh files are rounded, and so are dimensions that people write
+# of the diameter: nodes of mesh files and dimensions in scenes are rounded
 SAME_DIAMETER = 5e-3
 SAME_DIRECTION = np.cos(np.radians(0.1))  # a draft of half a degree is another face
-CLEARLY = 1.25  # times as far must the next face be
+CLEARLY = 1.25  # least ratio of the distances of the second and the nearest face
 
 Vector = Float[np.ndarray, "3"]
 
 
 def with_chosen_faces(scene: Scene, link: Link) -> Link:
-    """The link with the faces that the scene's joints choose on it by what they are, under what was said of them.
+    """The link with the faces that the scene's joints choose on it by their properties, named after these.
 
     Parameters
     ----------
-    link : a solid, whole: of one in segments each has the part of a face that is on it
+    link : an undivided solid; each of its segments has the part of a face that is on it
 
     Raises
     ------
     MeshError
-        A joint chooses a face that the link has not, or between several that are as near.
+        A joint chooses a face that the link does not have, or that is not unique.
     """
     found: dict[str, LinkFace] = {}
     offered: list[Candidate] | None = None
@@ -48,20 +48,20 @@ def with_chosen_faces(scene: Scene, link: Link) -> Link:
 
 
 def chosen_surface(link: Link, where: str, choice: ChosenFace, near: Vector, offered: Sequence[Candidate]) -> Candidate:
-    """The one surface of a link that a choice means.
+    """The one surface of a link with the properties of a choice.
 
     Parameters
     ----------
-    near : the point of the choice, of one without the joint's, to list surfaces by [m]
+    near : point of the choice, else the joint's, by which the message sorts surfaces [m]
 
     Raises
     ------
     MeshError
-        There is none, or several of which none is clearly the nearest; with those there are.
+        There is none, or several of which none is clearly the nearest; the message lists them.
     """
     far = {id(each): distance(link, each, near) for each in offered}
     ordered = sorted(offered, key=lambda each: far[id(each)])
-    meant = [each for each in ordered if fits(each, choice)]
+    meant = [each for each in ordered if matches(each, choice)]
     if len(meant) == 1:
         return meant[0]
     slack = PLANE_TOLERANCE * link.size
@@ -71,7 +71,7 @@ def chosen_surface(link: Link, where: str, choice: ChosenFace, near: Vector, off
             return meant[0]
     alike = [each for each in ordered if each.form == choice.form]
     offered = meant or alike or [each for each in ordered if each.form != "other"]
-    those = ", ".join(f"{each.kind} {as_choice(link, each)} {length(far[id(each)])} away" for each in offered[:MOST])
+    those = ", ".join(f"{each.kind} {choice_text(link, each)} {length(far[id(each)])} away" for each in offered[:MOST])
     more = f", and {len(offered) - MOST} more" if len(offered) > MOST else ""
     if meant:
         wanted, got = f"mean one face of link '{link.name}'", f"{len(meant)} such faces"
@@ -83,7 +83,7 @@ def chosen_surface(link: Link, where: str, choice: ChosenFace, near: Vector, off
     raise MeshError(f"{where}: must {wanted}, got {got}; nearest first: {those}{more}; {advice}")
 
 
-def fits(each: Candidate, choice: ChosenFace) -> bool:
+def matches(each: Candidate, choice: ChosenFace) -> bool:
     """Whether a surface is of the form, size and direction of a choice."""
     if each.form != choice.form:
         return False
@@ -94,8 +94,8 @@ def fits(each: Candidate, choice: ChosenFace) -> bool:
     return diameter is None or abs(2 * each.radius - diameter) <= SAME_DIAMETER * diameter
 
 
-def as_choice(link: Link, each: Candidate) -> str:
-    """What one would write to choose a surface."""
+def choice_text(link: Link, each: Candidate) -> str:
+    """The choice of a surface as a scene states it."""
     diameter = 2 * each.radius
     axis = tuple(np.round(each.direction, 9))
     match each.form:
@@ -117,7 +117,7 @@ def _on(link: Link, each: Candidate) -> tuple[float, float, float]:
 
 
 def _face(link: Link, choice: ChosenFace, each: Candidate) -> LinkFace:
-    """The surface as a face of the link that is called what the choice says."""
+    """The surface as a face of the link with the choice as its name."""
     kind = choice.form
     sides = link.basis.mesh.facets[:, each.facets].T
     inward = each.kind in {"bore", "ball seat"}
