@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.pages import script, table, write_page
-from kedfem.motion.batch import Choice, settled
+from kedfem.motion.batch import RowSelection, newton_solution
 from kedfem.motion.linkage import Linkage, linkage, resting_poses
 from kedfem.motion.newton import target
 from kedfem.motion.path import Path as MotionPath
@@ -77,7 +77,7 @@ def _one_by_one(link: Linkage, along: MotionPath, tau: np.ndarray) -> np.ndarray
     poses, near, out = resting_poses(len(link.bodies)), along.near[:1], []
     for each in tau:
         at = np.array([each])
-        got = settled(link, Choice(link.rows), poses, target(link, at, near), link.drives.at(at)[1:])
+        got = newton_solution(link, RowSelection(link.rows), poses, target(link, at, near), link.drives.at(at)[1:])
         poses, near = got.poses, features(link.rows, got.poses, near).value[link.rows.angles].T
         out.append(got.second[1][0])
     return np.stack(out)

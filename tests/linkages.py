@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from kedfem.motion.batch import moving
+from kedfem.motion.batch import solved_motion
 from kedfem.motion.linkage import Linkage, linkage
-from kedfem.motion.path import Path, aimed, path, predicted
+from kedfem.motion.path import Path, path, predicted, target_on_path
 from kedfem.motion.rigid import RigidMotion, rigid_motion
 from kedfem.scene import Scene, path_parameter, scene_from
 
@@ -75,7 +75,7 @@ def drive_rates(link: Linkage, along: Path, tau: np.ndarray, drive: int = 0) -> 
     """Rates of all bodies at places of a path per unit rate of one drive: v of what is drawn at the origin, and ω."""
     q = np.zeros((len(tau), len(link.drives)))
     q[:, drive] = 1.0
-    got = moving(link, along.rows, predicted(along, tau), aimed(link, along, tau), (q, 0 * q))
+    got = solved_motion(link, along.rows, predicted(along, tau), target_on_path(link, along, tau), (q, 0 * q))
     v, omega = got.first
     return v - np.cross(omega, got.poses[0] @ link.centre), omega
 

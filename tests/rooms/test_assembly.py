@@ -19,7 +19,7 @@ from kedfem.links.beams.beam_axis import directions
 from kedfem.mesh import link_mesh
 from kedfem.mesh.methods import file_axes
 from kedfem.motion.assembly import assembled
-from kedfem.motion.closed import Shift, closed_scene
+from kedfem.motion.closed import RigidDisplacement, closed_scene
 from kedfem.motion.linkage import linkage
 from kedfem.scene import Cad, Polyline, RigidBody, Scene, inertia_tensor, scene_from
 from tests.runs import quick
@@ -278,11 +278,11 @@ def test_gears_stay_in_mesh_as_drawn() -> None:
 # -- what goes with the links -------------------------------------------------------------------------------
 
 
-SHIFT = Shift(np.array([0.2, 0.1, 0.0]), np.array([1e-3, -2e-3, 0.0]), np.array([0.0, 0.0, 0.02]))
-TILT = Shift(np.array([0.2, 0.1, 0.0]), np.array([1e-3, -2e-3, 3e-3]), np.array([0.01, -0.02, 0.02]))
+SHIFT = RigidDisplacement(np.array([0.2, 0.1, 0.0]), np.array([1e-3, -2e-3, 0.0]), np.array([0.0, 0.0, 0.02]))
+TILT = RigidDisplacement(np.array([0.2, 0.1, 0.0]), np.array([1e-3, -2e-3, 3e-3]), np.array([0.01, -0.02, 0.02]))
 
 
-def moved(shift: Shift, x: Any) -> Array:
+def moved(shift: RigidDisplacement, x: Any) -> Array:
     R = Rotation.from_rotvec(shift.theta).as_matrix()
     return (np.asarray(x) - shift.centre) @ R.T + shift.centre + shift.d
 
@@ -294,7 +294,7 @@ def arm(**sections: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("shift", [SHIFT, TILT])
-def test_everything_on_a_link_goes_with_it(shift: Shift) -> None:
+def test_everything_on_a_link_goes_with_it(shift: RigidDisplacement) -> None:
     inertia = (0.02, 0.03, 0.04, 0.001, -0.002, 0.003)
     force = {"kind": "force", "link": "arm", "at": [0.4, 0], "vector": [1.0, 2.0]}
     body = {"kind": "rigid_body", "link": "arm", "at": [0, 0], "mass": 1.0, "inertia": list(inertia), "centre": [0, 0.01]}
@@ -359,7 +359,9 @@ def test_plates_go_with_their_outline_and_holes() -> None:
     "keys", [{}, {"z": "y"}, {"origin": [0.1, 0.2], "towards": [0.1, 0.2, 1.0]}, {"towards": [1.0, 0.5, 0.2], "z": "x"}]
 )
 @pytest.mark.parametrize("shift", [SHIFT, TILT])
-def test_parts_from_cad_are_placed_where_their_link_goes(shift: Shift, keys: dict[str, Any], tmp_path: Path) -> None:
+def test_parts_from_cad_are_placed_where_their_link_goes(
+    shift: RigidDisplacement, keys: dict[str, Any], tmp_path: Path
+) -> None:
     (tmp_path / "arm.step").write_text("", "utf-8")
     raw = arm()
     raw["links"]["arm"] = {"material": "steel", "shape": {"kind": "cad", "file": "arm.step", **keys}}

@@ -21,7 +21,7 @@ from kedfem.links.solid import solid_link
 from kedfem.links.surfaces.candidates import surfaces
 from kedfem.links.surfaces.chosen_faces import choice_text, chosen_surface, distance, matches
 from kedfem.mesh import SolidMesh
-from kedfem.motion.closed import STILL, Shift, closed_scene
+from kedfem.motion.closed import STILL, RigidDisplacement, closed_scene
 from kedfem.motion.linkage import linkage
 from kedfem.scene import ChosenFace, Material, Scene, scene_from
 
@@ -207,7 +207,7 @@ def test_what_cannot_be_a_choice_is_refused(tmp_path: Path, faces: Any, message:
 
 def test_a_choice_goes_with_its_link_when_joints_are_closed(tmp_path: Path) -> None:
     scene = scene_with(tmp_path, {"cylinder": "8 mm", "axis": "x", "near": [0.1, 0, 0]})
-    turn = Shift(np.zeros(3), np.array([0.0, 0.0, 0.001]), np.array([0.0, 0.0, math.pi / 2]))
+    turn = RigidDisplacement(np.zeros(3), np.array([0.0, 0.0, 0.001]), np.array([0.0, 0.0, math.pi / 2]))
     (face,) = closed_scene(scene, {"part": turn, "ground": STILL}).joints["A"].chosen_faces("part")
     assert_allclose(face.axis, [0, 1, 0], atol=1e-12)
     assert_allclose(face.near, [0, 0.1, 0.001], atol=1e-12)

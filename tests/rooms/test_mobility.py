@@ -9,7 +9,7 @@ from rich.console import Console
 from kedfem.dynamics.stepping.transient import instant_in_words
 from kedfem.errors import MotionError
 from kedfem.motion.dead_point import DeadPoint
-from kedfem.motion.linkage import linkage, looser_rows, reference_linkage
+from kedfem.motion.linkage import alternative_rows, linearised_linkage, linkage
 from kedfem.motion.messages import position_in_words
 from kedfem.motion.mobility import Mobility, mobility
 from kedfem.motion.path import path
@@ -150,7 +150,7 @@ def test_bennett_hinges_hold_all_but_their_turn_twice() -> None:
 
 def test_self_stress_balances_on_every_link_and_does_no_work_in_its_joint() -> None:
     """Equilibrium by hand: forces, and moments about the centre, of the joints of each link sum to zero."""
-    drawn = reference_linkage(linkage_scene(SKEW))
+    drawn = linearised_linkage(linkage_scene(SKEW))
     stress = np.linalg.svd(drawn.J.T)[2][-3:].T
     for link in drawn.links:
         total = np.zeros((6, 3))
@@ -174,12 +174,12 @@ def test_the_remedy_leaves_the_motion_as_it_was_and_nothing_redundant(
     As drawn, and about there: half a revolution on, Bennett's linkage with a ball and a sleeve could leave its motion.
     """
     scene = linkage_scene(joints, sliders=sliders)
-    drawn = reference_linkage(scene)
-    changes, left = without_redundancy(drawn, looser_rows(scene, drawn))
+    drawn = linearised_linkage(scene)
+    changes, left = without_redundancy(drawn, alternative_rows(scene, drawn))
     assert left == 0
     other = {name: (dict(changes).get(name, joint[0]), *joint[1:]) for name, joint in joints.items()}
     cured = linkage_scene(other, sliders=sliders)
-    assert redundancy(reference_linkage(cured)) == 0
+    assert redundancy(linearised_linkage(cured)) == 0
     assert found(other, sliders=sliders).remedy == ""
     t = np.linspace(0, 1.0, 7)
     before, after = motion_at(scene, t), motion_at(cured, t)
@@ -195,7 +195,7 @@ def test_free_motions_are_told_by_the_fewest_links_that_make_them() -> None:
     joints = {name: joint for name, joint in BAR.items() if name != "D"}
     joints["E"] = ("spherical", "ground", "arm", (0.0, 1.0, 0.0))
     joints["F"] = ("prismatic", "ground", "block", (3.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    drawn = reference_linkage(linkage_scene(joints, sliders=("block",)))
+    drawn = linearised_linkage(linkage_scene(joints, sliders=("block",)))
     motions = free_motions(drawn)
     assert sorted((each.links, each.basis.shape[1], each.joints) for each in motions) == [
         (("arm",), 3, ("E",)),
@@ -214,9 +214,9 @@ def test_free_motions_are_told_by_the_fewest_links_that_make_them() -> None:
 
 
 def test_making_one_ball_a_universal_joint_stops_the_idle_spin() -> None:
-    (spin,) = free_motions(reference_linkage(linkage_scene(rssr(1.0, ball=True))))
+    (spin,) = free_motions(linearised_linkage(linkage_scene(rssr(1.0, ball=True))))
     assert remedy(spin) == "make joint B or C universal"
-    assert not free_motions(reference_linkage(linkage_scene(universal_rssr(1.0))))
+    assert not free_motions(linearised_linkage(linkage_scene(universal_rssr(1.0))))
 
 
 # -- dead points --------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kedfem.errors import MotionError
-from kedfem.motion.batch import Choice, Moving, settled
+from kedfem.motion.batch import RowSelection, SolvedMotion, newton_solution
 from kedfem.motion.constraints import ConstraintEquation, coupled, joint_rows, stacked, travel_row, turn_row
 from kedfem.motion.linkage import Linkage, linkage
 from kedfem.motion.path import continuation, path
@@ -288,7 +288,7 @@ def test_the_path_knows_that_a_turn_closes_and_where_the_linkage_is_weakest() ->
     link = linkage(linkage_scene(four_bar(0.3048, 0.9144, 0.762, 0.9144, 1.0)))
     along = path(link, 0.0, 7.0)
     assert along.periodic
-    crank = (along.weakest[1] + 1.0) % (2 * np.pi)
+    crank = (along.nearest_singularity[1] + 1.0) % (2 * np.pi)
     # the extremes of the transmission angle are at crank angles 0 and 180°: cosine rule, diagonals d ∓ a
     assert min(crank, 2 * np.pi - crank, abs(crank - np.pi)) < 0.25
     assert not path(link, -0.5, 0.5).periodic
@@ -298,11 +298,11 @@ def test_a_turn_is_followed_a_few_grid_points_at_once(monkeypatch: pytest.Monkey
     """A drag link: 31 steps of 12° and smaller ones at first; the last point, predicted from far, is the first again."""
     followed = []
 
-    def counted(link: Linkage, chosen: Choice, guess: Poses, *more: Any) -> Moving:
+    def counted(link: Linkage, chosen: RowSelection, guess: Poses, *more: Any) -> SolvedMotion:
         followed.append(len(guess[1]))
-        return settled(link, chosen, guess, *more)
+        return newton_solution(link, chosen, guess, *more)
 
-    monkeypatch.setattr(continuation, "settled", counted)
+    monkeypatch.setattr(continuation, "newton_solution", counted)
     along = path(linkage(linkage_scene(four_bar(0.92, 0.82, 0.89, 0.57, 5.75))), 0.0, 6.3)
     assert along.periodic
     assert len(followed) <= 16

@@ -117,6 +117,7 @@ RETIRED = {
     "watcher": r"(?i)\bwatcher\b|\bStepWatch\b|\b(asked_for|first_enough|last_of|let_go)\b",
     "in_common": r"\b(in_common|drawn_points|places_apart|stated_link|counted_on)\b",
     "parted": r"\b(parted|most_(segments|slices)|not_touching|in_its_plane|between_gauss|on_functions|rigid_functions)\b",
+    "looser_rows": r"\b(looser_rows|would_move|reference_linkage|of_joints|weakness)\b",
     "truth": r"\b(from|against|beside) the truth\b",
 }
 """Words of docs/notation.md that package and docs do not use any more; its names and prose have the right column."""

@@ -19,7 +19,7 @@ from kedfem.accuracy.variants import with_analysis
 from kedfem.dynamics.history import Block
 from kedfem.dynamics.stepping.scheme import stable_rotation
 from kedfem.errors import KedfemError
-from kedfem.motion.linkage import reference_linkage
+from kedfem.motion.linkage import linearised_linkage
 from kedfem.motion.released_motions import free_motions
 from kedfem.scene import Scene, time_grid, without_vibration
 
@@ -96,7 +96,7 @@ def mass_damping_warning(ready: Prepared, taken: float | None = None) -> tuple[s
         return ()
     if taken is not None and taken < LOST:
         return ()
-    meant = [each for each in free_motions(reference_linkage(scene)) if not each.spin]
+    meant = [each for each in free_motions(linearised_linkage(scene)) if not each.spin]
     if not meant:
         return ()
     links = list(dict.fromkeys(name for each in meant for name in each.links))

@@ -8,7 +8,7 @@ import scipy.linalg
 
 from kedfem.arrays import Float
 from kedfem.errors import MotionError
-from kedfem.motion.closed import Shift, closed_scene
+from kedfem.motion.closed import RigidDisplacement, closed_scene
 from kedfem.motion.constraints import GAP, ConstraintEquation, Rows, stacked
 from kedfem.motion.joint_equations import GROUND, scene_centre, undriven_rows
 from kedfem.motion.linkage import scene_size
@@ -18,9 +18,9 @@ from kedfem.motion.released_motions import RANK_TOLERANCE
 from kedfem.motion.values import Poses, features, jacobian, residuals
 from kedfem.scene import Scene
 
-MOST = 0.01  # of the linkage's size: larger misfits are faults of the drawing
-CLOSED = 1e-12  # of the size, and in radians: what rows may keep
-ROUNDING = 1e-13  # of the size, and in radians: motions that are none, such as those out of a linkage's plane
+MOST = 0.01  # of the linkage's size: larger misfits are mistakes in the scene
+CLOSED = 1e-12  # of the size, and in radians: tolerance of closed joints
+ROUNDING = 1e-13  # of the size, and in radians: smaller motions are rounding, as out of a linkage's plane
 ITERATIONS = 60
 Change = Float[np.ndarray, "n 6"]
 
@@ -30,7 +30,7 @@ class Assembly:
     """Motions of links that closed their joints; empty if no links were given apart.
 
     misfits : by joint [m], how far its links were given apart in the directions that it constrains
-    moved : by link, how far the farthest of its joints' points went [m] and how far it turned [rad]
+    moved : by link, largest displacement of its joints' points [m], and rotation [rad]
     """
 
     misfits: dict[str, float] = field(default_factory=dict)
@@ -43,7 +43,7 @@ class Assembly:
 
 
 def assembled(scene: Scene) -> tuple[Scene, Assembly]:
-    """A scene as it is analysed: with all joints closed, and what that took; of a steady motion over its period.
+    """A scene for analysis, with all joints closed, and their assembly; of a steady motion over its period.
 
     Raises
     ------
@@ -59,15 +59,15 @@ def assembled(scene: Scene) -> tuple[Scene, Assembly]:
 def _closed(scene: Scene) -> tuple[Scene, Assembly]:
     """A scene with all joints closed; the scene itself where no links are given apart.
 
-    Links are moved as rigid bodies, with all that is on them: of all motions that close the rows of joints and couplings
-    those of the least Σ |d|²/size² + |θ|², d the displacement of the mean of a link's joints, θ its turn. The drive's
-    joint moves with the others; its angle then counts from the closed position.
+    Links are moved as rigid bodies with everything attached, by the motions that satisfy the equations of joints and
+    couplings with the least Σ |d|²/size² + |θ|², d the displacement of the mean of a link's joints, θ its rotation. The
+    drive's angle then counts from the closed position.
 
     Raises
     ------
     MotionError
-        A misfit above 1 % of the linkage's size, joints that no small motions close, or shapes that cannot be turned
-        out of their plane and would have to be.
+        A misfit above 1 % of the linkage's size, joints that no small motions close, or plane shapes that would have
+        to be tilted.
     """
     if not any(joint.open for joint in scene.joints.values()):
         return scene, Assembly()
@@ -85,14 +85,15 @@ def _closed(scene: Scene) -> tuple[Scene, Assembly]:
         raise MotionError("\n".join(_refusal(scene, name, wanted, misfit) for name, misfit in misfits.items()))
     middle = scene_centre(scene)
     shifts = {
-        name: Shift(c + middle, size * x[:3], x[3:]) for name, c, x in zip(scene.links, centres, change, strict=True)
+        name: RigidDisplacement(c + middle, size * x[:3], x[3:])
+        for name, c, x in zip(scene.links, centres, change, strict=True)
     }
     ways = {name: _way(scene, name, shift) for name, shift in shifts.items()}
     return closed_scene(scene, shifts), Assembly(misfits, ways)
 
 
 def assembly_warning(assembly: Assembly) -> tuple[str, ...]:
-    """A line about links that were moved; none without any."""
+    """The warning of links that were moved; empty without any."""
     if not assembly.misfits:
         return ()
     (joint, misfit), way = assembly.worst, max(assembly.moved.values())[0]
@@ -104,14 +105,13 @@ def assembly_warning(assembly: Assembly) -> tuple[str, ...]:
 
 
 def least_change(rows: Rows, centres: Float[np.ndarray, "n 3"], size: float) -> tuple[Change, Float[np.ndarray, " m"]]:
-    """Displacements (of centres, in units of size) and rotation vectors of n bodies that close rows, of the least norm.
+    """Least-norm displacements (of centres, in units of size) and rotation vectors of n bodies that satisfy all rows.
 
-    Each iteration solves J(x) x⁺ = J(x) x − r(x) with least |x⁺|. At the end r = 0 and x is in the span of Jᵀ: no
-    change of first order makes it less.
+    Each iteration solves J(x) x⁺ = J(x) x − r(x) with least |x⁺|. At convergence r = 0 and x is in the span of Jᵀ.
 
     Returns
     -------
-    (n, 6); and (m,) what rows keep, in units of size and radians, infinite where iterations have not converged
+    (n, 6); and (m,) residuals of the rows, in units of size and radians, infinite where iterations have not converged
     """
     x, scale = np.zeros((len(centres), 6)), rows.scale(size)[: rows.count]
     for _ in range(ITERATIONS):
@@ -167,7 +167,7 @@ def _centres(scene: Scene) -> Float[np.ndarray, "n 3"]:
 
 
 def _points(scene: Scene, link: str) -> Iterator[tuple[float, float, float]]:
-    """Where the joints of a link are on it [m]."""
+    """Points of the joints on a link [m]."""
     return (joint.on(link) for joint in scene.joints.values() if link in joint.links)
 
 
@@ -190,7 +190,7 @@ def _refusal(scene: Scene, name: str, wanted: str, misfit: float) -> str:
     return f"joints.{name}.at: {wanted}, got {' and '.join(points)}, {misfit:.4g} apart"
 
 
-def _way(scene: Scene, name: str, shift: Shift) -> tuple[float, float]:
+def _way(scene: Scene, name: str, shift: RigidDisplacement) -> tuple[float, float]:
     """Displacement [m] and rotation [rad] of a link."""
     went = [float(np.linalg.norm(np.subtract(shift.point(at), at))) for at in _points(scene, name)]
     return max(went, default=0.0), float(np.linalg.norm(shift.theta))

@@ -1,4 +1,4 @@
-"""Positions at all time points at once: from a close prediction, by one or two small linear systems each.
+"""Poses at many time points at once by Newton's method, from close predictions, and their velocities and accelerations.
 
 A constant set of independent constraint equations, as many as unknowns, replaces least squares over all of them; the
 others are only checked.
@@ -18,50 +18,50 @@ from kedfem.motion.newton import (
     BlockFactor,
     Factor,
     Target,
+    constraint_values,
     driven_rows,
     factored,
     moved,
-    remainder,
     scaled,
-    stride,
+    step_size,
     twists,
 )
 from kedfem.motion.values import Features, Poses, Twists, convective, features
 
-EXACT = 1e-13  # a Newton step, of the linkage's size: rates at the poses before it are those after it
-QUADRATIC = 1e-7  # after such a step the next one would be rounding
+EXACT = 1e-13  # a Newton step, of the linkage's size, before and after which rates are equal to rounding
+QUADRATIC = 1e-7  # a Newton step after which the next one is rounding
 ITERATIONS = 12
-SPREAD = 30.0  # how much worse a square set of rows may be conditioned than all rows
-TRIES = 4  # places on a path whose own best rows are tried for all of it
-POINTS, USUAL = (250, 12)  # time points solved together, as many as stay in the cache, of linkages of so many bodies
+SPREAD = 30.0  # largest ratio of the condition of a square set of rows to that of all rows
+TRIES = 4  # places on a path whose best rows are tried for all of it
+POINTS, USUAL = (250, 12)  # time points solved together, as fit into the cache, for linkages of so many bodies
 
 Rates = tuple[Float[np.ndarray, "T D"], Float[np.ndarray, "T D"]]
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class RowSelection:
     """Rows to be solved, all or some of a linkage, with numbers of their constraints and angles; rest : to be checked."""
 
     rows: Rows
     which: Int[np.ndarray, " k"] | slice = field(default_factory=lambda: slice(None))
     angles: Int[np.ndarray, " a"] | slice = field(default_factory=lambda: slice(None))
-    rest: "Choice | None" = None
+    rest: "RowSelection | None" = None
 
     def target(self, aim: Target) -> Target:
-        """What these rows shall be."""
+        """Required values of these rows."""
         over = None if aim.over is None else aim.over[:, self.which]
         return Target(aim.q, aim.near[:, self.angles], over)
 
 
-def choice(rows: Rows, which: Int[np.ndarray, " k"]) -> Choice:
-    """Constraints picked by their numbers, all others to be checked."""
+def row_selection(rows: Rows, which: Int[np.ndarray, " k"]) -> RowSelection:
+    """The constraints with some numbers, all others to be checked."""
     others = np.setdiff1d(np.arange(rows.count), which)
     (chosen, angles), (left, their) = rows.part(which), rows.part(others)
-    return Choice(chosen, which, angles, Choice(left, others, their) if len(others) else None)
+    return RowSelection(chosen, which, angles, RowSelection(left, others, their) if len(others) else None)
 
 
 def independent(J: Float[np.ndarray, "G m k"], least: Float[np.ndarray, " G"]) -> Int[np.ndarray, " i"]:
-    """Numbers of k rows about as well conditioned as all of them at and between G places; all rows where none are.
+    """Numbers of k rows about as well conditioned as all rows at and between G places; of all rows if there are none.
 
     Parameters
     ----------
@@ -84,14 +84,14 @@ def independent(J: Float[np.ndarray, "G m k"], least: Float[np.ndarray, " G"]) -
 
 
 @dataclass(frozen=True, slots=True)
-class Moving:
+class SolvedMotion:
     """Poses and rates of all bodies at T time points.
 
     poses : R (T, B, 3, 3), p (T, B, 3)
     first, second : twists (v, ω) and their time derivatives, each a pair of (T, B, 3)
-    gap : (T,) largest gap left, in units of size; infinite where Newton has not settled
-    steps : (T,) each: of points that were solved together the Newton steps, in units of size and radians
-    factor : of these, rows at the poses
+    gap : (T,) largest residual of the joints, in units of size; infinite where Newton's method has not converged
+    steps : (T,) each, Newton steps of points that were solved together, in units of size and radians
+    factor : factored rows of these at the poses
     """
 
     poses: Poses
@@ -102,21 +102,35 @@ class Moving:
     factor: Factor | BlockFactor | None = None
 
 
-def moving(link: Linkage, chosen: Choice, guess: Poses, aim: Target, rates: Rates) -> Moving:
-    """Poses that close all joints next to a guess, and the bodies' rates at given speeds and accelerations of the drives.
+def solved_motion(
+    link: Linkage, chosen: RowSelection, guess: Poses, aim: Target, rates: Rates, few: int = 0
+) -> SolvedMotion:
+    """Poses that close all joints, from a guess, and the bodies' rates at given speeds and accelerations of the drives.
 
+    Parameters
+    ----------
     chosen : constraints to solve, square or in least squares
+    few : time points solved together; as many as fit into the cache if not given
     """
-    few = max(POINTS * USUAL // max(USUAL, len(link.bodies)), 1)
-    return _in_parts(link, chosen, guess, aim, rates, few)
+    few = few or max(POINTS * USUAL // max(USUAL, len(link.bodies)), 1)
+    blocks = [slice(k, k + few) for k in range(0, max(len(aim), 1), few)]
+    parts = [
+        newton_solution(link, chosen, (guess[0][b], guess[1][b]), aim.at(b), (rates[0][b], rates[1][b])) for b in blocks
+    ]
+    return parts[0] if len(parts) == 1 else _joined(parts)
 
 
-def settled(
-    link: Linkage, chosen: Choice, guess: Poses, aim: Target, rates: Rates, limits: tuple[float, float] = (EXACT, np.inf)
-) -> Moving:
-    """The same of all points together, with the factored rows.
+def newton_solution(
+    link: Linkage,
+    chosen: RowSelection,
+    guess: Poses,
+    aim: Target,
+    rates: Rates,
+    limits: tuple[float, float] = (EXACT, np.inf),
+) -> SolvedMotion:
+    """`solved_motion` of all points together, with the factored rows.
 
-    limits : the least step of Newton to take; a first one that is farther is not followed up
+    limits : Newton step at which iterations end; first step beyond which a point is not iterated
     """
     rows, poses, steps = chosen.rows, guess, []
     scale = rows.scale(link.size)[: rows.count]
@@ -131,11 +145,11 @@ def settled(
             x = factor.solve(rhs)
         except np.linalg.LinAlgError:
             if len(aim) > 1:
-                return _in_parts(link, chosen, poses, aim, rates, 1)
+                return solved_motion(link, chosen, poses, aim, rates, 1)
             none = np.zeros_like(poses[1]), np.zeros_like(poses[1])
-            return Moving(poses, none, none, np.full(1, np.inf))
+            return SolvedMotion(poses, none, none, np.full(1, np.inf))
         change = twists(link, x[..., 0])
-        before, step = step, stride(link, change)
+        before, step = step, step_size(link, change)
         steps.append(step)
         poses = moved(poses, change)
         unsettled = (step > limits[0]) & (before > QUADRATIC) & (steps[0] <= limits[1])
@@ -147,24 +161,17 @@ def settled(
     if chosen.rest is not None:
         gaps = np.concatenate([gaps, _gaps(link, chosen.rest, poses, aim)[1]], axis=1)
     gap = np.where(step <= SETTLED, np.abs(gaps).max(axis=1, initial=0.0), np.inf)
-    return Moving(poses, first, second, gap, steps, factor)
+    return SolvedMotion(poses, first, second, gap, steps, factor)
 
 
-def _gaps(link: Linkage, chosen: Choice, poses: Poses, aim: Target) -> tuple[Features, Float[np.ndarray, "T m"]]:
-    """How far rows are from what they shall be, in units of size, and what they are made of."""
+def _gaps(link: Linkage, chosen: RowSelection, poses: Poses, aim: Target) -> tuple[Features, Float[np.ndarray, "T m"]]:
+    """Features of rows, and their residuals in units of size."""
     own = chosen.target(aim)
     f = features(chosen.rows, poses, own.near)
-    return f, scaled(link, chosen.rows, remainder(chosen.rows, f, own))
+    return f, scaled(link, chosen.rows, constraint_values(chosen.rows, f, own))
 
 
-def _in_parts(link: Linkage, chosen: Choice, guess: Poses, aim: Target, rates: Rates, few: int) -> Moving:
-    """A few points at a time."""
-    blocks = [slice(k, k + few) for k in range(0, max(len(aim), 1), few)]
-    parts = [settled(link, chosen, (guess[0][b], guess[1][b]), aim.at(b), (rates[0][b], rates[1][b])) for b in blocks]
-    return parts[0] if len(parts) == 1 else _joined(parts)
-
-
-def _joined(parts: list[Moving]) -> Moving:
+def _joined(parts: list[SolvedMotion]) -> SolvedMotion:
     """Successive time points, one after the other."""
 
     def pair(name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -172,4 +179,4 @@ def _joined(parts: list[Moving]) -> Moving:
         return np.concatenate(one), np.concatenate(other)
 
     gap = np.concatenate([x.gap for x in parts])
-    return Moving(pair("poses"), pair("first"), pair("second"), gap)
+    return SolvedMotion(pair("poses"), pair("first"), pair("second"), gap)

@@ -17,13 +17,13 @@ from kedfem.motion.values import Features, coupled_terms, gradients
 
 
 class Plan(NamedTuple):
-    """By which JᵀJ is factored, and J multiplied, as `blocks_kernel` takes it.
+    """The plan of the factorisation of JᵀJ and of products with J, as `blocks_kernel` takes it.
 
     starts : (m + 1,) first entry of each row, and their number
     body : (e,) place of each entry's body in the order of elimination
     pairs : (n, 3) block of JᵀJ and the two entries whose product goes there
-    columns, below : (b + 1,), (blocks,) first block of each column of the factor, its diagonal, and the row of each
-    updates, of_column : (u, 3) block that two others of one column change; (b + 1,) first of each column
+    columns, below : (b + 1,), (blocks,) first block of each column of the factor, its diagonal; row of each block
+    updates, of_column : (u, 3) block changed by two others of one column, and these; (b + 1,) first of each column
     """
 
     starts: Int[np.ndarray, " m1"]
@@ -37,10 +37,10 @@ class Plan(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Blocks:
-    """Where the entries of constraint rows are, and the plan by which JᵀJ is factored.
+    """The positions of entries of constraint rows, and the plan of the factorisation of JᵀJ.
 
     row : (e,) constraint of each entry, rising
-    term, side, share : (e,) its elementary row, which of the two bodies there, and the coefficient
+    term, side, share : (e,) its elementary row, which of the two bodies of that, and the coefficient
     place : (b,) of each moving body in the order of elimination
     """
 
@@ -69,18 +69,18 @@ class Blocks:
     def least_squares(
         self, values: Float[np.ndarray, "T e 6"], rhs: Float[np.ndarray, "T m c"]
     ) -> Float[np.ndarray, "T k c"]:
-        """x that leaves least of J x = rhs.
+        """x of the least squares of J x − rhs.
 
         Raises
         ------
         LinAlgError
-            Where J has not the rank of its columns.
+            J does not have full column rank.
         """
         x = self._solved(values, rhs)[0]
         return np.moveaxis(x[:, :, self.place].reshape(*x.shape[:2], -1), 1, 2)
 
     def left(self, values: Float[np.ndarray, "T e 6"], rhs: Float[np.ndarray, "T m c"]) -> Float[np.ndarray, "T m c"]:
-        """What the least squares leave of J x = rhs: its part on the null space of Jᵀ."""
+        """Residual of the least squares of J x − rhs: the part of rhs in the null space of Jᵀ."""
         return np.swapaxes(self._solved(values, rhs)[1], 1, 2)
 
     def _solved(self, values: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -93,12 +93,12 @@ class Blocks:
         return x, left
 
     def least_norm(self, values: Float[np.ndarray, "T e 6"], rhs: Float[np.ndarray, "T b 6"]) -> Float[np.ndarray, "T m"]:
-        """The least y with Jᵀ y = rhs.
+        """The y of least norm with Jᵀ y = rhs.
 
         Raises
         ------
         LinAlgError
-            Where J has not the rank of its columns.
+            J does not have full column rank.
         """
         from kedfem.motion.blocks_kernel import least_norm
 
@@ -109,7 +109,7 @@ class Blocks:
         return y
 
     def extremes(self, values: Float[np.ndarray, "T e 6"]) -> Float[np.ndarray, "T 2"]:
-        """Greatest and least singular value of J, the latter 0 where J has not the rank of its columns."""
+        """Greatest and least singular value of J, the latter 0 where J does not have full column rank."""
         from kedfem.motion.blocks_kernel import extremes
 
         out = np.empty((len(values), 2))
@@ -178,7 +178,7 @@ def blocks(rows: Rows, bodies: int, size: float) -> Blocks:
 
 
 def _elimination(near: list[set[int]]) -> tuple[list[int], dict[int, set[int]]]:
-    """Bodies in order of least degree, and of each those later ones that its column of the factor has."""
+    """Bodies in order of minimum degree, and the later bodies in each one's column of the factor."""
     near = [set(each) for each in near]
     left, order, later = set(range(len(near))), [], {}
     while left:
@@ -193,13 +193,10 @@ def _elimination(near: list[set[int]]) -> tuple[list[int], dict[int, set[int]]]:
 
 
 def _parity(order: Int[np.ndarray, " n"]) -> int:
-    """1 of an even permutation, -1 of an odd one."""
-    seen, sign = np.zeros(len(order), bool), 1
-    for first in range(len(order)):
-        k, length = first, 0
-        while not seen[k]:
-            seen[k] = True
-            k, length = int(order[k]), length + 1
-        if length and length % 2 == 0:
-            sign = -sign
-    return sign
+    """1 of an even permutation, -1 of an odd one: by the number of its cycles."""
+    import scipy.sparse as sp
+    from scipy.sparse.csgraph import connected_components
+
+    n = len(order)
+    cycles, _ = connected_components(sp.csr_array((np.ones(n), order, np.arange(n + 1)), shape=(n, n)))
+    return -1 if (n - cycles) % 2 else 1

@@ -10,8 +10,8 @@ import numpy as np
 
 from kedfem.compiled import compiled, inner
 
-REFINEMENTS = 2  # of refinement: each takes off what the squared condition number costs
-TRIES, SETTLED = 60, 1e-5  # of the iterations for extreme singular values: relative change at which they end
+REFINEMENTS = 2  # steps of iterative refinement, for the accuracy lost by the squared condition number
+TRIES, SETTLED = 60, 1e-5  # iterations for extreme singular values; relative change at which they end
 
 
 @inner
@@ -117,7 +117,7 @@ def onto_bodies(value, plan, rows, out):  # type: ignore[no-untyped-def]
 
 @inner
 def refined(value, right, plan, L, x, left, change):  # type: ignore[no-untyped-def]
-    """x (b, 6) that leaves least of J x = right, and left (m,), what it leaves."""
+    """Fill in x (b, 6) of the least squares of J x − right, and the residual, left (m,)."""
     x[:] = 0.0
     for r in range(len(left)):
         left[r] = right[r]
@@ -134,7 +134,7 @@ def refined(value, right, plan, L, x, left, change):  # type: ignore[no-untyped-
 
 @compiled
 def least_squares(values, rhs, plan, x):  # type: ignore[no-untyped-def]
-    """x (T, c, b, 6) that leaves least of J x = rhs (T, c, m), which becomes what is left; times where defined."""
+    """Fill in x (T, c, b, 6) of the least squares of J x − rhs (T, c, m), then the residual; times where defined."""
     L = np.empty((len(plan.below), 6, 6))
     left, change = np.empty(rhs.shape[2]), np.empty(x.shape[2:])
     for t in range(len(values)):
@@ -148,7 +148,7 @@ def least_squares(values, rhs, plan, x):  # type: ignore[no-untyped-def]
 
 @compiled
 def least_norm(values, rhs, plan, y):  # type: ignore[no-untyped-def]
-    """The least y (T, m) with Jᵀ y = rhs (T, b, 6); the number of times at which that is defined."""
+    """Fill in the y (T, m) of least norm with Jᵀ y = rhs (T, b, 6); returns the number of times where it is defined."""
     L = np.empty((len(plan.below), 6, 6))
     more, left = np.empty(y.shape[1]), np.empty(rhs.shape[1:])
     for t in range(len(values)):
@@ -169,7 +169,7 @@ def least_norm(values, rhs, plan, y):  # type: ignore[no-untyped-def]
 
 @inner
 def normalised(x):  # type: ignore[no-untyped-def]
-    """Length of x (b, 6), which becomes one."""
+    """Normalise x (b, 6); returns its length."""
     size = 0.0
     for k in range(len(x)):
         for i in range(6):

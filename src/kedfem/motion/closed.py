@@ -1,4 +1,4 @@
-"""The scene with its joints closed by small rigid motions of links, which take everything on a link with them."""
+"""The scene with its joints closed by small rigid displacements of links, with everything attached to them."""
 
 import math
 from collections.abc import Mapping
@@ -36,12 +36,12 @@ from kedfem.scene.records.base import Record
 from kedfem.scene.records.joints import FaceName
 from kedfem.scene.records.points import XYZ
 
-TILTED = 1e-9  # rad: shapes that are level with the xy plane may be out of it by rounding
+TILTED = 1e-9  # rad: smaller tilts of shapes parallel to the xy plane are rounding
 AnyRecord = TypeVar("AnyRecord", bound=Record)
 
 
 @dataclass(frozen=True, slots=True)
-class Shift:
+class RigidDisplacement:
     """A rigid motion: x goes to x + d + (R − I)(x − c), R = exp([θ]×).
 
     centre, d : (3,) c and d [m]
@@ -58,12 +58,12 @@ class Shift:
         return rotation(self.theta)
 
     def point(self, x: XYZ) -> XYZ:
-        """Where a point goes; coordinates that do not change stay as they are to the last digit."""
+        """The displaced point; coordinates that do not change are exact."""
         moved = np.asarray(x) + self.d + (self.R - np.eye(3)) @ (np.asarray(x) - self.centre)
         return _three(moved)
 
     def rotated(self, a: XYZ) -> XYZ:
-        """A direction, or a vector."""
+        """A rotated direction or vector."""
         return _three(np.asarray(a) + (self.R - np.eye(3)) @ np.asarray(a))
 
 
@@ -71,16 +71,16 @@ def _three(x: Float[np.ndarray, "3"]) -> XYZ:
     return float(x[0]), float(x[1]), float(x[2])
 
 
-STILL = Shift(np.zeros(3), np.zeros(3), np.zeros(3))
+STILL = RigidDisplacement(np.zeros(3), np.zeros(3), np.zeros(3))
 
 
-def closed_scene(scene: Scene, shifts: Mapping[str, Shift]) -> Scene:
-    """A scene whose links have moved; joints have one point again, the ground stays.
+def closed_scene(scene: Scene, shifts: Mapping[str, RigidDisplacement]) -> Scene:
+    """A scene with displaced links, whose joints have one point again; the ground does not move.
 
     Raises
     ------
     MotionError
-        Shapes that cannot be drawn in their new place, all of them.
+        Shapes that cannot be placed there, all of them.
     """
     links, faults = {}, []
     for name, link in scene.links.items():
@@ -107,8 +107,8 @@ def closed_scene(scene: Scene, shifts: Mapping[str, Shift]) -> Scene:
     )
 
 
-def _moved(record: AnyRecord, shift: Shift) -> AnyRecord:
-    """What is on a link: its points, a vector in the link's frame, inertia."""
+def _moved(record: AnyRecord, shift: RigidDisplacement) -> AnyRecord:
+    """A record attached to a link: its points, vectors in the link's frame and inertia displaced."""
     given = [key for key in ("at", "centre") if getattr(record, key, None) is not None]
     change: dict[str, Any] = {key: shift.point(getattr(record, key)) for key in given}
     for key in ("vector", "end_vector") if getattr(record, "frame", None) == "link" else ():
@@ -123,16 +123,16 @@ def _moved(record: AnyRecord, shift: Shift) -> AnyRecord:
     return record.model_copy(update=change)
 
 
-def _spring(spring: Spring, shifts: Mapping[str, Shift]) -> Spring:
-    """Ends on links go with them."""
+def _spring(spring: Spring, shifts: Mapping[str, RigidDisplacement]) -> Spring:
+    """A spring with its ends displaced with their links."""
     if not isinstance(spring, LineSpring) or spring.between is None:
         return spring
     ends = tuple(_moved(end, shifts.get(end.link, STILL)) for end in spring.between)
     return spring.model_copy(update={"between": ends})
 
 
-def _joint(joint: Joint, shifts: Mapping[str, Shift]) -> Joint:
-    """A closed joint: its point is the ground's, of what slides that of the moving link; its axis likewise."""
+def _joint(joint: Joint, shifts: Mapping[str, RigidDisplacement]) -> Joint:
+    """A closed joint: its point and axis are those of the ground; the point of a sliding joint is the moving link's."""
     first, moving = joint.links[0], moving_pair(joint)[0]
     still = GROUND if GROUND in joint.links else first
     of = {"slot": first}.get(joint.kind, moving if joint.kind in DIRECTED else still)
@@ -148,8 +148,8 @@ def _joint(joint: Joint, shifts: Mapping[str, Shift]) -> Joint:
     return joint.model_copy(update=change)
 
 
-def _face(face: FaceName, shift: Shift) -> FaceName:
-    """A face of a link: what is said of its place and direction goes with it."""
+def _face(face: FaceName, shift: RigidDisplacement) -> FaceName:
+    """A chosen face of a link, with its place and direction displaced."""
     if isinstance(face, str):
         return face
     turned = {key: getattr(face, key) for key in ("plane", "axis") if getattr(face, key) is not None}
@@ -159,7 +159,7 @@ def _face(face: FaceName, shift: Shift) -> FaceName:
     return face.model_copy(update=change)
 
 
-def _link(name: str, link: LinkScene, shift: Shift) -> LinkScene:
+def _link(name: str, link: LinkScene, shift: RigidDisplacement) -> LinkScene:
     """A link with its shape moved."""
     where = f"links.{name}.shape"
     change: dict[str, Any] = {}
@@ -186,15 +186,15 @@ def _link(name: str, link: LinkScene, shift: Shift) -> LinkScene:
     return link.model_copy(update={"shape": link.shape.model_copy(update=change)})
 
 
-def _item(item: XYZ | Arc, shift: Shift) -> XYZ | Arc:
+def _item(item: XYZ | Arc, shift: RigidDisplacement) -> XYZ | Arc:
     """A corner or an arc of an outline."""
     if isinstance(item, Arc):
         return item.model_copy(update={"via": shift.point(item.via), "to": shift.point(item.to)})
     return shift.point(item)
 
 
-def _placing(shape: Cad | MeshFile, shift: Shift) -> dict[str, Any]:
-    """Where a file's origin and axes go."""
+def _placing(shape: Cad | MeshFile, shift: RigidDisplacement) -> dict[str, Any]:
+    """Displaced origin and axes of a file."""
     along = (1.0, 0.0, 0.0) if shape.towards is None else _three(np.subtract(shape.towards, shape.origin))
     flat = math.hypot(*along[:2]) / math.hypot(*along)
     z = shape.z or ((0.0, 0.0, 1.0) if flat > 1e-9 else (1.0, 0.0, 0.0))
@@ -204,23 +204,23 @@ def _placing(shape: Cad | MeshFile, shift: Shift) -> dict[str, Any]:
 
 
 def _directions(line: Polyline) -> list[tuple[XYZ, XYZ]]:
-    """The segments whose direction decides where a section is up."""
+    """The segments whose directions determine the default of `up`."""
     return list(pairwise(line.points))[: 1 if line.smooth else None]
 
 
 def _defaults(segments: list[tuple[XYZ, XYZ]]) -> list[XYZ]:
-    """Where sections of segments are up if nothing is said: z, of steep ones x."""
+    """Defaults of `up` of segments: z, of steep ones x."""
     steep = {abs(Q[2] - P[2]) >= 0.9 * math.dist(P, Q) for P, Q in segments}
     return [(1.0, 0.0, 0.0) if each else (0.0, 0.0, 1.0) for each in sorted(steep)]
 
 
-def _tilt(shift: Shift, *ups: XYZ) -> float:
-    """How far a motion turns directions [rad]."""
+def _tilt(shift: RigidDisplacement, *ups: XYZ) -> float:
+    """Largest rotation of directions [rad]."""
     return max(math.dist(shift.rotated(up), up) for up in ups)
 
 
-def _up(where: str, up: XYZ | None, segments: list[tuple[XYZ, XYZ]], shift: Shift) -> XYZ | None:
-    """Where the sections of a polyline are up after a motion."""
+def _up(where: str, up: XYZ | None, segments: list[tuple[XYZ, XYZ]], shift: RigidDisplacement) -> XYZ | None:
+    """`up` of a polyline after a displacement."""
     ups = _defaults(segments) if up is None else [up]
     if _tilt(shift, *ups) == 0.0:
         return up
@@ -230,8 +230,8 @@ def _up(where: str, up: XYZ | None, segments: list[tuple[XYZ, XYZ]], shift: Shif
     return shift.rotated(ups[0])
 
 
-def _check_level(where: str, kind: str, shift: Shift) -> None:
-    """Shapes that are level with the xy plane stay so."""
+def _check_level(where: str, kind: str, shift: RigidDisplacement) -> None:
+    """Refuse to tilt a shape parallel to the xy plane."""
     tilt = _tilt(shift, (0.0, 0.0, 1.0))
     if tilt > TILTED:
         wanted = "must be a polyline, a part from CAD or a mesh where closing the joints tilts it"

@@ -3,11 +3,11 @@
 A body's point is at p + R X (X: reference position, R = I there). All are made of three kinds of elementary rows:
 
 * gap:   b_j · (x_i − x_j)    distance of two points of bodies i and j along a direction b fixed in body j
-* turn:  a_i · b_j            cosine between directions of body i and body j: zero where they are perpendicular
-* angle: twist of body i against body j about an axis b of both, counted on beyond a revolution: the arctangent of
-         a_i · e_j − e_i · a_j over a_i · a_j + e_i · e_j, e = b × a: the same for all a across b, however the axes tilt
+* turn:  a_i · b_j            cosine of the angle between directions of bodies i and j: zero where they are perpendicular
+* angle: rotation of body i against body j about an axis b of both, unwrapped beyond a revolution: the arctangent of
+         a_i · e_j − e_i · a_j over a_i · a_j + e_i · e_j, e = b × a: the same for all a across b, also for tilted axes
 
-A constraint is an elementary row, plus further ones with constant coefficients, less the value of a drive: zero.
+A constraint is that an elementary row, plus further ones with constant coefficients, less the value of a drive is zero.
 """
 
 from dataclasses import dataclass, field, replace
@@ -22,16 +22,16 @@ GAP, TURN, ANGLE = 0, 1, 2
 Vector = Float[np.ndarray, "3"]
 CONSTRAINED = {
     "spherical": ("xyz", ""),
-    "universal": ("xyz", ""),  # and the turn about the normal of its cross
+    "universal": ("xyz", ""),  # and the rotation about the normal of its cross
     "revolute": ("xyz", "xy"),
     "weld": ("xyz", "xyz"),
     "prismatic": ("xy", "xyz"),
     "cylindrical": ("xy", "xy"),
-    "screw": ("xy", "xy"),  # and the turn that goes with its travel
+    "screw": ("xy", "xy"),  # and the rotation that its travel determines
     "planar": ("z", "xy"),
     "slot": ("xy", ""),
 }
-"""Axes along which each kind constrains gaps, and about which turns; z is the joint's axis. The rest it releases."""
+"""Axes along and about which each kind constrains translations and rotations; z is the joint's axis."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class ConstraintEquation:
     a : gap: point of body i [m]; turn, angle: direction in body i [-]; reference components
     b : direction in body j (angle: the axis), reference components
     joint : name, for messages
-    a_j : gap: the point of body j [m]; angle: where a points in body j at no turn; None: as a, the joint drawn closed
+    a_j : gap: the point of body j [m]; angle: direction of a in body j at angle zero; None: as a, of a closed joint
     plus : further elementary rows, each with its coefficient
     drive : number of the drive whose value the row takes; None: the row is zero
     """
@@ -69,7 +69,7 @@ def perpendiculars(axis: Vector) -> tuple[Vector, Vector]:
 def joint_rows(
     kind: str, name: str, i: int, j: int, point: Vector, axis: Vector | tuple[Vector, Vector] | None
 ) -> list[ConstraintEquation]:
-    """Rows of a joint between bodies i and j; of a slot i has the pin and j the line. Of a screw without its lead.
+    """Rows of a joint between bodies i and j, of a slot with the pin and the line; of a screw without its lead.
 
     Parameters
     ----------
@@ -94,12 +94,12 @@ def joint_rows(
 
 
 def turn_row(name: str, i: int, j: int, axis: Vector) -> ConstraintEquation:
-    """The turn of body i against body j about an axis."""
+    """Rotation of body i against body j about an axis."""
     return ConstraintEquation(ANGLE, i, j, perpendiculars(axis)[0], axis, name)
 
 
 def travel_row(name: str, i: int, j: int, point: Vector, axis: Vector) -> ConstraintEquation:
-    """The travel of body i's point against body j along an axis."""
+    """Travel of body i's point against body j along an axis."""
     return ConstraintEquation(GAP, i, j, point, axis, name)
 
 
@@ -133,7 +133,7 @@ class Rows:
     drive : (m,) number of the drive whose value a constraint takes; -1: none
     gaps, angles : numbers of elementary rows of these kinds
     driven : numbers of constraints that take a drive's value
-    body, vector : (3 E + 4 A,), (3 E + 4 A, 3) vectors that turn with bodies: a, a_j, b; of angles a, b × a, a_j, b × a_j
+    body, vector : (3 E + 4 A,), (3 E + 4 A, 3) vectors fixed in bodies: a, a_j, b; of angles a, b × a, a_j, b × a_j
     """
 
     kind: np.ndarray
@@ -166,11 +166,11 @@ class Rows:
         return len(self.drive)
 
     def scale(self, size: float) -> Float[np.ndarray, " E"]:
-        """Factors that make gaps comparable with turns."""
+        """Factors of the rows: one over size for gaps."""
         return np.where(self.kind == GAP, 1 / size, 1.0)
 
     def part(self, which: Int[np.ndarray, " k"]) -> "tuple[Rows, Int[np.ndarray, ' a']]":
-        """Some of the constraints, and which of the angles are among their elementary rows."""
+        """Some of the constraints, and numbers of the angles among their elementary rows."""
         renumbered = {int(k): n for n, k in enumerate(which)}
         plus = [(renumbered[k], row, c) for k, row, c in self.plus if k in renumbered]
         every = np.array([*which, *(row for _, row, _ in plus)], int)

@@ -31,7 +31,7 @@ class Coordinate:
     body, other : numbers of the body that moves and the one that it moves against
     at : the joint's point in the reference position [m]
     axis : unit vector in the other body, in the reference position, that it is about or along
-    mark : of an angle, the direction in the moving body, in the reference position, whose turn is measured
+    mark : of an angle, the direction in the moving body, in the reference position, whose rotation is measured
     """
 
     joint: str
@@ -77,7 +77,7 @@ def driven_names(scene: Scene, joint: str) -> list[str]:
 
 
 def unwrapped(angle: Float[np.ndarray, "T c"], before: Float[np.ndarray, " c"] | None) -> Float[np.ndarray, "T c"]:
-    """Angles beyond ±π, from the last ones of the time before on [rad]."""
+    """Angles beyond ±π, continuous with those of the time point before, if given [rad]."""
     if before is None:
         return np.asarray(np.unwrap(angle, axis=0))
     return np.asarray(np.unwrap(np.vstack([before, angle]), axis=0)[1:])
@@ -89,7 +89,7 @@ def _of(name: str, joint: Joint, linkage: Linkage) -> list[Coordinate]:
     at, none = np.asarray(joint.at), np.zeros(3)
     if joint.axes is not None:
         first, second = (coordinate_axis(joint, link) for link in (one, other))
-        return [  # the cross bears both axes: one's arm is seen to turn about the other's
+        return [  # the cross has both axes: each rotates about the other
             Coordinate(name, f"angle_about_{other}", "angle", body, against, at, second, first),
             Coordinate(name, f"angle_about_{one}", "angle", against, body, at, first, second),
         ]

@@ -1,4 +1,4 @@
-"""Angles counted on from one time point to the next, as laws over an angle need beyond half a revolution."""
+"""Angles unwrapped from one time point to the next, as laws over an angle need beyond half a revolution."""
 
 from collections.abc import Iterator
 
@@ -13,11 +13,11 @@ from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path, place_on
 from kedfem.scene import AngleLimit, Scene, TorsionSpring, corotational, path_parameter, time_grid
 
-MOST = 0.9 * np.pi  # between two time points [rad]: below half a turn, so that elastic motion does not matter
+MOST = 0.9 * np.pi  # between two time points [rad]: less than half a revolution, with a margin for elastic motion
 
 
 def require_counted(scene: Scene, link: Linkage, along: Path) -> None:
-    """Refuse time points between which a joint rotates so far that its direction is unknown to laws that count.
+    """Refuse time points between which a joint rotates so far that its revolutions cannot be counted for laws.
 
     Raises
     ------
@@ -42,10 +42,8 @@ def require_counted(scene: Scene, link: Linkage, along: Path) -> None:
 
 
 def _counting(scene: Scene) -> Iterator[tuple[str, str, str | None]]:
-    """Joints whose revolutions are counted, by place, and for a universal one the link about whose axis.
-
-    Laws do, and with co-rotational frames gears and threads.
-    """
+    """Place in the scene, joint, and link about whose axis, of angles whose revolutions are counted: for laws, and with
+    co-rotational frames for gears and screws."""
     for name, spring in scene.springs.items():
         if isinstance(spring, TorsionSpring):
             yield f"springs.{name}", spring.joint, spring.about
@@ -65,9 +63,7 @@ def _counting(scene: Scene) -> Iterator[tuple[str, str, str | None]]:
 def angle_along(
     scene: Scene, link: Linkage, along: Path, name: str, tau: Float[np.ndarray, " T"], about: str | None = None
 ) -> Float[np.ndarray, " T"]:
-    """Angle of a joint about its axis at places of the path, counted from the reference position [rad].
-
-    The grid of the path is fine enough for that.
+    """Angle of a joint about its axis at places of the path, unwrapped from the reference position [rad].
 
     Parameters
     ----------

@@ -7,12 +7,12 @@ import numpy as np
 from kedfem.arrays import Float
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import moved
-from kedfem.motion.path import Path, aimed, predicted
+from kedfem.motion.path import Path, predicted, target_on_path
 from kedfem.motion.values import Poses, features, jacobian
 from kedfem.scene import Scene
 
 SEARCHED = np.radians(60.0)  # joints, and drives beyond their range (slides by size, times by a quarter of the path)
-INWARD = 0.01  # of a step of the path: how far apart places are from which it is led on
+INWARD = 0.01  # of a step of the path: distance of places from which it is extrapolated
 FOLD, CROSSING = 0.5, 1.0  # powers of the distance with which the least singular value vanishes
 
 
@@ -20,15 +20,14 @@ FOLD, CROSSING = 0.5, 1.0  # powers of the distance with which the least singula
 class DeadPoint:
     """The position of the drive's range at which a linkage is nearest to a dead point.
 
-    weakness : smallest singular value of the rows there, of the largest
-    tau : place on the path: turn or travel of the drive, of several the time [rad, m or s]
-    joint, off : the joint that would have to turn most to get into a dead point, and by how much [rad], estimated; None
-        where that is far
-    outside : τ at which the path, led on beyond that end, would meet one, estimated; None if the weakest
-        position is not at an end, or that is far
+    reciprocal_condition : smallest singular value of the rows there, of the largest
+    tau : place on the path: angle or travel of the drive, of several drives the time [rad, m or s]
+    joint, off : the joint with the largest rotation to the dead point, and that rotation [rad], estimated; None if far
+    outside : τ of the dead point of the path extrapolated beyond that end, estimated; None if the position is not at an
+        end, or the dead point is far
     """
 
-    weakness: float
+    reciprocal_condition: float
     tau: float
     joint: str | None = None
     off: float = 0.0
@@ -37,11 +36,11 @@ class DeadPoint:
 
 def nearest_dead_point(scene: Scene, link: Linkage, along: Path) -> DeadPoint:
     """The weakest position on a path, and the dead point beside it."""
-    weakness, tau = along.weakest
+    reciprocal_condition, tau = along.nearest_singularity
     k = int(np.abs(along.phi - tau).argmin())
     joint, off = _off(scene, link, (along.R[k : k + 1], along.p[k : k + 1]), along.near[k : k + 1])
     ends = not along.periodic and k in {0, len(along.phi) - 1}
-    return DeadPoint(weakness, tau, joint, off, _outside(link, along, k) if ends else None)
+    return DeadPoint(reciprocal_condition, tau, joint, off, _outside(link, along, k) if ends else None)
 
 
 def _rows(link: Linkage, poses: Poses, near: Float[np.ndarray, "T A"]) -> Float[np.ndarray, "T m k"]:
@@ -50,10 +49,10 @@ def _rows(link: Linkage, poses: Poses, near: Float[np.ndarray, "T A"]) -> Float[
 
 
 def _off(scene: Scene, link: Linkage, poses: Poses, near: Float[np.ndarray, "1 A"]) -> tuple[str | None, float]:
-    """The joint that turns most on the way to the singular position, and by how much.
+    """The joint with the largest rotation to the singular position, and that rotation.
 
-    All bodies are moved along the motion v that the rows hold least, joints left open to second order, until uᵀ J v is
-    zero; here it is the smallest singular value.
+    All bodies are moved along the right singular vector v of the smallest singular value uᵀ J v until that is zero, with
+    joints closed to first order.
     """
     U, _, Vt = np.linalg.svd(_rows(link, poses, near)[0], full_matrices=False)
     u, v = U[:, -1], Vt[-1]
@@ -78,7 +77,7 @@ def _off(scene: Scene, link: Linkage, poses: Poses, near: Float[np.ndarray, "1 A
 
 
 def _outside(link: Linkage, along: Path, k: int) -> float | None:
-    """Where beyond an end of the path the least singular value σ would vanish.
+    """τ beyond an end of the path at which the least singular value σ vanishes.
 
     With x inward from the end, d to the dead point: σ² = c (d + x) at a limit of the drive, σ = c (d + x) where two
     branches meet; whichever fits three points of the path better.
@@ -88,13 +87,13 @@ def _outside(link: Linkage, along: Path, k: int) -> float | None:
         return None
     x = min(INWARD * link.drives.step(low, high), (high - low) / 2) * np.arange(3)
     tau = along.phi[k] + (x if k == 0 else -x)
-    s = np.linalg.svd(_rows(link, predicted(along, tau), aimed(link, along, tau).near), compute_uv=False)
+    s = np.linalg.svd(_rows(link, predicted(along, tau), target_on_path(link, along, tau).near), compute_uv=False)
     sigma = s[:, -1] / s[:, 0]
     trials = []
     for power in (FOLD, CROSSING):
         y = sigma ** (1 / power)
         slope = (y[1] - y[0]) / x[1]
-        change = abs(y[2] - y[0])  # none of a linkage whose drives leave its shape as it is
+        change = abs(y[2] - y[0])  # zero for a linkage whose drives do not change its shape
         misfit = abs(y[0] + slope * x[2] - y[2]) / change if change > 0.0 else np.inf
         trials.append((misfit, y[0] / slope if slope > 0 else np.inf))
     distance = float(min(trials)[1])

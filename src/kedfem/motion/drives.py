@@ -1,4 +1,4 @@
-"""Drives along the path of a linkage: the parameter τ is the angle or travel of one drive, of several drives the time."""
+"""Drives of a linkage over the parameter τ of its path: angle or travel of a single drive, the time with several."""
 
 from dataclasses import dataclass
 
@@ -39,7 +39,7 @@ class Drives:
         return q, q1, q2
 
     def step(self, low: float, high: float) -> float:
-        """Steps of τ between two values in which no drive moves by more than STEP, nor τ farther than a sixteenth."""
+        """Step of τ between two values: no drive moves by more than STEP in it, nor τ by more than a sixteenth."""
         if len(self) == 1:
             return float(STEP) * self.units[0]
         speeds = np.abs(self.at(np.linspace(low, high, SAMPLES))[1]) / np.array(self.units)
@@ -47,7 +47,7 @@ class Drives:
         return float(STEP / max(fastest, least))
 
     def period(self) -> float:
-        """τ after which all that is driven may be back for the first time; infinite if not all drives turn steadily."""
+        """τ of the first possible return of all drives; infinite unless all rotate at constant speed."""
         if len(self) == 1:
             return 2 * np.pi if self.turning[0] else np.inf
         if not self.laws or not all(self.turning) or any(x.kind != "constant_speed" for x in self.laws):

@@ -20,18 +20,18 @@ from kedfem.scene import Scene, path_parameter
 from kedfem.vectors import cross
 
 TURNING = {"revolute", "screw"}  # joints whose speed is a rotation, of the others it is along the axis
-REACHED = 1e-6  # of the fastest speed: velocities that far off are not what was asked for
+REACHED = 1e-6  # of the fastest speed: tolerance of requested speeds
 AXES = "xyz"
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
-    """One speed that a scene asks for.
+class RequestedSpeed:
+    """One requested speed of a scene.
 
     where, unit : for messages
     row : (6 B,) its row on the twists (v, ω) of all bodies, ground first, v at the linkage's centre
     value : [m/s or rad/s]
-    rigid : what the rigid-body motion gives of it
+    rigid : its value in the rigid-body motion
     """
 
     where: str
@@ -42,7 +42,7 @@ class Wanted:
 
     @property
     def more(self) -> float:
-        """What is to be added to the rigid-body motion."""
+        """Difference from the rigid-body motion."""
         return self.value - self.rigid
 
 
@@ -57,21 +57,20 @@ class Start:
 def initial_twists(
     scene: Scene, linkage: Linkage, along: Path
 ) -> tuple[Float[np.ndarray, "B 3"], Float[np.ndarray, "B 3"]]:
-    """Velocities to add to those of the rigid-body motion, in its position at the start, for the speeds asked for.
+    """Velocities to add to those of the rigid-body motion at the start, for the requested speeds.
 
-    All joints allow them with the drive held. What the speeds leave open: joints that are not named move as little
-    against each other as can be, in the sum of squares (slides per size of the linkage); after that bodies as little as
-    can be.
+    They are compatible with all joints, the drive held. Among these, joints without a requested speed have the least
+    speeds, in the sum of squares (slides per size of the linkage), and then bodies.
 
     Returns
     -------
     v, omega : (B, 3) each [m/s, rad/s]
-        Velocity of the point that is drawn at the origin, as in `RigidMotion`, and rotational speed; ground first.
+        Velocity of the reference origin, as in `RigidMotion`, and angular velocity; ground first.
 
     Raises
     ------
     MotionError
-        If the joints do not allow these speeds: naming them, with what was asked for and the closest that is possible.
+        If the joints do not allow these speeds: with the requested speeds and the closest possible ones.
     """
     bodies, size, given = len(linkage.bodies), linkage.size, scene.analysis.initial_speeds
     twists = np.zeros((bodies, 6))
@@ -106,12 +105,12 @@ def _start(linkage: Linkage, motion: RigidMotion) -> Start:
 def _least(
     A: Float[np.ndarray, "w f"], b: Float[np.ndarray, " w"], C: Float[np.ndarray, "c f"]
 ) -> Float[np.ndarray, " f"]:
-    """x nearest to A x = b, of these the least |C x|, of these the least |x|; rows of A are near 1 or as good as zero."""
+    """x of least |A x − b|, of these of least |C x|, of these of least |x|; rows of A have length 1 or are rounding."""
     A = np.where(np.linalg.norm(A, axis=1, keepdims=True) > RANK_TOLERANCE, A, 0.0)
     x = scipy.linalg.lstsq(A, b, cond=RANK_TOLERANCE)[0]
     Z = scipy.linalg.null_space(A, rcond=RANK_TOLERANCE)
     if Z.shape[1] and len(C):
-        # of the size of C: where x leaves C x no way to change, C Z is rounding, and its own size shows nothing
+        # relative to C: where C x cannot change, C Z is rounding
         U, s, Vt = np.linalg.svd(C @ Z, full_matrices=False)
         determined = s > RANK_TOLERANCE * np.linalg.norm(C, 2)
         x = x - Z @ (Vt[determined].T @ ((U[:, determined].T @ (C @ x)) / s[determined]))
@@ -119,7 +118,7 @@ def _least(
 
 
 def _allowed(linkage: Linkage, poses: Poses) -> Float[np.ndarray, "k f"]:
-    """Orthonormal basis of the scaled twists that all joints allow in a position, the drive held but nothing else."""
+    """Orthonormal basis of the scaled twists that all joints allow in a position with the drive held."""
     bodies = len(linkage.bodies)
     held = len(linkage.joints) - (linkage.mobility if linkage.drive else 0)
     if not held:
@@ -128,14 +127,14 @@ def _allowed(linkage: Linkage, poses: Poses) -> Float[np.ndarray, "k f"]:
     return np.asarray(scipy.linalg.null_space(J[:held], rcond=RANK_TOLERANCE))
 
 
-def _wanted(scene: Scene, linkage: Linkage, poses: Poses) -> Iterator[Wanted]:
-    """All speeds that a scene asks for, of joints and of links, where these are at the start."""
+def _wanted(scene: Scene, linkage: Linkage, poses: Poses) -> Iterator[RequestedSpeed]:
+    """All requested speeds of a scene, of joints and of links in their poses at the start."""
     bodies = len(linkage.bodies)
     for name, value in scene.analysis.initial_speeds.items():
         turns = scene.joints[name].kind in TURNING
         row = stacked([coordinate_row(scene, name, linkage.bodies, turns)])
         rates = np.append(np.zeros(6), jacobian(row, features(row, poses), bodies)[0, 0])
-        yield Wanted(f"analysis.initial_speeds.{name}", "rad/s" if turns else "m/s", rates, value)
+        yield RequestedSpeed(f"analysis.initial_speeds.{name}", "rad/s" if turns else "m/s", rates, value)
     for name, motion in scene.analysis.initial_motions.items():
         k = linkage.bodies.index(name)
         turn = -cross_matrix(poses[0][0, k] @ (np.asarray(motion.at) - linkage.centre))
@@ -147,15 +146,15 @@ def _wanted(scene: Scene, linkage: Linkage, poses: Poses) -> Iterator[Wanted]:
                 rates = np.zeros((bodies, 2, 3))
                 rates[k] = blocks[0][c], blocks[1][c]
                 where = f"analysis.initial_motions.{name}.{key} along {AXES[c]}"
-                yield Wanted(where, unit, rates.ravel(), value)
+                yield RequestedSpeed(where, unit, rates.ravel(), value)
 
 
-def _check_reached(asked: list[Wanted], got: Float[np.ndarray, " w"], size: float) -> None:
+def _check_reached(asked: list[RequestedSpeed], got: Float[np.ndarray, " w"], size: float) -> None:
     """Raise an error for speeds that the joints do not allow together; of rotations at an arm of the linkage's size.
 
     Parameters
     ----------
-    got : what is added to the rigid-body motion
+    got : speeds added to the rigid-body motion
     """
     arms = np.array([1.0 if each.unit == "m/s" else size for each in asked])
     more, values = np.array([each.more for each in asked]), np.array([[each.value, each.rigid] for each in asked])

@@ -46,7 +46,7 @@ def unit(axis: tuple[float, float, float]) -> Float[np.ndarray, "3"]:
 
 
 def joint_axis(joint: Joint) -> Float[np.ndarray, "3"]:
-    """Unit vector of a joint that has an axis: the scene gives one to hinges and asks sliding joints for theirs."""
+    """Unit vector of a joint's axis; the default, of hinges, is z."""
     return unit(joint.axis or (0.0, 0.0, 1.0))
 
 
@@ -71,7 +71,7 @@ def rows_of(
 
 
 def moving_pair(joint: Joint) -> tuple[str, str]:
-    """The link of a joint that its turn and travel are of, and the other: the first that is not the ground."""
+    """The link of a joint whose coordinates are meant, the first that is not the ground, and the other."""
     one, other = joint.links
     return (other, one) if one == GROUND else (one, other)
 
@@ -96,7 +96,7 @@ def coordinate_axis(joint: Joint, about: str | None = None, along: XYZ | None = 
 
     Parameters
     ----------
-    about : of a universal joint, the link about whose axis the other's is seen to rotate, as the cross has both
+    about : of a universal joint, the link about whose axis the other link's rotates, as the cross has both
     along : of a planar joint, a direction in its plane
     """
     if about is not None and joint.axes is not None:
@@ -107,7 +107,7 @@ def coordinate_axis(joint: Joint, about: str | None = None, along: XYZ | None = 
 def coordinate_row(
     scene: Scene, name: str, bodies: tuple[str, ...], turns: bool, about: str | None = None, along: XYZ | None = None
 ) -> ConstraintEquation:
-    """Turn or travel of a joint; about and along as of `coordinate_axis`."""
+    """Rotation or travel of a joint; about and along as of `coordinate_axis`."""
     joint, axis = scene.joints[name], coordinate_axis(scene.joints[name], about, along)
     one, other = ordered(joint, about)
     i, j = bodies.index(one), bodies.index(other)
@@ -119,7 +119,7 @@ def coordinate_row(
 
 
 def cross_row(joint: Joint, name: str, bodies: tuple[str, ...], about: str) -> ConstraintEquation:
-    """The sine of a universal joint's angle about the axis of its other link, whatever that about its own."""
+    """The sine of a universal joint's angle about the axis of its other link, at any angle about its own."""
     other = next(link for link in joint.links if link != about)
     axis = coordinate_axis(joint, about)
     normal = cross(axis, coordinate_axis(joint, other))
@@ -127,7 +127,7 @@ def cross_row(joint: Joint, name: str, bodies: tuple[str, ...], about: str) -> C
 
 
 def driven_row(scene: Scene, name: str, bodies: tuple[str, ...]) -> ConstraintEquation:
-    """Turn or travel that one of `Scene.all_drives` prescribes."""
+    """Rotation or travel that one of `Scene.all_drives` prescribes."""
     drive = scene.all_drives[name]
     return coordinate_row(scene, drive.joint, bodies, not driven_travel(scene, name), drive.about, drive.along)
 
@@ -159,7 +159,7 @@ def joint_free_rows(scene: Scene, name: str, bodies: tuple[str, ...]) -> list[Co
 
 
 def plane_rows(bodies: tuple[str, ...]) -> list[ConstraintEquation]:
-    """Rows that hold all links in planes z = constant."""
+    """Rows that constrain all links to planes z = constant."""
     numbers, origin, z = range(1, len(bodies)), np.zeros(3), np.eye(3)[2]
     return [row for k in numbers for row in joint_rows("planar", PLANE, k, 0, origin, z)]
 

@@ -1,7 +1,7 @@
 """The linkage as rigid bodies and constraint equations; its mobility and redundancy in the reference position.
 
-With co-rotational frames motions may be free. In the rigid-body motion the joints with free motions stay in the
-reference position while the drive moves the rest; without a drive the linkage is at rest.
+With co-rotational frames motions may be free. In the rigid-body motion joints with free motions are locked in the
+reference position while the drive moves the others; without a drive the linkage is at rest.
 """
 
 from dataclasses import dataclass, replace
@@ -29,29 +29,38 @@ from kedfem.motion.joint_equations import (
     undriven_rows,
 )
 from kedfem.motion.parts import parts
-from kedfem.motion.redundancy import LOOSER, Looser, would_move
-from kedfem.motion.released_motions import RANK_TOLERANCE, Reference, free_motions, listed, null_space, planar, rank, span
+from kedfem.motion.redundancy import ALTERNATIVES, AlternativeRows, mobilising_change
+from kedfem.motion.released_motions import (
+    RANK_TOLERANCE,
+    LinearLinkage,
+    free_motions,
+    listed,
+    null_space,
+    planar,
+    rank,
+    span,
+)  # fmt: skip
 from kedfem.motion.released_motions import remedy as held_by
 from kedfem.motion.values import Poses, features, jacobian
 from kedfem.scene import Scene, corotational_links, driven_travel, plane_scene
 
-# by so much less counts each further joint motion, so that rounding chooses none that is to be held
+# relative weight by which later joint motions count less, so that rounding does not choose the locked ones
 FIRST = 1e-6
-MANY = 12  # bodies up to which the rows are solved as one matrix: about as fast then, and in the least squares of QR
+MANY = 12  # bodies up to which the rows are solved as one dense matrix, which is about as fast, and by QR
 
 
 @dataclass(frozen=True, slots=True)
 class Linkage:
-    """Bodies (ground first) and all rows of joints, couplings and drives; also those that hold free motions.
+    """Bodies (ground first) and all rows of joints, couplings and drives, and those that lock free motions.
 
     bodies : names
     rows : as arrays
     joints : for each row the joint's name, or that of the coupling as `gears.NAME`
-    size : characteristic length, makes rows and columns comparable [m]
-    centre : of the joints, and reference point of all poses, so that the scene may lie far from the origin [m]
-    drives : what is driven
-    mobility : free motions that the drives leave, of a plane scene in its plane; as many rows, the last ones, hold these
-    blocks : how rows are solved entry by entry, of linkages of many bodies
+    size : characteristic length by which rows and columns are scaled [m]
+    centre : mean of the joints, the reference point of all poses, as the scene may lie far from the origin [m]
+    drives : its drives
+    mobility : number of free motions with drives held, of a plane scene in its plane, locked by as many last rows
+    blocks : sparse solution of the rows, of linkages of many bodies
     """
 
     bodies: tuple[str, ...]
@@ -70,10 +79,10 @@ class Linkage:
 
     @property
     def redundant(self) -> tuple[str, ...]:
-        """Joints whose rows repeat what others already hold in the reference position, by rank-revealing QR of Jᵀ."""
+        """Joints with redundant rows in the reference position, by rank-revealing QR of Jᵀ."""
         if not self.joints:
             return ()
-        J = resting_jacobian(self.rows, len(self.bodies), self.size)
+        J = reference_jacobian(self.rows, len(self.bodies), self.size)
         _, r, pivot = scipy.linalg.qr(J.T, pivoting=True, mode="economic")
         rank = int((np.abs(np.diag(r)) > RANK_TOLERANCE * abs(r[0, 0])).sum())
         return tuple(sorted({self.joints[k] for k in pivot[rank:]}))
@@ -85,7 +94,7 @@ def linkage(scene: Scene) -> Linkage:
     Raises
     ------
     SceneError
-        A record that was made beside `scene_from`, so that its tables have not been checked against each other.
+        A record that was not made by `scene_from`, whose tables have not been checked against each other.
     MotionError
         If a driven linkage cannot move, has a dead point in the reference position, or keeps a free motion of links with
         rigid-body frames.
@@ -104,23 +113,22 @@ def linkage(scene: Scene) -> Linkage:
         every_part = parts(stacked(held), [row.joint for row in held], len(bodies))
         free = 6 * (len(bodies) - 1) - sum(part.rank(rest, size) for part in every_part)
     elif several is None or not _well_driven(every, several, size):
-        reference = reference_linkage(scene, rows)
+        reference = linearised_linkage(scene, rows)
         if plane_scene(scene):
             across = _across(reference, bodies)
             rows = rows + across
-            reference = planar(reference_linkage(scene, rows) if across else reference)
+            reference = planar(linearised_linkage(scene, rows) if across else reference)
         free = _check_mobility(scene, reference)
         rows = rows + _holding(scene, reference, free)
         every = stacked(rows)
         several = several and blocks(every, len(bodies), size)
-    joints = tuple(row.joint for row in rows)
-    return Linkage(bodies, every, joints, size, scene_centre(scene), driven, free, several)
+    return Linkage(bodies, every, tuple(row.joint for row in rows), size, scene_centre(scene), driven, free, several)
 
 
 def _well_driven(rows: Rows, plan: Blocks, size: float) -> bool:
-    """Whether joints and drives hold every motion at first, and each drive can move alone: nothing is to be refused.
+    """Whether joints and drives constrain every motion in the reference position, and each drive can move alone.
 
-    J has the rank of its columns, and its least squares leave nothing of the rates at which one drive moves.
+    J has full column rank, and its least squares have no residual for the rate of a single drive.
     """
     values = plan.values(rows, features(rows, resting_poses(plan.count + 1)), size)
     greatest, least = plan.extremes(values)[0]
@@ -133,27 +141,27 @@ def _well_driven(rows: Rows, plan: Blocks, size: float) -> bool:
 
 
 def _all_rows(scene: Scene) -> tuple[list[ConstraintEquation], Drives]:
-    """All rows of joints, couplings and drives, and these."""
+    """All rows of joints, couplings and drives, and the drives."""
     driven, bodies = drives(scene, scene_size(scene)), body_names(scene)
     driving = [replace(driven_row(scene, name, bodies), drive=k) for k, name in enumerate(scene.all_drives)]
     return undriven_rows(scene) + driving, driven
 
 
-def reference_linkage(scene: Scene, rows: list[ConstraintEquation] | None = None) -> Reference:
-    """A scene's linkage to first order in the reference position, with all its rows unless given; nothing is refused."""
+def linearised_linkage(scene: Scene, rows: list[ConstraintEquation] | None = None) -> LinearLinkage:
+    """A scene's linkage linearised in the reference position, by all its rows if none are given; nothing is refused."""
     bodies, size, rows = body_names(scene), scene_size(scene), rows or _all_rows(scene)[0]
     J, names = reference_jacobian(rows, len(bodies), size), tuple(row.joint for row in rows)
     moves = np.array([row.drive is not None for row in rows], bool)
-    return Reference(J, names, moves, bodies[1:], scene.joints, scene_centre(scene), size)
+    return LinearLinkage(J, names, moves, bodies[1:], scene.joints, scene_centre(scene), size)
 
 
-def looser_rows(scene: Scene, reference: Reference) -> Looser:
-    """Rows that joints would have if they were of a kind that constrains less; driven joints are left as they are."""
+def alternative_rows(scene: Scene, reference: LinearLinkage) -> AlternativeRows:
+    """Rows of joints if they were of another kind that constrains less; not of driven joints."""
     bodies = (GROUND, *reference.links)
     out = {}
-    every = sorted(scene.joints.items(), key=lambda each: GROUND in each[1].links)  # bearings stay, if they can
+    every = sorted(scene.joints.items(), key=lambda each: GROUND in each[1].links)  # those of the ground last
     for name, joint in every:
-        for kind in LOOSER.get(joint.kind, ()) if name not in scene.driven_joints else ():
+        for kind in ALTERNATIVES.get(joint.kind, ()) if name not in scene.driven_joints else ():
             rows = rows_of(scene, name, bodies, reference.centre, kind)
             out[name, kind] = reference_jacobian(rows, len(bodies), reference.size)
     return out
@@ -165,28 +173,24 @@ def resting_poses(bodies: int) -> Poses:
 
 
 def scene_size(scene: Scene) -> float:
-    """Characteristic length [m]: from joint to joint, the farthest; the same however the scene is turned."""
+    """Characteristic length [m]: the largest distance of two joints, the same in a rotated scene."""
     points = joint_points(scene)
     return float(max((np.linalg.norm(points - point, axis=1).max() for point in points), default=0.0)) or 1.0
 
 
-def reference_jacobian(rows: list[ConstraintEquation], bodies: int, size: float) -> Float[np.ndarray, "m k"]:
-    """Row derivatives in the reference position, lengths divided by `size`."""
-    return resting_jacobian(stacked(rows), bodies, size)
+def reference_jacobian(rows: list[ConstraintEquation] | Rows, bodies: int, size: float) -> Float[np.ndarray, "m k"]:
+    """Derivatives of rows in the reference position, lengths divided by `size`."""
+    every = rows if isinstance(rows, Rows) else stacked(rows)
+    return np.asarray(jacobian(every, features(every, resting_poses(bodies)), bodies, size)[0])
 
 
-def resting_jacobian(rows: Rows, bodies: int, size: float) -> Float[np.ndarray, "m k"]:
-    """The same of rows that are arrays already."""
-    return np.asarray(jacobian(rows, features(rows, resting_poses(bodies)), bodies, size)[0])
-
-
-def _check_mobility(scene: Scene, reference: Reference) -> int:
-    """How many motions the drive releases; they must be of links with co-rotational frames."""
+def _check_mobility(scene: Scene, reference: LinearLinkage) -> int:
+    """Number of free motions with drives held, which must be of links with co-rotational frames."""
     k, drives = int(reference.J.shape[1]), int(reference.driven.sum())
     free, mobility = k - rank(reference.J), k - rank(reference.J[~reference.driven])
     driven = ", ".join(f"joints.{name}" for name in scene.driven_joints)
     if mobility == 0:
-        moves = would_move(reference, looser_rows(scene, reference))
+        moves = mobilising_change(reference, alternative_rows(scene, reference))
         raise MotionError(
             f"{driven}: its drive must be able to move the linkage, got a structure without any mobility "
             f"({f'it would move {moves}' if moves else 'the joints constrain every link'}; "
@@ -226,7 +230,7 @@ def _at_reference(scene: Scene) -> str:
     return "drive travel 0 mm, " if driven_travel(scene, name) else "drive angle 0 deg, "
 
 
-def _other_drives(scene: Scene, reference: Reference) -> list[str]:
+def _other_drives(scene: Scene, reference: LinearLinkage) -> list[str]:
     """Joints whose drive could move the linkage from its reference position."""
     bodies = (GROUND, *reference.links)
     out = []
@@ -240,8 +244,8 @@ def _other_drives(scene: Scene, reference: Reference) -> list[str]:
     return out
 
 
-def _across(reference: Reference, bodies: tuple[str, ...]) -> list[ConstraintEquation]:
-    """Rows that hold the motions that only leave the plane of a plane scene: its links know none of them."""
+def _across(reference: LinearLinkage, bodies: tuple[str, ...]) -> list[ConstraintEquation]:
+    """Rows that lock out-of-plane motions of a plane scene, whose links have none."""
     released = null_space(reference.J)
     if not released.shape[1]:
         return []
@@ -250,10 +254,10 @@ def _across(reference: Reference, bodies: tuple[str, ...]) -> list[ConstraintEqu
     return _most_changed(plane_rows(bodies), across, len(bodies), reference.size)
 
 
-def _holding(scene: Scene, reference: Reference, free: int) -> list[ConstraintEquation]:
-    """Rows that hold as many joint motions as are free in the reference position, of driven joints the last.
+def _holding(scene: Scene, reference: LinearLinkage, free: int) -> list[ConstraintEquation]:
+    """Rows that lock as many joint motions as are free in the reference position, those of driven joints last.
 
-    Of a driven joint they are those of its motions that its drives leave.
+    Of a driven joint they are of the motions that its drives do not prescribe.
     """
     if not free:
         return []
@@ -269,7 +273,7 @@ def _holding(scene: Scene, reference: Reference, free: int) -> list[ConstraintEq
 def _most_changed(
     rows: list[ConstraintEquation], motions: Float[np.ndarray, "k n"], bodies: int, size: float
 ) -> list[ConstraintEquation]:
-    """As many rows as there are motions: those that these change most, of equal ones the first."""
+    """As many rows as there are motions, those with the largest changes in these, of equal ones the first."""
     if not motions.shape[1]:
         return []
     change = reference_jacobian(rows, bodies, size) @ motions
@@ -281,7 +285,7 @@ def _most_changed(
 def _free_rows(
     scene: Scene, name: str, bodies: tuple[str, ...], size: float, motions: np.ndarray
 ) -> list[ConstraintEquation]:
-    """Rows of what a joint releases, along and about directions that these motions have, not the axes of the world."""
+    """Rows of what a joint releases, along and about the directions of these motions instead of the world's axes."""
     out = []
     for kind, group in groupby(joint_free_rows(scene, name, bodies), key=lambda row: row.kind):
         rows = list(group)

@@ -1,4 +1,4 @@
-"""Messages for linkages that cannot follow their drive, with the joint and the drive angle."""
+"""Messages for linkages that cannot follow their drive, with the joint and the position of the drive."""
 
 import numpy as np
 
@@ -6,15 +6,15 @@ from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import Target
 from kedfem.motion.values import Poses, features, jacobian
 
-NEAR_SINGULAR = 1e-3  # of the largest singular value: what stops the linkage is a dead point
-IDLE = 1e-4  # of all reactions: the drive's own where its angle does not matter
+NEAR_SINGULAR = 1e-3  # of the largest singular value: below, the linkage is at a dead point
+IDLE = 1e-4  # of all reactions: below, the drive does not take part in a self-stress
 
 
-def stopped(link: Linkage, poses: Poses, tau: float, aim: Target) -> str:
-    """The message for a linkage that cannot go on from poses at a place τ of its path.
+def locking_message(link: Linkage, poses: Poses, tau: float, aim: Target) -> str:
+    """The message for a linkage that cannot continue from poses at a place τ of its path.
 
-    At a dead point the rows bear a state of self-stress. If a drive takes part in it, the drive works against the
-    links and the linkage locks; if not, it can turn on, but the links may take another branch.
+    At a dead point the rows have a state of self-stress. If a drive takes part in it, the linkage locks; if not, it can
+    continue, but the links may take another branch.
     """
     f = features(link.rows, poses, aim.near)
     left, s, _ = np.linalg.svd(jacobian(link.rows, f, len(link.bodies), link.size)[0])

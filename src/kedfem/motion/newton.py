@@ -11,11 +11,11 @@ from kedfem.motion.constraints import Rows
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.values import Features, Poses, Twists, features, jacobian, residuals
 
-SETTLED = 1e-9  # a Newton step, of the linkage's size [-, rad]: the next one would be rounding
-NEARLY = 1e-8  # what is as far from a rotation is one to rounding after a step
+SETTLED = 1e-9  # a Newton step, of the linkage's size [-, rad], after which the next one is rounding
+NEARLY = 1e-8  # deviation from a rotation that one step reduces to rounding
 I3 = np.eye(3)
 TINY = 1e-100  # rad: sin x / x is 1 there
-OPEN = 1e-6  # of the size: what joints of a redundant linkage may be out of true, far below any bearing's clearance
+OPEN = 1e-6  # of the size: tolerated gaps of joints of a redundant linkage, far below any bearing's clearance
 
 
 def rotation(theta: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 3 3"]:
@@ -37,8 +37,8 @@ class Target:
     """The required values of the rows at T time points.
 
     q : (T, D) values of the drives [rad or m]
-    near : (T, A) turns of the angle rows, to within half a revolution [rad]
-    over : (T, m) what rows have gathered over whole periods of the path, to be added; None: nothing
+    near : (T, A) angles of the angle rows, to within half a revolution [rad]
+    over : (T, m) change of the rows over whole periods of the path, to be added; None: zero
     """
 
     q: Float[np.ndarray, "T D"]
@@ -53,14 +53,14 @@ class Target:
         return Target(self.q[which], self.near[which], None if self.over is None else self.over[which])
 
 
-def remainder(rows: Rows, f: Features, aim: Target) -> Float[np.ndarray, "T m"]:
+def constraint_values(rows: Rows, f: Features, aim: Target) -> Float[np.ndarray, "T m"]:
     """Values of the constraints."""
     rest = residuals(rows, f, aim.q)
     return rest if aim.over is None else rest + aim.over
 
 
 def target(link: Linkage, tau: Float[np.ndarray, " T"], near: Float[np.ndarray, "T A"]) -> Target:
-    """The drives' values at τ; turns of their own rows are these, those of others near given ones."""
+    """The drives' values at τ, which are the angles of their own rows; those of other rows are near given ones."""
     q, rows = link.drives.at(tau)[0], link.rows
     near = near.copy()
     for k, row in enumerate(rows.angles):
@@ -70,7 +70,7 @@ def target(link: Linkage, tau: Float[np.ndarray, " T"], near: Float[np.ndarray, 
 
 
 class Factor:
-    """The scaled rows J at T poses, if there are more of them than unknowns with their QR: then in the least squares."""
+    """The scaled rows J at T poses, with their QR for least squares if there are more rows than unknowns."""
 
     def __init__(self, link: Linkage, f: Features, rows: Rows | None = None) -> None:
         self.f = f
@@ -80,15 +80,15 @@ class Factor:
             self.Q, self.U = np.linalg.qr(self.J)
 
     def solve(self, rhs: Float[np.ndarray, "T m c"]) -> Float[np.ndarray, "T k c"]:
-        """x that leaves least of J x = rhs."""
+        """x of the least squares of J x − rhs."""
         return np.linalg.solve(self.U, rhs if self.Q is None else np.swapaxes(self.Q, 1, 2) @ rhs)
 
     def left(self, rhs: Float[np.ndarray, "T m c"]) -> Float[np.ndarray, "T m c"]:
-        """What the least squares leave of J x = rhs: its part on the null space of Jᵀ."""
+        """Residual of the least squares of J x − rhs: the part of rhs in the null space of Jᵀ."""
         return np.zeros_like(rhs) if self.Q is None else np.asarray(rhs - self.Q @ (np.swapaxes(self.Q, 1, 2) @ rhs))
 
     def least_norm(self, rhs: Float[np.ndarray, "T b 6"]) -> Float[np.ndarray, "T m"]:
-        """The least y with Jᵀ y = rhs."""
+        """The y of least norm with Jᵀ y = rhs."""
         y = np.linalg.solve(np.swapaxes(self.U, 1, 2), rhs.reshape(len(rhs), -1, 1))
         return np.asarray((y if self.Q is None else self.Q @ y)[..., 0])
 
@@ -99,27 +99,27 @@ class Factor:
         return np.asarray(np.linalg.svd(self.U, compute_uv=False)[:, [0, -1]])
 
     def of_body(self, body: int) -> tuple[Int[np.ndarray, " r"], Float[np.ndarray, "T r 6"]]:
-        """Rows that may have entries for a body but the ground, and these."""
+        """Rows that may have entries for a body other than the ground, and these entries."""
         return np.arange(self.J.shape[1]), self.J[:, :, 6 * body - 6 : 6 * body]
 
 
 class BlockFactor:
-    """The same of a large linkage, entry by entry."""
+    """`Factor` of a large linkage, with sparse rows."""
 
     def __init__(self, link: Linkage, f: Features, blocks: Blocks) -> None:
         self.f, self.blocks = f, blocks
         self.J = blocks.values(link.rows, f, link.size)
 
     def solve(self, rhs: Float[np.ndarray, "T m c"]) -> Float[np.ndarray, "T k c"]:
-        """x that leaves least of J x = rhs."""
+        """x of the least squares of J x − rhs."""
         return self.blocks.least_squares(self.J, rhs)
 
     def left(self, rhs: Float[np.ndarray, "T m c"]) -> Float[np.ndarray, "T m c"]:
-        """What the least squares leave of J x = rhs; nothing where rows hold every motion once."""
+        """Residual of the least squares of J x − rhs; zero without redundant rows."""
         return self.blocks.left(self.J, rhs) if self.blocks.rows > 6 * self.blocks.count else np.zeros_like(rhs)
 
     def least_norm(self, rhs: Float[np.ndarray, "T b 6"]) -> Float[np.ndarray, "T m"]:
-        """The least y with Jᵀ y = rhs."""
+        """The y of least norm with Jᵀ y = rhs."""
         return self.blocks.least_norm(self.J, rhs)
 
     def extremes(self) -> Float[np.ndarray, "T 2"]:
@@ -127,18 +127,18 @@ class BlockFactor:
         return self.blocks.extremes(self.J)
 
     def of_body(self, body: int) -> tuple[Int[np.ndarray, " r"], Float[np.ndarray, "T r 6"]]:
-        """Rows that have entries for a body but the ground, and these; a row may be there twice."""
+        """Rows that have entries for a body other than the ground, and these entries; a row may occur twice."""
         here = np.flatnonzero(self.blocks.plan.body == self.blocks.place[body - 1])
         return self.blocks.row[here], self.J[:, here]
 
 
 def factored(link: Linkage, f: Features, rows: Rows | None = None) -> Factor | BlockFactor:
-    """The scaled rows at T poses, ready to be solved: all of them, or some of a small linkage."""
+    """The factored rows at T poses: all of them, or some of a small linkage."""
     return Factor(link, f, rows) if link.blocks is None else BlockFactor(link, f, link.blocks)
 
 
-def agree(link: Linkage, J: Float[np.ndarray, "T ..."]) -> Bool[np.ndarray, " I"]:
-    """Whether no singular position lies between poses that are close by, from one to the next: det J₁ᵀ J₂ > 0."""
+def same_branch(link: Linkage, J: Float[np.ndarray, "T ..."]) -> Bool[np.ndarray, " I"]:
+    """Whether successive poses are on the same assembly branch, without a singular position between: det J₁ᵀ J₂ > 0."""
     if link.blocks is not None:
         return np.array([link.blocks.agree(*pair) for pair in pairwise(J)])
     return np.asarray(np.linalg.slogdet(np.swapaxes(J[:-1], 1, 2) @ J[1:])[0] > 0)
@@ -167,32 +167,32 @@ def moved(poses: Poses, change: Twists) -> Poses:
 
 
 def orthonormal(R: Float[np.ndarray, "... 3 3"]) -> Float[np.ndarray, "... 3 3"]:
-    """The rotation next to a matrix that almost is one: Newton steps R (3 − Rᵀ R)/2 to it, one or a few."""
+    """The rotation nearest to a matrix close to one, by Newton steps R (3 − Rᵀ R)/2."""
     for _ in range(5):
         off = np.swapaxes(R, -1, -2) @ R - I3
-        R = R - 0.5 * (R @ np.clip(off, -1.0, 1.0))  # of what is far from one it shall not grow beyond measure
+        R = R - 0.5 * (R @ np.clip(off, -1.0, 1.0))  # bounds the step far from a rotation
         if np.abs(off).max(initial=0.0) < NEARLY:
             break
     return np.asarray(R)
 
 
-def closed(link: Linkage, poses: Poses, aim: Target, iterations: int) -> Poses:
-    """Poses after at most so many Newton steps towards those at which all rows vanish."""
+def corrected(link: Linkage, poses: Poses, aim: Target, iterations: int) -> Poses:
+    """Poses after at most so many Newton steps towards those at which all rows are zero."""
     for _ in range(iterations):
         f = features(link.rows, poses, aim.near)
-        rest = scaled(link, link.rows, remainder(link.rows, f, aim))
+        rest = scaled(link, link.rows, constraint_values(link.rows, f, aim))
         try:
             change = twists(link, factored(link, f).solve(-rest[..., None])[..., 0])
         except np.linalg.LinAlgError:
             return poses
-        poses, step = moved(poses, change), stride(link, change)
+        poses, step = moved(poses, change), step_size(link, change)
         if (step <= SETTLED).all() or not (step < 1).any():
             break
     return poses
 
 
-def stride(link: Linkage, change: Twists) -> Float[np.ndarray, " T"]:
-    """How far twists move the bodies: the farthest, in the linkage's size and radians."""
+def step_size(link: Linkage, change: Twists) -> Float[np.ndarray, " T"]:
+    """Largest displacement or rotation of the bodies by twists, in units of size and radians."""
     v, theta = change
     return np.asarray(np.maximum(np.abs(v).max(axis=(1, 2)) / link.size, np.abs(theta).max(axis=(1, 2))))
 

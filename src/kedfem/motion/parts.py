@@ -21,11 +21,11 @@ from kedfem.motion.values import Poses, features, jacobian
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Bodies, the first of which the others are measured against, and the constraints between them.
+    """Bodies of an independent part, and the constraints between them.
 
     bodies : numbers in the linkage
     rows : its constraints, between bodies as numbered here
-    closed : whether closed loops join its bodies, and not one joint
+    closed : whether its bodies are connected by closed loops instead of a single joint
     """
 
     bodies: Int[np.ndarray, " b"]
@@ -34,7 +34,7 @@ class Part:
 
     @property
     def freedoms(self) -> int:
-        """Of its bodies against the first."""
+        """Degrees of freedom of its bodies relative to the first, without constraints."""
         return 6 * (len(self.bodies) - 1)
 
     def rank(self, poses: Poses, size: float) -> int:
@@ -48,7 +48,12 @@ class Part:
 
 
 def parts(rows: Rows, joints: Sequence[str], bodies: int) -> Iterator[Part]:
-    """The parts of a linkage, those of single joints too; joints of each constraint."""
+    """The independent parts of a linkage, also single joints.
+
+    Parameters
+    ----------
+    joints : joint of each constraint
+    """
     of_row = [{int(rows.i[k]), int(rows.j[k])} for k in range(rows.count)]
     for k, other, _ in rows.plus:
         of_row[k] |= {int(rows.i[other]), int(rows.j[other])}

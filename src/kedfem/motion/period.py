@@ -24,15 +24,15 @@ from kedfem.scene import (
     revolution_steps,
 )
 
-WHOLE = 1e-9  # of a period: how near whole multiples must be
-STEADY, FATIGUE = "analysis.kind = 'steady'", "[fatigue]"  # what asks for a period
-SAME = 1e-6  # of a curve's range: how near its end must be to its beginning
+WHOLE = 1e-9  # of a period: tolerance of whole multiples
+STEADY, FATIGUE = "analysis.kind = 'steady'", "[fatigue]"  # keys that need a period
+SAME = 1e-6  # of a curve's range: tolerance between its end and its beginning
 
 
 def over_one_period(scene: Scene) -> Scene:
     """A scene of a steady motion with the end of its analysis after one period; any other scene as it is.
 
-    A drive that speeds up turns at its final speed: the steady motion is that after it has.
+    A drive with a ramp has its final speed: the steady motion is that after the ramp.
 
     Raises
     ------
@@ -60,12 +60,12 @@ def over_one_period(scene: Scene) -> Scene:
 
 
 def repeats_after(scene: Scene) -> float:
-    """The time after which linkage, drive and loads are where they were, once the drive has sped up [s].
+    """The time after which linkage, drive and loads return, at the final speed of the drive [s].
 
     Raises
     ------
     SceneError
-        Where something does not repeat itself, or only the scene can say after which time.
+        Where something does not repeat itself, or the period is unknown.
     """
     scene = _sped_up(scene)
     base = cycle(scene.motion)
@@ -107,7 +107,7 @@ def _periods(scene: Scene, rigid: Linkage, base: float, asked: str) -> tuple[int
 
 
 def _range(scene: Scene, base: float) -> tuple[float, float]:
-    """Least and greatest place on the linkage's path in as many periods as are tried; it ends where it returns."""
+    """Least and greatest place on the linkage's path in all periods to be tried."""
     if cycle(scene.motion) is None:
         most = base if len(scene.all_drives) < 2 else (MOST_TURNS + 1) * base
     else:
@@ -117,7 +117,7 @@ def _range(scene: Scene, base: float) -> tuple[float, float]:
 
 
 def _never(scene: Scene, asked: str) -> Iterator[str]:
-    """Drives and loads that have no period."""
+    """Faults of drives and loads without a period."""
     where = f"must have a period with {asked}"
     for name, drive in scene.all_drives.items():
         if not isinstance(drive.motion, MotionCurve) and cycle(drive.motion) is None:
@@ -152,13 +152,13 @@ def _open(scene: Scene, along: Path, time: float, asked: str) -> Iterator[str]:
 
 
 def _gone(motion: MotionLaw, time: float) -> bool:
-    """Whether a drive is elsewhere after a time."""
+    """Whether a drive has not returned after a time."""
     angle = drive_angle(motion, np.linspace(0.0, time, 65))[0]
     return bool(abs(angle[-1] - angle[0]) > SAME * np.ptp(angle))
 
 
 def _open_curve(name: str, motion: MotionCurve, time: float) -> Iterator[str]:
-    """A curve of motion that does not end as it begins."""
+    """Faults of a curve of motion that does not end as it begins."""
     angle, rate, _ = drive_angle(motion, np.linspace(0.0, time, 65))
     for what, over in (("angle or travel", angle), ("speed", rate)):
         if abs(over[-1] - over[0]) > SAME * np.ptp(over):

@@ -1,8 +1,8 @@
 """Forces of all joints and drives of rigid links: Jᵀ λ balances the forces on the bodies, at many times at once.
 
-Redundant equations leave part of λ undetermined: the least λ in scaled equations is taken, and `open_directions` shows
-which components of a joint's force depend on that choice. λ is linear in the forces, with factors that depend on the
-pose.
+With redundant equations part of λ is indeterminate: it is the λ of least norm in scaled equations, and `open_directions`
+gives the components of a joint's force that depend on that choice. λ is linear in the forces, with factors that depend on
+the pose.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ class Reactions:
 
     motion : the rigid motion
     factor : the scaled rows J at its poses
-    column : (6,) what their entries for each body have been multiplied by
+    column : (6,) factors by which their entries for each body are scaled
     """
 
     linkage: Linkage
@@ -45,7 +45,7 @@ class Reactions:
         return out
 
     def multipliers(self, wrench: Float[np.ndarray, "T b 6"]) -> Float[np.ndarray, "T m"]:
-        """The least scaled λ that balance forces and moments on all bodies but the ground: Jᵀ λ = −(force, moment)."""
+        """The scaled λ of least norm that balance forces and moments on all moving bodies: Jᵀ λ = −(force, moment)."""
         return self.factor.least_norm(-self.column * wrench)
 
     def joint_wrench(
@@ -56,12 +56,12 @@ class Reactions:
         return np.asarray(np.einsum("wtek,te->wtk", own, multipliers[:, rows]))
 
     def responses(self, A: Float[np.ndarray, "T m c"]) -> Float[np.ndarray, "T c k"]:
-        """What is A λ of forces and moments on all bodies but the ground, with the least λ that balances them."""
+        """A λ as a linear function of forces and moments on all moving bodies, λ of least norm."""
         x = np.swapaxes(self.factor.solve(A), 1, 2)
         return np.asarray(-np.tile(self.column, x.shape[2] // 6) * x)
 
     def open_directions(self, A: Float[np.ndarray, "T m c"]) -> tuple[Float[np.ndarray, "c c"], Float[np.ndarray, "c c"]]:
-        """Along which directions A λ is open, and along which there is any at all.
+        """Directions in which A λ is indeterminate, and directions of all A λ.
 
         Returns
         -------

@@ -12,22 +12,22 @@ from kedfem.motion.joint_equations import PLANE
 from kedfem.scene import Joint
 from kedfem.vectors import cross
 
-RANK_TOLERANCE = 1e-6  # of the largest singular value: axes that far out of true count as parallel
-STILL = 1e-6  # of a motion: what counts as none
-SEARCHED = 10  # links up to which all groups are looked through for motions of their own
+RANK_TOLERANCE = 1e-6  # of the largest singular value: axes with a smaller angle between them are parallel
+STILL = 1e-6  # of a motion: smaller ones are rounding
+SEARCHED = 10  # links up to which all groups are searched for motions of their own
 AXES = np.eye(3)
-ACROSS = np.array([2, 3, 4])  # columns of a link that leave the xy plane: v_z, ω_x, ω_y
+ACROSS = np.array([2, 3, 4])  # columns of a link's out-of-plane motions: v_z, ω_x, ω_y
 Basis = Float[np.ndarray, "k n"]
 
 
 @dataclass(frozen=True, slots=True)
-class Reference:
+class LinearLinkage:
     """A linkage linearised in its reference position.
 
     J : (m, k) derivatives of the rows by the links' twists (v, ω) at the centre; gaps and v in units of size
     rows : (m,) joint of each row, or coupling
     driven : (m,) whether a row is that of a drive
-    links : names, k = 6 a link
+    links : names; k = 6 per link
     joints : of the scene
     centre, size : [m]
     """
@@ -61,12 +61,12 @@ def rank(J: Float[np.ndarray, "m k"]) -> int:
 
 
 def null_space(J: Float[np.ndarray, "m k"]) -> Basis:
-    """Orthonormal columns that J takes to zero."""
+    """Orthonormal basis of the null space of J, as columns."""
     return np.asarray(scipy.linalg.null_space(J, rcond=RANK_TOLERANCE)) if J.size else np.eye(J.shape[1])
 
 
 def span(vectors: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k d"]:
-    """Orthonormal basis of some vectors; what all but vanishes is left out."""
+    """Orthonormal basis of the span of some vectors; negligible ones are left out."""
     U, s, _ = np.linalg.svd(vectors, full_matrices=False)
     return np.asarray(U[:, s > STILL])
 
@@ -74,8 +74,8 @@ def span(vectors: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k d"]:
 # -- the plane ----------------------------------------------------------------------------------------------
 
 
-def planar(reference: Reference) -> Reference:
-    """A linkage whose links the xy plane holds: of each joint and drive what is left of its rows there."""
+def planar(reference: LinearLinkage) -> LinearLinkage:
+    """The linkage with its links constrained to the xy plane, and the rows of each joint and drive reduced to it."""
     keys = list(zip(reference.rows, reference.driven.tolist(), strict=True))
     rows = {key: in_plane(reference.J[[each == key for each in keys]]) for key in dict.fromkeys(keys)}
     held = np.eye(reference.J.shape[1]).reshape(len(reference.links), 6, -1)[:, ACROSS].reshape(-1, reference.J.shape[1])
@@ -85,7 +85,7 @@ def planar(reference: Reference) -> Reference:
 
 
 def in_plane(rows: Float[np.ndarray, "m k"]) -> Float[np.ndarray, "n k"]:
-    """Independent equations that the rows of one joint are between motions in the plane."""
+    """Independent rows of one joint for motions in the plane."""
     left = rows.copy().reshape(len(rows), -1, 6)
     left[:, :, ACROSS] = 0.0
     _, s, Vt = np.linalg.svd(left.reshape(rows.shape), full_matrices=False)
@@ -96,7 +96,7 @@ def in_plane(rows: Float[np.ndarray, "m k"]) -> Float[np.ndarray, "n k"]:
 
 
 def direction(d: Float[np.ndarray, "3"]) -> str:
-    """``z``, or ``(0.6, 0.8, 0)`` with its greatest part positive."""
+    """``z``, or ``(0.6, 0.8, 0)`` with its greatest component positive."""
     d = d / np.linalg.norm(d) * np.sign(d[np.abs(d).argmax()])
     if d.max() > 1 - STILL:
         return "xyz"[int(d.argmax())]
@@ -104,14 +104,14 @@ def direction(d: Float[np.ndarray, "3"]) -> str:
 
 
 def components(d: Float[np.ndarray, "3"], digits: int = 9, form: str = ".3g") -> str:
-    """A vector in words, without what rounding left of zero."""
+    """A vector as text, rounded."""
     return f"({', '.join(format(x + 0.0, form) for x in np.round(d, digits))})"
 
 
 def directions(
     what: str, where: str, within: Float[np.ndarray, "3 d"], axis: Float[np.ndarray, "3"] | None = None
 ) -> str:
-    """``forces along x and y``: what, where, and a line, plane or all of space; `axis` is that of the joint.
+    """``forces along x and y``: directions within a line, a plane or all of space; `axis` is that of the joint.
 
     >>> directions("turn", "about", np.eye(3)[:, 2:])
     'turn about z'
@@ -133,7 +133,7 @@ def directions(
 
 
 def _alike(a: Float[np.ndarray, "3"], b: Float[np.ndarray, "3"]) -> bool:
-    """Whether two unit vectors are on one line that is no axis of coordinates, which has a shorter name."""
+    """Whether two unit vectors are parallel, but to no coordinate axis, which has a shorter name."""
     return bool(np.linalg.norm(np.cross(a, b)) < STILL and np.abs(a).max() < 1 - STILL)
 
 
@@ -142,10 +142,10 @@ def listed(names: list[str] | tuple[str, ...], last: str = "and") -> str:
     return f" {last} ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
 
 
-def of_joints(names: list[str] | tuple[str, ...], last: str = "and") -> str:
+def joints_in_words(names: list[str] | tuple[str, ...], last: str = "and") -> str:
     """``joint A``, or ``joints A and B``; couplings have names such as ``gears.pair``.
 
-    >>> of_joints(["A", "B", "gears.pair"])
+    >>> joints_in_words(["A", "B", "gears.pair"])
     'joints A and B and gears.pair'
     """
     joints, couplings = ([x for x in names if ("." in x) == coupling] for coupling in (False, True))
@@ -159,14 +159,14 @@ def of_joints(names: list[str] | tuple[str, ...], last: str = "and") -> str:
 
 @dataclass(frozen=True, slots=True)
 class FreeMotion:
-    """A free motion in which only some links move.
+    """A free motion of some links.
 
-    links : that move
-    joints : that work
+    links : moving links
+    joints : moving joints
     basis : (k, n) scaled twists of all links
-    words : what they are
-    drivable : those of them that have one motion alone
-    spin : the joints between which a link idly spins, if that is what it does
+    words : its description
+    drivable : moving joints of one degree of freedom
+    spin : the joints on the line about which a link spins idly, if it does
     """
 
     links: tuple[str, ...]
@@ -177,13 +177,13 @@ class FreeMotion:
     spin: tuple[str, ...] = ()
 
 
-def free_motions(reference: Reference) -> list[FreeMotion]:
+def free_motions(reference: LinearLinkage) -> list[FreeMotion]:
     """Motions that joints and drives release, sorted by the smallest groups of links that can move alone."""
     return [_described(reference, links, basis) for links, basis in _groups(reference, null_space(reference.J))]
 
 
-def _groups(reference: Reference, free: Basis) -> list[tuple[tuple[str, ...], Basis]]:
-    """Free motions by the links that make them: first those of one link alone, then of two, and so on."""
+def _groups(reference: LinearLinkage, free: Basis) -> list[tuple[tuple[str, ...], Basis]]:
+    """Free motions by their moving links: first those of one link alone, then of two, and so on."""
     found, out, n = np.zeros((free.shape[1], 0)), [], len(reference.links)
     sizes = range(1, n + 1) if n <= SEARCHED else (1, n)
     for some in (group for size in sizes for group in combinations(reference.links, size)):
@@ -198,13 +198,13 @@ def _groups(reference: Reference, free: Basis) -> list[tuple[tuple[str, ...], Ba
     return out
 
 
-def _relative(reference: Reference, joint: str, basis: Basis) -> Float[np.ndarray, "6 n"]:
+def _relative(reference: LinearLinkage, joint: str, basis: Basis) -> Float[np.ndarray, "6 n"]:
     """Twists (v, ω) at a joint of its one link against the other."""
     one, other = (_twists(reference, link, joint, basis) for link in reference.joints[joint].links)
     return np.asarray(one - other)
 
 
-def _twists(reference: Reference, link: str, joint: str, basis: Basis) -> Float[np.ndarray, "6 n"]:
+def _twists(reference: LinearLinkage, link: str, joint: str, basis: Basis) -> Float[np.ndarray, "6 n"]:
     """Twists (v, ω) of a link at a joint's point."""
     if link not in reference.links:
         return np.zeros((6, basis.shape[1]))
@@ -212,7 +212,7 @@ def _twists(reference: Reference, link: str, joint: str, basis: Basis) -> Float[
     return np.concatenate([v + cross(omega.T, np.broadcast_to(reference.place(joint), omega.T.shape)).T, omega])
 
 
-def _described(reference: Reference, links: tuple[str, ...], basis: Basis) -> FreeMotion:
+def _described(reference: LinearLinkage, links: tuple[str, ...], basis: Basis) -> FreeMotion:
     links = tuple(link for link in links if np.abs(basis[reference.block(link)]).max() > STILL)
     joints = tuple(name for name in reference.joints if np.abs(_relative(reference, name, basis)).max() > STILL)
     drivable = tuple(name for name in joints if reference.joints[name].kind in {"revolute", "prismatic"})
@@ -221,12 +221,12 @@ def _described(reference: Reference, links: tuple[str, ...], basis: Basis) -> Fr
         return FreeMotion(links, joints, basis, words, drivable, spin)
     count = f"{basis.shape[1]} ways" if basis.shape[1] > 1 else "one way"
     words = f"links {listed([repr(x) for x in links])} can move together in {count}"
-    words += f", by {of_joints(joints)}" if joints else ""
+    words += f", by {joints_in_words(joints)}" if joints else ""
     return FreeMotion(links, joints, basis, words, drivable)
 
 
-def _alone(reference: Reference, link: str, joints: tuple[str, ...], basis: Basis) -> tuple[str, tuple[str, ...]]:
-    """Motions of one link in words; and the joints on the line about which it spins."""
+def _alone(reference: LinearLinkage, link: str, joints: tuple[str, ...], basis: Basis) -> tuple[str, tuple[str, ...]]:
+    """Motions of one link in words, and the joints on the line about which it spins."""
     twists = {name: _twists(reference, link, name, basis) for name in joints}
     still = [name for name in joints if np.abs(twists[name][:3]).max() < STILL]
     at = still[0] if still else next(iter(joints), None)
@@ -238,7 +238,7 @@ def _alone(reference: Reference, link: str, joints: tuple[str, ...], basis: Basi
     if basis.shape[1] == 1 and len(still) > 1:
         kinds = {reference.joints[name].kind for name in still}
         which = f"both {kinds.pop()}" if len(kinds) == 1 and len(still) == 2 else "on one line"
-        return f"{words}, the line through {of_joints(still)} ({which})", tuple(still)
+        return f"{words}, the line through {joints_in_words(still)} ({which})", tuple(still)
     return words + (f" at joint {at} ({reference.joints[at].kind})" if at else ", constrained by no joint"), ()
 
 

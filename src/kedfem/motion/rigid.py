@@ -7,11 +7,11 @@ import numpy as np
 
 from kedfem.arrays import Float, Int
 from kedfem.errors import MotionError
-from kedfem.motion.batch import Moving, moving
+from kedfem.motion.batch import SolvedMotion, solved_motion
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.messages import position_in_words
 from kedfem.motion.newton import OPEN, cross_matrix
-from kedfem.motion.path import Path, aimed, predicted
+from kedfem.motion.path import Path, predicted, target_on_path
 from kedfem.vectors import cross
 
 
@@ -24,7 +24,7 @@ class RigidMotion:
     omega, alpha : (T, B, 3) angular velocity and acceleration, world components [rad/s, rad/s²]
     v : (T, B, 3) p' [m/s]
     R2, p2 : (T, B, 3, 3), (T, B, 3): R'' and p'' [1/s², m/s²]
-    drives : (T, D) turn or travel of each drive [rad or m]; phi is the first of them
+    drives : (T, D) angle or travel of each drive [rad or m]; phi is the first of them
     """
 
     t: Float[np.ndarray, " T"]
@@ -73,7 +73,7 @@ def seen_from(motion: RigidMotion, bodies: tuple[int, int], at: Float[np.ndarray
 
 
 def resting(bodies: int, t: Float[np.ndarray, " T"]) -> RigidMotion:
-    """Rigid-body motion of a linkage that nothing drives: all rest in the reference position, at given times (T,) [s]."""
+    """Rigid-body motion of a linkage without a drive, at rest in the reference position, at given times (T,) [s]."""
     R = np.broadcast_to(np.eye(3), (len(t), bodies, 3, 3)).copy()
     p, omega, alpha, v, p2 = np.zeros((5, len(t), bodies, 3))
     phi, none = np.zeros(len(t)), np.zeros((len(t), 0))
@@ -84,15 +84,13 @@ Along = tuple[Float[np.ndarray, " T"], Float[np.ndarray, " T"], Float[np.ndarray
 
 
 def rigid_motion(link: Linkage, along: Path, t: Float[np.ndarray, " T"], drive: Along) -> RigidMotion:
-    """The rigid part of [KED, eqs. (2)(3)] at given times.
-
-    Newton from the path, then differentiated constraints.
+    """The rigid part of [KED, eqs. (2)(3)] at given times, by Newton's method from the path.
 
     Parameters
     ----------
     along : path that covers the drive
     t : (T,) [s]
-    drive : place on the path and its derivatives, each (T,): turn or travel of the drive; of several t, 1, 0
+    drive : place on the path and its derivatives, each (T,): angle or travel of the drive; with several t, 1, 0
 
     Raises
     ------
@@ -104,7 +102,7 @@ def rigid_motion(link: Linkage, along: Path, t: Float[np.ndarray, " T"], drive: 
     tau, speed, acceleration = (x[:, None] for x in drive)
     q, q1, q2 = link.drives.at(drive[0])
     rates = (q1 * speed, q2 * speed**2 + q1 * acceleration)
-    got = moving(link, along.rows, predicted(along, drive[0]), aimed(link, along, drive[0]), rates)
+    got = solved_motion(link, along.rows, predicted(along, drive[0]), target_on_path(link, along, drive[0]), rates)
     if got.gap.size and got.gap.max() > OPEN:
         k = int(got.gap.argmax())
         raise MotionError(
@@ -114,7 +112,7 @@ def rigid_motion(link: Linkage, along: Path, t: Float[np.ndarray, " T"], drive: 
     return _about_origin(link, t, q, got)
 
 
-def _about_origin(link: Linkage, t: Float[np.ndarray, " T"], q: np.ndarray, got: Moving) -> RigidMotion:
+def _about_origin(link: Linkage, t: Float[np.ndarray, " T"], q: np.ndarray, got: SolvedMotion) -> RigidMotion:
     """Motion of bodies in their poses about the linkage's centre c: reference position X goes to p + c + R (X − c)."""
     (R, p), (v, omega), (v2, alpha) = got.poses, got.first, got.second
     W, c = cross_matrix(omega), link.centre

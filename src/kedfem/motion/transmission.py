@@ -19,18 +19,18 @@ from kedfem.scene import Scene
 from kedfem.vectors import cross
 
 ENDS = ("revolute", "spherical", "universal")
-LEAST = np.radians(40.0)  # the usual limit: below it, and above 180° less it, a linkage tends to jam
+LEAST = np.radians(40.0)  # the usual limit: below it, and above 180° − it, a linkage tends to jam
 SAME = 1e-9  # of the linkage's size: joints at the same place
 
 
 @dataclass(frozen=True, slots=True)
 class Transmission:
-    """A coupler and what it drives.
+    """A coupler and the link that it drives.
 
     coupler, driven : names
     body, output : their numbers
-    near, far : drawn points of the coupler: where it drives, and its other joint [m]
-    pivot, axis : drawn point and direction of the driven link's joint with the ground
+    near, far : joints of the coupler in the reference position: with the driven link, and the other one [m]
+    pivot, axis : point and direction of the driven link's joint with the ground, in the reference position
     turns : whether that is a hinge, else a slide
     """
 
@@ -81,7 +81,7 @@ def _on(
     scene: Scene, linkage: Linkage, coupler: str, output: str,
     near: Float[np.ndarray, "3"], far: Float[np.ndarray, "3"],
 ) -> Iterator[Transmission]:  # fmt: skip
-    """A coupler on a link that the ground holds by one hinge, not at the coupler, or slide; undriven."""
+    """The transmission of a coupler to an undriven link with one hinge on the ground, not at the coupler, or slide."""
     held = {key: joint for key, joint in scene.joints.items() if set(joint.links) == {GROUND, output}}
     if len(held) != 1 or held.keys() & scene.driven_joints.keys():
         return
@@ -97,7 +97,7 @@ def _on(
 
 
 def _beyond(scene: Scene, linkage: Linkage, joint: str, link: str) -> str:
-    """The link at a joint; past a cross, whose two joints are at one point, the link behind it."""
+    """The other link at a joint; beyond a cross, whose two joints are at one point, the next link."""
     other = next(each for each in scene.joints[joint].links if each != link)
     if other == GROUND:
         return other

@@ -1,6 +1,6 @@
 """Values of constraint rows and their first and second derivatives, for many time points at once.
 
-Internally, time runs along the last axis: of a few hundred points all that one operation touches then lies in the cache.
+Internally time is the last axis, so that operations on a few hundred points stay in the cache.
 """
 
 from collections.abc import Iterator
@@ -45,7 +45,7 @@ class Features:
 
 
 def features(rows: Rows, poses: Poses, near: Float[np.ndarray, "T A"] | None = None) -> Features:
-    """Evaluate elementary rows; `near` holds the turn of each angle row to within half a turn [rad], 0 if not given."""
+    """Values of elementary rows; `near`: angle of each angle row to within half a revolution [rad], 0 if not given."""
     near = np.zeros((len(poses[1]), len(rows.angles))) if near is None else near
     R, p = np.ascontiguousarray(poses[0].transpose(3, 2, 1, 0)), np.ascontiguousarray(poses[1].T)
     turned = R[0].take(rows.body, axis=1) * rows.vector[:, 0, None]

@@ -27,7 +27,7 @@ from kedfem.motion.initial import initial_twists
 from kedfem.motion.messages import position_in_words
 from kedfem.motion.mobility import mobility
 from kedfem.motion.path import Path
-from kedfem.motion.released_motions import of_joints
+from kedfem.motion.released_motions import joints_in_words
 from kedfem.output.derived import fields
 from kedfem.output.vtu import write_frame
 from kedfem.output.words import NOTHING, with_prefix
@@ -127,7 +127,7 @@ def resolution_table(found: Resolution, scene: Scene) -> Table:
 def _motion(ready: Prepared) -> Table:
     along: Path = ready.path
     names = tuple(ready.scene.driven_joints)
-    drive = f"{of_joints(names)}, {_over(ready)}" if names else "none: the mechanism moves by itself"
+    drive = f"{joints_in_words(names)}, {_over(ready)}" if names else "none: the mechanism moves by itself"
     table = facts("Rigid motion", [("drive", drive), *_initial_speeds(ready)])
     for k, name in enumerate(ready.linkage.bodies[1:] if names else (), start=1):
         words = motion_in_words(along.R[:, k], along.p[:, k], ready.linkage.size)

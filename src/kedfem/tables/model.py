@@ -19,7 +19,7 @@ from kedfem.motion.dead_point import DeadPoint
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.messages import position_in_words
 from kedfem.motion.mobility import Mobility
-from kedfem.motion.released_motions import of_joints
+from kedfem.motion.released_motions import joints_in_words
 from kedfem.motion.released_motions import remedy as held_by
 from kedfem.output.words import with_prefix
 from kedfem.results.modelled import ELEMENTS, element_facts
@@ -103,10 +103,10 @@ def mobility_table(scene: Scene, link: Linkage, found: Mobility, works: bool = F
     ----------
     works : whether a run's first steps were found: what is free is meant to be
     """
-    driven = f"driven at {of_joints(tuple(scene.driven_joints))}" if found.drives else "none driven"
+    driven = f"driven at {joints_in_words(tuple(scene.driven_joints))}" if found.drives else "none driven"
     twice = f"{found.redundancy} of them redundant" if found.redundancy else "none redundant"
     rows = [("degrees of freedom", f"{found.freedom}, {driven}"), ("joint equations", f"{found.equations}, {twice}")]
-    rows += [(f"constrained redundantly at {of_joints(each.joints)}", each.words) for each in found.redundant]
+    rows += [(f"constrained redundantly at {joints_in_words(each.joints)}", each.words) for each in found.redundant]
     if found.redundancy:
         rows.append(("without these", found.remedy))
     if found.free:
@@ -125,8 +125,8 @@ def _dead_point(link: Linkage, found: DeadPoint | None) -> Iterator[tuple[str, s
     off = f"{np.degrees(FAR):.0f}° or more from it"
     if found.joint is not None and found.off < FAR:
         off = f"joint {found.joint} about {np.degrees(found.off):.2g}° from it"
-    weakness = f"smallest singular value {found.weakness:.2g} of the largest"
-    yield "closest to a dead point", f"at {position_in_words(link, found.tau, '.4g')}, {off} (estimated; {weakness})"
+    condition = f"smallest singular value {found.reciprocal_condition:.2g} of the largest"
+    yield "closest to a dead point", f"at {position_in_words(link, found.tau, '.4g')}, {off} (estimated; {condition})"
     if found.outside is not None:
         apart, near = _apart(link, abs(found.outside - found.tau)), position_in_words(link, found.outside, ".3g")
         yield "dead point outside the range", f"about {apart} from its end, near {near} (estimated)"

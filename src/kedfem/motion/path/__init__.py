@@ -1,4 +1,4 @@
 """Paths of linkages along their drives."""
 
 from kedfem.motion.path.following import MOST_TURNS, path
-from kedfem.motion.path.record import Path, aimed, place_on, predicted
+from kedfem.motion.path.record import Path, place_on, predicted, target_on_path

@@ -11,19 +11,19 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.errors import MotionError
-from kedfem.motion.batch import Choice, Moving, settled
+from kedfem.motion.batch import RowSelection, SolvedMotion, newton_solution
 from kedfem.motion.linkage import Linkage, resting_poses
-from kedfem.motion.messages import stopped
-from kedfem.motion.newton import OPEN, SETTLED, TINY, agree, cross_matrix, orthonormal, target
+from kedfem.motion.messages import locking_message
+from kedfem.motion.newton import OPEN, SETTLED, TINY, cross_matrix, orthonormal, same_branch, target
 from kedfem.motion.values import Poses, angle_rates, features
 
-JUMP = 0.02  # of the size [-, rad]: a prediction that far off may lead to another branch
-CONTRACTION = 0.1  # Newton's second step against its first: well within the branch's own basin
+JUMP = 0.02  # of the size [-, rad]: a larger error of a prediction may lead to another branch
+CONTRACTION = 0.1  # ratio of Newton's second step to its first: well within the basin of the branch
 SMALLEST_STEP = 1e-6  # of a usual step
 FIRST_STEP, GROWTH = 0.25, 1.5  # of a usual step; of the last one
 AHEAD = 6  # most grid points that are predicted together
-SAFE = 0.5  # of JUMP: so far off may the last of them be expected to be
-FARTHEST, QUARTER = 0.8, np.pi / 2  # turn of a body between grid points, and in a prediction [rad]
+SAFE = 0.5  # of JUMP: largest expected error of the last of them
+FARTHEST, QUARTER = 0.8, np.pi / 2  # rotation of a body between grid points, and in a prediction [rad]
 ROUNDING = 1e-12  # of τ against a usual step
 
 
@@ -31,11 +31,11 @@ ROUNDING = 1e-12  # of τ against a usual step
 class GridPoint:
     """One grid point.
 
-    tau : τ there
+    tau : its τ
     shape : (3, 12 B) R and p of all bodies, and their two derivatives by τ
-    near, turning : (A,) turns of angle rows, and their rates by τ
-    fastest : turn of the body that turns fastest, by τ
-    missed : how far its prediction was off, in units of size and radians
+    near, turning : (A,) angles of angle rows, and their rates by τ
+    fastest : rate by τ of the fastest rotation of a body
+    missed : error of its prediction, in units of size and radians
     J : scaled rows
     """
 
@@ -48,18 +48,18 @@ class GridPoint:
     J: Float[np.ndarray, "m k"]
 
 
-def started(link: Linkage) -> GridPoint:
+def reference_point(link: Linkage) -> GridPoint:
     """The grid point at the reference position."""
     rest = resting_poses(len(link.bodies))
     near = features(link.rows, rest).value[link.rows.angles].T
     found = _settled(link, np.zeros(1), rest, near)
     if not found:
-        raise MotionError(stopped(link, rest, 0.0, target(link, np.zeros(1), near)))
+        raise MotionError(locking_message(link, rest, 0.0, target(link, np.zeros(1), near)))
     return found[0]
 
 
 def continued(link: Linkage, grid: list[GridPoint], usual: float, end: float) -> list[GridPoint]:
-    """Grid points led on to `end`, by usual steps, smaller ones where the linkage comes near a dead point.
+    """Grid points continued to `end` by usual steps, and smaller ones near dead points.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def continued(link: Linkage, grid: list[GridPoint], usual: float, end: float) ->
 
 
 def _next(link: Linkage, grid: list[GridPoint], step: float, ahead: int, usual: float, end: float) -> list[GridPoint]:
-    """The next grid points, the step halved until Newton converges fast and the orientation stays."""
+    """The next grid points, the step halved until Newton's method converges fast on the same branch."""
     here = grid[-1]
     left = abs(end - here.tau)
     step = min(step, usual, left, FARTHEST / max(here.fastest, TINY))
@@ -90,7 +90,7 @@ def _next(link: Linkage, grid: list[GridPoint], step: float, ahead: int, usual: 
             return found
         step, ahead = step / 2, 1
     poses, at = split(here.shape[:1]), np.array([here.tau])
-    raise MotionError(stopped(link, poses, here.tau, target(link, at, here.near[None])))
+    raise MotionError(locking_message(link, poses, here.tau, target(link, at, here.near[None])))
 
 
 def _settled(
@@ -100,15 +100,15 @@ def _settled(
     near: Float[np.ndarray, "T A"],
     before: GridPoint | None = None,
 ) -> list[GridPoint]:
-    """Grid points next to guesses, up to one that is too far off, converges slowly or lies behind a singular position."""
+    """Grid points from guesses, up to one that is too far, converges slowly or lies beyond a singular position."""
     rates, jump = link.drives.at(tau)[1:], np.inf if before is None else JUMP
-    got = settled(link, Choice(link.rows), guess, target(link, tau, near), rates, (SETTLED, jump))
+    got = newton_solution(link, RowSelection(link.rows), guess, target(link, tau, near), rates, (SETTLED, jump))
     steps, factor = got.steps, got.factor
     if factor is None:
         return []
     good, fastest = (got.gap <= OPEN) & (steps[0] <= jump), np.abs(got.first[1]).max(axis=(1, 2))
     if before is not None:
-        good &= agree(link, np.concatenate([before.J[None], factor.J]))
+        good &= same_branch(link, np.concatenate([before.J[None], factor.J]))
         good[1:] &= np.abs(np.diff(tau)) * fastest[:-1] <= FARTHEST
     if len(steps) > 1:
         good &= steps[1] <= CONTRACTION * steps[0] + SETTLED
@@ -121,7 +121,7 @@ def _settled(
 
 
 def _predicted(grid: list[GridPoint], step: Float[np.ndarray, " T"]) -> Poses:
-    """Poses some steps on: by the quintic through the last two grid points, of the first one by Taylor."""
+    """Extrapolated poses: by the quintic through the last two grid points, or the first one's Taylor series."""
     here = grid[-1]
     if len(grid) == 1:
         return on_curves(iter(here.shape[::-1] / np.array([[2.0], [1.0], [1.0]])), step)
@@ -131,7 +131,7 @@ def _predicted(grid: list[GridPoint], step: Float[np.ndarray, " T"]) -> Poses:
 
 
 def on_curves(c: Iterator[Float[np.ndarray, "... C"]], s: Float[np.ndarray, " T"]) -> Poses:
-    """Poses by polynomials of R and p at places s, highest coefficients first, R made a rotation again."""
+    """Poses by polynomials of R and p at places s, highest coefficients first, with R orthonormalised."""
     x = next(c) + 0 * s[:, None]
     for each in c:
         x *= s[:, None]
@@ -146,7 +146,7 @@ def split(x: Float[np.ndarray, "T C"]) -> Poses:
     return x[:, : 9 * B].reshape(-1, B, 3, 3), x[:, 9 * B :].reshape(-1, B, 3)
 
 
-def shapes(got: Moving) -> Float[np.ndarray, "3 G C"]:
+def shapes(got: SolvedMotion) -> Float[np.ndarray, "3 G C"]:
     """R and p of all bodies (C = 12 B numbers), and their two derivatives."""
     (R, p), W, A = got.poses, cross_matrix(got.first[1]), cross_matrix(got.second[1])
     R = orthonormal(R)

@@ -1,4 +1,4 @@
-"""Paths of linkages over the range of their drives, with period and weakest position; the last ones are cached."""
+"""Paths of linkages over the range of their drives, with period and nearest singularity; the last ones are cached."""
 
 import pickle
 from dataclasses import replace
@@ -7,18 +7,18 @@ from hashlib import sha256
 import numpy as np
 
 from kedfem.arrays import Float
-from kedfem.motion.batch import Choice, Moving
+from kedfem.motion.batch import RowSelection, SolvedMotion
 from kedfem.motion.constraints import ANGLE
 from kedfem.motion.linkage import Linkage, resting_poses
 from kedfem.motion.newton import OPEN
-from kedfem.motion.path.continuation import ROUNDING, GridPoint, continued, quintics, shapes, split, started
+from kedfem.motion.path.conditioning import checked
+from kedfem.motion.path.continuation import ROUNDING, GridPoint, continued, quintics, reference_point, shapes, split
 from kedfem.motion.path.record import Path
-from kedfem.motion.path.refinement import halved, refined
-from kedfem.motion.path.weakest import checked
+from kedfem.motion.path.refinement import bisected, refined
 
-FINER = 0.25  # of a usual step: where one between two grid points cannot be closed
-MOST_TURNS = 60  # that a linkage may take to return to its pose
-RETURNED = 1e-9  # of the size [-, rad]: as closely gears must return
+FINER = 0.25  # of a usual step: where a position between two grid points cannot be closed
+MOST_TURNS = 60  # revolutions in which a linkage may return to its pose
+RETURNED = 1e-9  # of the size [-, rad]: tolerance of the return of gears
 MOST_KEPT = 4  # paths of a process
 
 
@@ -35,7 +35,7 @@ def path(link: Linkage, low: float, high: float) -> Path:
     if link.drive is None:
         rest = resting_poses(len(link.bodies))
         none = np.zeros_like(rest[1]), np.zeros_like(rest[1])
-        shape = shapes(Moving(rest, none, none, np.zeros(1)))
+        shape = shapes(SolvedMotion(rest, none, none, np.zeros(1)))
         return _through(link, np.zeros(1), shape, np.zeros((1, len(link.rows.angles))), np.inf)
     period = link.drives.period()
     low, high = _on_periods(low, period), _on_periods(high, period)
@@ -52,13 +52,13 @@ _KEPT: dict[bytes, Path] = {}
 
 
 def _named(link: Linkage, low: float, high: float) -> bytes:
-    """A digest of all that a path depends on: of a single drive τ is its turn, whatever its law."""
+    """A digest of all on which a path depends: not the law of a single drive, whose position τ is."""
     drives = replace(link.drives, laws=()) if len(link.drives) == 1 else link.drives
     return sha256(pickle.dumps((replace(link, drives=drives), low, high))).digest()
 
 
 def _on_periods(tau: float, period: float) -> float:
-    """A place that is whole periods off, but for rounding, at these."""
+    """τ, made a whole number of periods if it is one but for rounding."""
     if not np.isfinite(period):
         return tau
     whole = period * round(tau / period)
@@ -66,20 +66,20 @@ def _on_periods(tau: float, period: float) -> float:
 
 
 def _followed(link: Linkage, low: float, high: float, period: float) -> Path:
-    """By usual steps, or by finer ones where a position between two of these cannot be closed."""
+    """The path by usual steps, or by finer ones where a position between two of these cannot be closed."""
     usual = link.drives.step(low, high)
     for step in (usual, FINER * usual):
         grid, period = _grid(link, low, high, period, step)
         phi, shape, near = (np.stack([getattr(g, x) for g in grid]) for x in ("tau", "shape", "near"))
-        along, closes, factor = halved(link, _through(link, phi, shape.transpose(1, 0, 2), near, period))
+        along, closes, factor = bisected(link, _through(link, phi, shape.transpose(1, 0, 2), near, period))
         if closes:
             break
     return refined(link, checked(link, along, factor))
 
 
 def _grid(link: Linkage, low: float, high: float, period: float, step: float) -> tuple[list[GridPoint], float]:
-    """Grid points over a range, or over a period if the linkage is back after it, and that period."""
-    start = started(link)
+    """Grid points over a range, or over a period if the linkage returns after it, and that period."""
+    start = reference_point(link)
     ahead, behind = [start], [start]
     if high > period or low < -period:
         forwards = high > period
@@ -94,7 +94,7 @@ def _grid(link: Linkage, low: float, high: float, period: float, step: float) ->
 
 
 def _revolutions(link: Linkage, start: GridPoint, step: float, period: float, end: float) -> list[GridPoint]:
-    """Turn by turn, until the linkage is back or the end reached; at most so many revolutions."""
+    """Grid points revolution by revolution, until the linkage returns or the end is reached; at most MOST_TURNS."""
     out = [start]
     for turn in range(1, MOST_TURNS + 1):
         to = np.sign(end) * min(turn * period, abs(end))
@@ -105,7 +105,7 @@ def _revolutions(link: Linkage, start: GridPoint, step: float, period: float, en
 
 
 def _returned(link: Linkage, start: GridPoint, here: GridPoint) -> bool:
-    """Whether a linkage is in its first pose again."""
+    """Whether a linkage has returned to its first pose."""
     one = len(link.drives) == 1 and not link.rows.plus
     pairs = zip(split(start.shape[:1]), split(here.shape[:1]), (1.0, link.size), strict=True)
     apart = (np.abs(one - other).max() / unit for one, other, unit in pairs)
@@ -116,15 +116,15 @@ def _through(
     link: Linkage, phi: Float[np.ndarray, " G"], shape: Float[np.ndarray, "3 G C"], near: Float[np.ndarray, "G A"],
     period: float,
 ) -> Path:  # fmt: skip
-    """The path through grid points, not examined yet."""
+    """The path through grid points, not yet checked for singularities."""
     return Path(
         phi, shape, near, period, _gathered(link, near, period), (1.0, float(phi[0])),
-        Choice(link.rows), quintics(shape, np.diff(phi)),
+        RowSelection(link.rows), quintics(shape, np.diff(phi)),
     )  # fmt: skip
 
 
 def _gathered(link: Linkage, near: Float[np.ndarray, "G A"], period: float) -> Float[np.ndarray, " m"]:
-    """What couplings gather over a period: turns of their angles are whole ones, their ratio need not be."""
+    """Change of couplings over a period: their angles change by whole revolutions, whatever the ratio."""
     rows, out = link.rows, np.zeros(link.rows.count)
     if not np.isfinite(period):
         return out

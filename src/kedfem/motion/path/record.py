@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kedfem.arrays import Float, Int
-from kedfem.motion.batch import Choice
+from kedfem.motion.batch import RowSelection
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import Target, target
 from kedfem.motion.path.continuation import ROUNDING, on_curves, quintics, split
@@ -21,11 +21,11 @@ class Path:
 
     phi : (G,) τ, increasing [rad or m; s with several drives]
     shape : (3, G, 12 B) R and p of all bodies, ground first, and their two derivatives by τ
-    near : (G, A) turns of the angle rows, counted on from the start [rad]
+    near : (G, A) angles of the angle rows, unwrapped from the start [rad]
     period : τ after which the linkage returns to its pose; infinite if it does not
-    over : (m,) what the rows gather over a period: gears whose ratio is not quite that of whole revolutions
-    weakest : smallest singular value met on the way, relative, and τ there
-    rows : those that hold all motions, well conditioned all along
+    over : (m,) change of the rows over a period, of gears whose ratio is not exactly that of whole revolutions
+    nearest_singularity : smallest reciprocal condition number of the rows on the path, and τ there
+    rows : independent rows, well conditioned on all of the path
     curve : (G - 1, 6, 12 B) coefficients of the quintics between grid points, of R and p
     """
 
@@ -34,8 +34,8 @@ class Path:
     near: Float[np.ndarray, "G A"]
     period: float
     over: Float[np.ndarray, " m"]
-    weakest: tuple[float, float]
-    rows: Choice
+    nearest_singularity: tuple[float, float]
+    rows: RowSelection
     curve: Float[np.ndarray, "I 6 C"]
 
     @property
@@ -61,7 +61,7 @@ class Path:
         return bool(np.isfinite(self.period))
 
     def holds(self, low: float, high: float) -> bool:
-        """Whether it reaches so far, up to rounding."""
+        """Whether it covers a range, up to rounding."""
         slack = ROUNDING * (1 + self.phi[-1] - self.phi[0])
         return self.periodic or bool(self.phi[0] - slack <= low and high <= self.phi[-1] + slack)
 
@@ -69,7 +69,7 @@ class Path:
 def with_points(
     along: Path, phi: Float[np.ndarray, " T"], shape: Float[np.ndarray, "3 T C"], near: Float[np.ndarray, "T A"]
 ) -> tuple[Path, Int[np.ndarray, " G"]]:
-    """The path with some further grid points, and numbers of its points among the old ones with these behind."""
+    """The path with more grid points, and numbers of its points in the sequence of old points and then these."""
     order = np.argsort(np.concatenate([along.phi, phi]))
     phi = np.concatenate([along.phi, phi])[order]
     shape = np.concatenate([along.shape, shape], axis=1)[:, order]
@@ -90,15 +90,15 @@ def place_on(along: Path, tau: Float[np.ndarray, " T"]) -> tuple[np.ndarray, np.
 
 
 def predicted(along: Path, tau: Float[np.ndarray, " T"]) -> Poses:
-    """Poses between grid points: quintic Hermite interpolation of R and p, R made a rotation again."""
+    """Poses between grid points by quintic Hermite interpolation of R and p, with R orthonormalised."""
     k, s, _ = place_on(along, tau)
     if not len(along.curve):
         return np.tile(along.R, (len(tau), 1, 1, 1)), np.tile(along.p, (len(tau), 1, 1))
     return on_curves((along.curve[k, power] for power in range(5, -1, -1)), s)
 
 
-def aimed(link: Linkage, along: Path, tau: Float[np.ndarray, " T"]) -> Target:
-    """What the rows shall be: values of the drives, and turns of couplings from those on the grid."""
+def target_on_path(link: Linkage, along: Path, tau: Float[np.ndarray, " T"]) -> Target:
+    """Required values of the rows: those of the drives, and angles of couplings interpolated on the grid."""
     k, s, turns = place_on(along, tau)
     there = np.minimum(k + 1, len(along.phi) - 1)
     near = along.near[k] + s[:, None] * (along.near[there] - along.near[k])

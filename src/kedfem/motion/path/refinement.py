@@ -1,25 +1,25 @@
-"""Refinement of the grid of a path until poses between its points can be interpolated to rounding."""
+"""Refinement of the grid of a path until poses between its points are interpolated to rounding."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from kedfem.motion.batch import Choice, moving, settled
+from kedfem.motion.batch import RowSelection, newton_solution, solved_motion
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import OPEN, BlockFactor, Factor, target
 from kedfem.motion.path.continuation import shapes
-from kedfem.motion.path.record import Path, aimed, predicted, with_points
+from kedfem.motion.path.record import Path, predicted, target_on_path, with_points
 
-FINE = 6e-14  # of the size: error of a prediction from which rates can be taken
-NEAR = 1e-8  # of large linkages: one more iteration of Newton costs less than a finer grid
-HALVES = 64  # quintics between points half as far apart are so many times as close
+FINE = 6e-14  # of the size: error of a prediction whose rates are exact to rounding
+NEAR = 1e-8  # of large linkages, where one more Newton iteration costs less than a finer grid
+HALVES = 64  # ratio of the errors of quintics on a grid and on its bisection
 REFINEMENTS, MOST_POINTS = 5, 20_000
 
 
-def halved(link: Linkage, along: Path) -> tuple[Path, bool, Factor | BlockFactor | None]:
-    """The path with a grid point more in each interval, whether all of these can be closed, and then its rows, if known.
+def bisected(link: Linkage, along: Path) -> tuple[Path, bool, Factor | BlockFactor | None]:
+    """The path with a grid point more in each interval; whether all of these can be closed; its factored rows, if known.
 
-    Points of small linkages are all closed to rounding; between those of large ones rates need not be known as closely.
+    In small linkages all points are solved to rounding, in large ones only the new points.
     """
     middles = np.arange(1, len(along.phi))
     phi, near = (np.insert(x, middles, (x[:-1] + x[1:]) / 2, axis=0) for x in (along.phi, along.near))
@@ -28,7 +28,7 @@ def halved(link: Linkage, along: Path) -> tuple[Path, bool, Factor | BlockFactor
     else:
         old = replace(along, phi=phi[:0], shape=along.shape[:, :0], near=near[:0])
     wanted, rates = target(link, phi, near), link.drives.at(phi)[1:]
-    got = settled(link, Choice(link.rows), predicted(along, phi), wanted, rates)
+    got = newton_solution(link, RowSelection(link.rows), predicted(along, phi), wanted, rates)
     fine = got.gap <= OPEN
     kept = fine | np.isin(phi, along.phi)
     closes = bool(fine.all())
@@ -37,14 +37,14 @@ def halved(link: Linkage, along: Path) -> tuple[Path, bool, Factor | BlockFactor
 
 
 def refined(link: Linkage, along: Path) -> Path:
-    """Grid points added where the middle between two is not predicted to rounding."""
+    """The path with grid points added where the middle between two is not predicted to rounding."""
     fresh, enough = np.ones(len(along.phi) - 1, bool), FINE if link.blocks is None else NEAR
     for _ in range(REFINEMENTS):
         middle = (along.phi[:-1] + along.phi[1:])[fresh] / 2
         if not len(middle) or len(along.phi) + len(middle) > MOST_POINTS:
             break
-        aim, (R, p) = aimed(link, along, middle), predicted(along, middle)
-        got = moving(link, along.rows, (R, p), aim, link.drives.at(middle)[1:])
+        aim, (R, p) = target_on_path(link, along, middle), predicted(along, middle)
+        got = solved_motion(link, along.rows, (R, p), aim, link.drives.at(middle)[1:])
         apart = np.maximum(
             np.abs(got.poses[0] - R).max(axis=(1, 2, 3)), np.abs(got.poses[1] - p).max(axis=(1, 2)) / link.size
         )
