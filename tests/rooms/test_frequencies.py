@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 from rich.console import Console
 
 from kedfem.errors import SceneError
+from kedfem.export import state_space
 from kedfem.frequencies import Campbell, Wanted, crossed, frequencies
 from kedfem.scene import scene_from
 from kedfem.tables import frequencies_tables
@@ -90,6 +91,43 @@ def test_a_free_drive_is_refused_where_there_is_none(tmp_path: Path) -> None:
         frequencies(scene, Wanted(free=True), tmp_path / "out")
     found = frequencies(scene, Wanted(2), tmp_path / "out")
     assert (len(found.time), found.still, found.crossings) == (1, 1, ())
+
+
+ANALYSES = (
+    ({"revolutions": 1, "steps_per_revolution": 180}, "time"), ({"end_time": 1.0, "step": 0.01}, "angle"),
+    ({"kind": "steady"}, "angle"), ({"kind": "quasi-static"}, "time"), ({"kind": "static", "revolutions": 2}, "angle"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("times", "over"), ANALYSES, ids=str)
+def test_a_released_drive_moves_a_slider_that_is_a_mass_alone(times: dict[str, Any], over: str, tmp_path: Path) -> None:
+    """It was an internal error where the drive tells the end. With the crank across the slide the rod does not rotate:
+    J = m (r²/3 + w²/12) of the crank + (rod + slider) r²."""
+    r, section = 0.05, {"width": 0.01, "thickness": 0.012}
+    beam = {"model": "beam", "material": "steel", "mesh": {"elements": 2}}
+    crank, rod = ({"kind": "bar", "between": x, **section} for x in ([[0, 0], [0, r]], [[0, r], [0.2, 0]]))
+    factor = {"over": over, "at": [0, 1.0, 2.0], "value": [0, 1, 0], "period": 2.0 if over == "time" else 2 * np.pi}
+    hinges = {"A": ("ground", "crank", [0, 0]), "B": ("crank", "rod", [0, r]), "C": ("rod", "slider", [0.2, 0])}
+    raw = {
+        "links": {
+            "crank": {**beam, "shape": crank}, "rod": {**beam, "shape": rod}, "slider": {"model": "rigid", "mass": 0.8},
+        },
+        "joints": {
+            **{name: {"kind": "revolute", "links": [a, b], "at": x} for name, (a, b, x) in hinges.items()},
+            "G": {"kind": "prismatic", "links": ["ground", "slider"], "at": [0.2, 0], "axis": "x"},
+        },
+        "drive": {"joint": "A", "motion": {"kind": "constant_speed", "speed": "60 rpm"}},
+        "loads": {"F": {"kind": "force", "link": "slider", "at": [0.2, 0], "vector": [1, 0], "factor": factor}},
+        "damping": {"beta": 1e-5}, "analysis": {"accuracy": "quick", **times},
+    }  # fmt: skip
+    found = frequencies(scene_from(raw, tmp_path), Wanted(2, 2, free=True), tmp_path / "out")
+    assert found.still == 1
+    space, _ = state_space(scene_from(raw, tmp_path), 2, free=True)
+    assert space.frequencies[1:] == pytest.approx(found.values[0], rel=1e-6)
+    mass, w = 7850 * 0.01 * 0.012, 0.01
+    inertia = mass * r * (r**2 / 3 + w**2 / 12) + (mass * float(np.hypot(0.2, r)) + 0.8) * r**2
+    speed, torque, rate = space.outputs.index("drive/speed"), space.inputs.index("drive/torque"), len(space.frequencies)
+    assert space.C[speed, rate] * space.B[rate, torque] == pytest.approx(1 / inertia, rel=1e-5)
 
 
 @pytest.mark.parametrize("axis", [[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0], [0.48, 0.6, 0.64]])

@@ -11,7 +11,7 @@ from kedfem.arrays import Float
 from kedfem.dynamics.history import Block, LinkHistory
 from kedfem.dynamics.loads import unit_forces
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.modes.frozen import require_drive, tangent_warning
+from kedfem.dynamics.modes.frozen import released, require_drive, tangent_warning
 from kedfem.dynamics.modes.linear_model import LinearModel, Shapes, linear_model
 from kedfem.dynamics.system.record import System
 from kedfem.errors import SceneError
@@ -135,7 +135,7 @@ def _let_go(scene: Scene) -> tuple[Scene, tuple[_Element, ...]]:
         given = {"joint": drive.joint, "about": drive.about, "along": drive.along, "torque" if turns else "force": 0.0}
         motors[element.motor] = Motor.model_validate({key: x for key, x in given.items() if x is not None})
         elements.append(element)
-    return scene.model_copy(update={"drive": None, "drives": {}, "motors": motors}), tuple(elements)
+    return released(scene).model_copy(update={"motors": motors}), tuple(elements)
 
 
 def _unit(system: System, name: str, motion: RigidMotion) -> list[Float[np.ndarray, "n d"]]:

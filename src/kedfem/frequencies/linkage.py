@@ -10,7 +10,7 @@ import numpy as np
 from kedfem.accuracy.frequencies import error_words, frozen
 from kedfem.arrays import Float
 from kedfem.dynamics.history import Snapshot, bent
-from kedfem.dynamics.modes.frozen import Frozen, Modes, UnstableError, require_drive, tangent_warning
+from kedfem.dynamics.modes.frozen import Frozen, Modes, UnstableError, released, require_drive, tangent_warning
 from kedfem.dynamics.modes.stiffened import Stiffened
 from kedfem.dynamics.system.record import System
 from kedfem.errors import SceneError
@@ -106,7 +106,7 @@ def frequencies(
     scene, assembly = assembled(scene)
     watch("mesh and matrices", 0, 0)
     t = _positions(scene, wanted.positions)
-    made, errors, meshes = frozen(scene, wanted.modes, t[0], _without_drives if wanted.free else None)
+    made, errors, meshes = frozen(scene, wanted.modes, t[0], released if wanted.free else None)
     scene, system, solver = made.scene, made.system, made.solver
     turn = revolution_steps(scene)
     speed = 2 * np.pi / (turn * time_grid(scene).step) if turn else 0.0
@@ -122,7 +122,7 @@ def frequencies(
     angle = motion.phi - (2 * np.pi * np.floor(motion.phi.min() / (2 * np.pi) + 1e-9) if speed else 0.0)
     crossings = tuple(crossed(over, wanted.harmonics)) if speed else ()
     warnings = (*assembly_warning(assembly), *tangent_warning(system, "frequencies"), *meshes, *buckled)
-    with claimed(folder or frequencies_folder(scene)) as target:
+    with claimed(FilePath(folder or frequencies_folder(scene))) as target:
         done = Frequencies(target, t, angle, values, errors, still, speed, crossings, solver.factorisations, warnings)
         _write_files(target, scene, wanted, done, over, max(found) * speed)
         if wanted.shapes:
@@ -133,11 +133,6 @@ def frequencies(
             ]
             write_shapes(target, _shapes(scene, system, motion, every, where, wanted.shapes), scene.gravity)
     return done
-
-
-def _without_drives(scene: Scene) -> Scene:
-    """The scene whose drives have released their joints."""
-    return scene.model_copy(update={"drive": None, "drives": {}})
 
 
 def _write_files(

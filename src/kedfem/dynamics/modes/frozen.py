@@ -30,7 +30,7 @@ from kedfem.dynamics.system.starts.linear_equations import HeldBody, LinearEquat
 from kedfem.errors import SceneError, SolveError
 from kedfem.links.reduced import wave_frequency
 from kedfem.motion.rigid import RigidMotion
-from kedfem.scene import Scene
+from kedfem.scene import Scene, time_grid
 
 RIGID_MOTIONS = 6  # of a free body: so many equal frequencies must be found, at the least
 STILL = 1e-8  # ω²/s below which a motion has no strain: free chains of tests/laws/test_frozen.py leave less
@@ -224,6 +224,14 @@ def require_drive(scene: Scene, free: bool) -> None:
     """
     if free and scene.driven is None:
         raise SceneError("--free: must be combined with a drive to release, got a scene without one: leave it out")
+
+
+def released(scene: Scene) -> Scene:
+    """The scene over the same time without its drives, which have released their joints."""
+    grid = time_grid(scene)
+    times = {"end_time": grid.end, "step": grid.step, "revolutions": None, "steps_per_revolution": None}
+    analysis = scene.analysis.model_copy(update=times)
+    return scene.model_copy(update={"drive": None, "drives": {}, "analysis": analysis})
 
 
 def tangent_warning(system: System, what: str) -> tuple[str, ...]:
