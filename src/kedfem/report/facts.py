@@ -8,7 +8,7 @@ import numpy as np
 
 from kedfem.accuracy.error_budget import OF_SOURCE, TOGETHER, UNKNOWN, percent
 from kedfem.output.words import number_in, place_of, unstrained, with_prefix
-from kedfem.results import Fatigue, Peak, Results
+from kedfem.results import Fatigue, FatigueSpot, Peak, Results
 from kedfem.results.frequencies import Summary
 
 STEADY = "steady "  # first word of the notes of a steady motion
@@ -62,7 +62,7 @@ def facts(results: Results, highest: Peak | None, moment: Callable[[float, float
             message = f"{name}, {moment(*when)}"
             out.append(Fact(what, with_prefix(value, unit), message))
     if results.fatigue is not None and (spot := results.fatigue.worst) is not None:
-        message = f"link {spot.link}; life {life_of(spot.damage, results.fatigue)}"
+        message = f"link {spot.link}; life {life_of(spot, results.fatigue)}"
         message += "; unreliable, see below" if results.fatigue.unreliable else ""
         out.append(Fact("Highest utilisation in fatigue", percent(spot.utilisation), message))
     if errors := _noted(results.notes, TOGETHER):
@@ -243,11 +243,10 @@ def named_table(title: str, items: Iterable[tuple[str, str | float]]) -> Table:
     return Table(title, (), rows)
 
 
-def life_of(damage: float, found: Fatigue) -> str:
-    """Life in revolutions of the drive, or in periods, and in hours, from the damage in a period."""
-    turns, what = (found.revolutions, "revolutions") if found.revolutions else (1.0, "periods")
-    hours = found.period / 3600
-    return "endless" if damage * ENDLESS < turns else f"{turns / damage:.3g} {what}, {hours / damage:.3g} h"
+def life_of(spot: FatigueSpot, found: Fatigue) -> str:
+    """Life at a place in revolutions of the drive, or in periods, and in hours."""
+    cycles, what = found.cycles(spot), "revolutions" if found.revolutions else "periods"
+    return "endless" if cycles > ENDLESS else f"{cycles:.3g} {what}, {found.hours(spot):.3g} h"
 
 
 def fatigue_notes(found: Fatigue) -> list[str]:
@@ -271,7 +270,7 @@ def fatigue_table(found: Fatigue) -> Table:
     )  # fmt: skip
     rows: Rows = [
         (
-            name if rank == 0 else "", life_of(spot.damage, found), percent(spot.utilisation),
+            name if rank == 0 else "", life_of(spot, found), percent(spot.utilisation),
             with_prefix(spot.amplitude, "Pa"), with_prefix(spot.mean, "Pa"), spot.criterion,
             percent(spot.disproportion), place_of(spot.place), spot.near,
         )

@@ -204,10 +204,7 @@ def placed_shape(surface: Surface) -> PlacedShape:
 
 
 def _along(every: Sequence[Float[np.ndarray, "n 3"]]) -> Float[np.ndarray, "3"]:
-    """The direction in which a spring stretches; for one that does not stretch, its longest direction.
-
-    The longest direction would be wrong for a short coil about a thick rod.
-    """
+    """The direction in which a spring stretches, as a short coil may be wider than long; of a rigid one the longest."""
     X, *later = (points - points.mean(axis=0) for points in every)
     stretched = max((points - X for points in later), key=lambda x: float(np.abs(x).max(initial=0.0)), default=X)
     long = np.abs(stretched).max(initial=0.0) > STRETCHED * np.abs(X).max(initial=0.0)

@@ -10,10 +10,8 @@ Source: netCDF-4 file format; CF Metadata Conventions 1.11, sections 2.7 (groups
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from kedfem.results.channels import STRESS, TIME, XYZ, Channel
-from kedfem.results.layout import write_facts
+from kedfem.results.layout import write_facts, write_texts
 
 CONVENTIONS = "CF-1.11"
 NAMED = {XYZ: "xyz", XYZ[:2]: "xy", STRESS: "stress_component"}
@@ -37,14 +35,12 @@ def cf_attributes(channel: Channel) -> dict[str, str]:
 
 def lay_dimensions(file: Any, drive: Channel, channels: Sequence[Channel]) -> None:
     """Attach dimensions, units and descriptions to the rows and columns of all existing channels."""
-    import h5py
-
     write_facts(file, {"Conventions": CONVENTIONS, "coordinates": drive.name})
     file[TIME.name].make_scale(TIME.name)
     for channel in channels:
         name = columns_dimension(channel.columns)
         if name and name not in file:
-            file.create_dataset(name, data=np.array(channel.columns, object), dtype=h5py.string_dtype())
+            write_texts(file, name, channel.columns)
             write_facts(file[name], {"long_name": f"components {', '.join(channel.columns)}"})
             file[name].make_scale(name)
     for channel in (TIME, drive, *channels):

@@ -4,7 +4,7 @@ Numbers have HDF5's checksum (Fletcher's), its tables those of the layout of HDF
 texts: their digest is stored beside them.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from hashlib import sha256
 from importlib import metadata
 from pathlib import Path
@@ -90,6 +90,13 @@ def write_text(group: Any, key: str, text: str) -> None:
     """Store a text as a dataset, as an attribute is limited to 64 kB."""
     data = _encoded(text)
     group.create_dataset(key, data=data, dtype=_text_type(len(data)))
+
+
+def write_texts(group: Any, key: str, texts: Sequence[str]) -> None:
+    """Store texts as a dataset of variable length, as readers of netCDF expect names."""
+    import h5py
+
+    group.create_dataset(key, data=np.array(texts, object), dtype=h5py.string_dtype())
 
 
 def read_facts(item: Any) -> dict[str, Any]:

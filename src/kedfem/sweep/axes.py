@@ -31,7 +31,7 @@ class Axis:
     where : the key's place in the scene
     values : as a scene would state them
     numbers : the same in one unit; None if they are words
-    unit : as it was given, ``rpm``; of numbers without one that of SI; empty of counts and ratios, and of parameters
+    unit : the given one, as ``rpm``, else that of SI; empty of counts, ratios and parameters
     """
 
     where: Where
@@ -45,21 +45,24 @@ class Axis:
         return place(self.where)
 
     def at(self, which: Sequence[int]) -> "Axis":
-        """The same with the values of some points."""
+        """The axis with the values of some points."""
         numbers = None if self.numbers is None else self.numbers[list(which)]
         return Axis(self.where, tuple(self.values[k] for k in which), numbers, self.unit)
 
 
 def axes_of(texts: Sequence[str], raw: Mapping[str, Any], samples: int | None = None) -> list[Axis]:
-    """The swept keys, each with a value for every point: a grid of all, or a Latin hypercube.
-
-    A SceneError names the first invalid one.
+    """The swept keys, each with a value for every point: a full grid, or a Latin hypercube.
 
     Parameters
     ----------
     texts : ``KEY=a,b,c`` or ``KEY=from:to:count``; for a Latin hypercube ``KEY=from:to``
     raw : keys and values of the scene
     samples : points of a Latin hypercube (`scipy.stats.qmc`), with the same seed each time
+
+    Raises
+    ------
+    SceneError
+        An axis is invalid: the first such one.
     """
     if samples is not None and not 1 <= samples <= MOST:
         raise SceneError(f"--samples: must be from 1 to {MOST:,}, got {samples}")
@@ -107,7 +110,7 @@ def _axis(where: Where, spec: str) -> Axis:
 
 
 def _with_unit(axis: Axis, raw: Mapping[str, Any]) -> Axis:
-    """An axis of plain numbers with the unit that the scene takes them in."""
+    """An axis of plain numbers with the unit in which the scene takes them."""
     if axis.unit or axis.numbers is None:
         return axis
     hint: Any = Scene
@@ -141,7 +144,7 @@ def _at(raw: Any, where: Where) -> Any:
 
 
 def _item(held: Any, part: Any) -> Any:
-    """What a table or list holds, None if it does not."""
+    """An entry of a table or list; None if there is none."""
     try:
         return held[part]
     except (KeyError, IndexError, TypeError):
@@ -210,7 +213,7 @@ def _hypercube(ranges: Sequence[tuple[Where, float, float, str, bool]], samples:
 
 
 def located(name: str, raw: Mapping[str, Any]) -> Where:
-    """The key of a scene that is meant: in full, a parameter's name, or without names in between if one key alone fits.
+    """The key of a scene by its full name, a parameter's name, or a name without middle parts that only one key matches.
 
     Parameters
     ----------
@@ -243,7 +246,7 @@ def with_values(raw: Mapping[str, Any], values: Mapping[Where, Any]) -> dict[str
 
 
 def _keys(raw: Any, hint: Any, where: Where) -> Iterator[Where]:
-    """Places of single values: those that are written, and those that tables which are there may have."""
+    """Keys of single values: those that the scene has, and others that its tables may have."""
     if isinstance(raw, Mapping):
         for key in dict.fromkeys([*raw, *known_keys(hint, raw)]):
             if key in raw:
@@ -264,7 +267,7 @@ def _fits(short: list[str], full: list[str]) -> bool:
 
 
 def _nearest(name: str, known: list[str]) -> str | None:
-    """The known key that looks most like a name, with or without the table of parameters and names in between."""
+    """The known key most similar to a name, also without its middle parts or the table of parameters."""
     forms = {short: full for full in reversed(known) for short in _shortened(full)}
     close = nearest(name, forms)
     return forms[close] if close else None

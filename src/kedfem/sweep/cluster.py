@@ -20,7 +20,7 @@ class OnCluster(Executor):
         self._max_workers = len(client.scheduler_info(n_workers=-1)["workers"])
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """As every executor."""
+        """Submit a call to the workers."""
         future: Future[Any] = self._executor.submit(fn, *args, **kwargs)
         return future
 
@@ -94,5 +94,5 @@ def _refuse_unfit(client: Any, folder: FilePath) -> None:
 
 
 def _found_there(folder: str) -> tuple[str, bool]:
-    """At a worker: kedfem's version, and whether a folder is there."""
+    """kedfem's version at a worker, and whether a folder exists there."""
     return installed_version(), os.path.isdir(folder)  # noqa: PTH112 - runs at a worker, on plain text

@@ -13,7 +13,7 @@ import numpy as np
 
 from kedfem.dynamics.system.period.map import StateArrays
 from kedfem.results import replacing
-from kedfem.results.layout import installed_version, opened
+from kedfem.results.layout import installed_version, opened, write_texts
 from kedfem.results.table import write_rows
 from kedfem.sweep.axes import Axis
 from kedfem.sweep.points import MAGNITUDE, Row
@@ -76,23 +76,23 @@ def write_sweep(path: FilePath, axes: Sequence[Axis], rows: Sequence[Row], last:
     with replacing(path) as part, opened(part, "w") as file:
         file.attrs.update(kedfem_version=installed_version(), sweep_format=FORMAT, last_revolutions=last)
         file["point"] = np.arange(len(rows))
-        _texts(file, "column", list(units))
+        write_texts(file, "column", list(units))
         for name in ("point", "column"):
             file[name].make_scale(name)
         for axis in axes:
             if axis.numbers is None:
-                _texts(file, axis.key, [str(value) for value in axis.values])
+                write_texts(file, axis.key, [str(value) for value in axis.values])
             else:
                 file[axis.key] = axis.numbers
                 file[axis.key].attrs["units"] = axis.unit
             _along(file, axis.key, "point")
         for name in ("status", "settled", "message"):
-            _texts(file, name, [getattr(row, name) for row in rows])
+            write_texts(file, name, [getattr(row, name) for row in rows])
         for name in ("change", "seconds"):
             file[name] = [getattr(row, name) for row in rows]
         for name in ("status", "settled", "message", "change", "seconds"):
             _along(file, name, "point")
-        _texts(file, "unit", list(units.values()))
+        write_texts(file, "unit", list(units.values()))
         _along(file, "unit", "column")
         for k, kind in enumerate(KINDS):
             file[kind] = numbers[:, :, k]
@@ -107,7 +107,7 @@ def column_units(rows: Sequence[Row]) -> dict[str, str]:
 
 
 def plain_quantities(names: Sequence[str]) -> list[str]:
-    """Names to be shown: of vectors the magnitude alone, nothing of the rigid mechanism, stresses first."""
+    """Names to be shown: of vectors only the magnitude, none of the rigid mechanism, stresses first."""
     whole = {name.rpartition("/")[0] for name in names if name.endswith(f"/{MAGNITUDE}")}
     elastic = (name for name in names if "/rigid_" not in name)
     some = [x for x in elastic if x.rpartition("/")[0] not in whole or x.endswith(f"/{MAGNITUDE}")]
@@ -126,12 +126,6 @@ def _numbers(row: Row, units: dict[str, str]) -> Iterator[float]:
     """Extremes of all columns one after the other; nan where a row has none."""
     for name in units:
         yield from row.extremes.get(name, ("", (math.nan,) * len(KINDS)))[1]
-
-
-def _texts(file: Any, name: str, texts: list[str]) -> None:
-    import h5py
-
-    file.create_dataset(name, data=np.array(texts, object), dtype=h5py.string_dtype())
 
 
 def _along(file: Any, name: str, *dimensions: str) -> None:

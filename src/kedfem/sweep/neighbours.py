@@ -39,7 +39,7 @@ def refuse_without_order(scene: Scene, edges: bool) -> None:
 
 @dataclass
 class Continuation:
-    """The point that each one follows, and the names of their rows, which depend on all points before.
+    """The previous point of each point, and the names of their rows, which depend on all points before.
 
     before : number of a point → that of the previous point; None for the first of a line
     """
@@ -59,7 +59,7 @@ class Continuation:
         return cls(before)
 
     def named(self, k: int, own: str) -> str:
-        """The name of a point's row; `own` where points do not follow one another."""
+        """The name of a point's row; `own` without continuation."""
         if k not in self.before:
             return own
         last = self.before[k]
@@ -68,7 +68,7 @@ class Continuation:
         return self.names[k]
 
     def due(self, k: int, rows: Mapping[int, Row]) -> bool:
-        """Whether the point before is done."""
+        """Whether the previous point is finished."""
         last = self.before.get(k)
         return last is None or last in rows
 

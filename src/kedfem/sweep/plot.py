@@ -98,5 +98,5 @@ def _label(axis: Axis) -> str:
 
 
 def _far(growth: np.ndarray) -> float:
-    """By what factor colours go from one: as far as growth does on either side, to a thousandth of it."""
+    """Ratio of the ends of the colour scale to one: the largest of growth and its inverse, of a thousandth at least."""
     return float(np.exp(max(np.abs(np.log(np.maximum(growth, 1e-3))).max(), 1e-9)))

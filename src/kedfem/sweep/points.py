@@ -50,7 +50,7 @@ class BaseScene:
 
 @dataclass(frozen=True, slots=True)
 class SharedChoices:
-    """Choices of one plan for all points: of the analysis, and of links by name."""
+    """Choices of one plan for all points, for the analysis and for links by name."""
 
     analysis: Mapping[str, Any] = field(default_factory=dict)
     links: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
@@ -65,7 +65,7 @@ class SharedChoices:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A point to be run in another process, of plain records alone.
+    """A point to be run in another process, in plain records.
 
     values : key → value
     last : revolutions whose extremes are evaluated
@@ -203,7 +203,7 @@ def _ran(job: Job) -> Row:
 
 
 _ENDS: dict[str, tuple[Scene, ...]] = {}
-"""The last scenes of this process whose reduced links others share."""
+"""The last scenes of this process whose reduced links are shared."""
 
 
 def _ends(job: Job) -> tuple[Scene, ...]:
@@ -218,8 +218,8 @@ def _ends(job: Job) -> tuple[Scene, ...]:
 
 
 def _since(scene: Scene, last: float) -> float:
-    """The time [s] after which extremes count, between two steps; before the start where the drive makes no turns
-    and where one period, or each position by itself, is found."""
+    """The time [s] after which extremes count, between two steps; before the start without revolutions of the drive, and
+    where the analysis is a single period or independent positions."""
     turn, grid = revolution_steps(scene), time_grid(scene)
     if turn is None or scene.analysis.kind != "transient":
         return -0.5 * grid.step
@@ -248,9 +248,6 @@ def columns(results: Results, some: np.ndarray) -> Iterator[tuple[str, str, Floa
         if name.startswith(SUMS):
             continue
         rows = values[some]
-        if not channel.columns or rows.ndim == 1:
-            yield name, channel.unit, rows.reshape(len(rows))
-            continue
         for k, column in enumerate(channel.columns):
             yield f"{name}/{column}", channel.unit, rows[:, k]
         if channel.vector:

@@ -1,4 +1,4 @@
-"""All points of a sweep on a pool of processes; points that an earlier sweep finished are not run again."""
+"""All points of a sweep on a pool of processes, except points that an earlier sweep finished."""
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -31,7 +31,7 @@ class SweepOptions:
 
     last : revolutions of the drive whose extremes are evaluated
     workers : number of processes; if None, the number of cores that this one may use
-    quick : plain defaults for what the scene leaves open, instead of a plan
+    quick : defaults for open choices of the scene, instead of a plan
     keep : whether the files of each run are kept
     edges : relative width to which edges of unstable bands are found along the first key; None: no edges
     follow : whether the search for a steady motion starts from that of the previous point along the first key
@@ -76,7 +76,7 @@ def sweep(
     Parameters
     ----------
     folder : `sweep_folder` if not given
-    executor : what runs the points instead of a pool of processes of this machine
+    executor : runs the points instead of a pool of processes of this machine
 
     Raises
     ------
@@ -90,7 +90,7 @@ def sweep(
     if asked.quick:
         analysis = {**base.raw.get("analysis", {}), "accuracy": "quick"}
         base = replace(base, raw={**base.raw, "analysis": analysis})
-    scene = scene_from(base.raw, base.folder, stem=base.stem)  # its own faults are not those of points
+    scene = scene_from(base.raw, base.folder, stem=base.stem)  # raises its own faults, before those of points
     refuse_thinned(scene, asked.keep)
     if asked.edges is not None:
         refuse_without_growth(scene, axes[0], asked.edges)

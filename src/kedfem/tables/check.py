@@ -1,4 +1,4 @@
-"""Tables of `kedfem check`: the model, how it moves, and what a run would cost."""
+"""Tables of `kedfem check`: the model, its motion, and the cost of a run."""
 
 from dataclasses import replace
 from pathlib import Path as FilePath
@@ -42,20 +42,20 @@ from kedfem.tables.layout import facts
 from kedfem.tables.model import link_tables, mobility_table
 from kedfem.tables.run import plan_tables, reduction_table
 
-PARALLEL = 1e-6  # of the largest: turns about other axes that rounding leaves
-STILL = 1e-9  # rad, and of the linkage's size: motions below are rounding
-NEARLY = 0.01  # deg: of a full revolution, by rounding
+PARALLEL = 1e-6  # of the largest rotation: smaller ones about other axes are rounding
+STILL = 1e-9  # rad, and of the linkage's size: smaller motions are rounding
+NEARLY = 0.01  # deg: rounding of a full revolution
 
 
 def check_tables(
     ready: Prepared, reduction: Reduction | None, plan: Plan | None,
     tried: tuple[Cost, KedfemError | None] | None = None,
 ) -> list[Table]:  # fmt: skip
-    """What would be modelled: the plan for an accuracy, links, what reducing them costs, motion, frequency, cost.
+    """The model of a scene: plan for its accuracy, links, error of their reduction, motion, mobility, frequency, cost.
 
     Parameters
     ----------
-    tried : what `forecast` found, if that is known already
+    tried : result of `forecast`, if known
     """
     (cost, failed), found = tried or forecast(ready), resolution(ready)
     moving = mobility(ready.scene, ready.linkage, ready.path)
@@ -72,9 +72,9 @@ def check_tables(
 
 
 def forecast(ready: Prepared) -> tuple[Cost, KedfemError | None]:
-    """Cost of a run: a few steps are taken with all that a run makes of them, and one frame of the animation.
+    """Cost of a run, from a few of its steps and one frame of the animation.
 
-    From sizes alone where they cannot be taken, with what fails then: the run's first steps do, too.
+    If these steps fail, as those of the run would, the cost follows from sizes alone, and the error is returned too.
     """
     scene, model = ready.scene, ready.model
     every = [*model.links, *(prescribed.link for prescribed in model.prescribed)]
@@ -113,7 +113,7 @@ def seconds_of_frame(ready: Prepared, recoveries: list[StressRecovery], now: Sna
 
 
 def resolution_table(found: Resolution, scene: Scene) -> Table:
-    """First frequency of the linkage against step and drive."""
+    """First frequency of the linkage, with steps in its period and resonances with the drive."""
     span = "over the last revolution" if revolution_steps(scene) else "over the analysis"
     low, high = found.first.min(), found.first.max()
     return facts("First frequency (drive fixed, of what the loads excite)", [
@@ -138,11 +138,11 @@ def _motion(ready: Prepared) -> Table:
 
 
 def motion_in_words(R: Float[np.ndarray, "T 3 3"], p: Float[np.ndarray, "T 3"], size: float) -> str:
-    """How far a link turns, or slides where it does not turn, in words.
+    """Range of a link's rotation, or of its translation if it does not rotate, in words.
 
     Parameters
     ----------
-    R, p : its poses: a link that does not turn is p off the reference position [m]
+    R, p : its poses; p is the displacement of a link that does not rotate [m]
     size : of the linkage [m]
     """
     if np.abs(R - np.eye(3)).max() > STILL:
@@ -154,7 +154,7 @@ def motion_in_words(R: Float[np.ndarray, "T 3 3"], p: Float[np.ndarray, "T 3"], 
 
 
 def rotation_in_words(R: Float[np.ndarray, "T 3 3"]) -> str:
-    """How far a link turns on its way, in words; about one axis its angle is counted on, beyond half a revolution too."""
+    """Range of a link's rotation on its path, in words; about a single axis the angle is unwrapped."""
     from scipy.spatial.transform import Rotation
 
     start = Rotation.from_matrix(R[0]).as_rotvec()
@@ -183,7 +183,7 @@ def _over(ready: Prepared) -> str:
 
 
 def _force_elements(ready: Prepared) -> Table:
-    """Motors, springs and limits: where they act and by which law."""
+    """Motors, springs and limits: their joints and laws."""
     scene, parts = ready.scene, links_of(ready.model, ready.linkage.bodies)
     for name, element in force_elements(scene):  # refused where they do not fit
         element_joint(scene, name, element, *parts)
@@ -197,7 +197,7 @@ def _force_elements(ready: Prepared) -> Table:
 
 
 def _limit_law(limit: Limit) -> str:
-    """Where stops are, and their constants."""
+    """Positions of stops, and their constants."""
     unit, force, rate = ("rad", "N m/rad", "N m s/rad") if limit.kind == "angle" else ("m", "N/m", "N s/m")
     ends = " and ".join(with_prefix(x, unit) for x in (limit.lower, limit.upper) if x is not None)
     constants = zip((limit.stiffness, limit.damping), (force, rate), strict=True)
@@ -210,7 +210,7 @@ def _curve_words(curve: Curve, unit: str) -> str:
 
 
 def _spring_law(spring: Spring) -> tuple[str, str]:
-    """Where a spring is, and its constants."""
+    """Joint or ends of a spring, and its constants."""
     if isinstance(spring, LineSpring):
         ends = " and ".join(end.link for end in spring.between or ())
         on = f"spring between {ends}" if ends else f"spring along joint {spring.joint}"
@@ -229,7 +229,7 @@ def _spring_law(spring: Spring) -> tuple[str, str]:
 
 
 def _initial_speeds(ready: Prepared) -> list[tuple[str, str]]:
-    """How fast each link starts, in words, where the scene asks for speeds."""
+    """Initial speed of each link, in words, if the scene requests initial speeds."""
     analysis = ready.scene.analysis
     if not (analysis.initial_speeds or analysis.initial_motions):
         return []

@@ -1,4 +1,4 @@
-"""A scene to start from, written for an assembly: its solids as links, joints as a comment to confirm."""
+"""A draft of a scene for an assembly from CAD: its solids as links, joints as comments to confirm."""
 
 import os
 import re
@@ -43,13 +43,18 @@ step = "1 ms"     # with a drive leave it out: kedfem chooses the step, meshes a
 
 
 def draft_scene(assembly: Path, folder: Path, scale: float | None) -> str:
-    """The text of a scene for a CAD file in metres per unit, or its own unit, to be written into a folder.
+    """The text of a scene for a CAD file, to be written into a folder.
+
+    Parameters
+    ----------
+    scale : metres per unit of the file; None: the unit that the file states
+
     Raises
     ------
     MeshError
         The file cannot be read, or one of its solids is not one to mesh.
     SceneError
-        The file's name or the scale cannot stand in a scene.
+        The file's name or the scale is not valid in a scene.
     """
     scaled = {} if scale is None else {"scale": scale}
     link_from({"shape": {"file": assembly.name, **scaled}})
@@ -71,7 +76,7 @@ def scene_text(solids: Sequence[AssemblySolid], file: str, scale: float | None) 
 
 
 def link_names(names: Sequence[str]) -> list[str]:
-    """Names for the links of a scene: letters, digits and underscores, each its own, none of them the ground's.
+    """Unique names for the links of a scene, of letters, digits and underscores, none of them the ground's.
 
     >>> link_names(["Crank #1", "crank 1", "ground", "~"])
     ['Crank_1', 'crank_1_2', 'ground_2', 'part']
@@ -91,9 +96,9 @@ def link_names(names: Sequence[str]) -> list[str]:
 
 
 def ground_solid(solids: Sequence[AssemblySolid], found: Sequence[AssemblyJoint]) -> int | None:
-    """The solid that may be the frame: one of a frame's name, else the largest of those in a closed loop.
+    """The solid that is probably the frame: the largest with a frame's name, else the largest in a closed loop.
 
-    Only of those that meet others; None without such: in an open chain any may be.
+    None of a solid without contact to others, or in an open chain, where any may be the frame.
     """
     pairs = {frozenset(each.solids) for each in found}
     named = [i for i in sorted({i for pair in pairs for i in pair}) if FRAME.search(solids[i].name)]
@@ -104,7 +109,7 @@ def ground_solid(solids: Sequence[AssemblySolid], found: Sequence[AssemblyJoint]
 
 
 def _order(found: AssemblyJoint, ground: int | None, solids: Sequence[AssemblySolid]) -> tuple[bool, bool, float]:
-    """Hinges of the ground first, that of the shortest link before others: it may be the crank."""
+    """Sorting key: hinges of the ground first, among these that of the shortest link, which may be the crank."""
     others = [solids[i].extent for i in found.solids if i != ground]
     return found.ball, ground not in found.solids, min(others)
 
@@ -119,7 +124,7 @@ def _link(name: str, solid: AssemblySolid, file: str, scale: float | None) -> st
 
 
 def _as_frame(table: str, name: str) -> str:
-    """The table of the link that may be the frame, as a comment."""
+    """The table of the possible frame, as a comment."""
     phrase = (
         f'\n# {name} may be the frame: joints below call it "{GROUND}", and it needs no link. If it shall bend too,\n'
         f'# take this link, put its name in place of "{GROUND}", and weld it to the ground.\n'
@@ -168,7 +173,7 @@ def _joint(name: str, found: AssemblyJoint, names: Sequence[str], ground: int | 
 
 
 def _in_words(found: AssemblyJoint, links: Sequence[str]) -> str:
-    """What meets: ``bore of radius 6 mm of rod, pin of radius 6 mm of crank, together along 10 mm``."""
+    """Faces in contact: ``bore of radius 6 mm of rod, pin of radius 6 mm of crank, together along 10 mm``."""
     faces = [_face(face.inward, face.kind, face.radius) for face in found.faces]
     phrase = ", ".join(f"{face} of {link}" for face, link in zip(faces, links, strict=True))
     if found.ball:
@@ -197,7 +202,7 @@ def _xyz(x: Float[np.ndarray, "3"]) -> tuple[float, float, float]:
 
 
 def _mm(x: float) -> str:
-    """A length, to a nanometre: what rounding left of zero is zero."""
+    """A length, rounded to a nanometre."""
     return f"{round(1e3 * float(x), 6) + 0.0:.10g} mm"
 
 
@@ -214,7 +219,7 @@ def _key(name: str) -> str:
 
 
 def _quoted(text: str) -> str:
-    """A text as TOML writes it; a text that cannot be written so, half of a letter, is refused."""
+    """A text as TOML writes it; SceneError of an unpaired surrogate."""
     try:
         text.encode()
     except UnicodeEncodeError as error:
@@ -223,5 +228,5 @@ def _quoted(text: str) -> str:
 
 
 def _shown(text: str) -> str:
-    """A text in a comment: on one line, without the signs that TOML forbids there."""
+    """A text in a comment: on one line, without characters that TOML forbids there."""
     return _quoted(text)[1:-1].replace('\\"', '"')

@@ -1,4 +1,4 @@
-"""How tables of the terminal look: words to the left, numbers to the right, both whole however narrow it is."""
+"""Layout of tables in the terminal: words to the left, numbers to the right, none cut off in a narrow one."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 from rich.table import Column, Table
 from rich.text import Text
 
-READ, LEAST = 100, 44  # characters of a line that is read well, and of the last column's at least
+READ, LEAST = 100, 44  # characters of a readable line; least width of the last column
 
 
 def left(*names: str, **look: Any) -> list[Column]:
@@ -20,11 +20,11 @@ def right(*names: str, **look: Any) -> list[Column]:
 
 
 def facts(title: str | Text, rows: Iterable[Sequence[str | Text]] = (), **look: Any) -> Table:
-    """A table without a heading: what it is, and how much; longer texts go over several lines, in pipes and files too."""
+    """A table of names and values without a heading; long texts are wrapped, in pipes and files too."""
     every = [tuple(row) for row in rows]
     columns = max(map(len, every), default=0)
     before = [max(len(row[k]) for row in every) for k in range(columns - 1)]
-    most = max(LEAST, READ - sum(before) - 3 * columns - 1)  # lines and spaces between columns and at both ends
+    most = max(LEAST, READ - sum(before) - 3 * columns - 1)  # less lines and spaces between columns and at both ends
     last = [Column(overflow="fold", max_width=most)] if every else []
     return listed(title, [*left(*([""] * len(before))), *last], every, show_header=False, **look)
 

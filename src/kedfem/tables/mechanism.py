@@ -1,4 +1,4 @@
-"""What kinematics found of a mechanism, loads of its joints and drives, load cases of links, natural frequencies."""
+"""Tables of kinematics, loads of joints and drives, load cases of links, and natural frequencies."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -19,7 +19,7 @@ from kedfem.scene import Scene
 from kedfem.scene.records.units import RPM
 from kedfem.tables.layout import facts, left, listed, right
 
-WIDTH, BORDER = 72, 3  # of columns beside the first in a terminal of 80 characters; of each
+WIDTH, BORDER = 72, 3  # of all columns but the first in a terminal of 80 characters; of each column's border
 MODES = 8  # side by side
 SHORT = {
     "drive at peak": "at", "time of peak": "at", "time of largest": "at",
@@ -42,7 +42,7 @@ def kinematics_tables(scene: Scene, moved: KinematicsRun) -> list[Table]:
 
 
 def seconds_table(of: str, seconds: Mapping[str, float]) -> Table:
-    """How long each stage took."""
+    """Duration of each stage."""
     return facts(f"{of}; seconds", ((stage, f"{each:.2f}") for stage, each in seconds.items()))
 
 
@@ -67,7 +67,7 @@ def _transmissions(scene: Scene, moved: KinematicsRun) -> Iterator[tuple[str, ..
 
 
 def _forces(scene: Scene, moved: KinematicsRun) -> Iterator[tuple[str, ...]]:
-    """Largest sizes; what statics do not determine is not there."""
+    """Largest magnitudes of statically determinate forces."""
     found = {name: x for name, x in moved.results.channels.items() if "/rigid_" in name}
     highest = largest_by_unit(found.values())
     for name, (channel, values) in found.items():
@@ -109,7 +109,7 @@ def _summary(title: str, what: str, every: Mapping[str, Mapping[str, float]]) ->
 
 
 def case_tables(found: LoadCases) -> list[Table]:
-    """Of each instant the resultant of each kind of force, in the link's axes; the highest stress, the residual."""
+    """Resultants of each kind of force at each instant, in the link's axes; highest stress, residual."""
     title = Text(f"Load cases of {found.link}, in its axes in the reference position")
     table = listed(title, [*right("time"), *left("what"), *right("x", "y", "z")])
     short = listed("", right(
@@ -162,7 +162,7 @@ def _speeds(found: Frequencies, ranges: Mapping[tuple[int, int], str], harmonics
 
 
 def _blocks(numbers: Sequence[int], most: int) -> list[Sequence[int]]:
-    """Columns that fit beside one another."""
+    """Groups of columns that fit side by side."""
     return [numbers[k : k + most] for k in range(0, len(numbers), most)]
 
 
@@ -174,7 +174,7 @@ def _range(x: Crossing, speed: float) -> str:
 
 
 def part_tables(found: PartFrequencies) -> list[Table]:
-    """Frequencies of a single link; what it is and its support."""
+    """Frequencies of a single link, with its mass and support."""
     part, still = found.part, found.still
     held = f"held at {', '.join(part.held)}" if part.held else "free"
     left_out = f"{unstrained(still)}, at 0 Hz, left out" if still else ""
@@ -185,6 +185,6 @@ def part_tables(found: PartFrequencies) -> list[Table]:
 
 
 def _caption(*words: str) -> Text | None:
-    """What is below a table; none of empty words."""
+    """The caption of a table; None of empty words."""
     text = "; ".join(filter(None, words))
     return Text(text) if text else None

@@ -1,4 +1,4 @@
-"""What is modelled: sizes, links and their meshes, how they were closed and how they can move; a part from CAD alone."""
+"""Tables of the model: sizes, links and their meshes, assembly and mobility; of a single part from CAD."""
 
 from collections.abc import Iterable, Iterator, Sequence
 
@@ -27,11 +27,11 @@ from kedfem.scene import Scene
 from kedfem.tables.layout import facts, left, listed, right
 
 CLOSE = np.radians(20.0)  # of a dead point: forces of three times the load and more
-FAR = np.radians(30.0)  # estimates of joints from further away are rough
+FAR = np.radians(30.0)  # of a dead point: farther away estimates are rough
 
 
 def size_line(found: Sizes) -> str:
-    """Overall size, longest and shortest link, masses, moduli, speeds, in one line, so that a wrong unit is seen.
+    """Overall size, longest and shortest link, masses, moduli, speeds, in one line, in which a wrong unit is noticeable.
 
     >>> lengths, masses = {"crank": 0.1, "rod": 0.3}, {"crank": 0.16, "rod": 0.5}
     >>> size_line(Sizes(0.42, lengths, masses, {"steel": 2.1e11}, {"A": 600.0}, {}))
@@ -69,7 +69,7 @@ def assembly_table(assembly: Assembly) -> Table:
 
 
 def link_tables(model: Model) -> list[Table]:
-    """What each link is modelled as; how parts from CAD were meshed, and why so."""
+    """The model of each link; meshing methods of parts from CAD, with reasons."""
     rows = [
         (name, *map(str, element_facts(parts).values()), _mass(*parts), _quality(*parts))
         for name, parts in segments(model).items()
@@ -97,11 +97,11 @@ def _quality(*parts: Link) -> str:
 
 
 def mobility_table(scene: Scene, link: Linkage, found: Mobility, works: bool = False) -> Table:
-    """Degrees of freedom, what is held twice, what is not held, and the nearest dead point.
+    """Degrees of freedom, redundant constraints, free motions, and the nearest dead point.
 
     Parameters
     ----------
-    works : whether a run's first steps were found: what is free is meant to be
+    works : whether a run's first steps succeed, so that free motions are intended
     """
     driven = f"driven at {joints_in_words(tuple(scene.driven_joints))}" if found.drives else "none driven"
     twice = f"{found.redundancy} of them redundant" if found.redundancy else "none redundant"
@@ -143,7 +143,7 @@ def _apart(link: Linkage, x: float) -> str:
 
 
 def mesh_tables(name: str, mesh: SolidMesh, found: Sequence[PartCandidate]) -> list[Table]:
-    """A part on its own: how it was meshed, its faces that a joint can sit on, the quality of its elements."""
+    """A single part: meshing method, faces for joints, quality of its elements."""
     quality = mesh_quality(mesh)
     sides = mesh.points.max(axis=0) - mesh.points.min(axis=0)
     table = facts(Text(name), [
@@ -162,13 +162,13 @@ def mesh_tables(name: str, mesh: SolidMesh, found: Sequence[PartCandidate]) -> l
 
 
 def _surfaces(found: Sequence[PartCandidate]) -> Table:
-    """What a joint can sit on, by the numbers in the picture."""
+    """Faces for joints, by the numbers in the picture."""
     caption = (
         "mm; numbers as in the picture; what a joint finds that is put there, of round faces about their axis. "
         "Others by joints.NAME.faces: the face's name, or what it is: "
         '{ cylinder = "8 mm", axis = "z", near = [0.05, 0, 0] }'
     )
-    names = left("face", no_wrap=True)  # they are there to be copied: what is too wide breaks elsewhere
+    names = left("face", no_wrap=True)  # names are for copying: other columns are wrapped
     columns = [*right("no"), *names, *left("what"), *right("⌀", "at"), *left("axis", "finds")]
     table = listed("What joints can sit on", columns, caption=caption)
     for each in found:
@@ -180,5 +180,5 @@ def _surfaces(found: Sequence[PartCandidate]) -> Table:
 
 
 def _shown(x: Float[np.ndarray, "3"], digits: int) -> str:
-    """A point or direction without the noise of rounding."""
+    """A point or direction, rounded."""
     return "({:g}, {:g}, {:g})".format(*(np.round(x, digits) + 0.0))

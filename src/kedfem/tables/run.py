@@ -1,4 +1,4 @@
-"""Tables of a run: what was chosen, largest values, stresses, errors, energy balance, seconds."""
+"""Tables of a run: choices, largest values, stresses, errors, energy balance, seconds."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -25,7 +25,7 @@ from kedfem.tables.mechanism import seconds_table
 
 
 def plan_tables(plan: Plan) -> list[Table]:
-    """Where the error of a run with `analysis.accuracy` comes from, what was chosen, and what was not."""
+    """Sources of the error of a run with `analysis.accuracy`, and its choices."""
     budget = listed(
         f"Accuracy asked for: {100 * plan.asked:.3g} %",
         [*left("part of the error"), *right("expected", "allowed")],
@@ -37,7 +37,7 @@ def plan_tables(plan: Plan) -> list[Table]:
 
 
 def chosen_table(plan: Plan) -> Table:
-    """What was chosen, and what was tried for it."""
+    """Choices, and notes on their trials."""
     scene = plan.scene
     return facts(f"Chosen for {100 * plan.asked:.3g} %", [
         ("frames", str(scene.analysis.frames)),
@@ -63,7 +63,7 @@ def _chosen(link: LinkScene) -> str:
     mesh = ", ".join(f"{key} {_size(key, value)}" for key, value in sizes) if link.shape else ""
     segments = "" if link.segments is None else f", {link.segments} segments"
     open_kind = isinstance(link.shape, Cad | MeshFile) and "element" not in link.model_fields_set
-    kind = f"{link.element} " if link.element and not open_kind else ""  # a file's shape says what it is meshed with
+    kind = f"{link.element} " if link.element and not open_kind else ""  # of a file's part its mesh has them
     return f"{'reduced ' * link.reduced}{kind}{link.model}" + (f" ({mesh})" if mesh else "") + segments
 
 
@@ -96,7 +96,7 @@ def run_tables(scene: Scene, done: Run) -> list[Table]:
 
 
 def channel_table(scene: Scene, done: Run) -> Table:
-    """The largest value of every channel, and when it is."""
+    """The largest value of every channel, and its instant."""
     columns = [*left("channel", "component"), *right("largest", clock(scene), no_wrap=True)]
     table = listed(Text(scene.title or "Largest values"), columns)
     least = rounding(done.results)
@@ -112,7 +112,7 @@ def channel_table(scene: Scene, done: Run) -> Table:
 
 
 def largest_of(channel: Channel, values: Float[np.ndarray, "n c"]) -> tuple[int, str, float]:
-    """Row, component and value of the largest one; of vectors the magnitude where that tells more, as in plots."""
+    """Row, component and value of the largest one; of vectors the magnitude if it is clearly larger, as in plots."""
     k, c = (int(x) for x in np.unravel_index(np.abs(values).argmax(), values.shape))
     value = float(values[k, c])
     if channel.vector and channel.name.rsplit("/", 1)[-1] not in SIGNED:
@@ -123,7 +123,7 @@ def largest_of(channel: Channel, values: Float[np.ndarray, "n c"]) -> tuple[int,
 
 
 def steady_table(found: Steady) -> Table:
-    """Period, and how vibrations about a steady motion die away."""
+    """Period of a steady motion, and decay of vibrations about it."""
     n = f"{found.revolutions:.6g}"
     turns = f", {n} revolution{'s' * (n != '1')} of the drive" if found.revolutions else ""
     table = facts("Steady motion", [
@@ -140,7 +140,7 @@ def steady_table(found: Steady) -> Table:
 
 
 def stress_table(scene: Scene, peaks: Mapping[str, Peak]) -> Table:
-    """The highest stress of each link over all steps, and away from where it is not what it seems."""
+    """The highest stress of each link over all steps, and away from singular places."""
     columns = [*left("link"), *right("stress"), *left("reference position", clock(scene), "near")]
     rows = peak_rows(peaks, partial(moment, scene))
     return listed("Highest von Mises stress, over all steps", columns, rows)
@@ -177,7 +177,7 @@ def _cell(error: float | None) -> str:
 
 
 def balance_table(found: Balance) -> Table:
-    """The residual of energy over the steps, and what energy rigid-body frames make."""
+    """The residual of energy over the steps, and the energy that rigid-body frames create."""
     shares = {"energy, residual of the steps": f"{100 * found.energy:.2g} %"}
     if found.neglected > ROUNDING:
         shares["energy made by rigid-body frames"] = f"{100 * found.neglected:.3g} %"

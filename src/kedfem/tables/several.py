@@ -1,4 +1,4 @@
-"""Many runs as tables: beside each other, variants of a scene by speed and error, points of a sweep."""
+"""Tables of several runs: comparisons, variants of a scene by speed and error, points of a sweep."""
 
 import numpy as np
 from rich.table import Table
@@ -18,12 +18,12 @@ STUDY_COLUMNS = ("model", "mesh", "steps", "red.", "size", "prep.", "step", "who
 
 
 def compare_tables(found: Comparison) -> list[Table]:
-    """What differs in the scenes; peaks of all channels with what the others are off by; highest stresses."""
+    """Differing keys of the scenes; peaks and differences of all channels; highest stresses."""
     return [_keys(found), *(_differences(found, k) for k in range(1, len(found.names))), _peaks(found)]
 
 
 def _differences(found: Comparison, k: int) -> Table:
-    """Run k beside the first one."""
+    """Run k compared with the first one."""
     low, high = (with_prefix(x, found.unit) for x in found.range)
     title = f"{found.names[k]} compared with {found.names[0]}, over {found.over}, {low} to {high}"
     columns = [*left("channel"), *right("peak", f"of {found.names[0]}", "differs by", "at", "rms")]
@@ -62,7 +62,7 @@ def _peaks(found: Comparison) -> Table:
 
 
 def study_tables(study: Study, machine: str) -> list[Table]:
-    """Variants by time with their errors, and what the reference's own error is made of; those not run, by reason."""
+    """Variants by time with their errors, and the shares of the reference's own error; variants not run, with reasons."""
     first, *others, last = STUDY_COLUMNS
     columns = [*left(first, min_width=11), *right(*others, no_wrap=True)]
     columns += right(last, no_wrap=True, min_width=len(REFERENCE))
@@ -100,7 +100,7 @@ def _seconds(s: float) -> str:
 
 
 def sweep_tables(done: SweepResult) -> tuple[list[Table], list[str]]:
-    """The largest magnitudes over all points, where they are; and warnings."""
+    """The largest magnitudes over all points, and their points; and warnings."""
     failed = [k for k, row in enumerate(done.rows) if row.status == "failed"]
     fresh = len(done.rows) - done.before
     title = f"Sweep: {len(done.rows)} points, {len(failed)} failed, {fresh} run now"
@@ -120,7 +120,7 @@ def sweep_tables(done: SweepResult) -> tuple[list[Table], list[str]]:
 
 
 def _largest(done: SweepResult, name: str) -> tuple[int, float]:
-    """The point at which a quantity is largest, and how large."""
+    """The point at which a quantity is largest, and its value there."""
     sizes = {k: largest(row, name) for k, row in enumerate(done.rows) if name in row.extremes}
     at = max(sizes, key=sizes.__getitem__)
     return at, sizes[at]
