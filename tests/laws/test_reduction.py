@@ -20,6 +20,7 @@ from kedfem.dynamics.modes.residual import residual_deflections
 from kedfem.dynamics.reduced_model import reduced_model
 from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.system.steps import with_element_points
 from kedfem.links.reduced import rigid, rigid_modes
 from kedfem.scene import scene_from
 from tests import scenes
@@ -141,20 +142,24 @@ def test_a_scene_that_is_turned_has_the_same_forces_turned() -> None:
         assert_allclose(b, a @ R.T, rtol=0, atol=1e-7 * np.abs(a).max())  # rounding; z is held more than once
 
 
+@pytest.mark.parametrize("spring", [False, True])
 @pytest.mark.parametrize("kind", ["beam", "bar"])
-def test_the_full_models_own_state_leaves_no_residual(kind: str) -> None:
-    """With average acceleration the balance holds at the end of each step."""
+def test_the_full_models_own_state_leaves_no_residual(kind: str, spring: bool) -> None:
+    """With average acceleration the balance holds at the end of each step, what a spring exerts in it."""
     raw = arm(kind, rho_inf=1.0)
     del raw["damping"]
+    if spring:
+        ends = [{"link": "ground", "at": [0.5, 0.4, 0]}, {"link": "arm", "at": [0.5, 0, 0]}]
+        raw["springs"] = {"s": {"kind": "spring", "between": ends, "stiffness": 2000.0}}
     full = meshed(scene_from(raw))
-    parts = static_parts(full.model)
+    parts, points = static_parts(full.model), with_element_points(full.scene, full.linkage, full.model)
     states = list(snapshots(full.scene, full.linkage, full.path, full.model, steps_of(full.scene, full.model)))
     size = max(np.abs(s.states[0].g).max() for s in states)
-    for left in residual_deflections(full.model, parts, full.model, states[1::30]):
+    for left in residual_deflections(full.model, parts, full.model, states[1::30], points):
         assert np.abs(left[0]).max() < 1e-7 * size
     wrong = states[50]
     wrong.states[0].a[:] *= 1.01
-    assert np.abs(residual_deflections(full.model, parts, full.model, [wrong])[0][0]).max() > 1e-5 * size
+    assert np.abs(residual_deflections(full.model, parts, full.model, [wrong], points)[0][0]).max() > 1e-5 * size
 
 
 def four_bars(speed: str) -> dict[str, Any]:

@@ -148,7 +148,8 @@ def training_motion(full: Prepared) -> RigidMotion:
     if per_turn is not None:
         turn = min(per_turn * grid.step, grid.end)
         t = np.concatenate([t, grid.end - turn * np.arange(INSTANTS - half) / (INSTANTS - half)])
-    t = np.unique(np.concatenate([t, _loaded(full, grid.step * np.arange(grid.steps + 1))]))
+    released = [0.0] if scene.analysis.initial_deflection else []
+    t = np.unique(np.concatenate([released, t, _loaded(full, grid.step * np.arange(grid.steps + 1))]))
     return rigid_motion(full.linkage, full.path, t, path_parameter(scene, t))
 
 

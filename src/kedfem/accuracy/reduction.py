@@ -31,6 +31,8 @@ from kedfem.dynamics.modes.bases import bases, reduced_at
 from kedfem.dynamics.modes.reduction import Basis, enriched, static_parts
 from kedfem.dynamics.modes.residual import residual_deflections
 from kedfem.dynamics.reduced_model import reduced_model, restored_model, stored_model
+from kedfem.dynamics.rigid_elements import Acting, acting
+from kedfem.dynamics.system.steps import with_element_points
 from kedfem.links.record import Link
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
@@ -133,7 +135,7 @@ def reduced(
     needed &= reducible(full.model)
     if not needed:
         return Reduction(full, {}, tolerance)
-    found = bases(full.model, training_motion(full), parts, needed)
+    found = bases(full.model, training_motion(full), parts, needed, _acting(full))
     given = counts or {}
 
     def first(share: float) -> Modes:
@@ -190,8 +192,14 @@ def first_reduced(
     left &= reducible(model)
     if not left:
         return replace(full, model=model)
-    small = reduced_at(model, training_motion(full), left, lambda link, basis: _count(link, basis, tolerance))
+    forces = _acting(replace(full, model=model))
+    small = reduced_at(model, training_motion(full), left, lambda link, basis: _count(link, basis, tolerance), forces)
     return replace(full, model=small)
+
+
+def _acting(full: Prepared) -> Acting:
+    """What acts on the links of a prepared scene beside loads."""
+    return acting(full.scene, full.linkage, full.path, full.model)
 
 
 def _settled(
@@ -240,6 +248,7 @@ def _run(full: Prepared, Q: Modes, moments: Collection[int]) -> tuple[Prepared, 
 
 def _enriched(full: Prepared, parts: Sequence[Substructure], small: Prepared, kept: Sequence[Snapshot]) -> Modes:
     """Modes with added responses to the residual at some instants."""
-    answers = residual_deflections(full.model, parts, small.model, kept)
+    points = with_element_points(full.scene, full.linkage, full.model)
+    answers = residual_deflections(full.model, parts, small.model, kept, points)
     links = zip(full.model.links, small.model.links, zip(*answers, strict=True), strict=True)
     return [None if link is whole else enriched(link, each, ADDED) for whole, link, each in links]

@@ -179,24 +179,26 @@ class Block:
     def at(self, k: int) -> "Snapshot":
         """The k-th of its time points."""
         moments = [LinkMoment(**{f.name: getattr(each, f.name)[k] for f in fields(LinkMoment)}) for each in self.links]
-        return Snapshot(self.step + k, self.motion, k, moments)
+        return Snapshot(self.step + k, self.motion, k, moments, self.multipliers.every(slice(k, k + 1)))
 
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """Everything at one time point: number of the step, rigid motion (entry k of a block), elastic states."""
+    """Everything at one time point: number of the step, rigid motion (entry k of a block), states, multipliers."""
 
     step: int
     motion: RigidMotion
     k: int
     states: list[LinkMoment]
+    multipliers: Multipliers = NONE
 
     def copied(self) -> "Snapshot":
         """The same in arrays of its own, which keep nothing else alive."""
         motion = self.motion.at(np.array([self.k]))
         names = [f.name for f in fields(LinkMoment) if f.name != "strain"]
         states = [replace(x, **{name: getattr(x, name).copy() for name in names}) for x in self.states]
-        return Snapshot(self.step, motion, 0, states)
+        multipliers = multipliers_together([self.multipliers], lambda each: each[0].copy())
+        return Snapshot(self.step, motion, 0, states, multipliers)
 
     @property
     def t(self) -> float:

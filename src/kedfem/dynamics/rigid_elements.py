@@ -4,17 +4,19 @@ Their coordinates depend on earlier times only by the count of revolutions: angl
 of the linkage has that count, so that any part of the motion can be evaluated by itself.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.force_elements import force_elements, law_of, places, term_of
-from kedfem.dynamics.history import Block
+from kedfem.dynamics.history import Block, Forcing
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, direction
 from kedfem.dynamics.joints.constraint_ports import LinkageLayout, element_joint
+from kedfem.dynamics.loads import initial_forces
 from kedfem.dynamics.model import Model, link_keys
+from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.system.ends import end_of, rigid_end
 from kedfem.dynamics.system.forces.poses import forces_in_place, value
 from kedfem.dynamics.system.forces.supports import Pushed, exerted
@@ -29,6 +31,8 @@ from kedfem.scene import Scene
 from kedfem.vectors import cross
 
 Vectors = Float[np.ndarray, "T 3"]
+Acting = Callable[[RigidMotion], Iterable[tuple[int, Float[np.ndarray, "T n d"]]]]
+"""Nodal forces on links by number, world components, at the times of a motion."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,6 +205,34 @@ def rigid_elements(scene: Scene, linkage: Linkage, along: Path, model: Model | N
         counted = term.kind == ANGLE and getattr(element, "about", None) is None
         every.append(RigidElement(law_of(element), term, (one, other), str(element.joint) if counted else ""))
     return RigidElements(every, scene, linkage, along) if every else None
+
+
+def nothing(motion: RigidMotion) -> Iterable[tuple[int, Float[np.ndarray, "T n d"]]]:
+    """No forces beside loads."""
+    return ()
+
+
+def acting(scene: Scene, linkage: Linkage, along: Path, model: Model) -> Acting:
+    """Forces of motors and springs on links of a model in the rigid-body motion, at t = 0 those that are released too."""
+    elements = rigid_elements(scene, linkage, along, model)
+    released = initial_forces(scene, model.links) if scene.analysis.initial_deflection else []
+
+    def forces(motion: RigidMotion) -> Iterator[tuple[int, Float[np.ndarray, "T n d"]]]:
+        yield from elements.loads(motion) if elements else ()
+        start = (motion.t == 0.0)[:, None, None]
+        yield from ((k, start * F) for k, F in enumerate(released))
+
+    return forces
+
+
+def whole_forcings(model: Model, motion: RigidMotion, acting: Acting) -> list[Forcing]:
+    """Orientation and P − M R0'' of all links over time, P with all that acts in the rigid-body motion: follower loads of
+    co-rotational frames too, and motors and springs."""
+    loads = tuple(tuple(replace(load, own=False) for load in each) for each in model.loads)
+    found = forcings(replace(model, loads=loads), motion)
+    for k, more in acting(motion):
+        found[k] = replace(found[k], F=found[k].F + more)
+    return found
 
 
 def effort(law: Law, motion: RigidMotion, q: Times, rate: Times) -> Times:

@@ -5,6 +5,7 @@ import numpy as np
 from kedfem.dynamics.matrices.dense import SMALL
 from kedfem.dynamics.model import Model
 from kedfem.dynamics.modes.bases import reduced_at
+from kedfem.dynamics.rigid_elements import acting
 from kedfem.motion.linkage import Linkage
 from kedfem.motion.path import Path
 from kedfem.motion.rigid import rigid_motion
@@ -21,4 +22,4 @@ def coarse_model(scene: Scene, linkage: Linkage, along: Path, model: Model) -> M
         return None
     t = time_grid(scene).end * (np.arange(INSTANTS) + 0.5) / INSTANTS
     motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
-    return reduced_at(model, motion, large, lambda _, basis: basis.count(LEFT_OUT))
+    return reduced_at(model, motion, large, lambda _, basis: basis.count(LEFT_OUT), acting(scene, linkage, along, model))

@@ -17,7 +17,7 @@ from kedfem.dynamics.joints.constraint_matrices import constraint_matrices
 from kedfem.dynamics.matrices.closed import closed
 from kedfem.dynamics.matrices.substructure import Substructure, factored
 from kedfem.dynamics.model import Model
-from kedfem.dynamics.rigid_body import forcings
+from kedfem.dynamics.rigid_elements import Acting, nothing, whole_forcings
 from kedfem.dynamics.stepping.state import NodalOf
 from kedfem.links.record import Link, mass_times_over
 from kedfem.links.reduced import (
@@ -71,10 +71,17 @@ def static_parts(model: Model, free: bool = False) -> list[Substructure]:
     return [factored(link, joint, shift, 1.0) for link, joint in zip(model.links, model.joints, strict=True)]
 
 
-def excited(model: Model, parts: Sequence[Substructure], motion: RigidMotion) -> list[list[NodalOf]]:
-    """Static deflections at the times of a motion, with their shares in modes of the frozen linkage; per link."""
+def excited(
+    model: Model, parts: Sequence[Substructure], motion: RigidMotion, acting: Acting = nothing
+) -> list[list[NodalOf]]:
+    """Static deflections at the times of a motion, with their shares in modes of the frozen linkage; per link.
+
+    Parameters
+    ----------
+    acting : forces of motors and springs in the rigid-body motion, and such as are released at the start
+    """
     out: list[list[NodalOf]] = [[] for _ in model.links]
-    krylov = _krylov(model, parts, motion)
+    krylov = _krylov(model, parts, motion, acting)
     shares = np.array([_dots(M_b, krylov.static) for M_b in krylov.images])  # (l, T)
     for t, found in enumerate(krylov.found):
         Z = np.linalg.eigh(krylov.T[t, :found, :found])[1]
@@ -138,9 +145,9 @@ class _Krylov:
             self.T[:, level, k] = self.T[:, k, level] = _dots(M_b, x)
 
 
-def _krylov(model: Model, parts: Sequence[Substructure], motion: RigidMotion) -> _Krylov:
+def _krylov(model: Model, parts: Sequence[Substructure], motion: RigidMotion, acting: Acting = nothing) -> _Krylov:
     """Of the linkage frozen at the times of a motion, from its static deflection under P − M R0'' there, link frames."""
-    forcing = forcings(model, motion)
+    forcing = whole_forcings(model, motion, acting)
     frozen = closed(parts, [x.R for x in forcing], constraint_matrices(model.rows, motion, model.interface_unknowns))
     found = _Krylov(model, list(frozen.deflections([x.F @ x.R for x in forcing])))
     for _ in range(LANCZOS):

@@ -37,7 +37,7 @@ from kedfem.dynamics.system.starts.initial_states import rest
 from kedfem.dynamics.system.starts.instant import Instant, renumbered
 from kedfem.dynamics.system.starts.internal_forces import own
 from kedfem.dynamics.system.state import History, State, empty_history
-from kedfem.motion.linkage import linkage
+from kedfem.motion.linkage import Linkage, linkage
 from kedfem.motion.rigid import RigidMotion
 from kedfem.scene import Scene, corotational
 
@@ -60,11 +60,16 @@ def scene_system(scene: Scene, model: Model, stresses: Stiffening | None = None)
         If the coupling surface of a force element does not determine how it turns as a whole.
     """
     rigid = linkage(scene)
-    if scene.springs or scene.motors or scene.limits:
-        links, layout = links_of(model, rigid.bodies)
-        held = joined(scene, links, model.cuts, layout, elements=True)
-        model = replace(model, joints=tuple(held.attachments.values()), rows=held.rows)
-    return replace(system_of(scene, rigid, model=model), stiffening=stresses)
+    return replace(system_of(scene, rigid, model=with_element_points(scene, rigid, model)), stiffening=stresses)
+
+
+def with_element_points(scene: Scene, rigid: Linkage, model: Model) -> Model:
+    """The model with interface points for springs, motors and limits."""
+    if not (scene.springs or scene.motors or scene.limits):
+        return model
+    links, layout = links_of(model, rigid.bodies)
+    held = joined(scene, links, model.cuts, layout, elements=True)
+    return replace(model, joints=tuple(held.attachments.values()), rows=held.rows)
 
 
 class Steps:

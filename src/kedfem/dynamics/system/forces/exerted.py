@@ -10,6 +10,7 @@ import numpy as np
 from kedfem.arrays import Float, Int
 from kedfem.dynamics.joints.attachments import Attachment
 from kedfem.dynamics.joints.constraint_joints import ConstraintJoint, Side
+from kedfem.dynamics.model import Model
 from kedfem.dynamics.system.ends import end_of
 from kedfem.dynamics.system.forces.poses import Vectors
 from kedfem.dynamics.system.forces.supports import Supports
@@ -62,10 +63,16 @@ def on_ports(forces: Supports) -> Float[np.ndarray, "T m"]:
     return forces.on_interface([row for row in rows if not row.name.startswith((*ELEMENTS, "rigid."))])
 
 
-def on_links(forces: Supports) -> dict[int, Rows]:
-    """Nodal forces (T, n, d) of force elements on the links that they act on, by number, world components."""
-    model, out = forces.of.system.model, dict[int, Rows]()
-    for row in model.rows:
+def on_links(forces: Supports, on: Model | None = None) -> dict[int, Rows]:
+    """Nodal forces (T, n, d) of force elements on the links that they act on, by number, world components.
+
+    Parameters
+    ----------
+    on : a model of the same scene with interface points for force elements, as with unreduced links; the march's own if
+        not given
+    """
+    model, out = on or forces.of.system.model, dict[int, Rows]()
+    for row in forces.of.system.model.rows:
         for side in row.sides if row.name.startswith(ELEMENTS) else ():
             if side is None:
                 continue
