@@ -75,8 +75,7 @@ class LinkScene(Record):
     `analysis.accuracy`, and the default if that and no `reduction` is given, else a solid, of a polyline a beam"""
     reduction: Annotated[Literal["none", "modal"] | Count, BeforeValidator(checked_reduction)] = "none"
     """whether an elastic link moves in the span of a few modes only: `modal`: as many as `analysis.reduction_tolerance`
-    asks for, or their number; with co-rotational frames those of each segment, and beams stay unreduced.
-    Not where the drive leaves motions free, as of a suspension"""
+    asks for, or their number; with co-rotational frames those of each segment, and beams stay unreduced"""
     material: MaterialName | None = None
     """a name: built in or in `materials`; not for a rigid slider"""
     shape: Shape | None = None
