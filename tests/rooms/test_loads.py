@@ -207,6 +207,9 @@ def test_without_a_drive_loads_are_in_the_worlds_axes_and_it_is_said(tmp_path: P
     assert not any("its axes" in name for name in joint)
     assert np.isnan(found.joints["B"]["equivalent, ball bearing [N]"])
     assert not list(found.folder.glob("*.png"))
+    table_of_joints = loads_tables(found)[0]
+    assert [str(column.header) for column in table_of_joints.columns] == ["joint", "peak", "at", "mean", "rms"]
+    assert table_of_joints.caption is None
 
 
 def test_of_several_drives_peaks_are_told_by_their_time() -> None:

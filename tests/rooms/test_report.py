@@ -227,6 +227,18 @@ def test_rounding_in_load_tables_is_told_as_such() -> None:
     assert table.rows == [("A", "2 kN", "≈ 0", "10 nN m")]
 
 
+def test_notes_of_load_tables_are_about_columns_that_are_there() -> None:
+    """Without the links' orientation there are neither bearing loads nor power; their notes stood there all the same."""
+    for known in (np.nan, 2e3):
+        rows = (
+            {"A": {"peak [N]": 2e3, "equivalent, ball bearing [N]": known}},
+            {"A": {"mean [N]": 1e3, "mean power [W]": known}},
+        )
+        told = loads_tables(*rows)
+        assert [bool(table.note) for table in told] == [np.isfinite(known)] * 2
+        assert [len(table.rows[0]) for table in told] == [3 if np.isfinite(known) else 2] * 2
+
+
 def test_a_steady_motion_has_its_table() -> None:
     notes: dict[str, str | float] = {
         "steady period [s]": 0.02, "steady revolutions": 1.0, "steady marches": 11.0, "steady residual": 2e-9,

@@ -209,6 +209,20 @@ def test_stiffening_changes_frequencies_as_told_by_frequencies(tmp_path: Path) -
     assert_allclose(ends, stiff.frequencies, rtol=1e-6)
 
 
+@pytest.mark.parametrize("stiffening", [False, True])
+def test_what_stiffens_a_released_drive_is_told(stiffening: bool) -> None:
+    """A hanging arm under its weight has the frequency of a pendulum, √(1.5 g/L) of a thin one, with stiffening alone."""
+    raw = {
+        "gravity": [0, -9.81, 0], "links": {"arm": bar("beam", (0, 0), (0, -0.8), 6)},
+        "joints": {"A": {"kind": "revolute", "links": ["ground", "arm"], "at": [0, 0]}},
+        "drive": turning("1 rpm"),
+        "analysis": {"revolutions": 1, "steps_per_revolution": 90, "accuracy": "quick", "stiffening": stiffening},
+    }  # fmt: skip
+    space, told = state_space(scene_from(raw), 3, free=True)
+    assert space.frequencies[0] == pytest.approx(np.sqrt(1.5 * 9.81 / 0.8) / (2 * np.pi) if stiffening else 0.0, rel=1e-2)
+    assert [x for x in told if "as a stiffness, lowest frequency 0.68" in x] == [told[-1]][: int(stiffening)]
+
+
 def test_a_constant_load_is_answered_alike_whatever_modes_are_kept() -> None:
     """Twelve arms of nearly one length, so that what is left out is hardly stiffer than what is kept."""
     links: Raw = {"hub": bar("beam", (0, 0), (0.1, 0), 1)}

@@ -26,6 +26,10 @@ from kedfem.scene import Motor, Scene, driven_travel, time_grid
 FORMAT = "kedfem state space 1"
 # of a link's size: displacements from whose differences outputs are; exact where these are linear
 SMALL = 1e-5
+STIFF = (
+    "state space: weight and rotation at this position act as a stiffness, lowest frequency {:.4g} Hz, on what a "
+    "released drive moves, without the Coriolis forces: leave analysis.stiffening out for a drive that moves freely"
+)
 NOTHING = 1e-12  # of the largest of its unit: an input so small does nothing
 
 Matrix = Float[np.ndarray, "_ _"]
@@ -103,7 +107,9 @@ def state_space(
         [_unit(system, name, motion) for name in scene.loads], [names[f"motors.{each.motor}"] for each in elements],
     )  # fmt: skip
     space = _space(loose, made.linkage, system.model, motion, found, elements)
-    return space, (*assembly_warning(assembly), *tangent_warning(system, "state space"), *meshes, *_idle(space))
+    stiff = (STIFF.format(space.frequencies[0]),) if free and scene.analysis.stiffening and space.frequencies[0] else ()
+    said = (*assembly_warning(assembly), *tangent_warning(system, "state space"), *meshes, *stiff)
+    return space, (*said, *_idle(space))
 
 
 def _require(scene: Scene, modes: int, at: float, free: bool) -> None:

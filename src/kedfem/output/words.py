@@ -58,6 +58,11 @@ def number_in(row: Mapping[str, float], name: str) -> str:
     return "≈ 0" if abs(x) < NOTHING * largest else with_prefix(x, unit.removesuffix("]"))
 
 
+def known_names(every: Iterable[Mapping[str, float]]) -> list[str]:
+    """Names of which any row has a number."""
+    return list(dict.fromkeys(name for row in every for name, x in row.items() if np.isfinite(x)))
+
+
 def with_prefix(value: float, unit: str) -> str:
     """A number with an SI prefix: 1.23e7, Pa → 12.3 MPa. Angles are in degrees; kilograms and radians take no prefix.
 

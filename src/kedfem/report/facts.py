@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from kedfem.accuracy.error_budget import OF_SOURCE, TOGETHER, UNKNOWN, percent
-from kedfem.output.words import number_in, place_of, unstrained, with_prefix
+from kedfem.output.words import known_names, number_in, place_of, unstrained, with_prefix
 from kedfem.results import Fatigue, FatigueSpot, Peak, Results
 from kedfem.results.frequencies import Summary
 
@@ -176,18 +176,21 @@ def loads_tables(joints: Mapping[str, Mapping[str, float]], drives: Mapping[str,
     out = []
     if joints:
         note = "Equivalent bearing loads: mean by the power 3 (ball) or 10/3 (roller), ISO 281, over the whole run."
-        out.append(_numbers("Joint forces", "joint", joints, note))
+        out.append(_numbers("Joint forces", "joint", joints, ("equivalent", note)))
     if drives:
-        out.append(_numbers("Drive", "joint", drives, "Power is positive when the drive supplies it."))
+        out.append(_numbers("Drive", "joint", drives, ("power", "Power is positive when the drive supplies it.")))
     return out
 
 
-def _numbers(title: str, what: str, reported: Mapping[str, Mapping[str, float]], note: str) -> Table:
-    """A table with a row for each name; columns without any number are left out."""
-    every = dict.fromkeys(key for numbers in reported.values() for key in numbers)
-    keys = [key for key in every if any(np.isfinite(x.get(key, np.nan)) for x in reported.values())]
+def _numbers(title: str, what: str, reported: Mapping[str, Mapping[str, float]], note: tuple[str, str]) -> Table:
+    """A table with a row for each name; columns without any number are left out.
+
+    note : a word of the columns that a sentence is about, and the sentence
+    """
+    keys, (of, said) = known_names(reported.values()), note
     rows: Rows = [(name, *(number_in(x, key) for key in keys)) for name, x in reported.items()]
-    return Table(title, (what, *(key.rpartition(" [")[0] for key in keys)), rows, note)
+    shown = said if any(of in key for key in keys) else ""
+    return Table(title, (what, *(key.rpartition(" [")[0] for key in keys)), rows, shown)
 
 
 def budget_table(notes: Mapping[str, str | float]) -> list[Table]:

@@ -12,7 +12,7 @@ from kedfem.kinematics import KinematicsRun, first_largest
 from kedfem.load_cases import LoadCases
 from kedfem.loads import Loads
 from kedfem.motion.coordinates import driven_names
-from kedfem.output.words import NOTHING, clock, moment, number_in, unstrained, with_prefix
+from kedfem.output.words import NOTHING, clock, known_names, moment, number_in, unstrained, with_prefix
 from kedfem.results.channels import largest_by_unit
 from kedfem.results.kinematic import transmission_key
 from kedfem.scene import Scene
@@ -95,12 +95,13 @@ def _length(x: float) -> str:
 def loads_tables(found: Loads) -> list[Table]:
     """Peak, mean and equivalent loads of joints; torque and power of drives."""
     joints = _summary("Loads of joints", "joint", found.joints)
-    joints.caption = "radial, axial: largest; ball, roller: equivalent load for the life of such a bearing"
+    if "ball" in (column.header for column in joints.columns):
+        joints.caption = "radial, axial: largest; ball, roller: equivalent load for the life of such a bearing"
     return [joints, _summary("Drives", "drive", found.drives)]
 
 
 def _summary(title: str, what: str, every: Mapping[str, Mapping[str, float]]) -> Table:
-    names = list(dict.fromkeys(name for row in every.values() for name in row))
+    names = known_names(every.values())
     if any(name.startswith("drive at") for name in names):
         names = [name for name in names if not name.startswith("time of")]
     labels = [SHORT.get(label := name.rpartition(" [")[0], label) for name in names]
