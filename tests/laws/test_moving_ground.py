@@ -17,6 +17,9 @@ from kedfem.results import Results
 from kedfem.scene import Polynomial, drive_angle, scene_from
 from tests.laws.test_limits import AXES
 from tests.laws.test_mechanisms import rod_between_balls
+from tests.mechanisms import as_lists
+from tests.moving import beam_in_space
+from tests.partners import joint
 
 Raw = dict[str, Any]
 Vector = np.ndarray
@@ -229,9 +232,34 @@ def test_a_ground_that_moves_as_a_whole_is_inertia_loads(
                    ((moved, "tip"), (still, "tip"), (moved, "table")))  # fmt: skip
     shift = shift[:, : x.shape[1]]
     assert_allclose(x - shift, y, atol=1e-7 * np.abs(shift).max())
-    for joint in raw["joints"]:
-        forces = [found.channels[f"joints/{joint}/force"][1] for found in (moved, still)]
+    for name in raw["joints"]:
+        forces = [found.channels[f"joints/{name}/force"][1] for found in (moved, still)]
         assert_allclose(*forces, atol=1e-6 * np.abs(forces[1]).max())
+
+
+KINDS = ("revolute", "spherical", "universal", "prismatic", "cylindrical", "screw", "planar", "weld")
+
+
+@pytest.mark.parametrize("kind", [pytest.param(x, marks=[] if x == "prismatic" else pytest.mark.long) for x in KINDS])
+def test_a_steady_acceleration_of_the_ground_is_a_gravity(kind: str, tmp_path: Path) -> None:
+    """−a beside it, on a beam in space that any joint holds: the forces are the same, its travel but for the ground's."""
+    a, end, axis, step = 50.0, 4e-3, AXES["oblique"], 2e-4
+    tip = np.array([0.1, 0.05, 0.02])
+    raw: Raw = {
+        "links": {"beam": beam_in_space([0, 0, 0], tip.tolist(), 1)},
+        "joints": {"A": as_lists(joint(kind, ("beam", "ground"), np.zeros(3), np.array([0.3, 0.5, -0.8])))},
+        "analysis": {"end_time": end, "step": step, "rho_inf": 0.8, "initial": "rest", "frames": "co-rotational"},
+    }
+    moved = shaken(raw, axis, 0.0)
+    moved["drives"]["shake"]["motion"] = {"kind": "ramp", "shape": "linear", "speed": 2 * a * end, "time": 2 * end}
+    at = {"tip": travel("beam", tip.tolist())}
+    shaking, still = run(moved, tmp_path, **at), run({**raw, "gravity": (-a * axis).tolist()}, tmp_path, **at)
+    shift = np.multiply.outer(0.5 * a * still.time**2, axis)
+    x, y = (found.channels["probes/tip/travel"][1] for found in (shaking, still))
+    assert_allclose(x - shift, y, atol=1e-6 * np.abs(y).max())
+    for name in ("joints/A/force", "joints/A/moment"):
+        one, other = (found.channels[name][1] for found in (shaking, still))
+        assert_allclose(one, other, atol=max(1e-6 * np.abs(other).max(), 1e-12))
 
 
 def test_grounds_on_grounds_bear_centrifugal_and_coriolis_forces(tmp_path: Path) -> None:

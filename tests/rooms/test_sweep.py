@@ -18,6 +18,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from rich.console import Console
 
 from kedfem.accuracy import reduction
+from kedfem.accuracy.prepared import alike
 from kedfem.analysis import analyse
 from kedfem.errors import SceneError
 from kedfem.scene import scene_from
@@ -410,6 +411,16 @@ def reduced_four_bar() -> dict[str, Any]:
         },
         "output": {"plots": False, "picture": False, "animation": False},
     }  # fmt: skip
+
+
+def test_a_drive_that_runs_backwards_has_modes_of_its_own(tmp_path: Path) -> None:
+    """Its path is another: a pin goes to the other side of its slot."""
+    digests = []
+    for speed in (100, 200, -100):
+        raw = reduced_four_bar()
+        raw["drive"]["motion"]["speed"] = speed
+        digests.append(alike(scene_from(raw, tmp_path)))
+    assert digests[0] == digests[1] != digests[2]
 
 
 def test_points_at_other_speeds_and_dampings_share_their_modes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from itertools import chain
+from math import copysign
 from typing import Any, TypeVar
 
 import numpy as np
@@ -120,7 +121,7 @@ def alike(scene: Scene) -> str | None:
         return None
     if corotational_links(scene) or not isinstance(scene.drive.motion, ConstantSpeed | Ramp):
         return None
-    motion = scene.drive.motion.model_copy(update={"speed": 1.0})
+    motion = scene.drive.motion.model_copy(update={"speed": copysign(1.0, scene.drive.motion.speed)})
     drive = scene.drive.model_copy(update={"motion": motion})
     return key(scene.model_copy(update={"drive": drive, "damping": None}))
 

@@ -118,7 +118,8 @@ def joined(
             unknowns += _mixed(scene, name, surfaces, links, ports, unknowns)
             continue
         points = port_points(scene, name, joint, surfaces, links) if held else np.zeros((0, 3))
-        one_travel = any(links[link].rigid for link in held) or _lies_across(joint, points)
+        undeformed = any(links[link].rigid or links[link].kind == "spatial_beam" for link in held)
+        one_travel = undeformed or _lies_across(joint, points)
         travel = unknowns
         for k, point in enumerate(points):
             components = _components(scene, name, joint, [links[link] for link in held])
