@@ -35,7 +35,9 @@ from kedfem.scene import (
     spatial_beams,
 )
 
-SEGMENTS = 6  # of a solid or plane link with co-rotational frames, where none are given
+# of a solid or plane link with co-rotational frames, where none are given: their error falls with the square of their
+# number and is 1 to 2 % of the peak stress of links that bend by 2 % of their length (docs/theory/links.md)
+SEGMENTS = 6
 
 
 def bare_links(scene: Scene, known: Mapping[str, Link] | None = None) -> dict[str, Link]:
@@ -161,11 +163,7 @@ def max_segments(scene: Scene, name: str) -> int:
 
 
 def _usual_segments(link: Link, material: Material, ends: Float[np.ndarray, "p 3"], whole: list[Interval]) -> Segments:
-    """SEGMENTS of a link, or as many as its mesh can be divided into, none shorter than the link is wide.
-
-    Their error falls with the square of their number: 6 leave 1 to 2 % of the peak stress of links that bend by 2 % of
-    their length (docs/theory/links.md). Cuts of shorter segments would soften the link.
-    """
+    """SEGMENTS of a link, or as many as its mesh can be divided into, none shorter than the link is wide."""
     for count in range(min(SEGMENTS, max_slices(link.X, along(link, ends))), 1, -1):
         try:
             return segmented(link, material, count, ends, whole)

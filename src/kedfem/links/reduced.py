@@ -115,21 +115,13 @@ def rigid(link: Link, frequency: float | None = None) -> Link:
     frequency : of its own vibrations [rad/s]; RIGID times its `wave_frequency` if not given
     """
     made = reduced(link, rigid_body_functions(link))
-    if link.kind == "beam":
-        made = replace(made, mass=(*made.mass[:2], _definite(made.mass[2], made.one)))
+    if link.kind == "beam":  # ψ's mass may be at one point alone, as of a flywheel on a light beam
+        e, m = made.one / np.linalg.norm(made.one), made.mass[2]
+        made = replace(made, mass=(*made.mass[:2], m + LIGHT * np.trace(m) * (np.eye(len(m)) - np.outer(e, e))))
     stiffness = (RIGID * wave_frequency(link) if frequency is None else frequency) ** 2
     B = np.linalg.qr(_weighted(made, rigid_modes(made)))[0]
     K0 = _weighted(made, _weighted(made, stiffness * (np.eye(made.unknowns) - B @ B.T)).T)
     return replace(made, K0=K0, rigid=True)
-
-
-def _definite(m: Float[np.ndarray, "n n"], one: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n n"]:
-    """The mass of a planar beam's ψ made definite, as it may be at one point alone: a flywheel on a light beam.
-
-    The added part does not move in rigid rotations of the link.
-    """
-    e = one / np.linalg.norm(one)
-    return np.asarray(m + LIGHT * np.trace(m) * (np.eye(len(m)) - np.outer(e, e)))
 
 
 def wave_frequency(link: Link) -> float:

@@ -88,8 +88,11 @@ def _closed(scene: Scene) -> tuple[Scene, Assembly]:
         name: RigidDisplacement(c + middle, size * x[:3], x[3:])
         for name, c, x in zip(scene.links, centres, change, strict=True)
     }
-    ways = {name: _way(scene, name, shift) for name, shift in shifts.items()}
-    return closed_scene(scene, shifts), Assembly(misfits, ways)
+    moved = {}
+    for name, shift in shifts.items():
+        went = [float(np.linalg.norm(np.subtract(shift.point(at), at))) for at in _points(scene, name)]
+        moved[name] = max(went, default=0.0), float(np.linalg.norm(shift.theta))
+    return closed_scene(scene, shifts), Assembly(misfits, moved)
 
 
 def assembly_warning(assembly: Assembly) -> tuple[str, ...]:
@@ -188,9 +191,3 @@ def _refusal(scene: Scene, name: str, wanted: str, misfit: float) -> str:
         f"({', '.join(f'{part:.6g}' for part in point)}) on {link!r}" for link, point in scene.joints[name].points.items()
     )
     return f"joints.{name}.at: {wanted}, got {' and '.join(points)}, {misfit:.4g} apart"
-
-
-def _way(scene: Scene, name: str, shift: RigidDisplacement) -> tuple[float, float]:
-    """Displacement [m] and rotation [rad] of a link."""
-    went = [float(np.linalg.norm(np.subtract(shift.point(at), at))) for at in _points(scene, name)]
-    return max(went, default=0.0), float(np.linalg.norm(shift.theta))

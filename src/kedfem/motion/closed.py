@@ -35,6 +35,7 @@ from kedfem.scene import (
 from kedfem.scene.records.base import Record
 from kedfem.scene.records.joints import FaceName
 from kedfem.scene.records.points import XYZ
+from kedfem.scene.records.shapes import STEEP
 
 TILTED = 1e-9  # rad: smaller tilts of shapes parallel to the xy plane are rounding
 AnyRecord = TypeVar("AnyRecord", bound=Record)
@@ -168,7 +169,7 @@ def _link(name: str, link: LinkScene, shift: RigidDisplacement) -> LinkScene:
     match link.shape:
         case Polyline() as line:
             points = tuple(shift.point(x) for x in line.points)
-            change = {"points": points, "up": _up(where, line.up, _directions(line), shift)}
+            change = {"points": points, "up": _up(where, line, shift)}
         case Bar() as bar:
             up = bar.up if _tilt(shift, bar.upward) == 0.0 else shift.rotated(bar.upward)
             change = {"between": tuple(shift.point(x) for x in bar.between), "up": up}
@@ -203,27 +204,19 @@ def _placing(shape: Cad | MeshFile, shift: RigidDisplacement) -> dict[str, Any]:
     return {"origin": origin, "towards": towards, "z": shape.z if turned == z else turned}
 
 
-def _directions(line: Polyline) -> list[tuple[XYZ, XYZ]]:
-    """The segments whose directions determine the default of `up`."""
-    return list(pairwise(line.points))[: 1 if line.smooth else None]
-
-
-def _defaults(segments: list[tuple[XYZ, XYZ]]) -> list[XYZ]:
-    """Defaults of `up` of segments: z, of steep ones x."""
-    steep = {abs(Q[2] - P[2]) >= 0.9 * math.dist(P, Q) for P, Q in segments}
-    return [(1.0, 0.0, 0.0) if each else (0.0, 0.0, 1.0) for each in sorted(steep)]
-
-
 def _tilt(shift: RigidDisplacement, *ups: XYZ) -> float:
     """Largest rotation of directions [rad]."""
     return max(math.dist(shift.rotated(up), up) for up in ups)
 
 
-def _up(where: str, up: XYZ | None, segments: list[tuple[XYZ, XYZ]], shift: RigidDisplacement) -> XYZ | None:
-    """`up` of a polyline after a displacement."""
-    ups = _defaults(segments) if up is None else [up]
+def _up(where: str, line: Polyline, shift: RigidDisplacement) -> XYZ | None:
+    """`up` of a polyline after a displacement; by default it is z, of steep segments x."""
+    segments = list(pairwise(line.points))[: 1 if line.smooth else None]
+    steep = {abs(Q[2] - P[2]) >= STEEP * math.dist(P, Q) for P, Q in segments}
+    ups: list[XYZ] = [(1.0, 0.0, 0.0) if each else (0.0, 0.0, 1.0) for each in sorted(steep)]
+    ups = ups if line.up is None else [line.up]
     if _tilt(shift, *ups) == 0.0:
-        return up
+        return line.up
     if len(ups) > 1:
         wanted = "is required where closing the joints rotates a line with steep parts"
         raise MotionError(f"{where}.up: {wanted}, got nothing")

@@ -14,7 +14,7 @@ from kedfem.motion.linkage import Linkage
 from kedfem.motion.newton import cross_matrix
 from kedfem.motion.path import Path
 from kedfem.motion.released_motions import RANK_TOLERANCE
-from kedfem.motion.rigid import RigidMotion, rigid_motion
+from kedfem.motion.rigid import rigid_motion
 from kedfem.motion.values import Poses, features, jacobian
 from kedfem.scene import Scene, path_parameter
 from kedfem.vectors import cross
@@ -46,14 +46,6 @@ class RequestedSpeed:
         return self.value - self.rigid
 
 
-@dataclass(frozen=True, slots=True)
-class Start:
-    """The rigid-body motion where it begins: poses about the linkage's centre, twists there (6 B,), ground first."""
-
-    poses: Poses
-    twists: Float[np.ndarray, " k"]
-
-
 def initial_twists(
     scene: Scene, linkage: Linkage, along: Path
 ) -> tuple[Float[np.ndarray, "B 3"], Float[np.ndarray, "B 3"]]:
@@ -78,28 +70,24 @@ def initial_twists(
         return twists[:, :3], twists[:, 3:]
     t = np.zeros(1)
     motion = rigid_motion(linkage, along, t, path_parameter(scene, t))
-    start = _start(linkage, motion)
-    asked = [replace(each, rigid=float(each.row @ start.twists)) for each in _wanted(scene, linkage, start.poses)]
+    arm = motion.R @ linkage.centre
+    poses = motion.R, motion.p - linkage.centre + arm
+    rigid = np.concatenate([motion.v + cross(motion.omega, arm), motion.omega], axis=2).ravel()
+    asked = [replace(each, rigid=float(each.row @ rigid)) for each in _wanted(scene, linkage, poses)]
     if any(each.more for each in asked):
         column = np.tile([size, size, size, 1.0, 1.0, 1.0], bodies - 1)
         A, b = np.array([each.row[6:] * column for each in asked]), np.array([each.more for each in asked])
         sizes = np.linalg.norm(A, axis=1)
-        free = _allowed(linkage, start.poses)
+        free = _allowed(linkage, poses)
         other = [row for name, joint in scene.joints.items() for row in joint_free_rows(scene, name, linkage.bodies)
                  if name not in given or (row.kind != GAP and joint.kind not in TURNING)]  # fmt: skip
         loose = stacked(other)
-        C = jacobian(loose, features(loose, start.poses), bodies, size)[0]
+        C = jacobian(loose, features(loose, poses), bodies, size)[0]
         q = free @ _least(A / sizes[:, None] @ free, b / sizes, C @ free)
         _check_reached(asked, A @ q, size)
         twists[1:] = (q * column).reshape(-1, 6)
     v, omega = twists[:, :3], twists[:, 3:]
     return v - cross(omega, motion.R[0] @ linkage.centre), np.array(omega)
-
-
-def _start(linkage: Linkage, motion: RigidMotion) -> Start:
-    arm = motion.R @ linkage.centre
-    v = motion.v[0] + cross(motion.omega[0], arm[0])
-    return Start((motion.R, motion.p - linkage.centre + arm), np.concatenate([v, motion.omega[0]], axis=1).ravel())
 
 
 def _least(

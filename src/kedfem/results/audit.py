@@ -32,7 +32,7 @@ from kedfem.dynamics.rigid_body import forcings
 from kedfem.dynamics.stepping.state import Rayleigh
 from kedfem.dynamics.stiffening import Stiffening
 from kedfem.motion.rigid import RigidMotion
-from kedfem.results.balance import Balance, Flow, Stress, fields_of, flow, prescribed_fields, stress
+from kedfem.results.balance import Balance, Flow, fields_of, flow, prescribed_fields, stress
 from kedfem.results.channels import Channel
 from kedfem.results.forces.constraint_forces import joint_spring_work
 from kedfem.results.forces.damping_work import PreviousPoint, damping_work, previous_of, products
@@ -133,17 +133,17 @@ class Account:
             strain, pushed, self._springs = strain + springs.stored, springs.pushed, springs.last
             taken = taken + springs.dissipated[:, None] * [1, 0]
         taken = np.column_stack([taken, pushed])
-        stressed = self._stress(block)
-        strain = strain + stressed.stored
+        power, stored = self._stress(block)
+        strain = strain + stored
         energy = flow.kinetic + strain
-        flow = replace(flow, neglected=flow.neglected + stressed.power)
+        flow = replace(flow, neglected=flow.neglected + power)
         rates = np.stack([flow.loads, flow.supports, flow.neglected, flow.constraint_joints, flow.mass_damping], axis=1)
         if self._sums is None:
             self._sums = _Sums(float(block.motion.t[0]), rates[0], np.zeros(5), np.zeros(3))
-            self._start, self._stored = float(energy[0]), float(stressed.stored[0])
+            self._start, self._stored = float(energy[0]), float(stored[0])
         work, total = self._sums.add(block.motion.t, rates, taken)
         loads, supports, neglected, joints, damped = work.T
-        neglected = neglected - (stressed.stored - self._stored)
+        neglected = neglected - (stored - self._stored)
         dissipated, drag, pushed = total.T
         driven, supports = supports - joints, supports - pushed
         if self._displaced:  # constraints along directions of displaced bodies do no work in all
@@ -159,10 +159,9 @@ class Account:
         }  # fmt: skip
         return {name: x[:, None] for name, x in rows.items()} | {"work": np.stack([loads, supports], axis=1)}
 
-    def _stress(self, block: Block) -> Stress:
-        """Power and energy of geometric stiffening; zero without it."""
-        stresses, none = self.stresses(), np.zeros(len(block))
-        found = Stress(none, none)
+    def _stress(self, block: Block) -> Float[np.ndarray, "2 T"]:
+        """Power [W] and energy [J] of geometric stiffening; zero without it."""
+        stresses, found = self.stresses(), np.zeros((2, len(block)))
         if stresses is None:
             return found
         factors = stresses.over(forcings(self.model, block.motion), block.motion)
@@ -170,8 +169,7 @@ class Account:
         for group in self._groups:
             of, links = [self.of[i] for i in group], [block.links[i] for i in group]
             made = [(stresses.modes[i], factors[i]) for i in group]
-            more = stress(of, links, made, at.of(_bodies(of), of[0].k))
-            found = Stress(found.power + more.power, found.stored + more.stored)
+            found += stress(of, links, made, at.of(_bodies(of), of[0].k))
         return found
 
     def _flows(self, block: Block) -> tuple[Flow, Float[np.ndarray, "T 2"]]:
@@ -206,7 +204,7 @@ class Account:
         last = self._last[k] or previous_of(motion.t, at, of, links, made, 0)
         lost = damping_work(of, links, made, turns, (motion.t, at), last)
         self._last[k] = previous_of(motion.t, at, of, links, made, -1)
-        return found, np.stack([lost.dissipated, lost.drag], axis=1)
+        return found, np.stack(lost, axis=1)
 
 
 def energy_channels(account: Account) -> list[tuple[Channel, Callable[[Block], Rows]]]:

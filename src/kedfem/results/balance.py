@@ -42,30 +42,22 @@ class Flow:
         return Flow(*(getattr(self, each.name) + getattr(other, each.name) for each in fields(self)))
 
 
-@dataclass(frozen=True, slots=True)
-class Stress:
-    """Power and energy of geometric stiffening, of all links together at T time points.
-
-    power : (T,) of its forces R (k g P) against the absolute motion R0' + δ' [W]
-    stored : (T,) its energy ½ Σ g · k g P [J]
-    """
-
-    power: Scalars
-    stored: Scalars
-
-
 def stress(
     of: Sequence[Constants],
     histories: Sequence[LinkHistory],
     made: Sequence[tuple[StressModes, Float[np.ndarray, "T m"]]],
     at: RigidRates,
-) -> Stress:
-    """Geometric stiffening of links that are all planar or all in space.
+) -> Float[np.ndarray, "2 T"]:
+    """Geometric stiffening of links that are all planar or all in space, all together.
 
     Parameters
     ----------
     made : stress modes of each link, and their factors over time
     at : rigid-body motion of their bodies
+
+    Returns
+    -------
+    Power of its forces R (k g P) against the absolute motion R0' + δ' [W]; its energy ½ Σ g · k g P [J]
     """
     S, T = len(of), len(histories[0].u)
     rows, power, stored = np.empty((of[0].fit.m, S, T)), np.zeros((S, T)), np.zeros(T)
@@ -76,7 +68,7 @@ def stress(
         x.fit.of(f, rows[:, i])
         power[i] = dot(history.v, f)
     power += _work(rows[:-1].reshape(at.rates.shape[1:]), at.rates[0]) + rows[-1] * at.omega[-1]
-    return Stress(power.sum(axis=0), stored)
+    return np.stack([power.sum(axis=0), stored])
 
 
 @dataclass(frozen=True, slots=True)

@@ -53,7 +53,7 @@ def link_point(model: Model, linked: Linkage, where: str, name: str, at: Point) 
     prescribed = next((x for x in model.prescribed if x.link.name == name), None)
     if prescribed is not None:
         link = prescribed.link
-        return LinkPoint(prescribed.body, at, _at_rest, link.axes, link.planar)
+        return LinkPoint(prescribed.body, at, lambda block, _: np.zeros((len(block), 3)), link.axes, link.planar)
     if all(link.name != name for link in model.links):
         raise SceneError(f"{where.removesuffix('.at')}.link: must name a link with a shape, got {name!r}")
     try:
@@ -81,12 +81,6 @@ def _held(model: Model, name: str, at: Point) -> tuple[int, Float[np.ndarray, " 
                 value[joint.nodes] = share @ joint.weights[ports]
                 return k, value
     return None
-
-
-def _at_rest(block: Block, field: str) -> Rows:
-    """The elastic motion of a rigid link that a drive prescribes."""
-    del field
-    return np.zeros((len(block), 3))
 
 
 def _read(k: int, link: Link, value: Float[np.ndarray, " n"]) -> Callable[[Block, str], Rows]:

@@ -177,7 +177,8 @@ class ResultsWriter:
         count = len(rows.get(TIME.name, ()))
         if not count:
             return
-        require_space(self.path.parent, self._block_space(count))
+        width = 2 + sum(len(channel.columns) for channel in self.channels)  # in whole chunks
+        require_space(self.path.parent, 8 * width * self._chunk * (count // self._chunk + 2) + SPARE_SPACE)
         for name, block in rows.items():
             found = self._file[name]
             found.resize(self.rows + count, axis=0)
@@ -249,11 +250,6 @@ class ResultsWriter:
         seal(self._file)
         self.rows = kept
         self._publish()
-
-    def _block_space(self, length: int) -> int:
-        """Bytes that a block of rows may add, in whole chunks."""
-        width = 2 + sum(len(channel.columns) for channel in self.channels)
-        return 8 * width * self._chunk * (length // self._chunk + 2) + SPARE_SPACE
 
     def _publish(self) -> None:
         """Put the new file in the old one's place; closed meanwhile: not every system renames open files."""

@@ -143,8 +143,9 @@ def spatial_beam_link(name: str, axis: Axis, section: Section, material: Materia
     vectors = sp.csr_array(sp.kron(triples, sp.eye_array(3)))
     cube = np.sqrt(section.area) * min(section.second_moment, section.second_moment_z)
     rigid_nodes = rigid_node_functions(one)
-    lumped = _diagonal(rigid_nodes[:, 0], RIGID_NODE_INERTIA * material.density * cube, n)
-    m = sp.csr_array(triples.T @ m @ triples + lumped)
+    lumped = np.zeros(n)
+    lumped[rigid_nodes[:, 0]] = RIGID_NODE_INERTIA * material.density * cube
+    m = sp.csr_array(triples.T @ m @ triples + sp.diags_array(lumped))
     K0 = sp.csr_array(
         vectors.T @ K @ vectors
         + rigid_node_stiffness(X, rigid_nodes, RIGID_NODE_STIFFNESS * rigidity[0] * length_of(axis.frame[:, 0], cells))
@@ -216,7 +217,3 @@ def length_of(stations: Float[np.ndarray, "s 3"], cells: Int[np.ndarray, "e m"])
     """Length of an axis by the chords of its elements [m]."""
     ends = stations[cells[:, :2]]
     return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
-
-
-def _diagonal(at: Int[np.ndarray, " k"], value: float, n: int) -> sp.csr_array:
-    return sp.csr_array((np.full(len(at), value), (at, at)), shape=(n, n))

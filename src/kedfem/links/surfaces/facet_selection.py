@@ -70,7 +70,11 @@ def _selected_facets(
     axes = np.eye(3)[2:] if link.kind == "plane" else link.axes.T if axis is None else (axis,)
     about = [round_surfaces(link, seen, each) for each in axes]
     if axis is None and link.d == 3 and not any(each.inward for found in about for each in found):
-        about += [round_surfaces(link, seen, each) for each in _own_axes(link, seen)]
+        own = (
+            each for each in round_candidates(link) if each.cylindrical
+        )  # bores and journals with axes through the point
+        through = (x.direction for x in own if x.axis_distance(seen) <= CYLINDER_TOLERANCE * x.radius)
+        about += [round_surfaces(link, seen, each) for each in through]
     if bores := _first([[each for each in found if each.inward] for found in about]):
         return _one_pin(link, where, seen, bores)
     journals = _first([[each for each in found if not each.inward] for found in about])
@@ -95,9 +99,3 @@ def _one_pin(link: Link, where: str, point: Float[np.ndarray, "3"], found: list[
     if max(size) - min(size) > CYLINDER_TOLERANCE * max(size):
         raise MeshError(several_surfaces(link, where, point, chosen))
     return np.concatenate([each.facets for each in chosen])
-
-
-def _own_axes(link: Link, point: Float[np.ndarray, "3"]) -> list[Float[np.ndarray, "3"]]:
-    """Directions of the link's own bores and journals whose axes pass through a point."""
-    found = (each for each in round_candidates(link) if each.cylindrical)
-    return [x.direction for x in found if x.axis_distance(point) <= CYLINDER_TOLERANCE * x.radius]

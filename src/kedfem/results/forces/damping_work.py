@@ -23,18 +23,6 @@ Scalars = Float[np.ndarray, " T"]
 
 
 @dataclass(frozen=True, slots=True)
-class DampingWork:
-    """Energy that damping dissipates in all links, in each of the steps that end at T time points.
-
-    dissipated : (T,) h ġᵀ C0 ġ with ġ = (g1 − g0)/h [J]
-    drag : (T,) work of the damping forces against the rigid-body motion, where these rotate with it [J]
-    """
-
-    dissipated: Scalars
-    drag: Scalars
-
-
-@dataclass(frozen=True, slots=True)
 class PreviousPoint:
     """The time point before a block, T = 1: t, rigid-body motion, and of each link g, K0 g, C0 g and its deflection.
 
@@ -49,13 +37,18 @@ class PreviousPoint:
 def damping_work(
     of: Sequence[Constants], histories: Sequence[LinkHistory], made: Sequence[Products], turns: Sequence[bool],
     now: tuple[Scalars, RigidRates], before: PreviousPoint,
-) -> DampingWork:  # fmt: skip
+) -> tuple[Scalars, Scalars]:  # fmt: skip
     """Work of damped links over a block, from the previous time point on.
 
     Parameters
     ----------
     turns : whether K, and so the damping forces, turn with the rigid-body motion
     now : times, and rigid-body motion of all bodies
+
+    Returns
+    -------
+    dissipated, drag : (T,) each, in the steps that end there: energy that damping dissipates, h ġᵀ C0 ġ with
+        ġ = (g1 − g0)/h; work of damping forces against the rigid-body motion, where they rotate with it [J]
     """
     t, at = now
     h = np.diff(t, prepend=before.t)
@@ -79,8 +72,8 @@ def damping_work(
             arms[:, slot] = crossed(k, end, Cg) - 0.5 * crossed(k, g, Cg)
     taken /= np.where(h > 0, h, 1.0)
     if not len(which):
-        return DampingWork(taken, np.zeros(len(t)))
-    return DampingWork(taken, _drag(rows, arms, _mean(at.of(bodies, k), before.at.of(bodies, k))))
+        return taken, np.zeros(len(t))
+    return taken, _drag(rows, arms, _mean(at.of(bodies, k), before.at.of(bodies, k)))
 
 
 def _drag(rows: Float[np.ndarray, "m S T"], arms: Float[np.ndarray, "c S T"], at: RigidRates) -> Scalars:

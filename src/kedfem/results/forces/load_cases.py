@@ -126,7 +126,9 @@ def load_case(at: Snapshot, k: int, model: Model, full: Model, statics: Statics)
 def _joint_forces(joint: Attachment, n: int, now: LinkMoment) -> dict[str, Forces]:
     """Wᵀ λ of each joint; of all together where several share a coupling surface."""
     at_ports = port_vectors(joint, now.port_forces)
-    apart = not (joint.loose.nnz or joint.from_rows.nnz) and _whole(joint)
+    # no port is left out as redundant: each joint has all of its own
+    whole = bool((np.bincount(joint.keep // joint.components, minlength=len(joint.weights)) > 0).all())
+    apart = whole and not (joint.loose.nnz or joint.from_rows.nnz)
     names = list(dict.fromkeys(joint.joints))
     out: dict[str, Forces] = {}
     for name in names if apart else ["s"] * bool(names):
@@ -135,12 +137,6 @@ def _joint_forces(joint: Attachment, n: int, now: LinkMoment) -> dict[str, Force
         nodal[joint.nodes] = joint.weights[here].T @ at_ports[here]
         out[f"joint {name}" if apart else f"joints {', '.join(names)}"] = nodal
     return out
-
-
-def _whole(joint: Attachment) -> bool:
-    """Whether no port is left out because others imply it: each joint then has all of its own."""
-    held = np.bincount(joint.keep // joint.components, minlength=len(joint.weights))
-    return bool((held > 0).all())
 
 
 def _damping(link: Link, full: Link, of: Rayleigh, now: LinkMoment, omega: Float[np.ndarray, "3"]) -> Forces:

@@ -179,8 +179,8 @@ def _stiffness(link: Link) -> Matrix:
 
 def _masses(link: Link) -> tuple[Matrix, ...] | None:
     masses = tuple(_dense(m, link.unknowns) for m in link.mass)
-    if all(_is_one(m) for m in masses):
-        return None
+    if all(isinstance(m, np.ndarray) and np.abs(m - np.eye(len(m))).max() < 1e-10 for m in masses):
+        return None  # a reduced link, with mass-orthonormal modes
     if link.unknowns > SMALL:
         return masses
     M = np.zeros((link.d, link.n, link.d, link.n))
@@ -191,8 +191,3 @@ def _masses(link: Link) -> tuple[Matrix, ...] | None:
 
 def _dense(matrix: Matrix, unknowns: int) -> Matrix:
     return matrix.toarray() if unknowns <= DENSE and not isinstance(matrix, np.ndarray) else matrix
-
-
-def _is_one(m: Matrix) -> bool:
-    """Whether a reduced link's mass is 1, as its functions are made."""
-    return isinstance(m, np.ndarray) and bool(np.abs(m - np.eye(len(m))).max() < 1e-10)
