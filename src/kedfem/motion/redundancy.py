@@ -66,9 +66,6 @@ def _words(reference: LinearLinkage, name: str, stress: Float[np.ndarray, "m r"]
     return ", ".join(parts)
 
 
-# -- remedies -----------------------------------------------------------------------------------------------
-
-
 def with_rows(reference: LinearLinkage, joint: str, rows: Float[np.ndarray, "m k"]) -> LinearLinkage:
     """The linkage with other rows for one joint; its drive stays."""
     kept = ~reference.of(joint) | reference.driven

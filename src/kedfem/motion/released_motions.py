@@ -71,9 +71,6 @@ def span(vectors: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k d"]:
     return np.asarray(U[:, s > STILL])
 
 
-# -- the plane ----------------------------------------------------------------------------------------------
-
-
 def planar(reference: LinearLinkage) -> LinearLinkage:
     """The linkage with its links constrained to the xy plane, and the rows of each joint and drive reduced to it."""
     keys = list(zip(reference.rows, reference.driven.tolist(), strict=True))
@@ -90,9 +87,6 @@ def in_plane(rows: Float[np.ndarray, "m k"]) -> Float[np.ndarray, "n k"]:
     left[:, :, ACROSS] = 0.0
     _, s, Vt = np.linalg.svd(left.reshape(rows.shape), full_matrices=False)
     return np.asarray(Vt[s > RANK_TOLERANCE * s.max(initial=0.0)])
-
-
-# -- words --------------------------------------------------------------------------------------------------
 
 
 def direction(d: Float[np.ndarray, "3"]) -> str:
@@ -152,9 +146,6 @@ def joints_in_words(names: list[str] | tuple[str, ...], last: str = "and") -> st
     plural = "s" * (len(joints) > 1 and last == "and")
     words = [f"joint{plural} {listed(joints, last)}"] if joints else []
     return f" {last} ".join(words + ([listed(couplings, last)] if couplings else []))
-
-
-# -- free motions -------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)

@@ -114,7 +114,8 @@ def sweep_tables(done: SweepResult) -> tuple[list[Table], list[str]]:
         least[units[name]] = max(NOTHING * size, least.get(units[name], 0.0))
     for name, (at, size) in sizes.items():
         nothing = size <= least[units[name]]
-        words = "≈ 0" if nothing else _valued(size, units[name])
+        value = f"{size:.4g}" if units[name] == "1" else with_prefix(size, units[name])
+        words = "≈ 0" if nothing else value
         table.add_row(Text(name), words, Text("" if nothing else _place(done, at)))
     return [table], [*_failures(done, failed), *_warnings(done)]
 
@@ -124,10 +125,6 @@ def _largest(done: SweepResult, name: str) -> tuple[int, float]:
     sizes = {k: largest(row, name) for k, row in enumerate(done.rows) if name in row.extremes}
     at = max(sizes, key=sizes.__getitem__)
     return at, sizes[at]
-
-
-def _valued(size: float, unit: str) -> str:
-    return f"{size:.4g}" if unit == "1" else with_prefix(size, unit)
 
 
 def _place(done: SweepResult, k: int) -> str:

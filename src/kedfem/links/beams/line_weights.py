@@ -10,6 +10,7 @@ from kedfem.errors import SceneError
 from kedfem.links.beams.beam import nearest_parameter, shape_functions
 from kedfem.links.beams.spatial_recovery import element_frame
 from kedfem.links.record import Link, section_of
+from kedfem.links.surfaces.missing import shown
 
 NEAR = 1e-3  # of a beam's size: how far from its axis, or from a side of its section, a point may be
 SAME = 1e-9  # cosine and sine between neighbours along one side: rounding
@@ -178,9 +179,8 @@ def _place(along: Sequence[AxisElement], where: str, at: Float[np.ndarray, "3"])
     place = _nearest(along, at)
     gap = _gap(along, place, at)
     if gap > NEAR * _size(along):
-        shown = ", ".join(f"{v:.6g}" for v in at)
         name = along[0].link.name
-        raise SceneError(f"{where}: must lie on the axis of beam '{name}', got ({shown}), {gap:.3g} m beside it")
+        raise SceneError(f"{where}: must lie on the axis of beam '{name}', got {shown(at)}, {gap:.3g} m beside it")
     return place
 
 
@@ -195,10 +195,9 @@ def _side(of: AxisElement, where: str, at: Float[np.ndarray, "3"], r: float) -> 
     on = [(n * -np.sign(y), width) for y, extent, n, width in sides if abs(abs(y) - extent / 2) <= near]
     within = all(abs(y) <= extent / 2 + near for y, extent, _, _ in sides) and abs(d @ frame[0]) <= near
     if len(on) != 1 or not within:
-        shown = ", ".join(f"{v:.6g}" for v in at)
         wanted = f"must lie on one flat side along beam '{of.link.name}'"
         got = "one on an edge" if within and len(on) > 1 else "one on none"
-        raise SceneError(f"{where}: {wanted} (half of its width or thickness off its axis), got ({shown}), {got}")
+        raise SceneError(f"{where}: {wanted} (half of its width or thickness off its axis), got {shown(at)}, {got}")
     return on[0]
 
 
