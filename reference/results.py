@@ -137,7 +137,7 @@ brackets). Energies apart, nothing is summed up over time.
 | `/notes` | notes of the run: unknowns, step, estimated errors (`error of mesh, stress` ...), the residual of energy; `steps between rows` of a file without all |
 | `/notes/LINK` | what a link was modelled as: `model`, `elements`, `unknowns`; with what is attached `mass [kg]`, `centre of mass [m]` in the reference position, `inertia [kg m^2]` about it: xx, yy, zz, xy, yz, zx |
 | `/warnings`, `/timing` | what was reported to the user; seconds of each stage; both of a run that came to its end |
-| `/peaks/LINK` | highest von Mises stress over all steps, its place in the reference position, time, step and drive; `away` from places where it means little |
+| `/peaks/LINK` | highest von Mises stress over all steps, its place in the reference position, time, step and drive; `away` from places where it means little; the `yield_strength` of its material |
 | `/fatigue/LINK/RANK` | of a scene with `[fatigue]`: damage in a period, utilisation, worst cycle, criterion, place of the highest damage of each link, the worst first; period and `unreliable` are those of `/fatigue` |
 | `/scene` | the scene that was analysed, as `json` and `toml` |
 

@@ -27,6 +27,7 @@ M = { between = ["C", "D"], fraction = 0.5, offset = "12 mm" }
 density = "2810 kg/m^3"
 youngs_modulus = "71.7 GPa"
 poisson_ratio = 0.33
+yield_strength = "470 MPa"               # in T6
 ''',
     "[links.NAME]": '''
 [links.coupler]

@@ -41,6 +41,7 @@ from kedfem.output.derived import (
     write_mesh_errors,
     write_stresses,
     write_vibration,
+    yield_warning,
 )
 from kedfem.results import Peak, Results, add_notes, claimed, read_results
 from kedfem.results.additions import add_account, add_peaks, mark_unreliable
@@ -56,7 +57,7 @@ from kedfem.results.stresses.peaks import highest, peaks
 from kedfem.results.stresses.singular_stress import singular_places
 from kedfem.results.table import drive_heading, require_parquet
 from kedfem.resume import EVERY, Keeper, remove_state
-from kedfem.scene import Scene, refuse_few_rows, without_vibration
+from kedfem.scene import Scene, refuse_few_rows, without_vibration, yield_strengths
 from kedfem.stepping import Clock, Marched, Watch, Watched, stepped
 
 
@@ -223,7 +224,7 @@ def _judged(begun: _Begun, marched: Marched, keeper: Keeper, folder: FilePath, c
         *keeper.warnings(),
     )
     singular = singular_places(scene, ready.model, watched.recoveries)
-    add_peaks(file, peaks(envelope.links(), singular))
+    add_peaks(file, peaks(envelope.links(), singular, yield_strengths(scene)))
     results = read_results(file)
     errors = step.errors if step.levels > 1 else None
     idle = unstressed(ready.model, highest(results.peaks))
@@ -258,7 +259,10 @@ def _completed(begun: _Begun, judged: _Judged, marched: Marched, folder: FilePat
     if begun.period:
         damaged = partial(write_damage, ready.scene, ready.model, envelope, judged.singular, begun.period, folder)
         results = replace(results, fatigue=clock.timed("fatigue", damaged))
-    notices = *judged.notices, *peak_warning(peak, begun.watched.stresses_since), *fatigue_warning(results.fatigue)
+    notices = (
+        *judged.notices, *peak_warning(peak, begun.watched.stresses_since), *yield_warning(results.peaks),
+        *fatigue_warning(results.fatigue),
+    )  # fmt: skip
     write_stresses(ready.scene, ready.model, envelope, judged.singular, drive_heading(results.drive), folder)
     notices += tuple(clock.timed("pictures", lambda: write_derived(ready.scene, results, peak, folder)))
     write_mesh_errors(seen.strained.model, seen.strained.indicators, folder)

@@ -1,7 +1,9 @@
 """The highest stresses of each link as tables: places apart, with time and drive, as the envelope has them."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import meshio
 import numpy as np
@@ -9,6 +11,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from kedfem.analysis import Run, analyse
+from kedfem.output.derived import yield_warning
+from kedfem.report import write_report
+from kedfem.report.facts import peak_rows
+from kedfem.results import Peak, read_results
 from kedfem.results.stresses import peaks
 from kedfem.results.stresses.peaks import APART, MOST
 from kedfem.scene import scene_from
@@ -92,3 +98,46 @@ def test_each_kind_of_stress_has_its_own_time(run: Run) -> None:
         assert_allclose(size[:, 0], size[:, 1:].max(axis=1), rtol=1e-8)
         assert (pull != push).any()  # of planar beams one point has both fibres, in bending at one time
         assert (mises == np.where(size[:, 1] > size[:, 2], pull, push)).all()
+
+
+def cantilevers(strength: float) -> dict[str, Any]:
+    """Two bars of 0.5 m, 20 mm square, welded to the ground, with 100 N across their ends: 6 F L / b³ = 37.5 MPa."""
+    steel = {"density": 7850.0, "youngs_modulus": 210e9, "poisson_ratio": 0.3}
+    raw: dict[str, Any] = {
+        "materials": {"known": {**steel, "yield_strength": strength}, "unknown": steel},
+        "analysis": {"kind": "static"}, "links": {}, "joints": {}, "loads": {},
+    }  # fmt: skip
+    for y, name in enumerate(raw["materials"]):
+        bar = {"kind": "bar", "between": [[0, y], [0.5, y]], "width": 0.02, "thickness": 0.02}
+        raw["links"][name] = {"model": "beam", "material": name, "shape": bar}
+        raw["joints"][name] = {"kind": "weld", "links": ["ground", name], "at": [0, y]}
+        raw["loads"][name] = {"kind": "force", "link": name, "at": [0.5, y], "vector": [0, 100]}
+    return raw
+
+
+@pytest.mark.parametrize("strength", [30e6, 50e6])
+def test_highest_stresses_are_compared_with_yield_strengths(strength: float, tmp_path: Path) -> None:
+    run = analyse(scene_from(cantilevers(strength), tmp_path))
+    kept = read_results(run.folder / "results.h5").peaks
+    stress = kept["known"].stress
+    assert_allclose(stress, 37.5e6, rtol=1e-6)
+    assert kept["known"].strength == strength
+    assert np.isnan(kept["unknown"].strength)
+    rows = {row[0]: row[2] for row in peak_rows(kept, lambda time, angle: "")}
+    assert rows == {"known": f"{100 * 37.5e6 / strength:.3g} %", "unknown": "–"}
+    told = [text for text in run.warnings if "yield strength" in text]
+    assert len(told) == (strength < 37.5e6)
+    assert all("37.5 MPa in link known" in text and "above its yield strength, 30 MPa" in text for text in told)
+    write_report(run.folder)
+    assert f"{100 * 37.5e6 / strength:.3g} % of the yield strength" in (run.folder / "report.html").read_text()
+
+
+def test_stress_at_a_singular_place_is_not_compared_with_a_yield_strength() -> None:
+    sound = Peak(20e6, "arm", (0.0, 0.0, 0.0), 0, 0, 0.0, 0.0, strength=30e6)
+    corner = replace(sound, stress=90e6, near="a sharp corner")
+    assert yield_warning({"arm": replace(corner, away=sound)}) == yield_warning({"arm": corner}) == ()
+    assert "40 MPa" in yield_warning({"arm": replace(corner, away=replace(sound, stress=40e6))})[0]
+
+
+def test_without_a_yield_strength_there_is_no_column(run: Run) -> None:
+    assert {len(row) for row in peak_rows(run.peaks, lambda time, angle: "")} == {5}

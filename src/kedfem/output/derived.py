@@ -31,7 +31,7 @@ from kedfem.output.stress_files import (
     write_top,
 )
 from kedfem.output.vtu import write_cells, write_frame
-from kedfem.output.words import clock, moment, place_of, stress_at
+from kedfem.output.words import clock, moment, place_of, stress_at, with_prefix
 from kedfem.results import Fatigue, Peak, Results, write_csv, write_parquet
 from kedfem.results.additions import add_fatigue
 from kedfem.results.fatigue.damage import fatigue_of
@@ -67,6 +67,16 @@ def peak_warning(peak: Peak | None, since: float) -> tuple[str, ...]:
     message = f"the highest stress, {stress_at(peak)}, is at {peak.near}: {reason(peak.near)}"
     away = f"; away from {AWAY} it is {stress_at(peak.away)}" if peak.away else ""
     return (message + away, *late)
+
+
+def yield_warning(peaks: Mapping[str, Peak]) -> tuple[str, ...]:
+    """A warning if links are stressed beyond their yield strengths away from singular places."""
+    beyond = [x for peak in peaks.values() if (x := peak.sound) is not None and x.stress > x.strength]
+    if not beyond:
+        return ()
+    every = "; ".join(f"{stress_at(x)}, is above its yield strength, {with_prefix(x.strength, 'Pa')}" for x in beyond)
+    instead = "the model stays elastic there, so stresses and deflections are not those of a real part"
+    return (f"the highest stress, {every}: {instead}",)
 
 
 def fatigue_warning(found: Fatigue | None) -> tuple[str, ...]:

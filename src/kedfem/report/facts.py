@@ -51,6 +51,8 @@ def facts(results: Results, highest: Peak | None, moment: Callable[[float, float
         if highest.near:
             more += f"; at {highest.near}"
             more += f", away from it {with_prefix(highest.away.stress, 'Pa')}" if highest.away else ""
+        if np.isfinite(highest.strength):
+            more += f"; {_share(highest)} of the yield strength"
         out.append(Fact("Highest von Mises stress", with_prefix(highest.stress, "Pa"), more))
     for what, beginning, endings in (
         ("Largest joint force", "joints/", ("/force",)),
@@ -126,12 +128,13 @@ def _axis(joint: Mapping[str, Any]) -> str:
 
 def peaks_table(results: Results, moment: Callable[[float, float], str]) -> Table:
     """The highest stress of each link, over all steps."""
-    head = ("link", "von Mises stress", "reference position", "when", "near")
+    head = ("link", "von Mises stress", *of_yield(results.peaks), "reference position", "when", "near")
     return Table("Highest stress of each link, over all steps", head, peak_rows(results.peaks, moment))
 
 
 def peak_rows(peaks: Mapping[str, Peak], moment: Callable[[float, float], str]) -> Rows:
-    """Link, stress, place, instant and nearby singular place of each link's peak, and of its peak away from these.
+    """Link, stress, share of the yield strength where any is known, place, instant and nearby singular place of each
+    link's peak, and of its peak away from these.
 
     Parameters
     ----------
@@ -139,9 +142,19 @@ def peak_rows(peaks: Mapping[str, Peak], moment: Callable[[float, float], str]) 
     """
     every = (row for name, x in peaks.items() for row in ((name, x), ("  away from it", x.away)))
     return [
-        (label, with_prefix(x.stress, "Pa"), place_of(x.place), moment(x.time, x.angle), x.near)
+        (label, with_prefix(x.stress, "Pa"), *(_share(x) for _ in of_yield(peaks)), place_of(x.place),
+         moment(x.time, x.angle), x.near)
         for label, x in every if x is not None
     ]  # fmt: skip
+
+
+def of_yield(peaks: Mapping[str, Peak]) -> tuple[str, ...]:
+    """The heading of the column that relates stresses to yield strengths; none if none is known."""
+    return ("of yield",) if any(np.isfinite(peak.strength) for peak in peaks.values()) else ()
+
+
+def _share(peak: Peak) -> str:
+    return f"{100 * peak.stress / peak.strength:.3g} %" if np.isfinite(peak.strength) else "–"
 
 
 def frequencies_table(found: Summary) -> Table:

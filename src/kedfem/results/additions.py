@@ -16,7 +16,7 @@ from kedfem.results.records import Fatigue, FatigueSpot, Peak
 
 OF_PEAK = {
     "stress": "von_mises [Pa]", "link": "link", "place": "place [m]", "node": "node", "step": "step",
-    "time": "time [s]", "angle": "drive [rad or m]", "near": "near",
+    "time": "time [s]", "angle": "drive [rad or m]", "near": "near", "strength": "yield_strength [Pa]",
 }  # fmt: skip
 OF_FATIGUE = {"period": "period [s]", "revolutions": "revolutions", "repeats": "repeats to", "unreliable": "unreliable"}
 OF_SPOT = {

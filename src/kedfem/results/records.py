@@ -26,6 +26,7 @@ class Peak:
         travel [m]
     near : the singular place near the point, in words: a sharp corner, a point force, a joint; else empty
     away : the highest stress away from such places, where `near` is not empty and there is one
+    strength : yield strength of the link's material [Pa]; nan if the scene gives none
     """
 
     stress: float
@@ -37,6 +38,12 @@ class Peak:
     angle: float
     near: str = ""
     away: "Peak | None" = None
+    strength: float = math.nan
+
+    @property
+    def sound(self) -> "Peak | None":
+        """The highest stress away from singular places; None if all points with stress are near such ones."""
+        return self.away if self.near else self
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ from kedfem.scene.questions.modelling import (
     mass_place,
     masses_alone,
     moving_grounds,
+    yield_strengths,
 )
 from kedfem.scene.questions.planes import plane_scene, spatial_beams
 from kedfem.scene.questions.timing import TimeGrid, cycle, revolution_steps, states_step, time_grid, without_vibration

@@ -15,7 +15,7 @@ from kedfem.analysis import Run
 from kedfem.arrays import Float
 from kedfem.output.plots.groups import ALONE, SIGNED
 from kedfem.output.words import clock, moment, place_of, with_prefix
-from kedfem.report.facts import ENDLESS, fatigue_notes, peak_rows
+from kedfem.report.facts import ENDLESS, fatigue_notes, of_yield, peak_rows
 from kedfem.results import Channel, Fatigue, Peak
 from kedfem.results.balance import Balance
 from kedfem.results.records import rounding
@@ -141,7 +141,7 @@ def steady_table(found: Steady) -> Table:
 
 def stress_table(scene: Scene, peaks: Mapping[str, Peak]) -> Table:
     """The highest stress of each link over all steps, and away from singular places."""
-    columns = [*left("link"), *right("stress"), *left("reference position", clock(scene), "near")]
+    columns = [*left("link"), *right("stress", *of_yield(peaks)), *left("reference position", clock(scene), "near")]
     rows = peak_rows(peaks, partial(moment, scene))
     return listed("Highest von Mises stress, over all steps", columns, rows)
 

@@ -14,13 +14,16 @@ APART = 0.02  # of the link's size: nearer points belong to the same place, as n
 MOST = 10  # places of each link
 
 
-def peaks(found: Sequence[LinkEnvelope], near: Sequence[Sequence[str]]) -> dict[str, Peak]:
+def peaks(
+    found: Sequence[LinkEnvelope], near: Sequence[Sequence[str]], strengths: Mapping[str, float]
+) -> dict[str, Peak]:
     """The highest von Mises stress of each link that has stress, and the highest away from singular places.
 
     Parameters
     ----------
     found : per link or segment
     near : per link or segment the singular place near each point, in words; empty where there is none
+    strengths : link → yield strength of its material [Pa], where known
     """
     out, away = dict[str, Peak](), dict[str, Peak]()
     for each, words in zip(found, near, strict=True):
@@ -30,6 +33,7 @@ def peaks(found: Sequence[LinkEnvelope], near: Sequence[Sequence[str]]) -> dict[
         for of, among in ((out, np.ones(len(stress), bool)), (away, np.array([not word for word in words]))):
             if among.any():
                 peak = peak_at(each, int(np.where(among, stress, -1.0).argmax()), words)
+                peak = replace(peak, strength=strengths.get(each.link, np.nan))
                 of[each.link] = max(of.get(each.link, peak), peak, key=lambda x: x.stress)
     return {name: replace(peak, away=away.get(name)) if peak.near else peak for name, peak in out.items()}
 
@@ -39,7 +43,7 @@ def highest(every: Mapping[str, Peak]) -> Peak | None:
     if not every:
         return None
     peak = max(every.values(), key=lambda x: x.stress)
-    sound = [x for each in every.values() if (x := each.away if each.near else each) is not None]
+    sound = [x for each in every.values() if (x := each.sound) is not None]
     return replace(peak, away=max(sound, key=lambda x: x.stress, default=None)) if peak.near else peak
 
 

@@ -120,3 +120,9 @@ def _drive_joint(name: str, known: set[str], scene: Scene) -> str:
     if drive_joint.kind not in ("revolute", "prismatic") or drive_joint.bushing or drives[inner[0]][0].shaft_stiffness:
         return ""
     return inner[0]
+
+
+def yield_strengths(scene: Scene) -> dict[str, float]:
+    """Link → yield strength of its material [Pa], of links whose material has one."""
+    named = {name: scene.materials.get(str(link.material)) for name, link in scene.links.items()}
+    return {name: x.yield_strength for name, x in named.items() if x is not None and x.yield_strength is not None}

@@ -86,6 +86,8 @@ class Material(Record):
     """Poisson's ratio ν; from E and G if those are given"""
     shear_modulus: PositivePressure = math.nan
     """shear modulus G; E / (2 (1 + ν)) if ν is given"""
+    yield_strength: PositivePressure | None = None
+    """with which highest von Mises stresses are compared: links are elastic at any stress"""
 
     @model_validator(mode="after")
     def _both_moduli(self) -> Self:
