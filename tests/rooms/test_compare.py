@@ -184,6 +184,7 @@ def test_a_user_compares_two_runs(folders: list[Path], tmp_path: Path) -> None:
     assert {"drive/torque", "joints/A/force"} <= channels
     assert all(float(row["largest difference [%]"]) == 0.0 for row in rows[::2])
     assert all(float(row["largest difference [%]"]) > 1e-3 for row in rows[1::2] if row["channel"] == "drive/torque")
+    assert all(float(row["% of"]) >= float(by[row["channel"], rows[0]["run"]]["peak"]) for row in rows)
     for name in channels:
         with Image.open(tmp_path / "here" / f"{name.replace('/', '-')}.png") as image:
             assert image.size == (1320, 744)

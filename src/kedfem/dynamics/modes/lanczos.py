@@ -4,7 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from kedfem.arrays import Float
+from kedfem.arrays import Bool, Float
+from kedfem.errors import SceneError
 
 Block = Float[np.ndarray, "N _"]
 Product = Callable[[Block], Block]
@@ -12,6 +13,10 @@ Product = Callable[[Block], Block]
 CONVERGED = 1e-9  # residual of a vector, of its eigenvalue, which is right to about the square of that
 REPEATED = 1e-12  # of the size of a new vector: what is left of it beside those before is rounding
 MOST = 480  # vectors of a run
+_TOO_MANY = (
+    "--modes: must be so few that iterations with {} vectors find them, got {} with rigid-body modes, of which {} are "
+    "found: ask for {} at the most"
+)
 
 
 def lanczos(
@@ -27,16 +32,24 @@ def lanczos(
     count : eigenvalues that are wanted; where there are fewer, all
     block : vectors to begin with: of so many equal eigenvalues each is found
 
+    Raises
+    ------
+    SceneError
+        Not all converge within MOST vectors.
+
     Source: block Lanczos with full orthogonalisation, Golub and Van Loan, Matrix Computations, section 10.3.
     """
     first = np.random.default_rng(0).standard_normal((size, min(block, size)))
     V, MV, T = np.zeros((size, 0)), np.zeros((size, 0)), np.zeros((0, 0))
     theta, Z = np.zeros(0), np.zeros((0, 0))
     x = answer(momentum(first))
-    while V.shape[1] < MOST:
+    while True:
         new, R = _beside(V, MV, x, momentum)
-        if not new.shape[1] or _converged(theta, Z, R, count):
+        accurate = _accurate(theta, Z, R)
+        if not new.shape[1] or (len(theta) >= count and accurate[:count].all()):
             break
+        if V.shape[1] >= MOST:
+            raise SceneError(_TOO_MANY.format(MOST, count, n := int(accurate.argmin()), max(1, n - block)))
         V, MV = np.hstack([V, new]), np.hstack([MV, momentum(new)])
         x = answer(MV[:, -new.shape[1] :])
         column, known = MV.T @ x, len(T)
@@ -69,9 +82,9 @@ def _norm(x: Block, momentum_of: Block) -> float:
     return float(np.sqrt(max((x * momentum_of).sum(), 0.0)))
 
 
-def _converged(
-    theta: Float[np.ndarray, " m"], Z: Float[np.ndarray, "m m"], R: Float[np.ndarray, "_ _"], count: int
-) -> bool:
-    """Whether the residuals of the first eigenvectors, ‖R z‖ with their part z in the last block, are small."""
-    left = np.linalg.norm(R @ Z[len(Z) - R.shape[1] :, :count], axis=0) if len(Z) else np.zeros(0)
-    return len(theta) >= count and bool((left <= CONVERGED * theta[:count]).all())
+def _accurate(
+    theta: Float[np.ndarray, " m"], Z: Float[np.ndarray, "m m"], R: Float[np.ndarray, "_ _"]
+) -> Bool[np.ndarray, " m"]:
+    """Whether residuals of eigenvectors, ‖R z‖ with their part z in the last block, are small."""
+    left = np.linalg.norm(R @ Z[len(Z) - R.shape[1] :], axis=0) if len(Z) else np.zeros(0)
+    return np.asarray(left <= CONVERGED * theta)

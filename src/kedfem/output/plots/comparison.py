@@ -33,10 +33,10 @@ def write_comparison(
         factor, label = 180 / np.pi, "drive angle (°)"
     for each in found:
         _write_picture(each, names, factor * along, label, folder)
-    header = ["channel", "unit", "run", "peak", "largest difference [%]", "at", "rms difference [%]"]
+    header = ["channel", "unit", "run", "peak", "largest difference [%]", "at", "rms difference [%]", "% of"]
     every = ((x, k, name) for x in found for k, name in enumerate(names))
     rows = (
-        [x.channel.name, x.channel.unit, name, x.peaks[k], 100 * x.largest[k], x.at[k], 100 * x.rms[k]]
+        [x.channel.name, x.channel.unit, name, x.peaks[k], 100 * x.largest[k], x.at[k], 100 * x.rms[k], x.scale[k]]
         for x, k, name in every
     )
     write_rows(folder / "differences.csv", header, rows)
