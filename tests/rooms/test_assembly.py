@@ -15,7 +15,7 @@ from kedfem.accuracy.histories import histories
 from kedfem.accuracy.prepared import meshed
 from kedfem.analysis import analyse
 from kedfem.errors import MotionError, SceneError
-from kedfem.links.beams.beam_axis import directions
+from kedfem.links.beams.beam import directions
 from kedfem.mesh import link_mesh
 from kedfem.mesh.methods import file_axes
 from kedfem.motion.assembly import assembled

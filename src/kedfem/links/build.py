@@ -10,8 +10,7 @@ import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.errors import MeshError
-from kedfem.links.beams.beam import line_axes
-from kedfem.links.beams.beam_axis import chord_axes, directions
+from kedfem.links.beams.beam import chord_axes, directions, line_axes
 from kedfem.links.beams.beam_segments import beam_segments, space_segments
 from kedfem.links.beams.of_scene import scene_axis, scene_beam
 from kedfem.links.plane import plane_link

@@ -137,7 +137,7 @@ def replacing(path: Path) -> Iterator[Path]:
             yield part
     except OSError as error:
         ready_folder(path.parent)  # or says what is wrong with it
-        raise OutputError(f"{path}: must be a file that can be written, got {reason(error)}") from error
+        raise unwritable(path, error) from error
 
 
 def of_extra(package: str, where: str, extra: str = DATA) -> Any:

@@ -11,6 +11,7 @@ from kedfem.links.record import Link, Mass, mass_constants, read_only
 from kedfem.scene import Material
 
 CELL_TYPES = {2: "line", 3: "line3"}
+LEVEL = 1e-6  # least sine between a chord and `up`
 
 
 def cell_type(nodes: int) -> str:
@@ -188,14 +189,22 @@ def beam_link(name: str, points: Float[np.ndarray, "p 3"], section: Section, mat
     read_only(X, one, cells, m1, mX)
     return Link(
         name=name, kind="beam", X=X, one=one, cells=cells, cell_type=cell_type(nodes),
-        axes=polyline_axes(points), mass=mass, K0=K0, m1=m1, mX=mX, volume=m1[:, 0] / material.density,
+        axes=chord_axes(points), mass=mass, K0=K0, m1=m1, mX=mX, volume=m1[:, 0] / material.density,
         E=material.youngs_modulus, lame=material.lame(), section=section,
     )  # fmt: skip
 
 
-def polyline_axes(points: Float[np.ndarray, "p 3"]) -> Float[np.ndarray, "3 3"]:
-    """Link axes of a polyline, x from its start to its end; of a closed one along its first segment."""
-    return line_axes(points[0], points[1 if is_closed(points) else -1])
+def chord_axes(points: Float[np.ndarray, "p 3"], up: Float[np.ndarray, "3"] | None = None) -> Float[np.ndarray, "3 3"]:
+    """Link axes of a polyline as columns: x from its start to its end, or along the first segment of a closed one; z as
+    close as possible to `up`, if given and not along x."""
+    axes = line_axes(points[0], points[1 if is_closed(points) else -1])
+    level = up is not None and np.linalg.norm(np.cross(up, axes[:, 0])) > LEVEL * np.linalg.norm(up)
+    return directions(axes[:, 0], up).T if level else axes
+
+
+def directions(along: Float[np.ndarray, "3"], up: Float[np.ndarray, "3"] | None) -> Float[np.ndarray, "3 3"]:
+    """`section_axes` of a line; as `line_axes` chooses if `up` is None."""
+    return line_axes(np.zeros(3), along).T if up is None else section_axes(along / np.linalg.norm(along), up)
 
 
 def line_axes(start: Float[np.ndarray, "3"], end: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:

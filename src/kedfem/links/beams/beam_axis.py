@@ -6,9 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from kedfem.arrays import Bool, Float, Int
-from kedfem.links.beams.beam import is_closed, line_axes, line_cells, node_places, polyline_axes, section_axes
-
-LEVEL = 1e-6  # least sine between a chord and `up`
+from kedfem.links.beams.beam import directions, is_closed, line_cells, node_places
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,18 +77,6 @@ def smooth_axis(points: Float[np.ndarray, "p 3"], elements: int, nodes: int, up:
         frame[k, 2] = transported(frame[k - 1, 2], frame[k - 1, 1], frame[k, 1])
         frame[k, 3] = np.cross(frame[k, 1], frame[k, 2])
     return Axis(frame, number, line_cells(number[: -1 : nodes - 1], nodes), number % steps == 0, up)
-
-
-def directions(along: Float[np.ndarray, "3"], up: Float[np.ndarray, "3"] | None) -> Float[np.ndarray, "3 3"]:
-    """`section_axes` of a line; as `line_axes` chooses if `up` is None."""
-    return line_axes(np.zeros(3), along).T if up is None else section_axes(along / np.linalg.norm(along), up)
-
-
-def chord_axes(points: Float[np.ndarray, "p 3"], up: Float[np.ndarray, "3"] | None) -> Float[np.ndarray, "3 3"]:
-    """Link axes of a polyline as columns: x as of `polyline_axes`, z as close as possible to `up`, if given."""
-    axes = polyline_axes(points)
-    level = up is not None and np.linalg.norm(np.cross(up, axes[:, 0])) > LEVEL * np.linalg.norm(up)
-    return directions(axes[:, 0], up).T if level else axes
 
 
 def transported(

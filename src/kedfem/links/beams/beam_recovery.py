@@ -37,19 +37,14 @@ def nearest_on_beam(link: Link, point: Float[np.ndarray, "3"]) -> tuple[float, i
     half = link.section.height / 2 if link.section else 0.0
     found = []
     for e, cell in enumerate(link.cells):
-        r, offset, gap = beam_coordinates(link.X[cell][:, :2], point[:2])
+        x = link.X[cell][:, :2]
+        r = nearest_parameter(x, point[:2])
+        N, dN = shape_functions(r, len(x))
+        t, d = dN @ x / np.linalg.norm(dN @ x), point[:2] - N @ x
+        offset, gap = float(t[0] * d[1] - t[1] * d[0]), abs(float(t @ d))
         found.append((float(np.hypot(gap, max(0.0, abs(offset) - half))), abs(offset), e, r, offset))
     beyond, _, e, r, offset = min(found)
     return beyond, e, r, offset
-
-
-def beam_coordinates(x: Float[np.ndarray, "m 2"], point: Float[np.ndarray, "2"]) -> tuple[float, float, float]:
-    """Parent coordinate of the nearest axis point, signed offset to the left of the axis, distance beyond the ends."""
-    r = nearest_parameter(x, point)
-    N, dN = shape_functions(r, len(x))
-    t = dN @ x / np.linalg.norm(dN @ x)
-    d = point - N @ x
-    return r, float(t[0] * d[1] - t[1] * d[0]), abs(float(t @ d))
 
 
 def fibre_row(link: Link, element: int, r: float, offset: float, kinks: Points | None = None) -> Float[np.ndarray, " k"]:

@@ -12,13 +12,14 @@ from kedfem.arrays import Float, Int
 from kedfem.links.beams.beam import (
     assembled,
     cell_type,
+    chord_axes,
     dofs,
     element_mass,
     parent_nodes,
     parent_weights,
     shape_functions,
 )
-from kedfem.links.beams.beam_axis import Axis, chord_axes
+from kedfem.links.beams.beam_axis import Axis
 from kedfem.links.beams.section import Section
 from kedfem.links.record import Link, mass_constants, read_only
 from kedfem.scene import Material
