@@ -189,6 +189,20 @@ def test_a_harmonic_meets_what_stiffens_with_the_speed(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "campbell.png").is_file()
 
 
+@pytest.mark.parametrize("speed", [2 * UNIT, -2 * UNIT])
+def test_positions_of_a_ramp_have_the_speed_that_it_leads_to(speed: float, tmp_path: Path) -> None:
+    """Half a revolution while it speeds up: frequencies and crossings were those of the speeds until then."""
+    motions = {"kind": "ramp", "speed": speed, "time": np.pi / UNIT}, constant_speed(speed)
+    analysis = {"accuracy": "quick", "end_time": np.pi / UNIT, "step": np.pi / UNIT / 180, "stiffening": True}
+    ramp, constant = (
+        frequencies(scene_from({**arm("planar beam", 2.0), "drive": {"joint": "A", "motion": x}, "analysis": analysis}),
+                    Wanted(1, 4), tmp_path / x["kind"])
+        for x in motions
+    )  # fmt: skip
+    assert_allclose(ramp.values, constant.values, rtol=1e-8)
+    assert [x.slowest for x in ramp.crossings] == pytest.approx([x.slowest for x in constant.crossings], rel=1e-8)
+
+
 def test_speeds_at_which_links_buckle_are_left_out_and_told(tmp_path: Path) -> None:
     found = frequencies(scene_from(linkage("planar beam", 3000.0), tmp_path), Wanted(2, 8), tmp_path / "out")
     assert [text for text in found.warnings if "buckle by the stresses of motion between" in text]

@@ -111,6 +111,8 @@ def frequencies(
     turn = revolution_steps(scene)
     speed = 2 * np.pi / (turn * time_grid(scene).step) if turn else 0.0
     phi, rate, change = path_parameter(scene, t)
+    if speed:  # a ramp may reach it later
+        rate, change = np.copysign(speed, rate), np.zeros_like(change)
     shares = SPEEDS if speed and scene.analysis.stiffening else (1.0,)
     motions = {x: rigid_motion(made.linkage, made.along, t, (phi, x * rate, x**2 * change)) for x in shares}
     found, buckled = _at_speeds(solver, motions, speed, watch)
