@@ -134,12 +134,12 @@ def element_stiffness(x: Float[np.ndarray, "m 2"], rigidity: Float[np.ndarray, "
     return K
 
 
-def element_mass(x: Float[np.ndarray, "m d"]) -> Float[np.ndarray, "m m"]:
-    """∫ N_a N_b det J of one element [m]; of a planar one to be multiplied by (ρA, ρA, ρI), [KED, eq. (22)]."""
+def element_mass(x: Float[np.ndarray, "m 2"]) -> Float[np.ndarray, "m m"]:
+    """∫ N_a N_b det J of one element [m], to be multiplied by (ρA, ρA, ρI), [KED, eq. (22)]."""
     m = np.zeros((len(x), len(x)))
     for r, w in zip(*np.polynomial.legendre.leggauss(len(x) + 1), strict=True):
         N, dN = shape_functions(r, len(x))
-        m += w * np.hypot.reduce(dN @ x) * np.outer(N, N)
+        m += w * np.hypot(*(dN @ x)) * np.outer(N, N)
     return m
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from kedfem.arrays import Float, Int
 from kedfem.links.beams.beam import parent_weights, shape_functions
 from kedfem.links.record import BeamElement, read_only
-from kedfem.vectors import cross, nearest_rotations
+from kedfem.vectors import cross
 
 # of κ G A l: the stiffness of sections against shear, so that A fits at any rotation of them
 SECTION_STIFF = 1.0
@@ -135,7 +135,9 @@ def node_rotations(element: BeamElement, g: Vectors) -> Float[np.ndarray, "*b m 
     """Q of Σ g_k ⊗ X_k = Q U of each node."""
     shares = [np.swapaxes(g[..., mine, :], -1, -2) @ element.drawn[mine]
               for mine in (np.flatnonzero(element.node == a) for a in range(len(element.directors)))]  # fmt: skip
-    return nearest_rotations(np.stack(shares, axis=-3))
+    left, _, right = np.linalg.svd(np.stack(shares, axis=-3))
+    left[..., 2] *= np.linalg.det(left @ right)[..., None]
+    return np.asarray(left @ right)
 
 
 def _directors(element: BeamElement, Q: Float[np.ndarray, "*b m 3 3"]) -> Float[np.ndarray, "*b m 2 3"]:

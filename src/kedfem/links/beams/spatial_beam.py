@@ -9,16 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from kedfem.arrays import Float, Int
-from kedfem.links.beams.beam import (
-    assembled,
-    cell_type,
-    chord_axes,
-    dofs,
-    element_mass,
-    parent_nodes,
-    parent_weights,
-    shape_functions,
-)
+from kedfem.links.beams.beam import assembled, cell_type, chord_axes, dofs, parent_nodes, parent_weights, shape_functions
 from kedfem.links.beams.beam_axis import Axis
 from kedfem.links.beams.section import Section
 from kedfem.links.record import Link, mass_constants, read_only
@@ -126,7 +117,11 @@ def space_stiffness(x: Float[np.ndarray, "m 3 3"], rigidity: Float[np.ndarray, "
 
 def space_mass(x: Float[np.ndarray, "m 3 3"], section: Section) -> Float[np.ndarray, "k k"]:
     """∫ N_a N_b det J ⊗ diag(A, I_y, I_z) of one element, (3m, 3m), to be multiplied by ρ, [KED, eq. (9)]."""
-    return np.kron(element_mass(x[:, 0]), np.diag([section.area, section.second_moment, section.second_moment_z]))
+    m = np.zeros((len(x), len(x)))
+    for r, w in zip(*np.polynomial.legendre.leggauss(len(x) + 1), strict=True):
+        N, dN = shape_functions(r, len(x))
+        m += w * np.linalg.norm(dN @ x[:, 0]) * np.outer(N, N)
+    return np.kron(m, np.diag([section.area, section.second_moment, section.second_moment_z]))
 
 
 def spatial_beam_link(name: str, axis: Axis, section: Section, material: Material) -> Link:
