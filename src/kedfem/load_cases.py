@@ -21,7 +21,7 @@ from kedfem.output.static_decks import ELEMENTS, reactions, resultants, supports
 from kedfem.results import Results, read_results, ready_folder, results_file
 from kedfem.results.forces.load_cases import LoadCase, Statics, load_case
 from kedfem.results.table import drive_heading
-from kedfem.scene import Scene, corotational, scene_from
+from kedfem.scene import Scene, corotational, percentage, scene_from
 from kedfem.stepping import Watch
 
 OTHER = 0.01  # of the largest strain energy: what a run taken again may differ by, on another processor too
@@ -200,7 +200,7 @@ def _balance(name: str, cases: Sequence[LoadCase], left: Sequence[float]) -> Ite
     for case, x in zip(cases, left, strict=True):
         if x > OUT_OF_BALANCE:
             yield (
-                f"at t = {case.time:g} s forces on {name} are out of balance by {100 * x:.2g} % of the largest: take a "
+                f"at t = {case.time:g} s forces on {name} are out of balance by {percentage(x)} of the largest: take a "
                 "smaller step"
             )
 
@@ -214,7 +214,7 @@ def _differing(scene: Scene, link: Link, cases: Sequence[LoadCase]) -> Iterator[
     )
     for case in cases:
         if case.differs > DIFFERENT:
-            yield f"at t = {case.time:g} s statics finds stresses up to {100 * case.differs:.2g} % off the run's: {why}"
+            yield f"at t = {case.time:g} s statics finds stresses up to {percentage(case.differs)} off the run's: {why}"
 
 
 def _left(link: Link, case: LoadCase) -> float:

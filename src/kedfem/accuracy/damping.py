@@ -21,7 +21,7 @@ from kedfem.dynamics.stepping.scheme import stable_rotation
 from kedfem.errors import KedfemError
 from kedfem.motion.linkage import linearised_linkage
 from kedfem.motion.released_motions import free_motions
-from kedfem.scene import Scene, time_grid, without_vibration
+from kedfem.scene import Scene, percentage, time_grid, without_vibration
 
 STRONG = 0.7  # ρ∞ up to which a run is compared; above, steps twice as long show 0.55 and more of the true error
 LITTLE = 0.95, 0.9, 0.8  # ρ∞ of the compared run: the first in which no vibration grows
@@ -101,12 +101,12 @@ def mass_damping_warning(ready: Prepared, taken: float | None = None) -> tuple[s
         return ()
     links = list(dict.fromkeys(name for each in meant for name in each.links))
     from_ratio = " (from ratio and frequencies)" if scene.damping.ratio is not None else ""
-    share = "" if taken is None else f"; it took {100 * taken:.2g} % of the largest energy exchanged"
+    share = "" if taken is None else f"; it took {percentage(taken)} of the largest energy exchanged"
     instead = f"beta = {damping.beta:.3g} [s] alone" if damping.beta else "beta"
-    ratio = 100 * damping.alpha / (4 * np.pi)
+    ratio = damping.alpha / (4 * np.pi)
     return (
         f"damping: alpha = {damping.alpha:.3g} 1/s{from_ratio} resists links {', '.join(links)} as they move freely: "
-        f"they lose {100 * lost:.2g} % of their speed in the {end:.3g} s of this scene, a vibration at 1 Hz has "
-        f"{ratio:.2g} % of its critical damping from it{share}; take {instead}, which leaves rigid motion alone, and "
-        "dampers where there are some",
+        f"they lose {percentage(lost)} of their speed in the {end:.3g} s of this scene, a vibration at 1 Hz has "
+        f"{percentage(ratio)} of its critical damping from it{share}; take {instead}, which leaves rigid motion alone, "
+        "and dampers where there are some",
     )

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from kedfem.results.balance import Balance
+from kedfem.scene import percentage
 
 KINDS = ("displacement", "stress", "joint forces", "drive")
 SOURCES = ("mesh", "step", "positions", "reduction", "frames", "rounding")
@@ -190,7 +191,7 @@ def percent(error: float) -> str:
     """
     if 0 < error < ROUNDING:
         return "≈ 0"
-    return "over 100 %" if error > 1 else f"{float(f'{100 * error:.2g}'):g} %"
+    return "over 100 %" if error > 1 else percentage(error)
 
 
 def attributes(budget: Budget) -> dict[str, float | str]:

@@ -17,7 +17,7 @@ from kedfem.accuracy.step_estimate import LEAST_ORDER, SURE
 from kedfem.accuracy.trials import Trials
 from kedfem.accuracy.variants import with_analysis, with_steps
 from kedfem.errors import KedfemError
-from kedfem.scene import Scene
+from kedfem.scene import Scene, percentage
 
 FIRST = 200  # steps of the first run
 MOST = 51_200  # most steps of the last run
@@ -101,7 +101,7 @@ def _unreached(found: _Halved, asked: float, until: float, error: float) -> str:
     if until >= found.coarse.time[-1]:
         return message
     return (
-        f"{message}: {found.steps // 2:,} and {found.steps:,} steps agree within {100 * asked:.3g} % until t = "
+        f"{message}: {found.steps // 2:,} and {found.steps:,} steps agree within {percentage(asked, 3)} until t = "
         f"{until:.3g} s only. The motion is sensitive to the smallest differences (chaotic), or "
         "has vibration that these steps do not resolve: damping, a smoother start or a shorter analysis would help"
     )

@@ -37,7 +37,7 @@ from kedfem.accuracy.reduction import Reduction, prepared
 from kedfem.accuracy.trials import Stage, Trials
 from kedfem.accuracy.variants import families, of_family, with_analysis, with_links
 from kedfem.links.record import Link
-from kedfem.scene import LinkScene, Scene, refuse_unsupported
+from kedfem.scene import LinkScene, Scene, percentage, refuse_unsupported
 from kedfem.store import itself, kept
 
 STEP, MESH, MODEL, REDUCTION = 0.3, 0.4, 0.2, 0.1  # shares of the required accuracy
@@ -214,8 +214,8 @@ def _limits(plan: Plan) -> Iterator[str]:
     if not plan.reached:
         limit = max(plan.shares, key=lambda share: share.error)
         yield (
-            f"the accuracy of {100 * plan.asked:.3g} % could not be reached: {limit.what} limits it, "
-            f"{percent(plan.error) if plan.error > 2 * plan.asked else f'{100 * plan.error:.3g} %'} is expected"
+            f"the accuracy of {percentage(plan.asked, 3)} could not be reached: {limit.what} limits it, "
+            f"{percent(plan.error) if plan.error > 2 * plan.asked else percentage(plan.error, 3)} is expected"
         )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from kedfem.dynamics.model import Model
 from kedfem.motion.joint_equations import joint_points
-from kedfem.scene import ConstantSpeed, Ramp, Scene, driven_travel
+from kedfem.scene import ConstantSpeed, Ramp, Scene, driven_travel, percentage
 from kedfem.scene.records.materials import LINE
 from kedfem.scene.records.units import RPM
 
@@ -143,7 +143,7 @@ def _other_warnings(scene: Scene, found: Sizes) -> Iterator[str]:
         elif links and found.lengths[links[0]] > LONG and (strain := _spun(scene, links[0], tip)) > STRETCHED:
             yield (
                 f"drive of joint {name}: at {turns:.4g} rpm the end of links.{links[0]} moves at {tip:.4g} m/s, and its "
-                f"own inertia would stretch it by {100 * strain:.2g} %, more than such large machines bear: "
+                f"own inertia would stretch it by {percentage(strain)}, more than such large machines bear: "
                 "are lengths in mm? write '25 mm', or 0.025"
             )
 

@@ -12,7 +12,7 @@ from kedfem.dynamics.stepping.start import period_map
 from kedfem.dynamics.system.period.search import Periodic
 from kedfem.dynamics.system.steps import Steps
 from kedfem.dynamics.vibration import Vibration, vibration
-from kedfem.scene import Scene, revolution_steps, time_grid
+from kedfem.scene import Scene, percentage, revolution_steps, time_grid
 
 RESOLVED = 0.2  # most oscillations in a step (five steps each) for which a step determines whether they grow
 GROWS = 1e-6  # growth in a period above which a vibration is unstable: rounding and the step's error are less
@@ -111,7 +111,7 @@ def unstable(steady: Steady | None) -> str:
         return ""
     sure = "; extrapolation_levels = 2 would show whether the steps are short enough for this"
     return (
-        f"the steady motion is unstable: a vibration about it grows by {100 * (steady.growth - 1):.3g} % in each period "
+        f"the steady motion is unstable: a vibration about it grows by {percentage(steady.growth - 1, 3)} in each period "
         f"of {steady.period:.4g} s{steady.vibration and f', {steady.vibration}'}, until something else limits it"
         f"{'' if len(steady.levels) > 1 else sure}"
     )
@@ -143,18 +143,18 @@ def steady_warning(steady: Steady | None) -> tuple[str, ...]:
     if steady.growth > SLOW:
         left = f"{steady.periods:,} periods" if steady.periods else "ever"
         out.append(
-            f"steady motion: vibrations about it hardly die away ({100 * (1 - steady.growth):.2g} % in a period): a "
+            f"steady motion: vibrations about it hardly die away ({percentage(1 - steady.growth)} in a period): a "
             f"machine would ring for {left}; give the scene its damping"
         )
     if steady.error > KNOWN:
         out.append(
-            f"steady motion: it is known to about {100 * steady.error:.2g} % only: a period leaves {steady.residual:.1g} "
+            f"steady motion: it is known to about {percentage(steady.error)} only: a period leaves {steady.residual:.1g} "
             "of it, and vibrations hardly die away: give the scene its damping, or smaller steps"
         )
     if not steady.certain:
         out.append(
             "steady motion: how fast vibrations about it die away is known roughly only "
-            f"(about {100 * steady.growth:.3g} % is left after a period): many are damped alike"
+            f"(about {percentage(steady.growth, 3)} is left after a period): many are damped alike"
         )
     return tuple(out)
 

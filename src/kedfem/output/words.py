@@ -124,8 +124,3 @@ def place_of(point: Iterable[float]) -> str:
 def stress_at(peak: Peak) -> str:
     """The highest stress in words, with its link and place."""
     return f"{with_prefix(peak.stress, 'Pa')} in link {peak.link} at {place_of(peak.place)} in the reference position"
-
-
-def percent(x: float) -> str:
-    """A ratio in percent."""
-    return f"{100 * x:.2g} %"

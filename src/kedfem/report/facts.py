@@ -10,6 +10,7 @@ from kedfem.accuracy.error_budget import OF_SOURCE, TOGETHER, UNKNOWN, percent
 from kedfem.output.words import known_names, number_in, place_of, unstrained, with_prefix
 from kedfem.results import Fatigue, FatigueSpot, Peak, Results
 from kedfem.results.frequencies import Summary
+from kedfem.scene import percentage
 
 STEADY = "steady "  # first word of the notes of a steady motion
 ENDLESS = 1e15  # revolutions, taken as endless
@@ -154,7 +155,7 @@ def of_yield(peaks: Mapping[str, Peak]) -> tuple[str, ...]:
 
 
 def _share(peak: Peak) -> str:
-    return f"{100 * peak.stress / peak.strength:.3g} %" if np.isfinite(peak.strength) else "–"
+    return percentage(peak.stress / peak.strength, 3) if np.isfinite(peak.strength) else "–"
 
 
 def frequencies_table(found: Summary) -> Table:

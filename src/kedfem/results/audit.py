@@ -38,6 +38,7 @@ from kedfem.results.forces.constraint_forces import joint_spring_work
 from kedfem.results.forces.damping_work import PreviousPoint, damping_work, previous_of, products
 from kedfem.results.forces.force_elements import ElementForces
 from kedfem.results.forces.moments import Constants, RigidRates, constants, rates_of_bodies
+from kedfem.scene import percentage
 
 Rows = Float[np.ndarray, "T c"]
 GROUP = 12  # links whose moments are computed together: those of a thousand time points fit into a cache
@@ -222,7 +223,7 @@ def balance_warning(found: Balance) -> tuple[str, ...]:
     if found.energy <= UNBALANCED:
         return ()
     return (
-        f"the residual of the balance is {100 * found.energy:.2g} % of energy: the steps are too long for the motion, or "
+        f"the residual of the balance is {percentage(found.energy)} of energy: the steps are too long for the motion, or "
         "numerical damping takes vibrations that they do not resolve; take shorter ones",
     )
 

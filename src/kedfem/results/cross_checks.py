@@ -18,7 +18,7 @@ from kedfem.results.audit import Account
 from kedfem.results.channels import Channel
 from kedfem.results.forces.loads import drive_rate
 from kedfem.results.recorded import Rows, drive_effort
-from kedfem.scene import Scene, driven_travel, without_vibration
+from kedfem.scene import Scene, driven_travel, percentage, without_vibration
 
 # c and the mean of e − r may be off by this part; runs of examples/ and tests stay below 0.2, a missing effort gives 1
 CONTRADICTION = 0.5
@@ -133,11 +133,12 @@ class CrossChecks:
             share = each.share() if each.size > SMALL * most * self._arm(each) and each.count > 1 else None
             if share is not None:
                 out.append(
-                    f"{each.elastic} contradicts {each.rigid}: over the run it is {100 * share:.3g} % of it, on average; "
-                    "elastic links do not explain that, unless links or springs are very soft: one of both is wrong"
+                    f"{each.elastic} contradicts {each.rigid}: over the run it is {percentage(share, 3)} of it, "
+                    "on average; elastic links do not explain that, unless links or springs are very soft: one of "
+                    "both is wrong"
                 )
         if self.unworked > UNWORKED:
-            names, left = ", ".join(self.drives), f"{100 * self.unworked:.2g} % of the energy exchanged"
+            names, left = ", ".join(self.drives), f"{percentage(self.unworked)} of the energy exchanged"
             meaning = "a part of its effort is missing"
             if self.unworked <= MISSING:
                 left += ", no more"

@@ -90,3 +90,4 @@ from kedfem.scene.records.sections import (
     TubeSection,
 )
 from kedfem.scene.records.shapes import Bar, Cad, Extrusion, MeshFile, Part, PartGeometry, PlateLink, Polyline, Shape
+from kedfem.scene.records.wording import percentage

@@ -15,7 +15,7 @@ from kedfem.motion.coordinates import driven_names
 from kedfem.output.words import NOTHING, clock, known_names, moment, number_in, unstrained, with_prefix
 from kedfem.results.channels import largest_by_unit
 from kedfem.results.kinematic import transmission_key
-from kedfem.scene import Scene
+from kedfem.scene import Scene, percentage
 from kedfem.scene.records.units import RPM
 from kedfem.tables.layout import facts, left, listed, right
 
@@ -125,7 +125,7 @@ def case_tables(found: LoadCases) -> list[Table]:
             words = ("≈ 0" if abs(x) < NOTHING * largest else with_prefix(float(x), "N") for x in force)
             table.add_row(time if k == 0 else "", name, *words)
         table.add_section()
-        short.add_row(time, *stresses, f"{100 * case.differs:.1g} %", f"{100 * residual:.1g} %")
+        short.add_row(time, *stresses, percentage(case.differs, 1), percentage(residual, 1))
     return [table, short]
 
 

@@ -19,7 +19,7 @@ from kedfem.report.facts import ENDLESS, fatigue_notes, of_yield, peak_rows
 from kedfem.results import Channel, Fatigue, Peak
 from kedfem.results.balance import Balance
 from kedfem.results.records import rounding
-from kedfem.scene import Cad, LinkScene, MeshFile, Scene, time_grid, without_vibration
+from kedfem.scene import Cad, LinkScene, MeshFile, Scene, percentage, time_grid, without_vibration
 from kedfem.tables.layout import facts, left, listed, right
 from kedfem.tables.mechanism import seconds_table
 
@@ -27,7 +27,7 @@ from kedfem.tables.mechanism import seconds_table
 def plan_tables(plan: Plan) -> list[Table]:
     """Sources of the error of a run with `analysis.accuracy`, and its choices."""
     budget = listed(
-        f"Accuracy asked for: {100 * plan.asked:.3g} %",
+        f"Accuracy asked for: {percentage(plan.asked, 3)}",
         [*left("part of the error"), *right("expected", "allowed")],
         ((share.what, percent(share.error), percent(share.allowed)) for share in plan.shares),
         caption="each part by itself may take what is allowed; simpler links may take what the mesh leaves, too",
@@ -39,7 +39,7 @@ def plan_tables(plan: Plan) -> list[Table]:
 def chosen_table(plan: Plan) -> Table:
     """Choices, and notes on their trials."""
     scene = plan.scene
-    return facts(f"Chosen for {100 * plan.asked:.3g} %", [
+    return facts(f"Chosen for {percentage(plan.asked, 3)}", [
         ("frames", str(scene.analysis.frames)),
         ("step", _step(scene)),
         *((name, _chosen(link)) for name, link in scene.links.items()),
@@ -178,7 +178,7 @@ def _cell(error: float | None) -> str:
 
 def balance_table(found: Balance) -> Table:
     """The residual of energy over the steps, and the energy that rigid-body frames create."""
-    shares = {"energy, residual of the steps": f"{100 * found.energy:.2g} %"}
+    shares = {"energy, residual of the steps": percentage(found.energy)}
     if found.neglected > ROUNDING:
-        shares["energy made by rigid-body frames"] = f"{100 * found.neglected:.3g} %"
+        shares["energy made by rigid-body frames"] = percentage(found.neglected, 3)
     return facts("Balance", ((what, f"{share} of the largest exchanged") for what, share in shares.items()))

@@ -6,7 +6,8 @@ from rich.text import Text
 
 from kedfem.accuracy.study.measuring import MeasuredVariant, Study
 from kedfem.compare import Comparison
-from kedfem.output.words import NOTHING, percent, with_prefix
+from kedfem.output.words import NOTHING, with_prefix
+from kedfem.scene import percentage
 from kedfem.sweep import SweepResult
 from kedfem.sweep.files import column_units, largest, plain_quantities
 from kedfem.tables.layout import facts, left, listed, right
@@ -38,7 +39,7 @@ def _differences(found: Comparison, k: int) -> Table:
 
 
 def _off(x: float) -> str:
-    return f"{100 * x:.3g} %" if x >= 1e-8 else "≈ 0"
+    return percentage(x, 3) if x >= 1e-8 else "≈ 0"
 
 
 def _keys(found: Comparison) -> Table:
@@ -66,12 +67,12 @@ def study_tables(study: Study, machine: str) -> list[Table]:
     first, *others, last = STUDY_COLUMNS
     columns = [*left(first, min_width=11), *right(*others, no_wrap=True)]
     columns += right(last, no_wrap=True, min_width=len(REFERENCE))
-    shares = ", ".join(f"{name} {percent(share)}" for name, share in study.shares.items())
+    shares = ", ".join(f"{name} {percentage(share)}" for name, share in study.shares.items())
     unknown = "" if "mesh" in study.shares else "; its mesh could not be compared with a coarser one"
     caption = Text(
         f"bold: no other is both faster and nearer. mesh, steps: times as fine as the scene's. Errors are against "
-        f"{study.reference.variant.name}, whose own is about {percent(study.floor)} ({shares or 'not known'}{unknown}): "
-        f"≤ is below that. red.: error that the reduction may cause; size: unknowns; preparation, steps, whole run: "
+        f"{study.reference.variant.name}, whose own is about {percentage(study.floor)} ({shares or 'not known'}{unknown}"
+        f"): ≤ is below that. red.: error that the reduction may cause; size: unknowns; preparation, steps, whole run: "
         f"seconds, medians; worst channels: see the CSV. {machine}"
     )
     table = listed(Text(f"Speed against error: {study.title}"), columns, pad_edge=False, caption=caption)
@@ -90,7 +91,7 @@ def _study_row(row: MeasuredVariant, study: Study) -> tuple[str, ...]:
     model = v.model_kind.name, f"{v.fineness:g}", f"{v.steps}", tolerance
     times = (_seconds(s.preparation), _seconds(s.stepping), _seconds(s.whole))
     below = row.error <= study.floor
-    found = f"≤ {percent(study.floor)}" if below else percent(row.error)
+    found = f"≤ {percentage(study.floor)}" if below else percentage(row.error)
     return (*model, str(row.unknowns), *times, REFERENCE if v == study.reference.variant else found)
 
 
@@ -154,7 +155,7 @@ def _warnings(done: SweepResult) -> list[str]:
         worst = max(loose, key=lambda k: done.rows[k].change)
         lines.append(
             f"{len(loose)} of {len(done.rows)} points have not settled: their last two revolutions differ by more than "
-            f"1 %, by {100 * done.rows[worst].change:.2g} % at {_place(done, worst)}; raise analysis.revolutions"
+            f"1 %, by {percentage(done.rows[worst].change)} at {_place(done, worst)}; raise analysis.revolutions"
         )
     if unreliable := sum(row.status == "unreliable" for row in done.rows):
         lines.append(f"{unreliable} points are unreliable: their results mean nothing; sweep.csv says why")

@@ -17,7 +17,7 @@ from kedfem.results.records import Fatigue, FatigueSpot
 from kedfem.results.stresses.envelope import Envelope
 from kedfem.results.stresses.peaks import part_and_number, reference_points, separated_points
 from kedfem.scene import Fatigue as FatigueSettings
-from kedfem.scene import Scene, revolution_steps, time_grid, without_vibration
+from kedfem.scene import Scene, percentage, revolution_steps, time_grid, without_vibration
 
 MOST = 5  # hot spots of a link
 REPEATS = 0.01  # of a link's highest stress: by how much two periods may differ
@@ -84,7 +84,7 @@ def _why_unreliable(scene: Scene, period: Period, repeats: float) -> str:
     if repeats > REPEATS:
         what = "the period before" if period.before else "its beginning"
         return (
-            f"stresses of the last period differ from those of {what} by {100 * repeats:.2g} % of the highest, more than "
+            f"stresses of the last period differ from those of {what} by {percentage(repeats)} of the highest, more than "
             f"{100 * REPEATS:g} %: the motion has not settled; run more revolutions, or take analysis.kind = 'steady'"
         )
     if not (period.before or scene.analysis.kind == "steady" or without_vibration(scene)):

@@ -22,6 +22,15 @@ VALUES = {
 NOUNS = {"solid": "solid", "plane": "plane link", "beam": "beam"}  # links by their model
 
 
+def percentage(x: float, digits: int = 2) -> str:
+    """A ratio in percent, of any size without a power of ten.
+
+    >>> percentage(0.01234), percentage(14.96, 3)
+    ('1.2 %', '1500 %')
+    """
+    return f"{float(f'{100 * x:.{digits}g}'):g} %"
+
+
 def nearest(word: str, known: Iterable[str]) -> str | None:
     """Known word to which ``word`` was renamed, or the most similar one; None if there is none."""
     lower = {name.lower(): name for name in known}

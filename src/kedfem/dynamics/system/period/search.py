@@ -20,7 +20,7 @@ from kedfem.dynamics.system.record import ANGLE, COORDINATE, Spring, Stop, curve
 from kedfem.dynamics.system.starts.instant import TURN, Flat
 from kedfem.dynamics.system.state import State, copied
 from kedfem.errors import SolveError
-from kedfem.scene import Pieces
+from kedfem.scene import Pieces, percentage
 
 REPEATED = 1e-3  # of a curve's period, which elastic links may miss by so much
 CLOSED = 1e-9  # what a period may leave of the size of a state
@@ -140,7 +140,7 @@ def _fixed(over: PeriodMap, closed: float, coarse: Coarse | None) -> tuple[Flat,
         scale = min(scale, now) if over.linear else now  # the last march was not that of x, but of a product
     raise SolveError(
         "analysis.kind: must be a motion for which a steady state can be found, got one whose search does not "
-        f"converge: a period still leaves {100 * left / scale:.2g} % of it; take more damping, smaller steps, or "
+        f"converge: a period still leaves {percentage(left / scale)} of it; take more damping, smaller steps, or "
         "kind = 'transient'"
     )
 
