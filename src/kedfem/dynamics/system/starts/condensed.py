@@ -1,19 +1,18 @@
 """Large bodies of a system in the modes that hold all their static deflections, in which balances are sought.
 
 A body whose frame does not turn with the rigid-body motion takes no other deflection while it is at rest, or moves on
-without vibration: the balance found is that of the unreduced body, without a solution of its factor. The deflection of
-one that a drive rotates has inertia, under which modes are added (`with_inertia`) until they have it.
+without vibration: the balance found is that of the unreduced body, without a solution of its factor.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from kedfem.arrays import Float
 from kedfem.dynamics.matrices.dense import coordinates, dense_part
-from kedfem.dynamics.modes.static_modes import StaticResponses, static_modes, with_inertia
+from kedfem.dynamics.modes.static_modes import static_modes
 from kedfem.dynamics.reduced_model import reduced_model
 from kedfem.dynamics.system.layout import as_arrays
 from kedfem.dynamics.system.ready import Motion, Ready
@@ -36,14 +35,12 @@ class Condensed:
 
     shared : an instant of the latter, with what does not depend on time
     modes : per body (n, s); None where it stays as it is
-    responses : of bodies whose deflection has inertia, by number
     """
 
     full: Ready
     of: Ready
     shared: Instant
     modes: Sequence[Float[np.ndarray, "_ _"] | None]
-    responses: dict[int, StaticResponses] = field(default_factory=dict)
 
     def at(self, now: Instant, motion_at: Motion, near: State | None = None) -> Instant:
         """The instant of the condensed system at that of the full one."""
@@ -73,27 +70,6 @@ class Condensed:
                 here = coordinates(link, self.full.parts[k], Q @ rows(self.of, k, here)).ravel()
             out.append(here)
         return np.concatenate(out)
-
-    def with_inertia(self, turning: RigidMotion, u: Flat, v: Flat) -> "Condensed | None":
-        """With modes that bodies take by the inertia of a deflection u and of its rate v; None where they have these.
-
-        Parameters
-        ----------
-        turning : motion with which the deflection rotates
-        """
-        modes, changed = list(self.modes), False
-        for k, Q in enumerate(self.modes):
-            body = self.of.bodies.motion[k]
-            spin = float((turning.omega[:, body] ** 2 + np.abs(turning.alpha[:, body])).sum(axis=1).max())
-            if Q is None or not spin:
-                continue
-            if k not in self.responses:
-                self.responses[k] = StaticResponses(self.full.system.model.links[k])
-            x = [Q @ rows(self.of, k, each[own(self.of, k)]) for each in (u, v)]
-            more = with_inertia(self.responses[k], Q, x, spin)
-            if more is not None:
-                modes[k], changed = more, True
-        return _in_modes(self.shared, self.full, modes, self.responses) if changed else None
 
 
 def condensed(now: Instant, turning: Callable[[], RigidMotion] | None, forces: Rows | None = None) -> Condensed:
@@ -127,25 +103,18 @@ def _is_large(part: Part, link: Link) -> bool:
 
 
 def _made(now: Instant, large: Sequence[int], forces: Rows) -> Condensed:
-    of, model = now.of, now.of.system.model
-    modes: list[Float[np.ndarray, "_ _"] | None] = [None] * len(of.parts)
+    of, model, parts = now.of, now.of.system.model, list(now.of.parts)
+    modes: list[Float[np.ndarray, "_ _"] | None] = [None] * len(parts)
     for k in large:
         loads = [load.forces for load in model.loads[k]] + [forces[k]]
         modes[k] = static_modes(model.links[k], model.joints[k], loads)
-    return _in_modes(now, of, modes, {})
-
-
-def _in_modes(
-    now: Instant, of: Ready, found: Sequence[Float[np.ndarray, "_ _"] | None], responses: dict[int, StaticResponses]
-) -> Condensed:
-    """A system with some of its bodies in the span of modes; `now` is any instant of it."""
-    small, modes, parts = reduced_model(of.system.model, found), list(found), list(of.parts)
-    for k in (k for k, Q in enumerate(found) if Q is not None):
+    small = reduced_model(model, modes)
+    for k in large:
         modes[k] = mode_matrix(small.links[k])
         parts[k] = dense_part(small.links[k], small.joints[k], of.c.c_M, of.c.c_K)
     system = replace(of.system, model=small)
     made = replace(of, system=system, parts=parts, **_arrays(system, parts), halves=[], condensed=[])
-    return Condensed(of, made, Instant(made, lambda t: now.motion, now.time), modes, responses)
+    return Condensed(of, made, Instant(made, lambda t: now.motion, now.time), modes)
 
 
 def _arrays(system: System, parts: Sequence[Part]) -> dict[str, Any]:

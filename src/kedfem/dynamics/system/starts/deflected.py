@@ -30,7 +30,6 @@ SAME, ENOUGH = 3.0, 1e-7  # times what rounding leaves open of them; share of th
 # of rates, or of what rotates at 1 rad/s: the most that may stay open of what is released, which would be shaken else
 OPEN = 1e-3
 UNSETTLED = "rates with dampers do not converge: take weaker dampers, less force, a slower drive or short loads"
-RICHER = 4  # times that modes for the inertia of deflections are added, before unreduced bodies are taken
 LEAST = 1 / 64  # of loads, that an increment of theirs is
 LATER = np.array([
     [-25, 48, -36, 16, -3], [-3, -10, 18, -6, 1], [1, -8, 0, 8, -1], [-1, 6, -18, 10, 3], [3, -16, 36, -48, 25],
@@ -95,16 +94,9 @@ def _moving_state(
     now: Instant, motion_at: Motion, widenings: int = WIDER, near: State | None = None, forces: Rows | None = None
 ) -> State:
     """The state at an instant with a deflection that moves on with the rigid-body motion, under forces beside loads."""
-    small, turning = condensed(now, None, forces), motion_at(now.time + now.of.c.h / 4 * np.arange(5))
-    for n in range(RICHER + 1):
-        first = small.at(now, motion_at, near)
-        found = _moving(first, motion_at, widenings, 0.0 if forces is None else small.forces(forces))
-        richer = small.with_inertia(turning, found.u, found.v)
-        if richer is None:
-            break
-        small = richer if n + 1 < RICHER else condensed(now, lambda: turning, forces)
-        if forces is None and n + 1 < RICHER:
-            now.of.condensed[:] = [richer]
+    small = condensed(now, lambda: motion_at(now.time + now.of.c.h / 4 * np.arange(5)), forces)
+    first = small.at(now, motion_at, near)
+    found = _moving(first, motion_at, widenings, 0.0 if forces is None else small.forces(forces))
     return begun(now, small.back(found.u), small.back(found.v), strained=small.back(found.strained))
 
 
