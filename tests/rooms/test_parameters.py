@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kedfem.errors import SceneError
-from kedfem.resume import flat
+from kedfem.results.differences import flat
 from kedfem.scene import read_scene, scene_from
 from kedfem.scene.read.parameters import Parameters
 from kedfem.scene.records.expressions import evaluated
@@ -82,7 +82,7 @@ def test_the_stored_scene_is_complete_and_gives_itself_again() -> None:
     assert scene_from(scene.model_dump()).model_dump() == scene.model_dump()
     assert scene_from(scene.model_dump(mode="json", exclude_unset=True)).links == scene.links
     changed = scene_from(raw({"parameters.r": "26 mm"}))
-    stored, other = flat(scene), flat(changed)
+    stored, other = flat(scene.model_dump(mode="json")), flat(changed.model_dump(mode="json"))
     differ = [key for key in stored if stored[key] != other[key]]
     assert differ == ["parameters.r", "links.arm.shape.between", "links.arm.shape.width"]
     assert scene.as_given["links"]["arm"]["shape"]["width"] == "=width"

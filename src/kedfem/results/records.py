@@ -26,7 +26,7 @@ class Peak:
         travel [m]
     near : the singular place near the point, in words: a sharp corner, a point force, a joint; else empty
     away : the highest stress away from such places, where `near` is not empty and there is one
-    strength : yield strength of the link's material [Pa]; nan if the scene gives none
+    strength : yield strength of the link's material [Pa]; inf if the scene gives none
     """
 
     stress: float
@@ -38,7 +38,7 @@ class Peak:
     angle: float
     near: str = ""
     away: "Peak | None" = None
-    strength: float = math.nan
+    strength: float = math.inf
 
     @property
     def sound(self) -> "Peak | None":

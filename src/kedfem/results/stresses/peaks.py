@@ -33,7 +33,7 @@ def peaks(
         for of, among in ((out, np.ones(len(stress), bool)), (away, np.array([not word for word in words]))):
             if among.any():
                 peak = peak_at(each, int(np.where(among, stress, -1.0).argmax()), words)
-                peak = replace(peak, strength=strengths.get(each.link, np.nan))
+                peak = replace(peak, strength=strengths.get(each.link, np.inf))
                 of[each.link] = max(of.get(each.link, peak), peak, key=lambda x: x.stress)
     return {name: replace(peak, away=away.get(name)) if peak.near else peak for name, peak in out.items()}
 
