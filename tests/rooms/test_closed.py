@@ -40,27 +40,31 @@ def given(ready: Prepared, times: int = 3) -> Given:
 
 
 def assembled(parts: list[Substructure], R: list[np.ndarray], rows: ConstraintMatrices, loads: list[np.ndarray]) -> Any:
-    """Forces at interface points at the first time: (H + Cᵀ κ C) z = f + Cᵀ m, C z = 0, dense and in least squares."""
+    """Forces at interface points at the first time: (H + Cᵀ κ C) z = f + Cᵀ m, C z = 0, dense and in extended precision:
+    the travel of a slide has no stiffness but rounding of that of hubs."""
     k = parts[0].attachment.unknowns
-    H, f, every = np.zeros((k, k)), np.zeros(k), []
+    H, f, every = np.zeros((k, k), np.longdouble), np.zeros(k, np.longdouble), []
     for part, turn, load in zip(parts, R, loads, strict=True):
-        joint = part.attachment
-        onto = np.zeros((len(joint.weights), joint.components, k))
+        joint, S = part.attachment, part.S.astype(np.longdouble)
+        onto = np.zeros((len(joint.weights), joint.components, k), np.longdouble)
         onto.reshape(-1, k)[np.ix_(joint.keep, joint.columns)] = joint.B
         back = np.einsum("ba,pbk->pak", turn[0], onto).reshape(-1, k)[joint.keep]
-        RB, v = np.zeros((len(part.S), k)), load[0].ravel() @ part.Y
+        RB, v = np.zeros((len(S), k), np.longdouble), load[0].ravel() @ part.Y
         RB[: len(back)] = back
-        H += RB.T @ part.S @ RB
-        f += RB.T @ part.S @ v
-        every.append((part.S, RB, v))
+        H += RB.T @ S @ RB
+        f += RB.T @ (S @ v)
+        every.append((S, RB, v))
     C, rigid = rows.at(0).toarray(), np.isinf(rows.stiffness)
     H += (C[~rigid].T * rows.stiffness[~rigid]) @ C[~rigid]
     C = C[rigid & (np.abs(C).max(axis=1) > 0)]
-    scale = 1 / np.sqrt(H.diagonal())
-    C = C * scale / np.linalg.norm(C * scale, axis=1)[:, None]
+    scale = 1 / np.sqrt(np.maximum(H.diagonal(), 1e-12 * H.diagonal().max()))
+    C = C * scale / np.sqrt(np.sum((C * scale) ** 2, axis=1))[:, None]
     matrix = np.block([[H * np.outer(scale, scale), C.T], [C, np.zeros((len(C), len(C)))]])
-    z = scale * np.linalg.lstsq(matrix, np.concatenate([scale * f, np.zeros(len(C))]), rcond=1e-15)[0][:k]
-    return [S @ (RB @ z - v) for S, RB, v in every]
+    right, x = np.concatenate([scale * f, np.zeros(len(C))]), np.zeros(k + len(C), np.longdouble)
+    inverse = np.linalg.pinv(matrix.astype(float), rcond=1e-15)
+    for _ in range(4):  # what double precision leaves
+        x += inverse @ (right - matrix @ x).astype(float)
+    return [(S @ (RB @ (scale * x[:k]) - v)).astype(float) for S, RB, v in every]
 
 
 @pytest.mark.parametrize(("kind", "turn"), [*product(BEAMS, TURNS), ("cylindrical, bores", "z")])
