@@ -9,7 +9,7 @@ import pytest
 from kedfem.accuracy.prepared import meshed
 from kedfem.accuracy.resolution import stability_warning
 from kedfem.analysis import analyse
-from kedfem.dynamics.stepping.solvers import steps_of
+from kedfem.dynamics.stepping.solvers import eased_warning, steps_of
 from kedfem.dynamics.stepping.transient import transient
 from kedfem.errors import SolveError
 from kedfem.links.record import mass_times
@@ -165,6 +165,8 @@ def test_steps_that_do_not_settle_are_taken_in_parts() -> None:
     coarse, fine = ran(struck(1e-3, 2, 0.06)), ran(struck(1e-4, 2, 0.06))
     ends = [made.position("strip", [x, 0])[:, :2] for made in (coarse, fine) for x in (0, 1)]
     way = np.ptp(ends[2], axis=0).max()
+    assert any("were divided, which excites vibration" in text for text in eased_warning([coarse.solver]))
+    assert not any("divided" in text for text in eased_warning([fine.solver]))
     for rough, exact in zip(ends[:2], ends[2:], strict=True):
         assert np.abs(rough - exact[::10]).max() < 0.02 * way
 

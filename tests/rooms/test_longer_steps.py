@@ -1,5 +1,6 @@
 """Runs of which only differences count are in steps twice as long where that shows the same."""
 
+from collections.abc import Collection
 from dataclasses import replace
 from typing import Any
 from unittest.mock import patch
@@ -11,11 +12,11 @@ from numpy.testing import assert_allclose
 
 from kedfem.accuracy import reduction
 from kedfem.accuracy.estimates import step_errors
-from kedfem.accuracy.histories import histories, relative_errors
+from kedfem.accuracy.histories import Histories, histories, relative_errors
 from kedfem.accuracy.longer_steps import differs_alike, doubled
 from kedfem.accuracy.mesh_estimate import mesh_errors
 from kedfem.accuracy.prepared import Prepared, meshed
-from kedfem.scene import scene_from
+from kedfem.scene import scene_from, time_grid
 
 #: 2 % at 20 and 200 Hz: a vibration of 20 steps, 180 Hz here, has 1.8 %
 DAMPED = {"ratio": 0.02, "frequencies": [20, 200]}
@@ -71,6 +72,25 @@ def test_a_damped_scene_shows_what_its_modes_leave_out_in_steps_twice_as_long(th
     estimate, true = estimate_and_truth(full, longer=True).T
     assert (estimate > true).all()
     assert (estimate < 3.5 * true).all()
+
+
+def test_steps_twice_as_long_that_are_divided_show_nothing_of_modes() -> None:
+    """Divided steps excite vibration of their own: the estimate is that of the scene's steps."""
+    full = ready(bars(revolutions=0.1))
+    names = [link.name for link in full.model.links]
+    step, real = time_grid(full.scene).step, reduction.histories
+
+    def found(ready: Prepared, keep: Collection[int] = ()) -> Histories:
+        return replace(real(ready, keep), divided=time_grid(ready.scene).step > 1.5 * step)
+
+    def estimate() -> dict[str, float]:
+        return reduction.reduced(full, names, 0.01, dict.fromkeys(names, 14)).estimate
+
+    longer = estimate()
+    with patch.object(reduction, "differs_alike", lambda ready: False):
+        own = estimate()
+    with patch.object(reduction, "histories", found):
+        assert estimate() == own != longer
 
 
 @pytest.mark.parametrize(

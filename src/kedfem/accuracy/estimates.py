@@ -161,7 +161,7 @@ def budget(
                 shares.append(positions_share(base, sizes))
             some, base = fewer_positions(small.scene, base)
             small = replace(small, scene=some)
-        if longer is not None and differs_alike(small):
+        if longer is not None and not longer.divided and differs_alike(small):
             small, base = replace(small, scene=doubled(small.scene)), longer
         shares.append(mesh_share(small, base, eta, zeros))
         limits += _zeros(sizes, zeros)

@@ -32,6 +32,7 @@ class Histories:
     kept : states at the requested steps
     size : extent of the linkage [m]
     begun : the state at the beginning of a steady motion; None for other analyses, or if unknown
+    divided : whether a step was taken in parts, as its iterations did not converge
     """
 
     time: Float[np.ndarray, " T"]
@@ -39,6 +40,7 @@ class Histories:
     kept: tuple[Snapshot, ...] = ()
     size: float = 0.0
     begun: StateArrays | None = None
+    divided: bool = False
 
 
 def histories(
@@ -74,7 +76,8 @@ def histories(
         each.channel.name: (each.channel, np.concatenate([found[each.channel.name] for found in taken]))
         for each in recorded
     }
-    return Histories(np.concatenate(times), channels, tuple(states), extent(ready.model), steady_state(solvers))
+    divided = any(each.ready.halves for each in solvers)
+    return Histories(np.concatenate(times), channels, tuple(states), extent(ready.model), steady_state(solvers), divided)
 
 
 def steady_state(solvers: Sequence[Steps]) -> StateArrays | None:

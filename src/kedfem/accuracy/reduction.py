@@ -15,6 +15,7 @@ error have co-rotational frames. Of the residual in these frames only the effect
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -156,10 +157,9 @@ def reduced(
 
 
 def _beginning(full: Prepared) -> Prepared:
-    """A prepared scene for the estimate of the reduction error: with vibration, short, in long steps where possible."""
+    """A prepared scene for the estimate of the reduction error: with vibration, short."""
     scene = full.scene if without_vibration(full.scene) else with_analysis(full.scene, kind="transient")
-    short = replace(full, scene=shortened(scene))
-    return replace(short, scene=doubled(short.scene)) if differs_alike(short) else short
+    return replace(full, scene=shortened(scene))
 
 
 def _same(Q: Modes, share: float) -> Modes:
@@ -202,11 +202,24 @@ def _acting(full: Prepared) -> Acting:
     return acting(full.scene, full.linkage, full.path, full.model)
 
 
-def _settled(
+def _settled(full: Prepared, *given: Any) -> tuple[Modes, dict[str, float]]:
+    """Modes and the estimate, as `_in_rounds`: by steps twice as long where these show the same and none is divided.
+
+    A step that is divided, as its iterations do not converge, excites vibration that has nothing to do with the modes.
+    """
+    if differs_alike(full):
+        Q, estimate, divided = _in_rounds(replace(full, scene=doubled(full.scene)), *given)
+        if not divided:
+            return Q, estimate
+    return _in_rounds(full, *given)[:2]
+
+
+def _in_rounds(
     full: Prepared, parts: Sequence[Substructure], first: Callable[[float], Modes], tolerance: float,
     chosen: Collection[str], fixed: Collection[str],
-) -> tuple[Modes, dict[str, float]]:  # fmt: skip
-    """Modes whose estimated error is below the tolerance, or else the last ones, and the estimate.
+) -> tuple[Modes, dict[str, float], bool]:  # fmt: skip
+    """Modes whose estimated error is below the tolerance, or else the last ones, the estimate, and whether any step
+    was divided.
 
     Parameters
     ----------
@@ -214,12 +227,13 @@ def _settled(
     fixed : names of links whose number of modes is given
     """
     moments = set(np.linspace(1, time_grid(full.scene).steps, MOMENTS).astype(int).tolist())
-    share = 1.0
+    share, divided = 1.0, False
     Q = first(share)
     small, run = _run(full, Q, moments)
     for k in range(ROUNDS + 1):
         more = _enriched(full, parts, small, run.kept)
         richer, better = _run(full, more, moments)
+        divided = divided or run.divided or better.divided
         estimate = {name: CAUTION * error for name, error in relative_errors(run, better).items()}
         if worst(estimate) <= tolerance or set(chosen) <= set(fixed) or k == ROUNDS:
             break
@@ -229,7 +243,7 @@ def _settled(
         Q = [old if link.name in fixed else new for link, old, new in both]
         unchanged = all(new is tried for new, tried in zip(Q, more, strict=True))
         small, run = (richer, better) if unchanged else _run(full, Q, moments)
-    return Q, estimate
+    return Q, estimate, divided
 
 
 def _closer(model: Model, now: Modes, next_ones: Modes, richer: Modes) -> Modes:

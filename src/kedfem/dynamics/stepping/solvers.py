@@ -44,14 +44,20 @@ def stresses_of(scene: Scene, model: Model) -> Stiffening | None:
 
 
 def eased_warning(solvers: Sequence[Steps]) -> tuple[str, ...]:
-    """A warning where iterations of steps were taken as converged at an eased tolerance."""
-    eased = sum(each.eased for each in solvers)
-    if not eased:
-        return ()
-    return (
-        f"the iterations of {eased} steps converged to a hundred times the tolerance only (stiff springs, or ends and "
-        "corners of beams in space): take a smaller step to see whether results change",
-    )
+    """Warnings where iterations of steps were taken as converged at an eased tolerance, or steps were divided."""
+    eased, try_smaller = sum(each.eased for each in solvers), "take a smaller step to see whether results change"
+    out = []
+    if eased:
+        out.append(
+            f"the iterations of {eased} steps converged to a hundred times the tolerance only (stiff springs, or ends "
+            f"and corners of beams in space): {try_smaller}"
+        )
+    if any(each.ready.halves for each in solvers):
+        message = (
+            "the iterations of some steps did not converge, so that these steps were divided, which excites vibration"
+        )
+        out.append(f"{message}: {try_smaller}")
+    return tuple(out)
 
 
 def unstable_balance(solvers: Sequence[Steps]) -> str:
