@@ -142,11 +142,12 @@ def peak_rows(peaks: Mapping[str, Peak], moment: Callable[[float, float], str]) 
     moment : function from a time [s] and the drive's position [rad or m] to words
     """
     every = (row for name, x in peaks.items() for row in ((name, x), ("  away from it", x.away)))
-    return [
-        (label, with_prefix(x.stress, "Pa"), *(_share(x) for _ in of_yield(peaks)), place_of(x.place),
-         moment(x.time, x.angle), x.near)
-        for label, x in every if x is not None
-    ]  # fmt: skip
+    known, rows = bool(of_yield(peaks)), list[tuple[str, ...]]()
+    for label, x in every:
+        if x is not None:
+            share = (_share(x),) if known else ()
+            rows.append((label, with_prefix(x.stress, "Pa"), *share, place_of(x.place), moment(x.time, x.angle), x.near))
+    return rows
 
 
 def of_yield(peaks: Mapping[str, Peak]) -> tuple[str, ...]:
